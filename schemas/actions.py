@@ -1,0 +1,94 @@
+"""How any action travels: goal, cancel and result requests, and the feedback and status topics."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import msgspec
+
+from schemas.message import Message
+
+NOTHING = msgspec.Raw(b"\xc0")  # msgpack nil
+
+
+class GoalStatusCode(IntEnum):
+    """Where a goal stands; everything from SUCCEEDED on is terminal."""
+
+    UNKNOWN = 0
+    ACCEPTED = 1
+    EXECUTING = 2
+    CANCELING = 3
+    SUCCEEDED = 4
+    CANCELED = 5
+    ABORTED = 6
+    PREEMPTED = 7
+
+    @property
+    def is_terminal(self) -> bool:
+        return self >= GoalStatusCode.SUCCEEDED
+
+
+class GoalRequest(Message, frozen=True, kw_only=True):
+    """A goal with the id its client chose; `goal` is the action's own goal message."""
+
+    goal_id: str = ""
+    client: str = ""
+    goal: msgspec.Raw = NOTHING
+
+
+class GoalResponse(Message, frozen=True, kw_only=True):
+    """Accepted, or refused with a code of the action and a reason that names the thing."""
+
+    accepted: bool = False
+    code: int = 0
+    reason: str = ""
+    stamp: int = 0  # [ns] UNIX time of the decision
+
+
+class CancelRequest(Message, frozen=True, kw_only=True):
+    """Cancel one goal, or all of them where `goal_id` is empty."""
+
+    goal_id: str = ""
+
+
+class CancelResponse(Message, frozen=True, kw_only=True):
+    """The goals that are being cancelled; `reason` says why there is none."""
+
+    canceling: tuple[str, ...] = ()
+    reason: str = ""
+
+
+class ResultRequest(Message, frozen=True, kw_only=True):
+    """Ask for the result of a goal; answered when it ends or, with its status, after `wait`."""
+
+    goal_id: str = ""
+    wait: float = 0.0  # [s] how long the answer may be held back
+
+
+class ResultResponse(Message, frozen=True, kw_only=True):
+    """Status and, if terminal, the action's own result message."""
+
+    status: GoalStatusCode = GoalStatusCode.UNKNOWN
+    result: msgspec.Raw = NOTHING
+
+
+class GoalFeedback(Message, frozen=True, kw_only=True):
+    """The action's own feedback message for one goal."""
+
+    goal_id: str = ""
+    feedback: msgspec.Raw = NOTHING
+
+
+class GoalStatus(Message, frozen=True, kw_only=True):
+    """One goal's status."""
+
+    goal_id: str = ""
+    client: str = ""
+    status: GoalStatusCode = GoalStatusCode.UNKNOWN
+
+
+class GoalStatuses(Message, frozen=True, kw_only=True):
+    """All goals that a server knows, oldest first."""
+
+    stamp: int = 0  # [ns] UNIX time
+    goals: tuple[GoalStatus, ...] = ()

@@ -1,0 +1,63 @@
+"""`deploy/local.toml` and its kin as types: where things run and listen."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import msgspec
+
+from schemas.system import ParameterValue
+
+
+class DeploymentRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A table of a deployment file; an unknown key is an error."""
+
+
+class Broker(StrEnum):
+    """Which MQTT broker the `broker` process is."""
+
+    AMQTT = "amqtt"  # embedded, pure Python: local simulated runs
+    MOSQUITTO = "mosquitto"  # real arms and tests
+
+
+class ViewerMode(StrEnum):
+    """How the Rerun viewer shows itself."""
+
+    AUTO = "auto"  # native where there is a display, else web
+    NATIVE = "native"
+    WEB = "web"
+    NONE = "none"  # only the recording
+
+
+class RouterSection(DeploymentRecord, frozen=True, kw_only=True):
+    host: str = "127.0.0.1"
+    port: int = 7447
+
+
+class MqttSection(DeploymentRecord, frozen=True, kw_only=True):
+    broker: Broker = Broker.AMQTT
+    host: str = "127.0.0.1"
+    port: int = 1883
+
+
+class ViewerSection(DeploymentRecord, frozen=True, kw_only=True):
+    mode: ViewerMode = ViewerMode.AUTO
+    host: str = "127.0.0.1"
+    port: int = 9876  # gRPC
+    web_port: int = 9090  # the page
+
+
+class PathsSection(DeploymentRecord, frozen=True, kw_only=True):
+    run: str = ".gemelo/run"  # readiness files, the virtual device's memory
+    out: str = "out"  # recordings and logs
+
+
+class Deployment(DeploymentRecord, frozen=True, kw_only=True):
+    """One deployment; every key can be overridden by GEMELO_<SECTION>_<KEY> in the environment."""
+
+    robot: str = "urdf/rm1"
+    router: RouterSection = RouterSection()
+    mqtt: MqttSection = MqttSection()
+    viewer: ViewerSection = ViewerSection()
+    paths: PathsSection = PathsSection()
+    parameters: dict[str, dict[str, ParameterValue]] = {}  # by node, then by name

@@ -1,0 +1,66 @@
+"""The base of every message: frozen, named, evolvable, and finite.
+
+A message travels as a msgpack map. Unknown fields are ignored and missing ones take their
+defaults, so a message evolves by adding fields. A float that is not finite never gets in:
+neither by decoding nor by construction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TypeVar
+
+import msgspec
+
+Vector = tuple[float, ...]
+
+
+class BadMessage(ValueError):
+    """A payload that is not the message it claims to be; the text names the field and the value."""
+
+
+class Message(msgspec.Struct, frozen=True, kw_only=True):
+    """A frozen record with defaults for every field and no NaN or infinity anywhere in it."""
+
+    def __post_init__(self) -> None:
+        for field in self.__struct_fields__:
+            value = getattr(self, field)
+            kind = type(value)
+            if kind is float:
+                if not math.isfinite(value):
+                    raise ValueError(f"field `{field}` is {value}: it must be finite")
+            elif kind is tuple or kind is list:
+                _require_finite(field, value)
+
+
+M = TypeVar("M", bound=Message)
+
+
+def _require_finite(field: str, values: Iterable[object]) -> None:
+    for index, value in enumerate(values):
+        if type(value) is float:
+            if not math.isfinite(value):
+                raise ValueError(f"field `{field}[{index}]` is {value}: it must be finite")
+        elif type(value) is tuple or type(value) is list:
+            _require_finite(f"{field}[{index}]", value)
+
+
+_encoder = msgspec.msgpack.Encoder()
+_decoders: dict[type[Message], msgspec.msgpack.Decoder[Message]] = {}
+
+
+def encode(message: Message) -> bytes:
+    """The message as a msgpack map."""
+    return _encoder.encode(message)
+
+
+def decode(kind: type[M], payload: bytes | memoryview) -> M:
+    """The message in `payload`; raises `BadMessage` naming the kind, the field and the value."""
+    decoder = _decoders.get(kind)
+    if decoder is None:
+        decoder = _decoders[kind] = msgspec.msgpack.Decoder(kind)
+    try:
+        return decoder.decode(payload)  # type: ignore[return-value]
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise BadMessage(f"not a {kind.__name__} ({len(payload)} bytes): {error}") from error

@@ -1,0 +1,87 @@
+"""Trajectories and the action that follows them, as trajectory_msgs and control_msgs have them."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from schemas.message import Message, Vector
+
+
+class TrajectoryPoint(Message, frozen=True, kw_only=True):
+    """One point of a trajectory; `velocities` and `accelerations` may be empty.
+
+    The fields present choose the interpolation: positions only is linear, with velocities cubic,
+    with accelerations quintic.
+    """
+
+    positions: Vector = ()  # [rad] or [m]
+    velocities: Vector = ()  # [rad/s] or [m/s]
+    accelerations: Vector = ()  # [rad/s^2] or [m/s^2]
+    time_from_start: float = 0.0  # [s]
+
+
+class JointTrajectory(Message, frozen=True, kw_only=True):
+    """Timed points for `joint_names`; every point lists the joints in that order."""
+
+    stamp: int = 0  # [ns] UNIX time at which it is to start; 0 is "now"
+    joint_names: tuple[str, ...] = ()
+    points: tuple[TrajectoryPoint, ...] = ()
+
+
+class JointTolerance(Message, frozen=True, kw_only=True):
+    """How far `name` may be off: 0 means the default, -1 means no bound."""
+
+    name: str = ""
+    position: float = 0.0  # [rad] or [m]
+    velocity: float = 0.0  # [rad/s] or [m/s]
+    acceleration: float = 0.0  # [rad/s^2] or [m/s^2]
+
+
+class FollowJointTrajectoryGoal(Message, frozen=True, kw_only=True):
+    """A trajectory to execute and how exactly."""
+
+    trajectory: JointTrajectory = JointTrajectory()
+    path_tolerance: tuple[JointTolerance, ...] = ()
+    goal_tolerance: tuple[JointTolerance, ...] = ()
+    goal_time_tolerance: float = 0.0  # [s] 0 is the default of the gateway, which is finite
+
+
+class FollowJointTrajectoryFeedback(Message, frozen=True, kw_only=True):
+    """How the execution stands, 20 times a second."""
+
+    stamp: int = 0  # [ns] UNIX time
+    joint_names: tuple[str, ...] = ()
+    desired: TrajectoryPoint = TrajectoryPoint()
+    actual: TrajectoryPoint = TrajectoryPoint()
+    error: TrajectoryPoint = TrajectoryPoint()  # desired - actual
+    index: int = 0  # of the trajectory point that is being approached
+    points: int = 0  # how many points the trajectory has
+    elapsed: float = 0.0  # [s] along the trajectory
+    duration: float = 0.0  # [s] of the whole trajectory
+
+
+class FollowErrorCode(IntEnum):
+    """The codes of control_msgs/FollowJointTrajectory, and ours below -10."""
+
+    SUCCESSFUL = 0
+    INVALID_GOAL = -1
+    INVALID_JOINTS = -2
+    OLD_HEADER_TIMESTAMP = -3
+    PATH_TOLERANCE_VIOLATED = -4
+    GOAL_TOLERANCE_VIOLATED = -5
+    CANCELED = -10
+    PREEMPTED = -11
+    DEVICE_FAILED = -12
+
+
+class FollowJointTrajectoryResult(Message, frozen=True, kw_only=True):
+    """How an execution ended; success means that the executed steps were read back."""
+
+    error_code: FollowErrorCode = FollowErrorCode.SUCCESSFUL
+    error_string: str = ""
+    joint_names: tuple[str, ...] = ()
+    commanded_steps: tuple[int, ...] = ()  # [steps] absolute, at the end
+    executed_steps: tuple[int, ...] = ()  # [steps] absolute, as the device reported it
+    max_following_error: Vector = ()  # [steps] largest |commanded - executed| on the way
+    final_error: Vector = ()  # [steps] goal - executed at the end, with the goal's fraction
+    duration: float = 0.0  # [s] from acceptance to result

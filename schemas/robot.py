@@ -1,0 +1,81 @@
+"""`urdf/<robot>/robot.toml` as types: what turns steps into motion. Read by `services.arm`.
+
+Numbers that must be exact (gear ratios) are TOML strings holding a fraction or a decimal, for
+example "46.656" or "380/21"; everything else is SI unless the name says otherwise.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import msgspec
+
+
+class RobotRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A table of robot.toml; an unknown key is an error."""
+
+
+class Transmission(StrEnum):
+    """How the output shaft moves the joint."""
+
+    ROTARY = "rotary"
+    RACK_AND_PINION = "rack_and_pinion"
+
+
+class Driver(RobotRecord, frozen=True, kw_only=True):
+    """What a stepper driver demands of its inputs."""
+
+    name: str
+    step_high_us: float
+    step_low_us: float
+    dir_setup_us: float
+    enable_lead_ms: float = 0.0
+
+
+class Motor(RobotRecord, frozen=True, kw_only=True):
+    """A stepper behind its driver and gearbox."""
+
+    driver: str  # name of a [[driver]]
+    pulses_per_turn: int  # [pulses/rev] of the motor shaft, microsteps included
+    gear_ratio: str = "1"  # exact: motor turns per turn of the output shaft
+    step_pin: int | None = None
+    dir_pin: int | None = None
+    inverted: bool = False
+
+
+class StepperJoint(RobotRecord, frozen=True, kw_only=True):
+    """One joint's drive; limits tighter than the URDF's win."""
+
+    name: str  # of the URDF joint
+    wire_name: str  # on the device and in logs
+    motor: Motor
+    transmission: Transmission = Transmission.ROTARY
+    pinion_radius: float | None = None  # [m] for rack_and_pinion
+    max_speed_rpm: float = 15.0  # [rev/min] of the output shaft
+    ramp_time: float = 1.0  # [s] from rest to max_speed_rpm: gives the acceleration
+    jerk_time: float = 0.1  # [s] from zero to full acceleration: gives the jerk
+    reference_position: float = 0.0  # [rad] or [m] of the pose that `gemelo reference` declares
+    path_tolerance_steps: float = 4.0  # default of FollowJointTrajectory
+    goal_tolerance_steps: float = 0.75  # half a step is the physical limit
+
+
+class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
+    """The controller board."""
+
+    name: str  # MQTT: gemelo/v1/<name>/...
+    tick_hz: int = 50_000
+    queue_capacity: int = 128  # [knots]
+
+
+class RobotFile(RobotRecord, frozen=True, kw_only=True):
+    """The whole robot.toml."""
+
+    name: str
+    urdf: str = "robot.urdf"
+    srdf: str = "robot.srdf"
+    group: str = "arm"
+    base_frame: str = "base_link"
+    tool_frame: str
+    device: DeviceRecord
+    driver: tuple[Driver, ...]
+    joint: tuple[StepperJoint, ...]

@@ -1,0 +1,100 @@
+"""What nodes say about themselves: logs, statistics, information, parameters, failures."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from schemas.message import Message
+
+
+class LogLevel(IntEnum):
+    """As in Python's logging and rcl_interfaces/Log."""
+
+    DEBUG = 10
+    INFO = 20
+    WARNING = 30
+    ERROR = 40
+    FATAL = 50
+
+
+class LogRecord(Message, frozen=True, kw_only=True):
+    """One line of a node's log."""
+
+    stamp: int = 0  # [ns] UNIX time
+    node: str = ""
+    level: LogLevel = LogLevel.INFO
+    text: str = ""
+
+
+class TopicStatistics(Message, frozen=True, kw_only=True):
+    """What one node has seen of one key."""
+
+    key: str = ""
+    received: int = 0
+    dropped: int = 0  # overrun in the inbox (LATEST) or lost on the way (EVERY)
+    bad: int = 0  # not decodable; dropped, and reported once
+
+
+class NodeStatistics(Message, frozen=True, kw_only=True):
+    """How a node's loop does, once a second."""
+
+    stamp: int = 0  # [ns] UNIX time
+    node: str = ""
+    loop_rate: float = 0.0  # [Hz] achieved
+    loop_late_max: float = 0.0  # [s] worst lateness of the last second
+    cpu: float = 0.0  # [s/s] of one core
+    topics: tuple[TopicStatistics, ...] = ()
+
+
+class NodeInfo(Message, frozen=True, kw_only=True):
+    """Who a node is and what it speaks."""
+
+    node: str = ""
+    robot: str = ""
+    host: str = ""
+    pid: int = 0
+    version: str = ""
+    started: int = 0  # [ns] UNIX time
+    publishes: tuple[str, ...] = ()
+    subscribes: tuple[str, ...] = ()
+    serves: tuple[str, ...] = ()
+    actions: tuple[str, ...] = ()
+
+
+class Empty(Message, frozen=True, kw_only=True):
+    """Nothing to say."""
+
+
+class Failure(Message, frozen=True, kw_only=True):
+    """A request that was not carried out, and why."""
+
+    kind: str = ""  # "bad request", "refused", "internal error"
+    message: str = ""
+
+
+ParameterValue = bool | int | float | str
+
+
+class Parameter(Message, frozen=True, kw_only=True):
+    """A declared parameter of a node, its type and present value."""
+
+    name: str = ""
+    type: str = ""  # "bool", "int", "float", "str"
+    value: ParameterValue = False
+    default: ParameterValue = False
+    description: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+
+
+class Parameters(Message, frozen=True, kw_only=True):
+    """All parameters of a node."""
+
+    parameters: tuple[Parameter, ...] = ()
+
+
+class SetParameter(Message, frozen=True, kw_only=True):
+    """A new value for a parameter; a wrong name, type or range is refused."""
+
+    name: str = ""
+    value: ParameterValue = False

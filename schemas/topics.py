@@ -1,0 +1,133 @@
+"""The one table of the bus: every key, its message, rate, delivery, whether it is recorded, and who writes it.
+
+Keys are relative to the robot: on the network they stand under `<robot>/`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Generic, TypeVar
+
+from schemas.device import (
+    CommandAck,
+    CommandChunk,
+    DeviceCommandRequest,
+    DeviceCommandResponse,
+    DeviceEvent,
+    DeviceState,
+    DeviceStatus,
+)
+from schemas.frames import FrameTransforms, RobotDescription
+from schemas.joints import JointState, JointTargets, StepErrors
+from schemas.message import Message
+from schemas.motion import (
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
+)
+from schemas.planning import PlannedPath, PlanRequest, PlanResponse
+from schemas.system import LogRecord, NodeStatistics
+
+M = TypeVar("M", bound=Message)
+Q = TypeVar("Q", bound=Message)
+R = TypeVar("R", bound=Message)
+G = TypeVar("G", bound=Message)
+F = TypeVar("F", bound=Message)
+
+
+class Delivery(Enum):
+    """What a message's loss would mean, and so how it travels."""
+
+    LATEST = "latest"  # the newest wins; older ones may be dropped
+    EVERY = "every"  # reliable and in order
+    LATCHED = "latched"  # reliable, and a late joiner gets the last one
+
+
+@dataclass(frozen=True)
+class Topic(Generic[M]):
+    """A row of the table."""
+
+    key: str
+    message: type[M]
+    delivery: Delivery
+    rate: float | None  # [Hz]; None: when there is something to say
+    recorded: bool
+    writer: str  # node name; "any" where several may write
+    about: str
+
+
+@dataclass(frozen=True)
+class Request(Generic[Q, R]):
+    """A question with one answer."""
+
+    key: str
+    request: type[Q]
+    response: type[R]
+    server: str
+    about: str
+
+
+@dataclass(frozen=True)
+class Action(Generic[G, F, R]):
+    """A long-running goal with feedback, a result and a cancel."""
+
+    key: str
+    goal: type[G]
+    feedback: type[F]
+    result: type[R]
+    server: str
+    about: str
+
+
+LATEST, EVERY, LATCHED = Delivery.LATEST, Delivery.EVERY, Delivery.LATCHED
+GATEWAY, ANY = "stepper_gateway", "any"
+
+DESCRIPTION = Topic(
+    "description", RobotDescription, LATCHED, None, True, "state_publisher", "URDF, SRDF and robot.toml"
+)
+JOINT_STATES = Topic("joint_states", JointState, LATEST, 50.0, True, GATEWAY, "what the joints did: executed steps")
+JOINT_COMMANDS = Topic(
+    "joint_commands", JointState, LATEST, 50.0, True, GATEWAY, "what the path asks for at the same instant"
+)
+STEP_ERRORS = Topic("step_errors", StepErrors, LATEST, 50.0, True, GATEWAY, "commanded minus executed, in steps")
+JOINT_TARGETS = Topic(
+    "joint_targets", JointTargets, LATEST, None, True, ANY, "streamed targets from a slider or script"
+)
+FRAMES = Topic("frames", FrameTransforms, LATEST, 50.0, True, "state_publisher", "poses of the moving links")
+STATIC_FRAMES = Topic(
+    "static_frames", FrameTransforms, LATCHED, None, True, "state_publisher", "poses of the fixed links"
+)
+PLANNED_PATH = Topic("planned_path", PlannedPath, LATCHED, None, True, "planner", "the tool's planned way")
+DEVICE_STATUS = Topic(
+    "device/status", DeviceStatus, LATCHED, None, True, GATEWAY, "who the device is, and whether it is online"
+)
+DEVICE_STATE = Topic(
+    "device/state", DeviceState, LATEST, 50.0, True, GATEWAY, "mode, steps, queue and time scale of the device"
+)
+DEVICE_EVENTS = Topic("device/events", DeviceEvent, EVERY, None, True, GATEWAY, "faults, under-runs, reconnections")
+COMMANDS = Topic("commands", CommandChunk, EVERY, None, True, GATEWAY, "every chunk of knots sent to the device")
+COMMAND_ACKS = Topic("command_acks", CommandAck, EVERY, None, True, GATEWAY, "the device's answer to every chunk")
+LOG = Topic("log", LogRecord, EVERY, None, True, ANY, "the log of every node")
+STATISTICS = Topic(
+    "statistics", NodeStatistics, EVERY, None, True, ANY, "loop rate, losses and CPU of every node, 1 Hz"
+)
+
+TOPICS: tuple[Topic[Message], ...] = (
+    DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, JOINT_TARGETS, FRAMES, STATIC_FRAMES, PLANNED_PATH,
+    DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, COMMANDS, COMMAND_ACKS, LOG, STATISTICS,
+)  # type: ignore[assignment]  # fmt: skip
+
+PLAN = Request("plan", PlanRequest, PlanResponse, "planner", "a goal in, a verified trajectory or a refusal out")
+DEVICE_COMMAND = Request(
+    "device/command", DeviceCommandRequest, DeviceCommandResponse, GATEWAY, "hold, resume, stop, reset, reference"
+)
+
+REQUESTS = (PLAN, DEVICE_COMMAND)
+
+FOLLOW_JOINT_TRAJECTORY = Action(
+    "follow_joint_trajectory", FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult,
+    GATEWAY, "execute a trajectory to the step",
+)  # fmt: skip
+
+ACTIONS = (FOLLOW_JOINT_TRAJECTORY,)
