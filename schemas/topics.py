@@ -29,11 +29,11 @@ from schemas.motion import (
 from schemas.planning import PlannedPath, PlanRequest, PlanResponse
 from schemas.system import LogRecord, NodeStatistics
 
-M = TypeVar("M", bound=Message)
-Q = TypeVar("Q", bound=Message)
-R = TypeVar("R", bound=Message)
-G = TypeVar("G", bound=Message)
-F = TypeVar("F", bound=Message)
+M_co = TypeVar("M_co", bound=Message, covariant=True)
+Q_co = TypeVar("Q_co", bound=Message, covariant=True)
+R_co = TypeVar("R_co", bound=Message, covariant=True)
+G_co = TypeVar("G_co", bound=Message, covariant=True)
+F_co = TypeVar("F_co", bound=Message, covariant=True)
 
 
 class Delivery(Enum):
@@ -45,11 +45,11 @@ class Delivery(Enum):
 
 
 @dataclass(frozen=True)
-class Topic(Generic[M]):
+class Topic(Generic[M_co]):
     """A row of the table."""
 
     key: str
-    message: type[M]
+    message: type[M_co]
     delivery: Delivery
     rate: float | None  # [Hz]; None: when there is something to say
     recorded: bool
@@ -58,24 +58,24 @@ class Topic(Generic[M]):
 
 
 @dataclass(frozen=True)
-class Request(Generic[Q, R]):
+class Request(Generic[Q_co, R_co]):
     """A question with one answer."""
 
     key: str
-    request: type[Q]
-    response: type[R]
+    request: type[Q_co]
+    response: type[R_co]
     server: str
     about: str
 
 
 @dataclass(frozen=True)
-class Action(Generic[G, F, R]):
+class Action(Generic[G_co, F_co, R_co]):
     """A long-running goal with feedback, a result and a cancel."""
 
     key: str
-    goal: type[G]
-    feedback: type[F]
-    result: type[R]
+    goal: type[G_co]
+    feedback: type[F_co]
+    result: type[R_co]
     server: str
     about: str
 
@@ -116,18 +116,18 @@ STATISTICS = Topic(
 TOPICS: tuple[Topic[Message], ...] = (
     DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, JOINT_TARGETS, FRAMES, STATIC_FRAMES, PLANNED_PATH,
     DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, COMMANDS, COMMAND_ACKS, LOG, STATISTICS,
-)  # type: ignore[assignment]  # fmt: skip
+)  # fmt: skip
 
 PLAN = Request("plan", PlanRequest, PlanResponse, "planner", "a goal in, a verified trajectory or a refusal out")
 DEVICE_COMMAND = Request(
     "device/command", DeviceCommandRequest, DeviceCommandResponse, GATEWAY, "hold, resume, stop, reset, reference"
 )
 
-REQUESTS = (PLAN, DEVICE_COMMAND)
+REQUESTS: tuple[Request[Message, Message], ...] = (PLAN, DEVICE_COMMAND)
 
 FOLLOW_JOINT_TRAJECTORY = Action(
     "follow_joint_trajectory", FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult,
     GATEWAY, "execute a trajectory to the step",
 )  # fmt: skip
 
-ACTIONS = (FOLLOW_JOINT_TRAJECTORY,)
+ACTIONS: tuple[Action[Message, Message, Message], ...] = (FOLLOW_JOINT_TRAJECTORY,)
