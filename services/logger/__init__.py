@@ -1,0 +1,1 @@
+"""Everything to MCAP, every command to CSV."""

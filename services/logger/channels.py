@@ -1,0 +1,64 @@
+"""A topic as an MCAP channel: JSON messages, each with a JSON Schema that stands alone.
+
+JSON, not msgpack, because every viewer reads it and it costs almost nothing. Measured on 33 s of full motion,
+386 B a message raw, zstd chunks of 32 KiB: JSON 63 B and 6.2 us a message, msgpack 61 B and 5.2 us.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TypeAlias, cast
+
+import msgspec
+
+from schemas.message import Message
+from schemas.topics import TOPICS, Topic
+
+MESSAGE_ENCODING = "json"
+SCHEMA_ENCODING = "jsonschema"
+
+Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | None"
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What MCAP says of a topic once per file."""
+
+    key: str
+    schema_name: str
+    schema: bytes
+    metadata: dict[str, str]
+
+
+def schema_of(kind: type[Message]) -> bytes:
+    """JSON Schema of `kind` with every `$ref` replaced by what it refers to, as MCAP readers want it."""
+    schema = cast("dict[str, Json]", msgspec.json.schema(kind))
+    definitions = cast("dict[str, Json]", schema.pop("$defs", {}))
+    return json.dumps(_inlined(schema, definitions), separators=(",", ":")).encode()
+
+
+def channel_of(topic: Topic[Message]) -> Channel:
+    """The channel that a topic is recorded on."""
+    metadata = {"delivery": topic.delivery.value, "writer": topic.writer, "about": topic.about}
+    if topic.rate is not None:
+        metadata["rate_hz"] = f"{topic.rate:g}"
+    return Channel(topic.key, topic.message.__name__, schema_of(topic.message), metadata)
+
+
+def recorded_topics() -> tuple[Topic[Message], ...]:
+    """The rows of the table that are recorded."""
+    return tuple(topic for topic in TOPICS if topic.recorded)
+
+
+def _inlined(node: Json, definitions: dict[str, Json]) -> Json:
+    if isinstance(node, list):
+        return [_inlined(item, definitions) for item in node]
+    if not isinstance(node, dict):
+        return node
+    reference = node.get("$ref")
+    if isinstance(reference, str):
+        target = cast("dict[str, Json]", definitions[reference.rsplit("/", 1)[-1]])
+        beside = {key: value for key, value in node.items() if key != "$ref"}
+        return _inlined({**target, **beside}, definitions)
+    return {key: _inlined(value, definitions) for key, value in node.items()}

@@ -1,0 +1,125 @@
+"""Every command as a row: a knot as it was sent, and what the device answered. Pure."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from schemas.device import CommandAck, CommandChunk
+
+ACK_TIMEOUT = 2_000_000_000  # [ns] after which an unanswered chunk counts as lost
+LOST, RESENT, UNANSWERED = "lost", "resent", "unanswered"
+
+Row = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Pending:
+    chunk: CommandChunk
+    arrival: int  # [ns] UNIX time
+
+
+class CommandLog:
+    """Joins chunks with their acknowledgements, in the order in which the answers came."""
+
+    def __init__(self) -> None:
+        self.joints: tuple[str, ...] = ()  # names of the columns, in the wire's order
+        self.lost = 0  # chunks without an answer
+        self.missing = 0  # chunks that never arrived here: gaps of the sequence number
+        self._pending: dict[tuple[int, int], _Pending] = {}
+        self._newest: tuple[int, int] = (0, -1)  # stream, seq
+        self._rows: list[Row] = []
+
+    @property
+    def pending(self) -> int:
+        """How many chunks still wait for their answer."""
+        return len(self._pending)
+
+    def on_chunk(self, chunk: CommandChunk, now: int) -> None:
+        """Remember a chunk until its answer comes; one that is sent again ends the wait of the first."""
+        self.joints = self.joints or chunk.name
+        self._count_missing(chunk)
+        key = chunk.stream, chunk.seq
+        first = self._pending.pop(key, None)
+        if first is not None:
+            self._rows += _rows(first.chunk, None, RESENT)
+        self._pending[key] = _Pending(chunk, now)
+
+    def on_ack(self, ack: CommandAck) -> None:
+        """Complete the rows of the chunk that is answered; an answer to none of them is ignored."""
+        waiting = self._pending.pop((ack.stream, ack.seq), None)
+        if waiting is not None:
+            self._rows += _rows(waiting.chunk, ack, str(ack.code))
+
+    def step(self, now: int) -> list[Row]:
+        """The rows completed since the last call, those of lost chunks among them."""
+        while self._pending:
+            key, waiting = next(iter(self._pending.items()))
+            if now - waiting.arrival < ACK_TIMEOUT:
+                break
+            del self._pending[key]
+            self.lost += 1
+            self._rows += _rows(waiting.chunk, None, LOST)
+        rows, self._rows = self._rows, []
+        return rows
+
+    def finish(self, now: int) -> list[Row]:
+        """All rows that are left, with those still waiting marked as unanswered."""
+        rows = self.step(now)
+        for waiting in self._pending.values():
+            rows += _rows(waiting.chunk, None, UNANSWERED)
+        self._pending.clear()
+        return rows
+
+    def _count_missing(self, chunk: CommandChunk) -> None:
+        stream, seq = self._newest
+        expected = seq + 1 if chunk.stream == stream else 0
+        self.missing += max(0, chunk.seq - expected) if stream else 0
+        if chunk.stream != stream or chunk.seq > seq:
+            self._newest = chunk.stream, chunk.seq
+
+
+def header(joints: tuple[str, ...]) -> Row:
+    """The columns: the seed's, then what came back. Positions in rad or m, rates per second of those."""
+    motion = [f"{joint}_{quantity}" for joint in joints for quantity in ("pos", "vel", "acc")]
+    answer = ["stream", "knot", "stream_time_s", "ack_timestamp_us", "ack_code", "round_trip_ms"]
+    executed = [f"{joint}_executed_steps" for joint in joints]
+    return ("seq", "timestamp_pc_us", "timestamp_pc_iso", *motion, "command_sent", *answer, *executed)
+
+
+def _rows(chunk: CommandChunk, ack: CommandAck | None, code: str) -> list[Row]:
+    when = (str(chunk.seq), str(chunk.stamp // 1000), iso(chunk.stamp))
+    if ack is None:
+        answer, executed = ("", code, ""), ("",) * len(chunk.name)
+    else:
+        answer = (str(ack.stamp // 1000), code, f"{ack.round_trip * 1e3:.3f}")
+        executed = tuple(map(str, ack.steps)) or ("",) * len(chunk.name)
+    return [
+        (*when, *_motion(chunk, knot), _words(chunk, knot), str(chunk.stream), str(knot), _time(chunk, knot), *answer,
+         *executed)
+        for knot in range(len(chunk.steps))
+    ]  # fmt: skip
+
+
+def _motion(chunk: CommandChunk, knot: int) -> list[str]:
+    tables = (chunk.position, chunk.velocity, chunk.acceleration)
+    return [
+        f"{table[knot][joint]:.9g}" if knot < len(table) else "" for joint in range(len(chunk.name)) for table in tables
+    ]
+
+
+def _words(chunk: CommandChunk, knot: int) -> str:
+    """The knot's bytes as they stand in a TRAJ frame: n positions, then n velocities, i32 little-endian."""
+    words = (*chunk.steps[knot], *(chunk.step_rate[knot] if chunk.step_rate else ()))
+    return struct.pack(f"<{len(words)}i", *words).hex()
+
+
+def _time(chunk: CommandChunk, knot: int) -> str:
+    return f"{chunk.time + knot * chunk.dt:.6f}"
+
+
+def iso(stamp: int) -> str:
+    """UTC with microseconds, for example 2026-11-21T01:33:06.000250Z; `stamp` in ns UNIX."""
+    seconds, nanoseconds = divmod(stamp, 1_000_000_000)
+    return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{nanoseconds // 1000:06d}Z"

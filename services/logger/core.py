@@ -1,0 +1,136 @@
+"""The logger without its files: what is to be written next, and what was lost. Pure."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from dataclasses import dataclass, field
+
+from schemas.device import CommandAck, CommandChunk
+from schemas.frames import RobotDescription
+from schemas.message import Message
+from schemas.topics import Delivery, Topic
+from services.logger.command_log import CommandLog, Row
+
+MAX_WAITING = 10_000  # messages held while the disk refuses: about half a minute of full motion
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One message to be written; `arrival` in ns UNIX."""
+
+    topic: Topic[Message]
+    message: Message
+    arrival: int
+
+    @property
+    def stamp(self) -> int:
+        """The message's own time in [ns] UNIX; its arrival where it has none."""
+        return getattr(self.message, "stamp", 0) or self.arrival
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What is to be written now."""
+
+    entries: tuple[Entry, ...] = ()
+    rows: tuple[Row, ...] = ()
+
+
+@dataclass(frozen=True)
+class Losses:
+    """What this logger knows to be missing from its files."""
+
+    dropped: dict[str, int] = field(default_factory=dict)  # by key: the disk refused for too long
+    missing_chunks: int = 0  # gaps in the sequence of commands
+    lost_chunks: int = 0  # commands that the device never answered
+
+    @property
+    def sentence(self) -> str:
+        """For a person; empty where nothing is missing."""
+        dropped = ", ".join(f"{count} of `{key}`" for key, count in sorted(self.dropped.items()))
+        parts = [f"messages not written: {dropped}"] if dropped else []
+        parts += [f"{self.missing_chunks} command chunks never arrived at the logger"] if self.missing_chunks else []
+        parts += [f"{self.lost_chunks} command chunks were never acknowledged"] if self.lost_chunks else []
+        return "; ".join(parts)
+
+
+class Logger:
+    """Collects messages between two writes, and keeps those that every file begins with."""
+
+    def __init__(self, max_waiting: int = MAX_WAITING) -> None:
+        self.commands = CommandLog()
+        self.description: RobotDescription | None = None
+        self._waiting: deque[Entry] = deque()
+        self._rows: deque[Row] = deque()
+        self._max_waiting = max_waiting
+        self._latched: dict[str, Entry] = {}
+        self._dropped: Counter[str] = Counter()
+
+    def on_message(self, topic: Topic[Message], message: Message, now: int) -> None:
+        """Take one message that arrived at `now` [ns] UNIX."""
+        entry = Entry(topic, message, now)
+        self._keep(entry)
+        if topic.delivery is Delivery.LATCHED:
+            self._latched[topic.key] = entry
+        match message:
+            case CommandChunk():
+                self.commands.on_chunk(message, now)
+            case CommandAck():
+                self.commands.on_ack(message)
+            case RobotDescription():
+                self.description = message
+
+    def step(self, now: int) -> Batch:
+        """Everything that waits; what could not be written comes back by `give_back`."""
+        self._rows.extend(self.commands.step(now))
+        return self._take()
+
+    def finish(self, now: int) -> Batch:
+        """Everything that is left when the logger stops."""
+        self._rows.extend(self.commands.finish(now))
+        return self._take()
+
+    def give_back(self, batch: Batch) -> None:
+        """Keep for later what the disk refused; the least valuable of too much is dropped and counted."""
+        self._rows.extendleft(reversed(batch.rows))
+        while len(self._rows) > self._max_waiting:
+            self._rows.popleft()
+            self._dropped["commands.csv"] += 1
+        self._waiting.extendleft(reversed(batch.entries))
+        self._drop_excess()
+
+    def first_entries(self, batch: Batch, now: int) -> tuple[Entry, ...]:
+        """The latched messages that a file begins with so that it can be read alone; `batch` brings its own."""
+        said = [entry for entry in self._latched.values() if entry not in batch.entries]
+        return tuple(Entry(entry.topic, entry.message, now) for entry in said)
+
+    @property
+    def losses(self) -> Losses:
+        """What is missing so far."""
+        return Losses(dict(self._dropped), self.commands.missing, self.commands.lost)
+
+    def _keep(self, entry: Entry) -> None:
+        self._waiting.append(entry)
+        if len(self._waiting) > self._max_waiting:
+            self._drop_excess()
+
+    def _drop_excess(self) -> None:
+        """States go first, a tenth at a time; commands, faults and logs only where nothing else is left."""
+        while len(self._waiting) > self._max_waiting:
+            quota = len(self._waiting) - self._max_waiting + self._max_waiting // 10
+            kept: deque[Entry] = deque()
+            for entry in self._waiting:
+                if quota and entry.topic.delivery is Delivery.LATEST:
+                    quota -= 1
+                    self._dropped[entry.topic.key] += 1
+                else:
+                    kept.append(entry)
+            while len(kept) > self._max_waiting:
+                self._dropped[kept.popleft().topic.key] += 1
+            self._waiting = kept
+
+    def _take(self) -> Batch:
+        batch = Batch(tuple(self._waiting), tuple(self._rows))
+        self._waiting.clear()
+        self._rows.clear()
+        return batch

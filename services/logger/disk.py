@@ -1,0 +1,102 @@
+"""Where batches end up: the present recording, its rotation, and patience with a disk that refuses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from services.logger.core import Batch, Logger
+from services.logger.files import is_due, prune, stem_of
+from services.logger.parameters import LoggerParameters
+from services.logger.recording import Recording
+
+RETRY = 2_000_000_000  # [ns] between two attempts on a disk that refuses
+
+
+@dataclass
+class Disk:
+    """Writes what the logger gives and never dies of the disk."""
+
+    robot: str
+    metadata: dict[str, str]
+    tell: Callable[[str], None]  # a warning for a person
+    recording: Recording | None = field(default=None, init=False)
+    trouble: str = field(default="", init=False)  # why nothing can be written at present
+    files: list[Path] = field(default_factory=list, init=False)  # begun since the start
+    _retry_at: int = field(default=0, init=False)
+
+    def write(self, logger: Logger, batch: Batch, folder: Path, parameters: LoggerParameters, now: int) -> None:
+        """Write `batch`, or give it back to the logger where the disk refuses; `now` in ns UNIX."""
+        if now < self._retry_at:
+            logger.give_back(batch)
+            return
+        try:
+            recording = self._open_recording(logger, batch, folder, parameters, now)
+            self._write(recording, logger, batch)
+        except OSError as error:
+            logger.give_back(batch)
+            self._give_up(error, folder, now)
+        else:
+            self._recovered(recording)
+
+    def close(self) -> None:
+        """End the present recording, if any."""
+        recording, self.recording = self.recording, None
+        if recording is not None:
+            try:
+                recording.close()
+            except OSError as error:
+                self.tell(f"{recording.path} could not be finished ({error}); a streaming reader still reads it")
+
+    def _open_recording(
+        self, logger: Logger, batch: Batch, folder: Path, parameters: LoggerParameters, now: int
+    ) -> Recording:
+        if self.recording is not None and self._is_over(self.recording, folder, parameters, now):
+            self.close()
+        if self.recording is None:
+            folder.mkdir(parents=True, exist_ok=True)
+            self.recording = Recording(folder, stem_of(self.robot, now), now, self.metadata)
+            self.recording.write(logger.first_entries(batch, now))
+            self.files.append(self.recording.path)
+            prune(folder, self.robot, parameters.keep_files)
+        return self.recording
+
+    def _is_over(self, recording: Recording, folder: Path, parameters: LoggerParameters, now: int) -> bool:
+        age = (now - recording.started) / 1e9
+        moved = recording.path.parent != folder or not recording.path.exists()
+        return moved or is_due(recording.size, age, parameters.max_file_mb, parameters.max_age_minutes)
+
+    @staticmethod
+    def _write(recording: Recording, logger: Logger, batch: Batch) -> None:
+        if logger.description is not None:
+            recording.describe(logger.description)
+        if batch.entries:
+            recording.write(batch.entries)
+        if batch.rows:
+            recording.write_rows(logger.commands.joints, batch.rows)
+
+    def _give_up(self, error: OSError, folder: Path, now: int) -> None:
+        if self.recording is not None:
+            self.recording.abandon()
+            self._forget_if_empty(self.recording)
+            self.recording = None
+        self._retry_at = now + RETRY
+        trouble = f"cannot write to {folder}: {error.strerror or error}"
+        if trouble != self.trouble:
+            remedy = "free space or set the parameter `log_dir`; tried again every 2 s, messages wait in memory"
+            self.tell(f"{trouble}; {remedy}")
+        self.trouble = trouble
+
+    def _forget_if_empty(self, recording: Recording) -> None:
+        """A full disk must not gather a new empty file at every attempt."""
+        if recording.path not in self.files:
+            with suppress(OSError):
+                recording.path.unlink()
+
+    def _recovered(self, recording: Recording) -> None:
+        if self.trouble:
+            self.tell(f"writing again, to {recording.path}")
+        self.trouble = ""
+        self._retry_at = 0

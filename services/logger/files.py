@@ -1,0 +1,42 @@
+"""Names, age and number of the files of a recording: an MCAP, and the CSV of commands beside it."""
+
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+
+MCAP, CSV = ".mcap", ".csv"
+_NAME = r"\d{8}T\d{6}\.\d{3}Z_%s(\.\w+)"
+
+
+def stem_of(robot: str, now: int) -> str:
+    """For example `20261121T013306.250Z_rm1`: sorts by time; `now` in ns UNIX."""
+    seconds, nanoseconds = divmod(now, 1_000_000_000)
+    return f"{datetime.fromtimestamp(seconds, UTC):%Y%m%dT%H%M%S}.{nanoseconds // 1_000_000:03d}Z_{robot}"
+
+
+def is_due(size: int, age: float, max_file_mb: float, max_age_minutes: float) -> bool:
+    """Whether a file of `size` bytes and `age` seconds is to be followed by a new one."""
+    return size >= max_file_mb * 1e6 or age >= max_age_minutes * 60.0
+
+
+def surplus(names: list[str], robot: str, keep: int) -> list[str]:
+    """The files of all but the newest `keep` recordings of this robot; none where `keep` is 0."""
+    pattern = re.compile(_NAME % re.escape(robot))
+    ours = sorted(name for name in names if pattern.fullmatch(name))
+    stems = sorted({name.removesuffix(Path(name).suffix) for name in ours})
+    old = set(stems[:-keep]) if keep else set()
+    return [name for name in ours if name.removesuffix(Path(name).suffix) in old]
+
+
+def prune(folder: Path, robot: str, keep: int) -> list[str]:
+    """Delete the surplus in `folder`; returns what was deleted. What cannot be deleted stays."""
+    deleted = []
+    for name in surplus([path.name for path in folder.iterdir()], robot, keep):
+        try:
+            (folder / name).unlink()
+        except OSError:
+            continue
+        deleted.append(name)
+    return deleted

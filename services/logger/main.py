@@ -1,0 +1,60 @@
+"""`gemelo-logger`: every recorded topic to MCAP and every command to CSV, for as long as there is a disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from schemas.deployment import Deployment
+from schemas.message import Message
+from schemas.topics import Topic
+from services.logger.channels import recorded_topics
+from services.logger.core import Batch, Logger
+from services.logger.disk import Disk
+from services.logger.origin import origin
+from services.logger.parameters import LoggerParameters
+from services.runtime.application import service
+from services.runtime.deployment import project_root
+from services.runtime.node import Node
+
+WRITE_RATE = 2.0  # [Hz] a batch and an MCAP chunk each: what a kill -9 can cost
+
+
+def run(node: Node, deployment: Deployment) -> None:
+    """Collect between writes; the disk's trouble shows in the readiness and in the log."""
+    root = project_root()
+    parameters = node.parameters(LoggerParameters)
+    logger = Logger()
+    disk = Disk(node.robot, origin(node.robot, root), node.log.warning)
+    for topic in recorded_topics():
+        _subscribe(node, logger, topic)
+    default_folder = root / deployment.paths.out / "log"
+    said = ""
+
+    def write(now: int, batch: Batch) -> None:
+        nonlocal said
+        if parameters.value.enable_logging:
+            folder = Path(parameters.value.log_dir)
+            disk.write(logger, batch, root / folder if folder.parts else default_folder, parameters.value, now)
+        else:
+            disk.close()
+        node.set_ready(not disk.trouble, disk.trouble)
+        if logger.losses.sentence != said:
+            said = logger.losses.sentence
+            node.log.warning(said)
+
+    node.spin(lambda now: write(now, logger.step(now)), rate=WRITE_RATE)
+    write(node.now(), logger.finish(node.now()))
+    disk.close()
+
+
+def _subscribe(node: Node, logger: Logger, topic: Topic[Message]) -> None:
+    node.subscribe(topic, lambda message: logger.on_message(topic, message, node.now()))
+
+
+def main() -> None:
+    """Entry point."""
+    service("logger", run)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,102 @@
+"""One recording: an MCAP of messages and a CSV of commands that begin and end together.
+
+Every write ends a chunk and hands it to the operating system, so that a process that is killed loses only
+what it had not been given yet: the streaming reader finds the rest.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import IO
+
+import msgspec
+from mcap.writer import CompressionType, Writer
+
+from schemas.frames import RobotDescription
+from services.logger.channels import MESSAGE_ENCODING, SCHEMA_ENCODING, channel_of, recorded_topics
+from services.logger.command_log import Row, header
+from services.logger.core import Entry
+from services.logger.files import CSV, MCAP
+
+CHUNK_SIZE = 32 * 1024  # [B] uncompressed
+
+_encode = msgspec.json.Encoder().encode
+
+
+class Recording:
+    """The open files; every method raises OSError when the disk refuses, and the recording is then spent."""
+
+    def __init__(self, folder: Path, stem: str, started: int, metadata: dict[str, str]) -> None:
+        self.path = folder / (stem + MCAP)
+        self.csv_path = folder / (stem + CSV)
+        self.started = started  # [ns] UNIX time
+        self._described = ""
+        self._sequences: dict[int, int] = {}
+        self._table: IO[str] | None = None
+        self._file: IO[bytes] = self.path.open("xb")
+        self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
+        self._writer.start(profile="gemelo")
+        self._writer.add_metadata("gemelo", metadata)
+        self._channels = self._register()
+
+    @property
+    def size(self) -> int:
+        """[B] of the MCAP on disk."""
+        return self._file.tell()
+
+    def write(self, entries: Iterable[Entry]) -> None:
+        """Add messages, and make them survive this process."""
+        for entry in entries:
+            channel = self._channels[entry.topic.key]
+            sequence = self._sequences[channel] = self._sequences.get(channel, -1) + 1
+            self._writer.add_message(channel, entry.arrival, _encode(entry.message), entry.stamp, sequence)
+        self._writer.flush()
+
+    def describe(self, description: RobotDescription) -> None:
+        """Keep the robot's own files beside the data, once."""
+        if self._described == description.urdf + description.robot_toml:
+            return
+        self._described = description.urdf + description.robot_toml
+        files = {"urdf": description.urdf, "srdf": description.srdf, "robot_toml": description.robot_toml}
+        self._writer.add_metadata("robot", {"robot": description.robot, **files})
+        self._writer.flush()
+
+    def write_rows(self, joints: tuple[str, ...], rows: Iterable[Row]) -> None:
+        """Add commands; the table begins with the first of them, when the joints are known."""
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        if self._table is None:
+            table.writerow(header(joints))
+        table.writerows(rows)
+        if self._table is None:
+            self._table = self.csv_path.open("x", encoding="utf-8", newline="")
+        self._table.write(text.getvalue())
+        self._table.flush()
+
+    def close(self) -> None:
+        """End the files properly, with the index that lets readers jump."""
+        try:
+            self._writer.finish()
+        finally:
+            self.abandon()
+
+    def abandon(self) -> None:
+        """Let go of files that the disk no longer takes."""
+        for file in (self._file, self._table):
+            with suppress(OSError):
+                if file is not None:
+                    file.close()
+
+    def _register(self) -> dict[str, int]:
+        channels = {}
+        for topic in recorded_topics():
+            channel = channel_of(topic)
+            schema = self._writer.register_schema(channel.schema_name, SCHEMA_ENCODING, channel.schema)
+            channels[channel.key] = self._writer.register_channel(
+                channel.key, MESSAGE_ENCODING, schema, channel.metadata
+            )
+        return channels
