@@ -1,0 +1,23 @@
+"""The error of every file that describes an arm."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class DescriptionError(ValueError):
+    """A robot's folder is wrong; the text names the file, the thing, its value and, where known, the remedy."""
+
+
+def nearest_name(name: str, known: Iterable[str]) -> str | None:
+    """The known name that `name` was probably meant to be, or None when nothing is near."""
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+    return near[0] if near else None
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """`"; did you mean "x"?"`, or the list of what there is."""
+    names = sorted(known)
+    near = nearest_name(name, names)
+    return f'; did you mean "{near}"?' if near else f"; known are {', '.join(names)}"

@@ -1,0 +1,123 @@
+"""robot.toml, read strictly: an unknown key is an error with file, line, key and the nearest known one."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import get_args, get_origin, get_type_hints
+
+import msgspec
+
+from schemas.robot import RobotFile
+from services.arm.errors import DescriptionError, suggestion
+
+Keys = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class UnknownKey:
+    """A key that no type of schemas/robot.py has: `path` is where it stands, e.g. ("joint", 0, "motr")."""
+
+    path: Keys
+    line: int  # 0 where it was not found
+    hint: str
+
+
+def read_robot_file(path: Path) -> RobotFile:
+    """The typed robot.toml; raises `DescriptionError`."""
+    text = read_text(path)
+    data = parse_toml(path, text)
+    for unknown in unknown_keys(data, text):
+        raise DescriptionError(f"{path}, line {unknown.line}: unknown key `{dotted(unknown.path)}`{unknown.hint}")
+    try:
+        return msgspec.convert(data, RobotFile)
+    except msgspec.ValidationError as error:
+        raise DescriptionError(f"{path}: {error}") from error
+
+
+def read_text(path: Path) -> str:
+    """The text of a file of the robot's folder; raises `DescriptionError` where there is none."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise DescriptionError(f"{path}: there is no such file") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise DescriptionError(f"{path}: cannot be read: {error}") from error
+
+
+def parse_toml(path: Path, text: str) -> dict[str, object]:
+    """The raw tables of robot.toml; raises `DescriptionError` with the parser's line."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise DescriptionError(f"{path}: not TOML: {error}") from error
+
+
+def unknown_keys(data: dict[str, object], text: str) -> list[UnknownKey]:
+    """Every key of `data` that the types do not have."""
+    return [UnknownKey(path, line_of(path, text), hint) for path, hint in _walk(data, RobotFile, ())]
+
+
+def exact_ratio(text: str, where: str) -> Fraction:
+    """ "46.656" or "380/21" as a positive fraction; raises `DescriptionError` naming `where`."""
+    try:
+        ratio = Fraction(text.replace(" ", ""))
+    except (ValueError, ZeroDivisionError) as error:
+        raise DescriptionError(f'{where}: "{text}" is neither a decimal nor a fraction like "380/21"') from error
+    if ratio <= 0:
+        raise DescriptionError(f"{where}: a ratio of {text} is not positive; turn the direction with `inverted`")
+    return ratio
+
+
+def dotted(path: Keys) -> str:
+    """("joint", 0, "motor") as joint[0].motor."""
+    text = ""
+    for key in path:
+        text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else key
+    return text
+
+
+def line_of(path: Keys, text: str) -> int:
+    """The line, from 1, of a key in TOML written with table headers; 0 where it is not found."""
+    header: list[str | int] = []
+    counts: dict[str, int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        if table := re.match(r"\s*\[(\[?)\s*([\w.\-]+)\s*\]", line):
+            header = _header(table[2], bool(table[1]), counts)
+            if tuple(header) == path:
+                return number
+        elif (key := re.match(r"\s*\"?([\w\-]+)\"?\s*=", line)) and (*header, key[1]) == path:
+            return number
+    return 0
+
+
+def _header(name: str, is_array: bool, counts: dict[str, int]) -> list[str | int]:
+    """The key path of a table header, counting the tables of every array so far."""
+    if is_array:
+        counts[name] = counts.get(name, -1) + 1
+    path: list[str | int] = []
+    parts = name.split(".")
+    for depth, part in enumerate(parts, start=1):
+        path.append(part)
+        if (index := counts.get(".".join(parts[:depth]))) is not None:
+            path.append(index)
+    return path
+
+
+def _walk(data: object, kind: object, path: Keys) -> list[tuple[Keys, str]]:
+    if get_origin(kind) is tuple and isinstance(data, list):
+        item = get_args(kind)[0]
+        return [found for index, entry in enumerate(data) for found in _walk(entry, item, (*path, index))]
+    if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct) and isinstance(data, dict)):
+        return []
+    types = get_type_hints(kind)
+    found: list[tuple[Keys, str]] = []
+    for key, value in data.items():
+        if key in types:
+            found += _walk(value, types[key], (*path, key))
+        else:
+            found.append(((*path, key), suggestion(key, types)))
+    return found
