@@ -1,0 +1,45 @@
+# What a person does with gemelo. Everything here needs only `deploy/bootstrap`, which `make setup` runs.
+.DEFAULT_GOAL := help
+.PHONY: help setup up down test check format demo bench lock clean
+MAKEFLAGS += --no-print-directory
+bin := .venv/bin
+
+help: ## this list
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' Makefile | column -t -s '|'
+
+setup: ## make this folder ready to run; skips what is done
+	@deploy/bootstrap
+
+up: setup ## start the twin (setup first); Ctrl-C stops it
+	@deploy/up
+
+down: ## stop a twin that runs elsewhere
+	@$(bin)/process-compose down
+
+test: setup ## all tests: Python, firmware, whole stack
+	@deploy/test_firmware
+	@$(bin)/pytest
+
+check: setup ## ruff, mypy, import-linter, clang-format
+	@$(bin)/ruff check --quiet .
+	@$(bin)/ruff format --check --quiet . || { echo "remedy: make format"; exit 1; }
+	@$(bin)/mypy --no-error-summary schemas services firmware
+	@$(bin)/lint-imports --no-logo 2>/dev/null || $(bin)/lint-imports
+	@git ls-files 'firmware/*.h' 'firmware/*.hpp' 'firmware/*.cpp' | xargs -r $(bin)/clang-format --dry-run -Werror
+	@echo "check: all good"
+
+format: setup ## let ruff and clang-format write
+	@$(bin)/ruff check --quiet --fix . ; $(bin)/ruff format --quiet .
+	@git ls-files 'firmware/*.h' 'firmware/*.hpp' 'firmware/*.cpp' | xargs -r $(bin)/clang-format -i
+
+demo: setup ## a sine and a tour, without a display: out/demo.json, recording, picture
+	@$(bin)/gemelo demo
+
+bench: setup ## the figures: out/bench.json
+	@$(bin)/gemelo bench
+
+lock: setup ## resolve pyproject.toml anew into requirements.lock
+	@deploy/lock
+
+clean: ## remove everything that setup and runs made
+	rm -rf .venv .gemelo out firmware/build gemelo.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

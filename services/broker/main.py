@@ -1,0 +1,57 @@
+"""`gemelo-broker`: the broker that the deployment names, on the port that it names."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from schemas.deployment import Broker, Deployment
+from services.broker import mosquitto
+from services.broker.ports import PortTaken, require_free
+from services.runtime.deployment import DeploymentError, load_deployment, project_root
+from services.runtime.readiness import Readiness
+
+log = logging.getLogger("broker")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs until SIGTERM; 1 with one sentence where it cannot start."""
+    options = _parse(arguments)
+    logging.basicConfig(level=options.log_level.upper(), format="%(levelname)s %(name)s: %(message)s")
+    try:
+        return run(load_deployment(options.config))
+    except (DeploymentError, PortTaken, mosquitto.NotInstalled) as error:
+        log.error("%s", error)
+        return 1
+
+
+def run(deployment: Deployment) -> int:
+    """Serves; the readiness file is beaten once a second for as long as connections are accepted."""
+    section = deployment.mqtt
+    require_free(section.host, section.port, "choose another with GEMELO_MQTT_PORT or [mqtt] port in deploy/local.toml")
+    folder = project_root() / deployment.paths.run
+    folder.mkdir(parents=True, exist_ok=True)
+    readiness = Readiness(folder, "broker")
+    log.info("%s listens on %s port %d", section.broker, section.host, section.port)
+    if section.broker is Broker.MOSQUITTO:
+        return mosquitto.serve(section, folder, readiness.ready, readiness.not_ready)
+    from services.broker import embedded  # noqa: PLC0415  (half a second that mosquitto need not wait)
+
+    try:
+        return embedded.serve(section, readiness.ready)
+    finally:
+        readiness.not_ready()
+
+
+def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="gemelo-broker", description=__doc__)
+    parser.add_argument("--config", type=Path, default=None, help="deployment file [deploy/local.toml]")
+    parser.add_argument("--log-level", default="info", choices=("debug", "info", "warning", "error"))
+    return parser.parse_args(arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

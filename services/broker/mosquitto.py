@@ -1,0 +1,83 @@
+"""mosquitto in this process's place, so that what ends this process ends mosquitto."""
+
+from __future__ import annotations
+
+import os
+import select
+import shutil
+import signal
+import socket
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from schemas.deployment import MqttSection
+
+BEAT = 1.0  # [s]
+CONF = """\
+# Written by gemelo-broker at every start.
+listener {port} {host}
+allow_anonymous true
+set_tcp_nodelay true
+persistence false
+connection_messages false
+log_dest stderr
+log_type error
+log_type warning
+"""
+
+
+class NotInstalled(Exception):
+    """There is no mosquitto on this machine; one sentence with the remedy."""
+
+
+def find() -> str:
+    """The path of mosquitto, also where Debian keeps it out of a user's PATH."""
+    path = os.pathsep.join([os.environ.get("PATH", ""), "/usr/sbin", "/usr/local/sbin"])
+    found = shutil.which("mosquitto", path=path)
+    if found is None:
+        raise NotInstalled(
+            'the deployment says mqtt.broker = "mosquitto", but mosquitto is not installed: '
+            "sudo apt-get install mosquitto, or GEMELO_MQTT_BROKER=amqtt"
+        )
+    return found
+
+
+def serve(section: MqttSection, run: Path, beat: Callable[[], None], gone: Callable[[], None]) -> int:
+    """Becomes mosquitto; a small companion calls `beat` once a second while it accepts, and `gone` after it.
+
+    Does not return in the process that becomes mosquitto.
+    """
+    program = find()
+    conf = run / "mosquitto.conf"
+    conf.write_text(CONF.format(host=section.host, port=section.port))
+    alive, held = os.pipe()
+    if os.fork() == 0:
+        os.close(held)
+        _accompany(section, alive, beat, gone)
+        os._exit(0)
+    os.close(alive)
+    # Held open by mosquitto, never written: its end is seen by the companion whatever way it ends.
+    os.set_inheritable(held, True)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os.execv(program, [program, "-c", str(conf)])
+
+
+def _accompany(section: MqttSection, alive: int, beat: Callable[[], None], gone: Callable[[], None]) -> None:
+    for number in (signal.SIGTERM, signal.SIGINT):  # they are mosquitto's; this one ends with it
+        signal.signal(number, signal.SIG_IGN)
+    interval = 0.02
+    while not select.select([alive], [], [], interval)[0]:
+        if interval == BEAT or _accepts(section):
+            interval = BEAT
+            beat()
+    gone()
+
+
+def _accepts(section: MqttSection) -> bool:
+    try:
+        socket.create_connection((section.host, section.port), timeout=0.5).close()
+    except OSError:
+        return False
+    return True
