@@ -38,7 +38,8 @@ def run(deployment: Deployment) -> int:
     log.info("%s listens on %s port %d", section.broker, section.host, section.port)
     if section.broker is Broker.MOSQUITTO:
         return mosquitto.serve(section, folder, readiness.ready, readiness.not_ready)
-    from services.broker import embedded  # noqa: PLC0415  (half a second that mosquitto need not wait)
+    # amqtt takes half a second to import, which mosquitto need not wait for.
+    from services.broker import embedded
 
     try:
         return embedded.serve(section, readiness.ready)

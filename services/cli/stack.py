@@ -1,0 +1,210 @@
+"""The whole stack as a user starts it: process-compose on free ports, in folders of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+
+from services.cli.compose import Compose, ComposeError
+from services.runtime.deployment import project_root
+
+PROCESSES = (
+    "router",
+    "broker",
+    "virtual_esp32",
+    "stepper_gateway",
+    "state_publisher",
+    "planner",
+    "logger",
+    "visualizer",
+    "viewer",
+)
+POLL = 0.05  # [s]
+STOP = 20.0  # [s] for all to end by themselves
+
+
+class StackError(Exception):
+    """The stack did not do what was asked; the text holds the end of the logs that matter."""
+
+
+class Stack:
+    """Starts on entering, stops on leaving; every process can be looked at and killed by name.
+
+    `viewer="none"` leaves the viewer's process out. `environment` is added to what the stack gets.
+    """
+
+    def __init__(
+        self,
+        *,
+        broker: str = "amqtt",
+        viewer: str = "none",
+        out: Path | None = None,
+        processes: Sequence[str] | None = None,
+        environment: Mapping[str, str] | None = None,
+        ready_timeout: float = 60.0,
+    ) -> None:
+        self.root = project_root()
+        self.folder = Path(tempfile.mkdtemp(prefix="gemelo-"))
+        self.run = self.folder / "run"
+        self.out = (out or self.folder / "out").resolve()
+        left_out = ("viewer",) if viewer == "none" else ()
+        self.processes = tuple(processes or (name for name in PROCESSES if name not in left_out))
+        self.ready_seconds = 0.0
+        self._ready_timeout = ready_timeout
+        self.socket = self.folder / "process-compose.sock"
+        self.compose = Compose(self.socket)
+        self._server: subprocess.Popen[bytes] | None = None
+        router, mqtt, grpc, web = free_ports(4)
+        self.deployment: dict[str, str] = {
+            "GEMELO_ROUTER_PORT": str(router),
+            "GEMELO_MQTT_PORT": str(mqtt),
+            "GEMELO_MQTT_BROKER": broker,
+            "GEMELO_VIEWER_MODE": viewer,
+            "GEMELO_VIEWER_PORT": str(grpc),
+            "GEMELO_VIEWER_WEB_PORT": str(web),
+            "GEMELO_PATHS_RUN": str(self.run),
+            "GEMELO_PATHS_OUT": str(self.out),
+            **(environment or {}),
+        }
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """The environment in which clients of this stack run."""
+        return {**os.environ, **self.deployment}
+
+    def __enter__(self) -> Stack:
+        try:
+            self.start()
+        except BaseException:
+            self.stop()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def start(self) -> None:
+        """Starts every process and waits until all are ready; sets `ready_seconds`."""
+        self.run.mkdir(parents=True, exist_ok=True)
+        self.out.mkdir(parents=True, exist_ok=True)
+        started = time.monotonic()
+        arguments = [str(_process_compose(self.root)), "up", "-t=false", "--no-deps", *self.processes]
+        with (self.folder / "console.log").open("wb") as console:
+            self._server = subprocess.Popen(
+                arguments,
+                cwd=self.root,
+                env={
+                    **self.environment,
+                    "PC_SOCKET_PATH": str(self.socket),
+                    "PC_LOG_FILE": str(self.folder / "process-compose.log"),
+                },
+                stdin=subprocess.DEVNULL,
+                stdout=console,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+        self.wait_ready(self._ready_timeout)
+        self.ready_seconds = time.monotonic() - started
+
+    def stop(self) -> int | None:
+        """Ends all processes as Ctrl-C would; the exit code of process-compose."""
+        server, self._server = self._server, None
+        code = None
+        if server is not None:
+            server.send_signal(signal.SIGTERM)
+            try:
+                code = server.wait(STOP)
+            except subprocess.TimeoutExpired:
+                code = self._kill_all(server)
+        shutil.rmtree(self.folder, ignore_errors=True)
+        return code
+
+    def _kill_all(self, server: subprocess.Popen[bytes]) -> int:
+        with contextlib.suppress(ComposeError):
+            for pid in self.pids().values():
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+        server.kill()
+        return server.wait()
+
+    def wait_ready(self, timeout: float, names: Sequence[str] | None = None) -> None:
+        """Waits until all processes, or `names`, say that their state is valid; raises `StackError`."""
+        wanted = tuple(names or self.processes)
+        deadline = time.monotonic() + timeout
+        missing = wanted
+        while time.monotonic() < deadline:
+            if self._server is None or self._server.poll() is not None:
+                raise StackError(f"process-compose ended by itself:\n{self.console()[-2000:]}")
+            missing = tuple(name for name in missing if not self.is_ready(name))
+            if not missing:
+                return
+            time.sleep(POLL)
+        tails = "\n".join(f"--- {name}\n{self.logs(name)[-1500:]}" for name in missing)
+        raise StackError(f"not ready after {timeout:.0f} s: {', '.join(missing)}\n{tails}")
+
+    def is_ready(self, name: str) -> bool:
+        """Whether `name` says that its state is valid: the file that deploy/probe looks at."""
+        try:
+            return time.time() - (self.run / f"{name}.ready").stat().st_mtime < 3.0
+        except FileNotFoundError:
+            return False
+
+    def pid(self, name: str) -> int:
+        """The process id that `name` has now; 0 while it does not run."""
+        state = self.compose.process(name)
+        return state.pid if state.is_running else 0
+
+    def pids(self) -> dict[str, int]:
+        """Every process that runs, by name."""
+        return {state.name: state.pid for state in self.compose.processes() if state.is_running}
+
+    def kill(self, name: str, number: signal.Signals = signal.SIGKILL) -> int:
+        """Sends `number` to the process itself, and also clears what it said of its readiness; the pid."""
+        pid = self.pid(name)
+        if pid == 0:
+            raise StackError(f"{name} does not run")
+        os.kill(pid, number)
+        if number is signal.SIGKILL:
+            (self.run / f"{name}.ready").unlink(missing_ok=True)
+        return pid
+
+    def logs(self, name: str) -> str:
+        """Everything that `name` has printed."""
+        try:
+            return (self.out / "logs" / f"{name}.log").read_text(errors="replace")
+        except FileNotFoundError:
+            return ""
+
+    def console(self) -> str:
+        """What process-compose itself has printed."""
+        return (self.folder / "console.log").read_text(errors="replace")
+
+
+def free_ports(count: int) -> tuple[int, ...]:
+    """`count` different ports of loopback that nobody listens on now."""
+    sockets = [socket.socket() for _ in range(count)]
+    try:
+        for each in sockets:
+            each.bind(("127.0.0.1", 0))
+        return tuple(int(each.getsockname()[1]) for each in sockets)
+    finally:
+        for each in sockets:
+            each.close()
+
+
+def _process_compose(root: Path) -> Path:
+    found = root / ".venv/bin/process-compose"
+    if not found.exists():
+        raise StackError("process-compose is not there: run make setup")
+    return found
