@@ -1,0 +1,89 @@
+"""Commands that move the arm or tell how it is: move, state, hold, resume, stop, reset, reference."""
+
+from __future__ import annotations
+
+from services.cli.exits import ExitCode
+from services.cli.parser import Command, Options, Parser, finite_number
+
+MOVE_EXAMPLES = """examples:
+  gemelo move --to 0.25 0.15 0.10
+  gemelo move --joints brazo_joint=30deg antebrazo_joint=-45deg efector_joint=40mm
+  gemelo move --named ready --speed 0.5"""
+
+
+def move_options(parser: Parser) -> None:
+    parser.epilog = MOVE_EXAMPLES
+    goal = parser.add_mutually_exclusive_group(required=True)
+    goal.add_argument(
+        "--to", nargs=3, type=finite_number, metavar=("X", "Y", "Z"), help="tool position in the base frame [m]"
+    )
+    goal.add_argument(
+        "--joints", nargs="+", metavar="JOINT=VALUE", help="30deg, 0.5rad, 40mm, 0.04m; a bare number is rad or m"
+    )
+    goal.add_argument("--named", metavar="STATE", help="a named state of the SRDF")
+    parser.add_argument("--speed", type=finite_number, default=1.0, help="share of the velocity limits, in (0, 1]")
+    parser.add_argument("--plan-only", action="store_true", help="plan, and do not move")
+    parser.add_argument("--json", action="store_true", help="one JSON object instead of a line")
+
+
+def move(options: Options) -> ExitCode:
+    from services.cli.goals import goal_of, request_of
+    from services.cli.move import move
+    from services.cli.session import connect, load
+
+    _, arm = load()
+    request = request_of(goal_of(arm, options.to, options.joints or (), options.named), options.speed)
+    with connect() as session:
+        return move(session, request, options.plan_only, options.json)
+
+
+def state_options(parser: Parser) -> None:
+    parser.add_argument("-w", "--watch", action="store_true", help="again and again, until Ctrl-C")
+    parser.add_argument("--json", action="store_true", help="JSON, in SI units")
+
+
+def state(options: Options) -> ExitCode:
+    from services.cli.session import connect
+    from services.cli.state import state
+
+    with connect() as session:
+        return state(session, options.watch, options.json)
+
+
+def device_command(options: Options) -> ExitCode:
+    from schemas.device import DeviceCommandKind
+    from services.cli.device import command
+    from services.cli.session import connect
+
+    with connect() as session:
+        return command(session, DeviceCommandKind[options.command.words[0].upper()])
+
+
+def reference_options(parser: Parser) -> None:
+    parser.add_argument(
+        "--joints", nargs="+", default=[], metavar="JOINT=VALUE", help="where they stand, as 30deg or 40mm"
+    )
+
+
+def reference(options: Options) -> ExitCode:
+    from services.cli.device import reference
+    from services.cli.session import connect
+
+    with connect() as session:
+        return reference(session, options.joints)
+
+
+COMMANDS = (
+    Command(("move",), "plan a way to a goal and go it; Ctrl-C slows the arm down to rest", move, move_options),
+    Command(("state",), "joints, tool, steps commanded and executed, device", state, state_options),
+    Command(("hold",), "slow down on the path and stand there", device_command),
+    Command(("resume",), "go on along the path after a hold", device_command),
+    Command(("stop",), "slow down on the path and forget the rest of it", device_command),
+    Command(("reset",), "leave Fault or EStop, when a person has seen why", device_command),
+    Command(
+        ("reference",),
+        "declare where the joints stand; those not named stand at robot.toml's reference position",
+        reference,
+        reference_options,
+    ),
+)

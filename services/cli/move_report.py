@@ -1,0 +1,74 @@
+"""What is said about a move when it has ended."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from schemas.motion import JointTrajectory
+from services.cli.exits import ExitCode
+
+if TYPE_CHECKING:
+    from services.arm.description import Arm
+
+
+class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
+    """The outcome of one move; also what `--json` prints."""
+
+    robot: str
+    status: str = "PLANNED"
+    succeeded: bool = True
+    interrupted: bool = False
+    reason: str = ""
+    planned_ms: float
+    duration_s: float
+    took_s: float = 0.0
+    final_error_mm: float | None = None  # of the tool, when it has arrived
+    final_error_steps: dict[str, float] = {}
+    max_following_error_steps: dict[str, float] = {}
+    stopped_at: dict[str, str] = {}
+
+    @property
+    def exit_code(self) -> ExitCode:
+        if self.succeeded:
+            return ExitCode.OK
+        return ExitCode.CANCELLED if self.interrupted and self.status == "CANCELED" else ExitCode.FAILED
+
+    def as_json(self) -> str:
+        return msgspec.json.encode(self).decode()
+
+
+def summary(report: MoveReport, plan_only: bool = False) -> str:
+    """The one line that a person reads."""
+    planned = f"planned in {report.planned_ms:.1f} ms"
+    if plan_only:
+        return f"{planned}, would take {report.duration_s:.2f} s"
+    where = ", ".join(f"{name} {position}" for name, position in report.stopped_at.items())
+    if report.status == "CANCELED":
+        return f"cancelled after {report.took_s:.2f} s: stopped at {where or 'an unknown place'}"
+    if not report.succeeded:
+        reason = report.reason or "no reason was given"
+        return f"{report.status.lower()} after {report.took_s:.2f} s: {reason}" + (f"; now at {where}" if where else "")
+    steps = ", ".join(f"{name} {error:+.2f}" for name, error in report.final_error_steps.items())
+    millimetres = "unknown" if report.final_error_mm is None else f"{report.final_error_mm:.3f} mm"
+    return f"{planned}, took {report.took_s:.2f} s, final error {millimetres}, steps: {steps}"
+
+
+def tool_error_mm(arm: Arm, trajectory: JointTrajectory, errors: Mapping[str, float]) -> float:
+    """How far the tool is from where the trajectory ends [mm], by the final `errors` [steps] of the joints.
+
+    Forward kinematics of both: the goal, and the goal minus the error.
+    """
+    from services.arm.chain import link_transforms
+
+    goals = dict(zip(trajectory.joint_names, trajectory.points[-1].positions, strict=True))
+    reached = {
+        joint.name: goals[joint.name] - errors.get(joint.name, 0.0) / joint.steps.per_unit
+        for joint in arm.joints
+        if joint.name in goals
+    }
+    wanted_at, reached_at = (link_transforms(arm.model, each)[arm.tool_frame][0] for each in (goals, reached))
+    return math.dist(wanted_at, reached_at) * 1e3
