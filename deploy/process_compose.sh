@@ -45,12 +45,12 @@ build_by() {
     mkdir -p "$state/bin"
     say "    building process-compose $pinned_version from deploy/tools/go.mod: about a minute the first time"
     CGO_ENABLED=0 GOWORK=off run "$1" -C "$tools" build -trimpath -mod=readonly -o "$own_binary" \
-        -ldflags "-s -w -X $config.Version=$pinned_version -X $config.Commit=go.sum" "$module"
+        -ldflags "-s -w -X $config.Version=$pinned_version" "$module"
 }
 
 build_with_go() {
     local go minor
-    go=$(first_of go /usr/local/go/bin/go) || { say "    there is no Go on PATH"; return 1; }
+    go=$(first_of go) || { say "    there is no Go on PATH"; return 1; }
     minor=$("$go" version | sed -n 's/^go version go1\.\([0-9]*\).*/\1/p')
     # From 1.21 on Go fetches a newer toolchain by itself; before, it cannot read our go.mod.
     [ "${minor:-0}" -ge 21 ] || { say "    $go is 1.${minor:-?}: too old"; return 1; }

@@ -46,6 +46,8 @@ install_uv() {
     fi
 }
 
-# uv does not read pip's settings: pass on a mirror and a certificate that are set for pip.
+# uv reads neither pip's settings nor the machine's certificates: pass both on.
 [ -z "${PIP_INDEX_URL:-}" ] || export UV_DEFAULT_INDEX=${UV_DEFAULT_INDEX:-$PIP_INDEX_URL}
-[ -z "${PIP_CERT:-}" ] || export SSL_CERT_FILE=${SSL_CERT_FILE:-$PIP_CERT}
+for certificates in "${SSL_CERT_FILE:-}" "${PIP_CERT:-}" /etc/ssl/certs/ca-certificates.crt; do
+    if [ -f "$certificates" ]; then export SSL_CERT_FILE=$certificates && break; fi
+done

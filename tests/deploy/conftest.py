@@ -1,0 +1,84 @@
+"""A copy of what the bootstrap needs, on a machine whose programs the test chooses."""
+
+from __future__ import annotations
+
+import shutil
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from services.runtime.deployment import project_root
+
+COMMON = """bash sh cat chmod cut dirname env find flock grep head ln mkdir mktemp mv
+    rm sed sha256sum sort touch tr uname"""
+UV = """#!/bin/sh
+echo "uv $*" >> "$HOME/uv.log"
+mkdir -p .venv/bin
+ln -sf "$(command -v python3)" .venv/bin/python
+touch .venv/bin/gemelo
+"""
+PROCESS_COMPOSE = """#!/bin/sh
+[ "$1" = version ] && echo "Version:        {version}"
+exit 0
+"""
+
+
+class Machine:
+    """A project folder and a PATH with the common tools and nothing else."""
+
+    def __init__(self, folder: Path) -> None:
+        self.root = folder / "project"
+        self.bin = folder / "bin"
+        self.home = folder / "home"
+        for each in (self.root, self.bin, self.home):
+            each.mkdir()
+        source = project_root()
+        shutil.copytree(source / "deploy", self.root / "deploy")
+        for name in ("pyproject.toml", "requirements.lock", "process-compose.yaml"):
+            shutil.copy(source / name, self.root)
+        for name in COMMON.split():
+            self.link(name)
+        self.write(
+            self.root / "firmware/bindings/build.sh", "mkdir -p firmware/build; touch firmware/build/libgemelo_core.so"
+        )
+
+    def link(self, name: str) -> None:
+        """Gives the machine this machine's own `name`."""
+        found = shutil.which(name)
+        assert found is not None, f"{name} is not on this machine"
+        (self.bin / name).symlink_to(found)
+
+    def program(self, name: str, text: str) -> None:
+        """Gives the machine a program of the test's own."""
+        self.write(self.bin / name, text)
+
+    def write(self, path: Path, text: str) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        path.chmod(path.stat().st_mode | stat.S_IXUSR)
+
+    def bootstrap(self) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [self.bin / "bash", "deploy/bootstrap"],
+            cwd=self.root,
+            env={"PATH": str(self.bin), "HOME": str(self.home), "LC_ALL": "C"},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+
+    def complete(self) -> None:
+        """Everything that the bootstrap looks for, faked so that nothing is fetched or built."""
+        (self.bin / "python3").symlink_to(Path(sys.executable).resolve())
+        self.program("uv", UV)
+        self.program("c++", "#!/bin/sh\nexit 0\n")
+        self.program("process-compose", PROCESS_COMPOSE.format(version="v1.85.0"))
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Machine:
+    return Machine(tmp_path)

@@ -1,0 +1,41 @@
+"""requirements.lock: complete, hashed, and without a word of where things come from."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+
+import pytest
+
+from services.runtime.deployment import project_root
+
+ROOT = project_root()
+LOCKS = [ROOT / "requirements.lock", ROOT / "deploy/tools/uv.lock", ROOT / "deploy/tools/go.lock"]
+
+
+def requirements():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = [name for names in project["optional-dependencies"].values() for name in names]
+    return project["dependencies"] + extras
+
+
+@pytest.mark.parametrize("lock", LOCKS, ids=lambda lock: lock.name)
+def test_a_lock_holds_no_download_address(lock):
+    assert not re.search(r"https?://|file://|--(extra-)?index|--find-links| @ ", lock.read_text())
+
+
+@pytest.mark.parametrize("lock", LOCKS, ids=lambda lock: lock.name)
+def test_every_package_of_a_lock_is_pinned_by_hash(lock):
+    entries = re.split(r"\n(?=[a-z0-9])", lock.read_text(), flags=re.IGNORECASE)
+    packages = [entry for entry in entries if not entry.startswith("#")]
+    assert packages
+    for entry in packages:
+        assert re.match(r"[\w.-]+==\S+", entry), entry
+        assert "--hash=sha256:" in entry, entry
+
+
+def test_every_requirement_is_pinned_and_locked_at_that_version():
+    locked = (ROOT / "requirements.lock").read_text()
+    for requirement in requirements():
+        assert "==" in requirement, f"{requirement} is not pinned"
+        assert f"\n{requirement} " in f"\n{locked}", f"{requirement} is not in the lock: make lock"
