@@ -27,7 +27,7 @@ def run(node: Node, deployment: Deployment) -> None:
     disk = Disk(node.robot, origin(node.robot, root), node.log.warning)
     for topic in recorded_topics():
         _subscribe(node, logger, topic)
-    default_folder = root / deployment.paths.out / "log"
+    default_folder = root / deployment.paths.out / "recordings"
     said = ""
 
     def write(now: int, batch: Batch) -> None:

@@ -1,0 +1,188 @@
+"""Messages in, columns out: what the viewer is told ten times a second. Pure.
+
+Positions are in rad and m on the bus and in degrees and millimetres here, because here is the screen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from schemas.device import DeviceEvent, DeviceState, DeviceStatus
+from schemas.joints import JointState, StepErrors
+from schemas.planning import PlannedPath
+from schemas.system import LogRecord
+from services.visualizer import entities
+from services.visualizer.model import Joint, Model
+from services.visualizer.panel import Facts, mode_name, panel
+from services.visualizer.rotations import Array
+from services.visualizer.thinning import Thinned
+from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip, Times, Update
+
+PANEL_PERIOD = 500_000_000  # [ns]
+BAND = 0.5  # [steps] rounding to whole steps alone gives as much
+
+
+class Visualizer:
+    """The newest state of one arm, and the samples that have not been shown yet."""
+
+    def __init__(self, model: Model, robot: str, tool: str) -> None:
+        self.model = model
+        self._tool = tool
+        self._names = [joint.name for joint in model.moving]
+        width = len(self._names)
+        self._executed, self._commanded, self._errors = Thinned(width), Thinned(width), Thinned(width)
+        self._logs: list[tuple[int, str, str]] = []
+        self._path: PlannedPath | None = None
+        self._path_is_new = False
+        self._tip: Array | None = None  # where the trail ends
+        self._shown = ("", "")  # mode, panel
+        self._panel_at = 0
+        prismatic = frozenset(joint.name for joint in model.moving if joint.is_prismatic)
+        self._facts = Facts(robot=robot, prismatic=prismatic)
+
+    def on_joint_state(self, message: JointState) -> None:
+        """What the arm did."""
+        self._facts = replace(self._facts, joints=message)
+        self._executed.add(message.stamp, self._row(message.name, message.position, self._executed))
+
+    def on_joint_command(self, message: JointState) -> None:
+        """What the path asked for at the same instant."""
+        self._commanded.add(message.stamp, self._row(message.name, message.position, self._commanded))
+
+    def on_step_errors(self, message: StepErrors) -> None:
+        """Commanded minus executed steps."""
+        self._facts = replace(self._facts, errors=message)
+        self._errors.add(message.stamp, self._row(message.name, message.error, self._errors))
+
+    def on_device_state(self, message: DeviceState) -> None:
+        """Mode, queue, counters."""
+        self._facts = replace(self._facts, state=message)
+
+    def on_device_status(self, message: DeviceStatus) -> None:
+        """Whether the device is there."""
+        self._facts = replace(self._facts, status=message)
+
+    def on_planned_path(self, message: PlannedPath) -> None:
+        """The way the tool will take."""
+        self._path, self._path_is_new = message, True
+
+    def on_log(self, message: LogRecord) -> None:
+        """A line of a node."""
+        self._logs.append((message.stamp, f"{message.node}: {message.text}", message.level.name))
+
+    def on_event(self, message: DeviceEvent) -> None:
+        """Something that the device reports once."""
+        text = f"{message.device}: {message.event}" + (f" ({message.detail})" if message.detail else "")
+        self._logs.append((message.stamp, text, "ERROR" if message.event == "fault" else "INFO"))
+
+    def step(self, now: int) -> list[Update]:
+        """Everything new; `now` in ns UNIX."""
+        return [*self._measured(), *self._ghost(), *self._step_errors(), *self._planned(), *self._device(now),
+                *self._log_lines()]  # fmt: skip
+
+    def restart(self) -> None:
+        """Say the lasting things again: the viewer is a new one."""
+        self._path_is_new = self._path is not None
+        self._shown, self._tip, self._panel_at = ("", ""), None, 0
+
+    def _row(self, names: Sequence[str], values: Sequence[float], before: Thinned) -> list[float]:
+        row = list(before.newest or (0.0,) * len(self._names))
+        for name, value in zip(names, values, strict=False):
+            if name in self._names:
+                row[self._names.index(name)] = value
+        return row
+
+    def _measured(self) -> list[Update]:
+        times, rows = self._executed.take()
+        if not len(times):
+            return []
+        plots = self._plots(times, rows, entities.executed)
+        return [*self._poses(entities.MEASURED, times, rows), *plots, *self._trail(times, rows)]
+
+    def _ghost(self) -> list[Update]:
+        times, rows = self._commanded.take()
+        if not len(times):
+            return []
+        return [*self._poses(entities.COMMANDED, times, rows), *self._plots(times, rows, entities.commanded)]
+
+    def _poses(self, root: str, times: Times, rows: Array) -> list[Update]:
+        return [
+            Poses(
+                f"{root}/{self.model.paths[joint.child]}", times,
+                *joint.poses(self.model.positions(joint, rows, self._names)),
+            )
+            for joint in self.model.joints if joint.is_moving
+        ]  # fmt: skip
+
+    def _plots(self, times: Times, rows: Array, entity: Callable[[str], str]) -> list[Update]:
+        return [
+            Scalars(entity(joint.name), times, rows[:, [column]] * on_screen(joint))
+            for column, joint in enumerate(self.model.moving)
+        ]
+
+    def _trail(self, times: Times, rows: Array) -> list[Update]:
+        points = self.model.tips(self._tool, rows, self._names)
+        line = points if self._tip is None else np.vstack([self._tip, points])
+        self._tip = points[-1:]
+        moved = len(line) > 1 and float(np.ptp(line, axis=0).max()) > 1e-6
+        return [Strip(entities.TRAIL, int(times[-1]), line)] if moved else []
+
+    def _step_errors(self) -> list[Update]:
+        times, rows = self._errors.take()
+        if not len(times):
+            return []
+        edges = np.tile([BAND, -BAND], (len(times), 1))
+        return [
+            Scalars(entities.error(name), times, np.column_stack([rows[:, column], edges]))
+            for column, name in enumerate(self._names)
+        ]
+
+    def _planned(self) -> list[Update]:
+        if self._path is None or not self._path_is_new:
+            return []
+        self._path_is_new = False
+        return [Strip(entities.PATH, self._path.stamp, np.array(self._path.points, dtype=float).reshape(-1, 3))]
+
+    def _device(self, now: int) -> list[Update]:
+        if now - self._panel_at < PANEL_PERIOD:
+            return []
+        self._panel_at = now
+        mode, text = self._mode(), panel(self._facts, now)
+        shown, self._shown = self._shown, (mode, text)
+        updates: list[Update] = []
+        updates += [State(entities.MODE, now, mode)] if mode != shown[0] else []
+        updates += [Panel(entities.PANEL, now, text)] if text != shown[1] else []
+        return updates
+
+    def _mode(self) -> str:
+        if self._facts.status is not None and not self._facts.status.online:
+            return "OFFLINE"
+        return "WAITING" if self._facts.state is None else mode_name(self._facts.state)
+
+    def _log_lines(self) -> list[Update]:
+        logs, self._logs = self._logs, []
+        if not logs:
+            return []
+        stamps, lines, levels = zip(*logs, strict=True)
+        texts = tuple(f"{time_of_day(stamp)} {line}" for stamp, line in zip(stamps, lines, strict=True))
+        return [LogLines(entities.LOG, np.array(stamps, dtype=np.int64), texts, levels)]
+
+
+def on_screen(joint: Joint) -> float:
+    """Screen units per SI unit: mm for a prismatic joint, degrees for the others."""
+    return 1e3 if joint.is_prismatic else math.degrees(1.0)
+
+
+def time_of_day(stamp: int) -> str:
+    """UTC to the second, of ns UNIX."""
+    minutes, seconds = divmod(stamp // 1_000_000_000 % 86_400, 60)
+    return f"{minutes // 60:02d}:{minutes % 60:02d}:{seconds:02d}"
+
+
+def unit(joint: Joint) -> str:
+    """The screen's unit."""
+    return "mm" if joint.is_prismatic else "°"

@@ -1,0 +1,30 @@
+"""Where things stand in the viewer's tree."""
+
+from __future__ import annotations
+
+WORLD = "world"
+MEASURED = f"{WORLD}/measured"
+COMMANDED = f"{WORLD}/commanded"
+PATH = f"{WORLD}/planned_path"
+TRAIL = f"{WORLD}/tool_trail"
+MODE = "device/mode"
+PANEL = "device/panel"
+LOG = "log"
+
+
+def position(joint: str) -> str:
+    """Two series: commanded, executed."""
+    return f"joints/{joint}/position"
+
+
+def commanded(joint: str) -> str:
+    return f"{position(joint)}/commanded"
+
+
+def executed(joint: str) -> str:
+    return f"{position(joint)}/executed"
+
+
+def error(joint: str) -> str:
+    """Three series: the step error and both edges of its band."""
+    return f"joints/{joint}/step_error"

@@ -1,0 +1,77 @@
+"""`gemelo-visualizer`: what the arm does, as columns for the Rerun viewer, a recording, or both."""
+
+from __future__ import annotations
+
+from schemas.deployment import Deployment
+from schemas.frames import RobotDescription
+from schemas.topics import (
+    DESCRIPTION,
+    DEVICE_EVENTS,
+    DEVICE_STATE,
+    DEVICE_STATUS,
+    JOINT_COMMANDS,
+    JOINT_STATES,
+    LOG,
+    PLANNED_PATH,
+    STEP_ERRORS,
+)
+from services.runtime.application import service
+from services.runtime.deployment import project_root
+from services.runtime.node import Node
+from services.visualizer.core import Visualizer
+from services.visualizer.meshes import missing_meshes
+from services.visualizer.outputs import Outputs
+from services.visualizer.parameters import VisualizerParameters
+from services.visualizer.tool import tool_link
+from services.visualizer.urdf import parse_urdf
+
+BATCH_RATE = 10.0  # [Hz]
+
+
+def run(node: Node, deployment: Deployment) -> None:
+    """Wait for the description, then show everything in batches."""
+    root = project_root()
+    outputs = Outputs(deployment.viewer, root / deployment.robot, root, node.parameters(VisualizerParameters).value)
+    visualizer: Visualizer | None = None
+
+    def on_description(message: RobotDescription) -> None:
+        nonlocal visualizer
+        if visualizer is None:
+            visualizer = _visualizer(node, message)
+            for name in missing_meshes(visualizer.model, root / deployment.robot):
+                node.log.warning(f"mesh {name} is missing in {root / deployment.robot}: its link is drawn without it")
+
+    def step(now: int) -> None:
+        if visualizer is None:
+            node.set_ready(False, "no robot description yet: is state_publisher running?")
+            return
+        trouble = outputs.step(visualizer, now, node.monotonic())
+        node.set_ready(not trouble, trouble)
+
+    node.subscribe(DESCRIPTION, on_description)
+    node.spin(step, rate=BATCH_RATE)
+    outputs.close()
+
+
+def _visualizer(node: Node, message: RobotDescription) -> Visualizer:
+    """The core for the arm that was described, fed from the bus."""
+    model = parse_urdf(message.urdf)
+    core = Visualizer(model, message.robot, tool_link(model, message.robot_toml))
+    node.subscribe(JOINT_STATES, core.on_joint_state)
+    node.subscribe(JOINT_COMMANDS, core.on_joint_command)
+    node.subscribe(STEP_ERRORS, core.on_step_errors)
+    node.subscribe(DEVICE_STATE, core.on_device_state)
+    node.subscribe(DEVICE_STATUS, core.on_device_status)
+    node.subscribe(DEVICE_EVENTS, core.on_event)
+    node.subscribe(PLANNED_PATH, core.on_planned_path)
+    node.subscribe(LOG, core.on_log)
+    return core
+
+
+def main() -> None:
+    """Entry point."""
+    service("visualizer", run)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,22 @@
+"""One meaning, one colour: measured is solid and warm, commanded is light and blue."""
+
+from __future__ import annotations
+
+Color = tuple[int, int, int]
+
+ARM = (198, 202, 208)  # links whose URDF names no colour
+GHOST = (86, 156, 255, 60)
+EXECUTED = (255, 122, 48)
+COMMANDED = (122, 180, 255)
+ERROR = (255, 122, 48)
+BAND = (240, 190, 60)
+PATH = (122, 180, 255)
+TRAIL = (255, 122, 48)
+GRID = (140, 148, 160, 50)
+BACKGROUND = (22, 25, 30)
+
+MODES = {
+    "OFFLINE": (110, 110, 110), "WAITING": (110, 110, 110), "BOOT": (150, 150, 150), "UNREFERENCED": (222, 170, 60),
+    "HOMING": (170, 130, 230), "IDLE": (84, 160, 110), "RUN": (86, 156, 255), "HOLD": (240, 190, 60),
+    "FAULT": (230, 70, 70), "ESTOP": (230, 70, 70),
+}  # fmt: skip

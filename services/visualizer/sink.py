@@ -1,0 +1,119 @@
+"""Updates into one Rerun recording stream; with the layout, the only place that knows Rerun's columns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+
+from services.visualizer import entities, palette
+from services.visualizer.layout import TIMELINE, blueprint
+from services.visualizer.meshes import mesh_path
+from services.visualizer.model import Joint, Model, Visual
+from services.visualizer.shapes import mesh_of
+from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip, Times, Update
+
+APPLICATION = "gemelo"
+GHOST_MARGIN = 0.0015  # [m] the ghost is a skin around the arm, or the two would flicker
+
+
+class Sink:
+    """A stream that has been told the static things, and takes updates."""
+
+    def __init__(self, stream: rr.RecordingStream, model: Model, folder: Path, window: float, trail: float) -> None:
+        self._stream = stream
+        self._model = model
+        self._folder = folder  # of the robot: meshes stand relative to it
+        self._send_static()
+        stream.send_blueprint(blueprint(model, window, trail))
+
+    def write(self, updates: list[Update]) -> None:
+        """Send a batch."""
+        for update in updates:
+            self._write(update)
+
+    def close(self, timeout: float = 2.0) -> None:
+        """Hand over what is left, waiting at most `timeout` [s], and let go."""
+        try:
+            self._stream.flush(timeout_sec=timeout)
+        finally:
+            self._stream.disconnect()
+
+    def _write(self, update: Update) -> None:
+        match update:
+            case Scalars(entity, times, values):
+                columns = rr.Scalars.columns(scalars=values if values.shape[1] > 1 else values[:, 0])
+                self._send(entity, times, columns)
+            case Poses(entity, times, translations, rotations):
+                columns = rr.Transform3D.columns(translation=translations, quaternion=rotations)
+                self._send(entity, times, columns)
+            case Strip(entity, time, points):
+                self._send(entity, _once(time), rr.LineStrips3D.columns(strips=[points]))
+            case Panel(entity, time, markdown):
+                self._send(entity, _once(time), rr.TextDocument.columns(text=[markdown], media_type=["text/markdown"]))
+            case State(entity, time, state):
+                self._send(entity, _once(time), rr.StateChange.columns(state=[state]))
+            case LogLines(entity, times, texts, levels):
+                self._send(entity, times, rr.TextLog.columns(text=list(texts), level=[_level(name) for name in levels]))
+
+    def _send(self, entity: str, times: Times, columns: rr.ComponentColumnList) -> None:
+        index = rr.TimeColumn(TIMELINE, timestamp=times.astype("datetime64[ns]"))
+        self._stream.send_columns(entity, [index], columns)
+
+    def _send_static(self) -> None:
+        log = self._stream.log
+        log(entities.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for root, is_ghost in ((entities.MEASURED, False), (entities.COMMANDED, True)):
+            self._send_arm(root, is_ghost)
+        log(entities.PATH, rr.LineStrips3D.from_fields(colors=[palette.PATH], radii=[0.0022]), static=True)
+        log(entities.TRAIL, rr.LineStrips3D.from_fields(colors=[palette.TRAIL], radii=[0.0012]), static=True)
+        for joint in self._model.moving:
+            self._send_styles(joint)
+        names = list(palette.MODES)
+        log(entities.MODE, rr.StateConfiguration(values=names, labels=names, colors=list(palette.MODES.values())),
+            static=True)  # fmt: skip
+
+    def _send_arm(self, root: str, is_ghost: bool) -> None:
+        for joint in self._model.joints:
+            pose = rr.Transform3D(translation=joint.translation, quaternion=joint.rotation)
+            self._stream.log(f"{root}/{self._model.paths[joint.child]}", pose, static=not joint.is_moving)
+        for link, visuals in self._model.visuals.items():
+            for index, visual in enumerate(visuals):
+                entity = f"{root}/{self._model.paths[link]}/visual_{index}"
+                pose = rr.Transform3D(translation=visual.translation, quaternion=visual.rotation)
+                drawn = self._drawn(visual, is_ghost)
+                if drawn is not None:
+                    self._stream.log(entity, pose, drawn, static=True)
+
+    def _drawn(self, visual: Visual, is_ghost: bool) -> rr.Mesh3D | rr.Asset3D | None:
+        """The visual in its colour; None where its file is missing, which is not worth the whole view."""
+        color = palette.GHOST if is_ghost else (visual.color or palette.ARM)
+        if visual.shape.kind == "mesh":
+            path = mesh_path(self._folder, visual.shape.file)
+            # A mesh file brings its own colours, and a URDF's colour stands over them.
+            tint = palette.GHOST if is_ghost else visual.color
+            return rr.Asset3D(path=path, albedo_factor=tint) if path.is_file() else None
+        mesh = mesh_of(visual.shape, GHOST_MARGIN if is_ghost else 0.0)
+        return rr.Mesh3D(
+            vertex_positions=mesh.vertices, vertex_normals=mesh.normals, triangle_indices=mesh.triangles,
+            albedo_factor=color,
+        )  # fmt: skip
+
+    def _send_styles(self, joint: Joint) -> None:
+        self._style(entities.commanded(joint.name), [("commanded", palette.COMMANDED, 4.0)])
+        self._style(entities.executed(joint.name), [("executed", palette.EXECUTED, 1.5)])
+        band = [("+0.5 step", palette.BAND, 1.5), ("-0.5 step", palette.BAND, 1.5)]
+        self._style(entities.error(joint.name), [("commanded - executed", palette.ERROR, 1.5), *band])
+
+    def _style(self, entity: str, series: list[tuple[str, palette.Color, float]]) -> None:
+        names, colors, widths = zip(*series, strict=True)
+        self._stream.log(entity, rr.SeriesLines(colors=colors, widths=widths, names=names), static=True)
+
+
+def _once(time: int) -> Times:
+    return np.array([time], dtype=np.int64)
+
+
+def _level(name: str) -> str:
+    return {"WARNING": "WARN", "FATAL": "CRITICAL"}.get(name, name)

@@ -1,0 +1,56 @@
+"""Samples of one source between two batches; while nothing changes, only two a second are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from services.visualizer.rotations import Array
+from services.visualizer.updates import Times
+
+KEEP_ALIVE = 500_000_000  # [ns] between samples that say the same
+
+Sample = tuple[int, tuple[float, ...]]
+
+
+class Thinned:
+    """Rows of a fixed width in the order of their stamps."""
+
+    def __init__(self, width: int) -> None:
+        self._width = width
+        self._kept: list[Sample] = []
+        self._last: Sample | None = None  # newest kept
+        self._held: Sample | None = None  # newest that said the same as the last kept
+
+    @property
+    def newest(self) -> tuple[float, ...] | None:
+        """The newest row, kept or not."""
+        return None if self._last is None else self._last[1]
+
+    def add(self, stamp: int, row: Sequence[float]) -> None:
+        """A sample; one that is not newer than the last is left out."""
+        sample = stamp, tuple(row)
+        if self._last is None:
+            self._keep(sample)
+        elif stamp <= (self._held or self._last)[0]:
+            return
+        elif sample[1] != self._last[1]:
+            # The line must stay level up to the change.
+            if self._held is not None:
+                self._keep(self._held)
+            self._keep(sample)
+        elif stamp - self._last[0] >= KEEP_ALIVE:
+            self._keep(sample)
+        else:
+            self._held = sample
+
+    def take(self) -> tuple[Times, Array]:
+        """Stamps (n,) and rows (n, width) kept since the last call."""
+        kept, self._kept = self._kept, []
+        times = np.array([stamp for stamp, _ in kept], dtype=np.int64)
+        return times, np.array([row for _, row in kept], dtype=np.float64).reshape(len(kept), self._width)
+
+    def _keep(self, sample: Sample) -> None:
+        self._kept.append(sample)
+        self._last, self._held = sample, None

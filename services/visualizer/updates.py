@@ -1,0 +1,72 @@
+"""What the core wants shown: typed columns for entities, without a word of Rerun. Times are ns UNIX."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from services.visualizer.rotations import Array
+
+Times = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Scalars:
+    """Values (n, series) at times (n,)."""
+
+    entity: str
+    times: Times
+    values: Array
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Translations (n, 3) [m] and quaternions (n, 4) x y z w in the parent entity, at times (n,)."""
+
+    entity: str
+    times: Times
+    translations: Array
+    rotations: Array
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A line through points (n, 3) [m] in the root frame."""
+
+    entity: str
+    time: int
+    points: Array
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A text in Markdown that replaces the previous one."""
+
+    entity: str
+    time: int
+    markdown: str
+
+
+@dataclass(frozen=True)
+class LogLines:
+    """Lines with their levels (as in `LogLevel`'s names)."""
+
+    entity: str
+    times: Times
+    texts: tuple[str, ...]
+    levels: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class State:
+    """A named state that lasts until the next."""
+
+    entity: str
+    time: int
+    state: str
+
+
+Update: TypeAlias = Scalars | Poses | Strip | Panel | LogLines | State

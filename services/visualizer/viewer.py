@@ -1,0 +1,153 @@
+"""`gemelo-viewer`: runs the Rerun viewer on loopback, and says where it is and whether it answers.
+
+The viewer is a child rather than this process itself because somebody has to keep the readiness file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from urllib.parse import quote
+
+from schemas.deployment import Deployment, ViewerMode, ViewerSection
+from services.runtime.deployment import load_deployment, project_root
+from services.runtime.readiness import Readiness
+from services.visualizer.binary import rerun_binary
+from services.visualizer.child import start, stop
+from services.visualizer.connection import Watch
+
+PERIOD = 0.5  # [s] between two looks at the child
+EARLY = 5.0  # [s] a native viewer that ends sooner had no display that it could use
+
+
+def resolved(mode: ViewerMode, environ: Mapping[str, str], platform: str = sys.platform) -> ViewerMode:
+    """AUTO made definite: native where there is a display."""
+    if mode is not ViewerMode.AUTO:
+        return mode
+    has_display = platform != "linux" or bool(environ.get("DISPLAY") or environ.get("WAYLAND_DISPLAY"))
+    return ViewerMode.NATIVE if has_display else ViewerMode.WEB
+
+
+def command(program: Path, viewer: ViewerSection, mode: ViewerMode, memory: str) -> list[str]:
+    """The command line of the program."""
+    common = [str(program), "--bind", viewer.host, "--port", str(viewer.port)]
+    if mode is ViewerMode.WEB:
+        return [*common, "--serve-web", "--web-viewer-port", str(viewer.web_port), "--server-memory-limit", memory]
+    return [*common, "--memory-limit", memory, "--server-memory-limit", "64MB", "--hide-welcome-screen"]
+
+
+def address(viewer: ViewerSection, mode: ViewerMode) -> str:
+    """Where a person finds the view."""
+    stream = f"rerun+http://{viewer.host}:{viewer.port}/proxy"
+    if mode is ViewerMode.WEB:
+        return f"http://{viewer.host}:{viewer.web_port}/?url={quote(stream, safe='')}"
+    return f"a window on this display (data: {stream})"
+
+
+def taken_port(viewer: ViewerSection, mode: ViewerMode) -> str:
+    """A sentence about the first port that is in use by another program; empty where all are free."""
+    keys = ["port", "web_port"] if mode is ViewerMode.WEB else ["port"]
+    for key in keys:
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((viewer.host, getattr(viewer, key)))
+            except OSError as error:
+                remedy = f"stop what uses it, or set viewer.{key} in the deployment file or GEMELO_VIEWER_{key.upper()}"
+                return f"viewer: cannot listen on {viewer.host}:{getattr(viewer, key)} ({error.strerror}); {remedy}"
+    return ""
+
+
+def run(deployment: Deployment, memory: str, stopping: threading.Event) -> int:
+    """Keep the viewer and its readiness until asked to stop; returns the exit code."""
+    run_folder = project_root() / deployment.paths.run
+    run_folder.mkdir(parents=True, exist_ok=True)
+    readiness = Readiness(run_folder, "viewer")
+    mode = resolved(deployment.viewer.mode, os.environ)
+    try:
+        if mode is ViewerMode.NONE:
+            return _idle(readiness, stopping)
+        trouble = taken_port(deployment.viewer, mode)
+        if trouble:
+            return _say_error(trouble)
+        code = _keep(deployment.viewer, mode, memory, readiness, stopping)
+        if code and mode is not deployment.viewer.mode and mode is ViewerMode.NATIVE and not stopping.is_set():
+            print("viewer: no window could be opened; showing it in the browser instead", flush=True)
+            return _keep(deployment.viewer, ViewerMode.WEB, memory, readiness, stopping)
+        return code
+    finally:
+        readiness.not_ready()
+
+
+def _idle(readiness: Readiness, stopping: threading.Event) -> int:
+    print("viewer: none wanted (viewer.mode is `none`)", flush=True)
+    readiness.ready()
+    while not stopping.wait(1.0):
+        readiness.beat()
+    return 0
+
+
+def _keep(viewer: ViewerSection, mode: ViewerMode, memory: str, readiness: Readiness, stopping: threading.Event) -> int:
+    """Run the viewer once. A native one that ends well was closed by its user; a web one never ends by itself."""
+    watch = Watch(viewer.host, viewer.port)
+    child = start(command(rerun_binary(), viewer, mode, memory))
+    started = time.monotonic()
+    try:
+        while not stopping.wait(PERIOD):
+            if child.poll() is not None:
+                return _ended(child, mode, time.monotonic() - started)
+            _beat(watch, readiness, address(viewer, mode))
+        return 0
+    finally:
+        watch.close()
+        stop(child)
+
+
+def _beat(watch: Watch, readiness: Readiness, where: str) -> None:
+    if watch.is_new(time.monotonic()):
+        print(f"viewer: {where}", flush=True)
+        readiness.ready()
+    elif watch.is_alive:
+        readiness.beat()
+    else:
+        readiness.not_ready()
+
+
+def _ended(child: subprocess.Popen[bytes], mode: ViewerMode, age: float) -> int:
+    if child.returncode == 0 and mode is ViewerMode.NATIVE and age > EARLY:
+        print("viewer: closed", flush=True)
+        return 0
+    return _say_error(f"viewer: the rerun program ended with code {child.returncode} after {age:.1f} s")
+
+
+def _say_error(sentence: str) -> int:
+    print(sentence, file=sys.stderr, flush=True)
+    return 1
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(prog="gemelo-viewer", description=__doc__)
+    parser.add_argument("--config", type=Path, default=None, help="deployment file")
+    parser.add_argument("--memory-limit", default="1GB", help="of the viewer's store, for example 1GB or 25%%")
+    parser.add_argument("--log-level", default="INFO", help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    stopping = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stopping.set())
+    try:
+        sys.exit(run(load_deployment(arguments.config), arguments.memory_limit, stopping))
+    except (RuntimeError, ValueError) as error:
+        sys.exit(f"viewer: {error}")
+
+
+if __name__ == "__main__":
+    main()
