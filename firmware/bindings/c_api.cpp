@@ -1,0 +1,93 @@
+// The virtual device as plain C functions, for ctypes.
+#include <string.h>
+
+#include "../platform/host/virtual_device.h"
+
+using gemelo::DeviceConfig;
+using gemelo::VirtualDevice;
+
+extern "C" {
+
+// What a test or the virtual ESP32 reads of a device at once.
+struct GemeloSnapshot {
+    uint64_t now_us;
+    uint64_t play_us;
+    uint32_t mode;
+    uint32_t referenced;
+    uint32_t moving;
+    uint32_t max_slot_error_q8;
+    int32_t steps[gemelo::kMaxJoints];
+    int32_t commanded_q8[gemelo::kMaxJoints];
+    int64_t commanded_q20[gemelo::kMaxJoints];
+    uint32_t scale_q30;
+};
+
+// A sentence, or nullptr; `joint` becomes the joint at fault, or 8.
+const char* gemelo_find_fault(const DeviceConfig* config, uint8_t* joint) { return gemelo::find_fault(*config, joint); }
+
+VirtualDevice* gemelo_create(const DeviceConfig* config, uint32_t boot_id, const char* reset_cause, uint64_t now_us,
+                             const int32_t* steps, int referenced) {
+    uint8_t joint = 0;
+    if (gemelo::find_fault(*config, &joint) != nullptr) return nullptr;
+    VirtualDevice* device = new VirtualDevice(*config, boot_id, reset_cause, now_us);
+    device->start(steps, referenced != 0);
+    return device;
+}
+
+void gemelo_destroy(VirtualDevice* device) { delete device; }
+
+void gemelo_receive(VirtualDevice* device, const uint8_t* bytes, size_t size, int retained, uint64_t received_us) {
+    device->receive(bytes, size, retained != 0, received_us);
+}
+
+void gemelo_advance(VirtualDevice* device, uint64_t until_us) { device->advance(until_us); }
+
+void gemelo_report_status(VirtualDevice* device) { device->machine().report_status(); }
+
+// The oldest output's size, or -1 for none; taken out of the queue only if `capacity` suffices.
+int64_t gemelo_take(VirtualDevice* device, uint8_t* output, uint8_t* bytes, size_t capacity) {
+    auto& outputs = device->outputs();
+    if (outputs.empty()) return -1;
+    const gemelo::OutFrame& frame = outputs.front();
+    const size_t size = frame.payload.size();
+    if (size > capacity) return static_cast<int64_t>(size);
+    *output = static_cast<uint8_t>(frame.output);
+    memcpy(bytes, frame.payload.data(), size);
+    outputs.pop_front();
+    return static_cast<int64_t>(size);
+}
+
+void gemelo_snapshot(VirtualDevice* device, GemeloSnapshot* snapshot) {
+    const gemelo::Machine& machine = device->machine();
+    const gemelo::Point& point = machine.present();
+    *snapshot = GemeloSnapshot{};
+    snapshot->now_us = device->now_us();
+    snapshot->play_us = point.play_us;
+    snapshot->mode = static_cast<uint32_t>(machine.mode());
+    snapshot->referenced = machine.is_referenced();
+    snapshot->moving = machine.is_moving();
+    snapshot->max_slot_error_q8 = machine.max_slot_error_q8();
+    snapshot->scale_q30 = point.scale_q30;
+    for (uint8_t j = 0; j < gemelo::kMaxJoints; ++j) {
+        snapshot->steps[j] = machine.stepper().executed(j);
+        snapshot->commanded_q20[j] = point.position_q20[j];
+        snapshot->commanded_q8[j] = static_cast<int32_t>((point.position_q20[j] + 2048) >> 12);
+    }
+}
+
+void gemelo_trace(VirtualDevice* device, int on) { device->set_tracing(on != 0); }
+
+// Up to `capacity` pin changes, oldest first; returns how many.
+size_t gemelo_take_trace(VirtualDevice* device, uint64_t* tick, uint32_t* step, uint32_t* dir, size_t capacity) {
+    auto& trace = device->trace();
+    size_t count = 0;
+    for (; count < capacity && !trace.empty(); ++count) {
+        tick[count] = trace.front().tick;
+        step[count] = trace.front().pins.step;
+        dir[count] = trace.front().pins.dir;
+        trace.pop_front();
+    }
+    return count;
+}
+
+}  // extern "C"

@@ -1,0 +1,90 @@
+"""The shared library that `firmware/bindings/build.sh` makes of the core: its structures and functions."""
+
+from __future__ import annotations
+
+import ctypes as c
+import functools
+from pathlib import Path
+
+MAX_JOINTS = 8
+NAME_SIZE = 32
+LIBRARY = Path(__file__).resolve().parents[1] / "build" / "libgemelo_core.so"
+
+
+class CoreMissing(RuntimeError):
+    """The core has not been built."""
+
+
+class JointRecord(c.Structure):
+    """`JointConfig` of core/config.h."""
+
+    _fields_ = (
+        ("name", c.c_char * NAME_SIZE),
+        ("lower_q8", c.c_int32),
+        ("upper_q8", c.c_int32),
+        ("max_velocity_q8", c.c_int32),
+        ("max_acceleration_q8", c.c_int32),
+        ("dir_setup_us", c.c_uint32),
+        ("inverted", c.c_uint32),
+    )
+
+
+class ConfigRecord(c.Structure):
+    """`DeviceConfig` of core/config.h."""
+
+    _fields_ = (
+        ("name", c.c_char * NAME_SIZE),
+        ("tick_hz", c.c_uint32),
+        ("queue_capacity", c.c_uint32),
+        ("state_hz", c.c_uint32),
+        ("hold_timeout_ms", c.c_uint32),
+        ("joints", c.c_uint32),
+        ("joint", JointRecord * MAX_JOINTS),
+    )
+
+
+class SnapshotRecord(c.Structure):
+    """`GemeloSnapshot` of bindings/c_api.cpp."""
+
+    _fields_ = (
+        ("now_us", c.c_uint64),
+        ("play_us", c.c_uint64),
+        ("mode", c.c_uint32),
+        ("referenced", c.c_uint32),
+        ("moving", c.c_uint32),
+        ("max_slot_error_q8", c.c_uint32),
+        ("steps", c.c_int32 * MAX_JOINTS),
+        ("commanded_q8", c.c_int32 * MAX_JOINTS),
+        ("commanded_q20", c.c_int64 * MAX_JOINTS),
+        ("scale_q30", c.c_uint32),
+    )
+
+
+@functools.cache
+def load_library(path: Path = LIBRARY) -> c.CDLL:
+    """The library with its functions typed; raises CoreMissing with the remedy where there is none."""
+    try:
+        library = c.CDLL(str(path))
+    except OSError as error:
+        raise CoreMissing(
+            f"the firmware core cannot be loaded ({error}): run `make setup`, or firmware/bindings/build.sh"
+        ) from error
+    u8, u32, u64, size, device = c.POINTER(c.c_uint8), c.c_uint32, c.c_uint64, c.c_size_t, c.c_void_p
+    i32s, config = c.POINTER(c.c_int32), c.POINTER(ConfigRecord)
+    u32s, u64s = c.POINTER(c.c_uint32), c.POINTER(c.c_uint64)
+    signatures: dict[str, tuple[object, list[object]]] = {
+        "find_fault": (c.c_char_p, [config, u8]),
+        "create": (device, [config, u32, c.c_char_p, u64, i32s, c.c_int]),
+        "destroy": (None, [device]),
+        "receive": (None, [device, c.c_char_p, size, c.c_int, u64]),
+        "advance": (None, [device, u64]),
+        "report_status": (None, [device]),
+        "take": (c.c_int64, [device, u8, u8, size]),
+        "snapshot": (None, [device, c.POINTER(SnapshotRecord)]),
+        "trace": (None, [device, c.c_int]),
+        "take_trace": (size, [device, u64s, u32s, u32s, size]),
+    }
+    for name, (result, arguments) in signatures.items():
+        function = getattr(library, f"gemelo_{name}")
+        function.restype, function.argtypes = result, arguments
+    return library

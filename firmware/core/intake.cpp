@@ -1,0 +1,146 @@
+// What arrives: chunks of knots, heartbeats and clock questions.
+#include "bytes.h"
+#include "machine.h"
+
+namespace gemelo {
+
+void Machine::receive(const Arrival& arrival, uint64_t now_us) {
+    now_us_ = now_us;
+    const Frame frame = open_frame(arrival.bytes, arrival.size);
+    if (!frame.is_valid()) {
+        ++bad_frames_;
+        return;
+    }
+    switch (frame.type()) {
+        case FrameType::Traj:
+            return receive_chunk(frame, arrival);
+        case FrameType::Cmd:
+            return receive_command(frame, arrival);
+        case FrameType::Heartbeat:
+            return receive_heartbeat(frame, arrival);
+        case FrameType::Sync:
+            return receive_sync(frame, arrival);
+        default:
+            ++bad_frames_;
+    }
+}
+
+void Machine::receive_chunk(const Frame& frame, const Arrival& arrival) {
+    if (frame.size < kChunkHeaderSize) {
+        ++bad_frames_;
+        return;
+    }
+    const Chunk chunk(frame);
+    const Verdict verdict = judge(chunk, arrival);
+    if (verdict.is_ok()) {
+        take_chunk(chunk);
+    } else if (verdict.code != Code::Duplicate) {
+        ++refused_;
+    }
+    acknowledge(chunk, verdict);
+}
+
+Verdict Machine::judge(const Chunk& chunk, const Arrival& arrival) const {
+    const auto refuse = [](Code code, uint32_t value = 0, uint32_t limit = 0) {
+        return Verdict{code, kNoJoint, 0, static_cast<int32_t>(value), static_cast<int32_t>(limit)};
+    };
+    if (arrival.is_retained) return refuse(Code::Retained);
+    if (chunk.boot_id() != identity_.boot_id) return refuse(Code::WrongBoot);
+    if (chunk.joints() != rules_.joints) return refuse(Code::BadJoints, chunk.joints(), rules_.joints);
+    if (!chunk.has_right_size()) return refuse(Code::BadCount, chunk.knots(), kMaxKnots);
+    if (is_duplicate(chunk)) return refuse(Code::Duplicate);
+    if (now_us_ > chunk.expires_us()) return refuse(Code::Expired);
+    const Verdict place = judge_place(chunk);
+    if (!place.is_ok()) return place;
+    if (chunk.knots() > path_.space()) return refuse(Code::NoSpace, chunk.knots(), path_.space());
+    Knot before = path_.newest();
+    if (chunk.is_first()) {
+        for (uint8_t j = 0; j < rules_.joints; ++j)
+            before.position[j] = static_cast<int32_t>((present().position_q20[j] + 2048) >> 12);
+    }
+    return check_knots(chunk, rules_, before);
+}
+
+bool Machine::is_duplicate(const Chunk& chunk) const {
+    return chunk.stream() != 0 && chunk.stream() == streams_.stream() && chunk.seq() < streams_.next_seq();
+}
+
+// Whether this chunk is the one that is wanted now.
+Verdict Machine::judge_place(const Chunk& chunk) const {
+    const Verdict not_ready{Code::NotReady, kNoJoint, 0, static_cast<int32_t>(mode_), 0};
+    const Verdict wrong_stream{Code::WrongStream, kNoJoint, 0, 0, 0};
+    const auto gap = [&chunk](uint32_t next_seq) {
+        return Verdict{Code::Gap, kNoJoint, 0, static_cast<int32_t>(chunk.seq()), static_cast<int32_t>(next_seq)};
+    };
+    if (mode_ != Mode::Idle && mode_ != Mode::Run && mode_ != Mode::Hold) return not_ready;
+    if (is_stopping_) return not_ready;
+    if (chunk.stream() == 0 || streams_.is_past(chunk.stream())) return wrong_stream;
+    const bool is_playing = path_.is_active() && chunk.stream() == streams_.stream();
+    if (is_playing) {
+        if (path_.ends() || chunk.is_first()) return wrong_stream;
+        return chunk.seq() == streams_.next_seq() ? Verdict{} : gap(streams_.next_seq());
+    }
+    if (chunk.stream() == streams_.stream()) return wrong_stream;
+    if (chunk.is_first() && chunk.seq() == 0) return mode_ == Mode::Idle ? Verdict{} : not_ready;
+    return mode_ == Mode::Idle && chunk.seq() != 0 && !chunk.is_first() ? gap(0) : wrong_stream;
+}
+
+void Machine::take_chunk(const Chunk& chunk) {
+    if (chunk.is_first()) open_stream(chunk);
+    Knot knot{};
+    for (uint16_t k = chunk.is_first() ? 1 : 0; k < chunk.knots(); ++k) {
+        chunk.read_knot(k, &knot);
+        path_.append(knot);
+    }
+    path_.accept(chunk.is_last());
+    streams_.advance();
+}
+
+void Machine::open_stream(const Chunk& chunk) {
+    Knot knot{};
+    chunk.read_knot(0, &knot);
+    path_.start(knot);
+    streams_.open(chunk.stream());
+    stepper_.watch();
+    awaits_first_pulse_ = true;
+    alive_us_ = now_us_;
+    mode_ = Mode::Run;
+}
+
+void Machine::acknowledge(const Chunk& chunk, const Verdict& verdict) {
+    Acknowledgement ack{};
+    ack.stream = chunk.stream();
+    ack.seq = chunk.seq();
+    ack.next_seq = chunk.stream() == streams_.stream() ? streams_.next_seq() : 0;
+    ack.verdict = verdict;
+    ack.credits = path_.space();
+    ack.buffered_ms = buffered_ms();
+    ack.t_us = now_us_;
+    reporter_.acknowledge(ack);
+}
+
+void Machine::receive_heartbeat(const Frame& frame, const Arrival& arrival) {
+    if (frame.size != kHeaderSize + 8 || arrival.is_retained) {
+        ++bad_frames_;
+        return;
+    }
+    if (frame.boot_id() != 0 && frame.boot_id() != identity_.boot_id) return;
+    const uint32_t session = load_u32(frame.bytes + 8), counter = load_u32(frame.bytes + 12);
+    const bool is_same = has_session_ && session == session_;
+    // A late or repeated beat is no sign of life.
+    if (is_same && static_cast<int32_t>(counter - counter_) <= 0) return;
+    has_session_ = true;
+    session_ = session;
+    counter_ = counter;
+    if (arrival.received_us > alive_us_) alive_us_ = arrival.received_us;
+}
+
+void Machine::receive_sync(const Frame& frame, const Arrival& arrival) {
+    if (frame.size != kHeaderSize + 8 || arrival.is_retained) {
+        ++bad_frames_;
+        return;
+    }
+    reporter_.answer_sync(load_u64(frame.bytes + 8), arrival.received_us, now_us_);
+}
+
+}  // namespace gemelo

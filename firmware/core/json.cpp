@@ -1,0 +1,60 @@
+#include "json.h"
+
+namespace gemelo {
+
+void JsonWriter::put(char c) {
+    if (size_ < kSize) text_[size_++] = c;
+}
+
+void JsonWriter::put(const char* text) {
+    for (; *text != 0; ++text) put(*text);
+}
+
+void JsonWriter::put_number(uint64_t number) {
+    char digits[20];
+    int count = 0;
+    do {
+        digits[count++] = static_cast<char>('0' + number % 10);
+        number /= 10;
+    } while (number != 0);
+    while (count > 0) put(digits[--count]);
+}
+
+void JsonWriter::key(const char* name) {
+    put(size_ > 1 ? ", \"" : "\"");
+    put(name);
+    put("\": ");
+}
+
+void JsonWriter::field(const char* name, const char* text) {
+    key(name);
+    put('"');
+    put(text);
+    put('"');
+}
+
+void JsonWriter::field(const char* name, uint64_t number) {
+    key(name);
+    put_number(number);
+}
+
+void JsonWriter::field(const char* name, bool truth) {
+    key(name);
+    put(truth ? "true" : "false");
+}
+
+void JsonWriter::field(const char* name, uint32_t first, uint32_t second) {
+    key(name);
+    put('[');
+    put_number(first);
+    put(", ");
+    put_number(second);
+    put(']');
+}
+
+size_t JsonWriter::close() {
+    put('}');
+    return size_;
+}
+
+}  // namespace gemelo

@@ -1,0 +1,32 @@
+// Writes one flat JSON object into a buffer of fixed size; keys and strings need no escaping.
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+namespace gemelo {
+
+class JsonWriter {
+  public:
+    JsonWriter() { put('{'); }
+    void field(const char* key, const char* text);
+    void field(const char* key, uint64_t number);
+    void field(const char* key, bool truth);
+    // A pair of numbers as an array.
+    void field(const char* key, uint32_t first, uint32_t second);
+    // Closes the object; nothing may be added after.
+    size_t close();
+    const uint8_t* bytes() const { return reinterpret_cast<const uint8_t*>(text_); }
+
+  private:
+    void key(const char* name);
+    void put(char c);
+    void put(const char* text);
+    void put_number(uint64_t number);
+
+    static constexpr size_t kSize = 512;
+    char text_[kSize];
+    size_t size_ = 0;
+};
+
+}  // namespace gemelo

@@ -1,0 +1,123 @@
+// The device: frames in, a step stream and reports out.
+//
+// receive() and slot() belong to one task; only Stepper::tick() is an interrupt. slot() runs once per slot, after its
+// first tick, and prepares the increments of the slot after.
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "chunk.h"
+#include "command_log.h"
+#include "config.h"
+#include "path.h"
+#include "report.h"
+#include "stepper.h"
+#include "stream_log.h"
+
+namespace gemelo {
+
+struct Identity {
+    uint32_t boot_id;
+    const char* reset_cause;  // kept, not copied
+};
+
+// A frame as it came off the wire.
+struct Arrival {
+    const uint8_t* bytes;
+    size_t size;
+    bool is_retained;
+    uint64_t received_us;
+};
+
+class Machine {
+  public:
+    // The device is in Boot until start(). `config` is kept and must have no fault.
+    void begin(const DeviceConfig& config, const Identity& identity, const Sink& sink);
+    // The joints stand at these whole steps; whether that can be trusted is `referenced`.
+    void start(uint64_t now_us, const int32_t* steps, bool referenced);
+
+    void receive(const Arrival& arrival, uint64_t now_us);
+    void slot(uint64_t slot_start_us);
+    void report_status() const;
+
+    Stepper& stepper() { return stepper_; }
+    const Stepper& stepper() const { return stepper_; }
+    Mode mode() const { return mode_; }
+    bool is_referenced() const { return is_referenced_; }
+    bool is_moving() const { return mode_ == Mode::Run || !is_at_rest(); }
+    // As of the end of the last whole slot.
+    const Point& present() const { return points_[stepper_.latched_number() % kPoints]; }
+    // The largest |path - executed| at any slot end so far, Q8 steps rounded up.
+    uint32_t max_slot_error_q8() const { return static_cast<uint32_t>((max_error_q20_ + 4095) >> 12); }
+
+  private:
+    void receive_chunk(const Frame& frame, const Arrival& arrival);
+    Verdict judge(const Chunk& chunk, const Arrival& arrival) const;
+    Verdict judge_place(const Chunk& chunk) const;
+    bool is_duplicate(const Chunk& chunk) const;
+    void take_chunk(const Chunk& chunk);
+    void open_stream(const Chunk& chunk);
+    void acknowledge(const Chunk& chunk, const Verdict& verdict);
+
+    void receive_command(const Frame& frame, const Arrival& arrival);
+    Code judge_command(const Frame& frame, const Arrival& arrival) const;
+    Code carry_out(const Frame& frame);
+    Code stop();
+    Code resume();
+    Code reset();
+    Code reference(const Frame& frame);
+    void receive_heartbeat(const Frame& frame, const Arrival& arrival);
+    void receive_sync(const Frame& frame, const Arrival& arrival);
+
+    void finish_slot();
+    void measure(const Point& point);
+    void announce_start();
+    void end_stream(const char* event);
+    void watch_supply(const Point& point);
+    void watch_heartbeat();
+    void plan_slot();
+    void hold(const char* cause);
+    void fail(FaultCode fault, const char* detail);
+    void report_state(const Point& point);
+    void event(const char* name, const char* detail = "");
+    void place(const int64_t* position_q20);
+    bool is_at_rest() const { return is_still_ && stepper_.is_quiet(); }
+    uint16_t buffered_ms() const;
+
+    static constexpr uint8_t kPoints = 4;  // before, finished, running, prepared
+
+    const DeviceConfig* config_ = nullptr;
+    Identity identity_{};
+    Reporter reporter_;
+    KnotRules rules_{};
+    Path path_;
+    Stepper stepper_;
+    StreamLog streams_;
+    CommandLog commands_;
+
+    Point points_[kPoints];
+    uint32_t prepared_number_ = 0;
+    bool is_still_ = true;  // the prepared slot has no increments
+
+    Mode mode_ = Mode::Boot;
+    FaultCode fault_ = FaultCode::None;
+    bool is_referenced_ = false;
+    bool is_stopping_ = false;
+    bool is_dry_ = false;
+    bool awaits_first_pulse_ = false;
+
+    uint64_t now_us_ = 0;
+    uint64_t alive_us_ = 0;  // of the last heartbeat, or of the start or resumption if that was later
+    uint32_t session_ = 0;
+    uint32_t counter_ = 0;
+    bool has_session_ = false;
+
+    uint32_t slots_ = 0;
+    uint32_t underruns_ = 0;
+    uint32_t refused_ = 0;
+    uint32_t bad_frames_ = 0;
+    int64_t max_error_q20_ = 0;
+};
+
+}  // namespace gemelo

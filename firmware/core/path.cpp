@@ -1,0 +1,127 @@
+#include "path.h"
+
+namespace gemelo {
+namespace {
+
+constexpr uint32_t kUnknownCeiling = UINT32_MAX;
+
+}  // namespace
+
+void Path::begin(const DeviceConfig& config) {
+    joints_ = static_cast<uint8_t>(config.joints);
+    queue_.begin(static_cast<uint16_t>(config.queue_capacity));
+    ceiling_.begin(config);
+    scale_.begin(config);
+    flush();
+}
+
+void Path::start(const Knot& knot) {
+    flush();
+    from_ = knot;
+    from_.ceiling_q26 = kUnknownCeiling;
+    from_us_ = 0;
+    is_active_ = true;
+    scale_.set(kFullScale);
+}
+
+void Path::append(const Knot& knot) {
+    Knot fresh = knot;
+    fresh.ceiling_q26 = kUnknownCeiling;
+    queue_.push(fresh);
+}
+
+void Path::accept(bool ends) {
+    ends_ = ends;
+    queued_us_ = 0;
+    for (uint16_t i = 0; i < queue_.size(); ++i) queued_us_ += queue_[i].dt_us;
+    refresh_ceilings();
+    if (segment_.dt_us == 0) load();
+}
+
+void Path::flush() {
+    queue_.clear();
+    segment_.dt_us = 0;
+    from_us_ += elapsed_ >> kTimeBits;
+    elapsed_ = 0;
+    queued_us_ = 0;
+    is_active_ = false;
+    ends_ = false;
+    scale_.set(0);
+}
+
+// Takes the next segment into play, if there is one.
+void Path::load() {
+    elapsed_ = 0;
+    if (queue_.is_empty()) {
+        segment_.dt_us = 0;
+    } else {
+        segment_.load(from_, queue_[0], joints_);
+    }
+}
+
+// Backwards from the newest knot; once a knot's ceiling comes out as it was, the older ones stand as they are.
+void Path::refresh_ceilings() {
+    if (queue_.is_empty()) return;
+    uint16_t i = static_cast<uint16_t>(queue_.size() - 1);
+    queue_[i].ceiling_q26 = ends_ ? kFullCeiling : 0;
+    while (true) {
+        Knot& from = i == 0 ? from_ : queue_[static_cast<uint16_t>(i - 1)];
+        const uint32_t ceiling = ceiling_.before(from, queue_[i], queue_[i].ceiling_q26);
+        if (i == 0 || from.ceiling_q26 == ceiling) {
+            from.ceiling_q26 = ceiling;
+            return;
+        }
+        from.ceiling_q26 = ceiling;
+        --i;
+    }
+}
+
+// On the straight line between the ceilings of the segment's two knots.
+Allowance Path::allowance() const {
+    const uint32_t high = from_.ceiling_q26, low = queue_[0].ceiling_q26;
+    if (high >= kFullCeiling && low >= kFullCeiling) return Allowance{kFullCeiling, 0};
+    const int64_t fall = static_cast<int64_t>(high) - low;
+    const uint64_t whole = static_cast<uint64_t>(segment_.dt_us) << kTimeBits;
+    const int64_t left_q20 = static_cast<int64_t>((segment_left() << 20) / whole);
+    const int64_t ceiling = low + ((fall * left_q20) >> 20);
+    const int64_t slope_q30 = fall > 0 ? fall * 16 * (kSlotUs / 2) / segment_.dt_us : 0;
+    return Allowance{static_cast<uint32_t>(ceiling), static_cast<uint32_t>(slope_q30)};
+}
+
+void Path::move(uint64_t step) {
+    while (segment_.dt_us != 0 && step >= segment_left()) {
+        step -= segment_left();
+        from_ = queue_[0];
+        from_us_ += segment_.dt_us;
+        queued_us_ -= segment_.dt_us;
+        queue_.pop();
+        load();
+    }
+    if (segment_.dt_us != 0) elapsed_ += step;
+}
+
+void Path::advance(bool hold, Point* point) {
+    if (is_active_ && segment_.dt_us != 0) {
+        scale_.advance(hold, segment_, allowance());
+        move((static_cast<uint64_t>(scale_.value()) * kSlotUs) >> (30 - kTimeBits));
+        point->scale_q30 = scale_.value();
+    } else {
+        scale_.set(0);
+        point->scale_q30 = 0;
+    }
+    const bool is_at_last = is_active_ && segment_.dt_us == 0;
+    if (is_at_last) scale_.set(0);
+    point->is_end = is_at_last && ends_;
+    point->is_starved = is_at_last && !ends_;
+    point->play_us = from_us_ + (elapsed_ >> kTimeBits);
+    if (!is_active_) return;
+    const uint32_t u_q24 = segment_.dt_us == 0 ? 0 : static_cast<uint32_t>((elapsed_ << 9) / segment_.dt_us);
+    for (uint8_t j = 0; j < joints_; ++j) {
+        point->position_q20[j] =
+            segment_.dt_us == 0 ? static_cast<int64_t>(from_.position[j]) * 4096 : segment_.cubic[j].at(u_q24);
+    }
+}
+
+uint64_t Path::remaining_us() const { return queued_us_ - (elapsed_ >> kTimeBits); }
+
+}  // namespace gemelo

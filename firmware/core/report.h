@@ -1,0 +1,72 @@
+// What the device says: every outgoing frame and JSON text as bytes.
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "config.h"
+#include "protocol.h"
+
+namespace gemelo {
+
+constexpr const char* kFirmwareVersion = "1.0.0";
+
+// Where an output goes; in the order of the topics in PROTOCOL.md.
+enum class Output : uint8_t { TrajAck, CmdAck, SyncReply, State, Event, Status };
+
+// Takes every output at once; the bytes are valid during the call only.
+struct Sink {
+    void* context = nullptr;
+    void (*put)(void* context, Output output, const uint8_t* bytes, size_t size) = nullptr;
+};
+
+struct Acknowledgement {
+    uint32_t stream, seq, next_seq;
+    Verdict verdict;
+    uint16_t credits, buffered_ms;
+    uint64_t t_us;
+};
+
+struct StateReport {
+    uint64_t t_us;
+    Mode mode;
+    FaultCode fault;
+    uint32_t scale_q30;
+    uint16_t buffered_ms;
+    uint32_t stream, next_seq;
+    uint64_t play_us;
+    uint32_t underruns, refused, bad_frames;
+    int32_t steps[kMaxJoints];
+    int32_t velocity_q8[kMaxJoints];
+};
+
+struct StatusReport {
+    const DeviceConfig* config;
+    const char* reset_cause;
+    uint32_t boot_id;
+    bool referenced;
+};
+
+class Reporter {
+  public:
+    void begin(const Sink& sink, uint32_t boot_id, uint8_t joints) {
+        sink_ = sink;
+        boot_id_ = boot_id;
+        joints_ = joints;
+    }
+    void acknowledge(const Acknowledgement& ack) const;
+    void acknowledge_command(uint32_t id, uint8_t command, Code code, Mode mode, uint64_t t_us) const;
+    void answer_sync(uint64_t t0, uint64_t t1, uint64_t t2) const;
+    void state(const StateReport& report) const;
+    void event(const char* name, uint64_t t_us, uint32_t stream, const char* detail) const;
+    void status(const StatusReport& report) const;
+
+  private:
+    void send(Output output, uint8_t* bytes, size_t size) const;
+
+    Sink sink_;
+    uint32_t boot_id_ = 0;
+    uint8_t joints_ = 0;
+};
+
+}  // namespace gemelo

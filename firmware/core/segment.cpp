@@ -1,0 +1,45 @@
+#include "segment.h"
+
+namespace gemelo {
+namespace {
+
+int32_t magnitude(int32_t value) { return value < 0 ? -value : value; }
+
+// A velocity as the distance it covers in dt, Q20 steps.
+int64_t covered_q20(int32_t v_q8, uint32_t dt_us) {
+    return static_cast<int64_t>(v_q8) * static_cast<int64_t>(dt_us) * 4096 / 1000000;
+}
+
+}  // namespace
+
+Cubic make_cubic(int32_t p0_q8, int32_t v0_q8, int32_t p1_q8, int32_t v1_q8, uint32_t dt_us) {
+    const int64_t distance = (static_cast<int64_t>(p1_q8) - p0_q8) * 4096;
+    const int64_t m0 = covered_q20(v0_q8, dt_us);
+    const int64_t m1 = covered_q20(v1_q8, dt_us);
+    Cubic cubic;
+    cubic.origin_q20 = static_cast<int64_t>(p0_q8) * 4096;
+    cubic.c1 = m0;
+    cubic.c2 = 3 * distance - 2 * m0 - m1;
+    cubic.c3 = m0 + m1 - 2 * distance;
+    return cubic;
+}
+
+Drift drift_between(int32_t v0_q8, int32_t v1_q8) {
+    const int32_t s0 = magnitude(v0_q8), s1 = magnitude(v1_q8);
+    Drift drift;
+    drift.speed_q8 = s0 > s1 ? s0 : s1;
+    // Through a reversal the joint first brakes; that is the side that limits a stop.
+    const bool reverses = (v0_q8 < 0) != (v1_q8 < 0) && v0_q8 != 0 && v1_q8 != 0;
+    drift.gain_q8 = reverses ? -(s0 + s1) : s1 - s0;
+    return drift;
+}
+
+void Segment::load(const Knot& from, const Knot& to, uint8_t joints) {
+    dt_us = to.dt_us;
+    for (uint8_t j = 0; j < joints; ++j) {
+        cubic[j] = make_cubic(from.position[j], from.velocity[j], to.position[j], to.velocity[j], to.dt_us);
+        drift[j] = drift_between(from.velocity[j], to.velocity[j]);
+    }
+}
+
+}  // namespace gemelo

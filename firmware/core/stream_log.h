@@ -1,0 +1,34 @@
+// Which stream is played, which chunk it wants next, and which streams are over.
+#pragma once
+
+#include <stdint.h>
+
+namespace gemelo {
+
+class StreamLog {
+  public:
+    uint32_t stream() const { return stream_; }  // the present one, else the last one, 0 for none since boot
+    uint32_t next_seq() const { return next_seq_; }
+
+    void open(uint32_t stream) {
+        past_[next_past_] = stream_;
+        next_past_ = static_cast<uint8_t>((next_past_ + 1) % kPast);
+        stream_ = stream;
+        next_seq_ = 0;
+    }
+    void advance() { ++next_seq_; }
+    bool is_past(uint32_t stream) const {
+        for (uint32_t past : past_)
+            if (past == stream) return true;
+        return false;
+    }
+
+  private:
+    static constexpr uint8_t kPast = 8;
+    uint32_t past_[kPast] = {};
+    uint8_t next_past_ = 0;
+    uint32_t stream_ = 0;
+    uint32_t next_seq_ = 0;
+};
+
+}  // namespace gemelo

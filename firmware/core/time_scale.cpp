@@ -1,0 +1,75 @@
+#include "time_scale.h"
+
+#include "ceiling.h"
+
+namespace gemelo {
+namespace {
+
+constexpr uint32_t kFastestChange = kFullScale / 4;
+constexpr uint32_t kSlowest = 256;  // creeps on to the last knot instead of never reaching it
+
+uint32_t ceiling_scale(const Allowance& allowance) {
+    const uint32_t half_slot = allowance.slope_q30 / 2 > kSlowest ? allowance.slope_q30 / 2 : kSlowest;
+    const uint32_t highest = root(static_cast<uint64_t>(allowance.ceiling_q26) << 34);
+    // Half a slot's fall ahead of the curve, so that s falls by equal amounts and ends on the last knot.
+    return highest > 2 * half_slot ? highest - half_slot : half_slot;
+}
+
+}  // namespace
+
+uint32_t root(uint64_t value) {
+    uint64_t rest = value, result = 0, bit = 1ull << 62;
+    while (bit > rest) bit >>= 2;
+    for (; bit != 0; bit >>= 2) {
+        if (rest >= result + bit) {
+            rest -= result + bit;
+            result = (result >> 1) + bit;
+        } else {
+            result >>= 1;
+        }
+    }
+    return static_cast<uint32_t>(result);
+}
+
+void TimeScale::begin(const DeviceConfig& config) {
+    joints_ = static_cast<uint8_t>(config.joints);
+    for (uint8_t j = 0; j < joints_; ++j)
+        swing_q16_[j] = with_margin(config.joint[j].max_acceleration_q8) * 256 / kSlotHz;
+    s_q30_ = 0;
+}
+
+// ds = (A -/+ a y) / |v| for the joint that has least to give.
+uint32_t TimeScale::change(const Segment& segment, bool slowing) const {
+    const int64_t y_q30 = (static_cast<int64_t>(s_q30_) * s_q30_) >> 30;
+    int64_t least = kFastestChange;
+    for (uint8_t j = 0; j < joints_; ++j) {
+        const Drift& drift = segment.drift[j];
+        if (drift.speed_q8 == 0) continue;
+        int64_t own = slowing ? -static_cast<int64_t>(drift.gain_q8) : drift.gain_q8;
+        if (own < 0) own = 0;
+        const int64_t own_q16 = (own * 256 * kSlotUs / segment.dt_us * y_q30) >> 30;
+        const int64_t room_q16 = swing_q16_[j] > own_q16 ? swing_q16_[j] - own_q16 : 0;
+        const int64_t change_q30 = (room_q16 << 22) / drift.speed_q8;
+        if (change_q30 < least) least = change_q30;
+    }
+    return static_cast<uint32_t>(least);
+}
+
+void TimeScale::advance(bool hold, const Segment& segment, const Allowance& allowance) {
+    const bool unbounded = allowance.ceiling_q26 >= kFullCeiling;
+    if (!hold && unbounded && s_q30_ == kFullScale) return;
+    const uint32_t step = change(segment, hold);
+    uint32_t next = 0;
+    if (hold) {
+        next = s_q30_ > step ? s_q30_ - step : 0;
+    } else {
+        next = kFullScale - s_q30_ > step ? s_q30_ + step : kFullScale;
+    }
+    if (!unbounded) {
+        const uint32_t highest = ceiling_scale(allowance);
+        if (next > highest) next = highest;
+    }
+    s_q30_ = next;
+}
+
+}  // namespace gemelo
