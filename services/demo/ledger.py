@@ -1,0 +1,88 @@
+"""What was asked of the device and what it did, counted from the messages on the bus.
+
+Two independent sources are held against each other: `commands` says which knots were sent, and `device/state` says
+how many steps the device itself has emitted. Nothing is taken from what the demonstration wanted.
+
+- following error: `step_errors`, which compares both sides at the same moment of the device's path.
+- lost steps: when a stream has ended and the device stands, the last knot that was sent for it, rounded to the
+  nearest step, minus the device's count. Every step lost on the way would still be missing there.
+- chunks lost: chunks for which no `command_acks` ever said OK (or DUPLICATE, which is OK said twice).
+"""
+
+from __future__ import annotations
+
+from schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState
+from schemas.joints import StepErrors
+
+OK, DUPLICATE = 0, 1  # firmware/PROTOCOL.md, codes of ACK
+
+
+class Ledger:
+    """Feed it every message; read the totals when the arm stands."""
+
+    def __init__(self) -> None:
+        self.following: dict[str, float] = {}  # [steps] largest |commanded - executed|
+        self.executed: dict[str, int] = {}  # [steps] the device's newest count
+        self.round_trips: list[float] = []  # [s] from sending a chunk to its acknowledgement
+        self._sent: set[tuple[int, int]] = set()  # (stream, seq)
+        self._acknowledged: set[tuple[int, int]] = set()
+        self._last_knot: dict[int, dict[str, int]] = {}  # by stream [1/256 step]
+        self._streams: list[int] = []  # in the order of their first chunk
+        self._differences: dict[int, dict[str, int]] = {}  # by stream [steps] at rest
+
+    def on_errors(self, message: StepErrors) -> None:
+        largest = message.max_error or (0.0,) * len(message.name)
+        for name, error, worst in zip(message.name, message.error, largest, strict=False):
+            self.following[name] = max(self.following.get(name, 0.0), abs(error), worst)
+
+    def on_chunk(self, message: CommandChunk) -> None:
+        self._sent.add((message.stream, message.seq))
+        if message.stream not in self._streams:
+            self._streams.append(message.stream)
+        if message.steps:
+            self._last_knot[message.stream] = dict(zip(message.name, message.steps[-1], strict=True))
+            self._differences.pop(message.stream, None)
+
+    def on_ack(self, message: CommandAck) -> None:
+        if message.code in (OK, DUPLICATE):
+            self._acknowledged.add((message.stream, message.seq))
+            self.round_trips.append(message.round_trip)
+
+    def on_state(self, message: DeviceState) -> None:
+        self.executed = dict(zip(message.name, message.steps, strict=True))
+        knot = self._last_knot.get(message.stream)
+        is_at_rest = message.mode is DeviceMode.IDLE and message.buffered == 0.0 and not any(message.velocity)
+        if knot is not None and is_at_rest:
+            self._differences[message.stream] = {
+                name: nearest_step(position) - self.executed[name] for name, position in knot.items()
+            }
+
+    @property
+    def commanded(self) -> dict[str, int]:
+        """[steps] where the newest stream was to end."""
+        if not self._streams:
+            return dict(self.executed)
+        return {name: nearest_step(q8) for name, q8 in self._last_knot.get(self._streams[-1], {}).items()}
+
+    @property
+    def chunks_sent(self) -> int:
+        return len(self._sent)
+
+    @property
+    def chunks_lost(self) -> int:
+        return len(self._sent - self._acknowledged)
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the device was seen at rest at the end of the newest stream, so that its steps are accounted for."""
+        return all(stream in self._differences for stream in self._streams[-1:])
+
+    @property
+    def lost_steps(self) -> int:
+        """Sum over all joints and all streams that came to rest."""
+        return sum(abs(lost) for differences in self._differences.values() for lost in differences.values())
+
+
+def nearest_step(position: int) -> int:
+    """floor(p + 0.5) of a position in [1/256 step], as the firmware rounds."""
+    return (position + 128) >> 8

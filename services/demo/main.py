@@ -1,0 +1,110 @@
+"""`make demo`: starts a stack of its own, performs, stops it, and leaves figures, a recording and a picture.
+
+Leaves out/demo.json (the figures), out/demo.rrd (for `rerun`), out/demo.png, and in out/demo/ the MCAP, the command
+CSV and the logs. Exit code 0 only if every move succeeded and every figure holds. How each figure is measured stands
+in `ledger` and `report`; times are those of the planner (`plan_ms`) and of the gateway (`took`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from pathlib import Path
+
+import msgspec
+
+from services.arm.description import load_arm
+from services.cli.stack import Stack, StackError
+from services.demo.performance import Performance
+from services.demo.report import complaints, report_of, text_of
+from services.runtime.deployment import load_deployment, project_root
+from services.runtime.node import Node
+
+MOSQUITTO = (shutil.which("mosquitto"), shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin"))
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(prog="make demo", description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--out", type=Path, default=project_root() / "out", help="folder of the results")
+    parser.add_argument("--broker", choices=("amqtt", "mosquitto"), default=None)
+    parser.add_argument("--no-picture", action="store_true", help="leave out the PNG")
+    options = parser.parse_args()
+    try:
+        sys.exit(demonstrate(options.out.resolve(), options.broker or best_broker(), not options.no_picture))
+    except StackError as error:
+        sys.exit(f"demo: {error}")
+
+
+def best_broker() -> str:
+    """mosquitto where it is installed: real arms use it; else the embedded one."""
+    return "mosquitto" if any(MOSQUITTO) else "amqtt"
+
+
+def demonstrate(out: Path, broker: str, with_picture: bool) -> int:
+    """Everything; the exit code."""
+    folder, recording = out / "demo", out / "demo.rrd"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    for old in (out / "demo.json", recording, out / "demo.png"):
+        old.unlink(missing_ok=True)
+    robot = load_deployment().robot
+    environment = {"GEMELO_CONFIG": str(write_deployment(folder / "deployment.toml", robot, recording))}
+    say(f"starting the stack with {broker}")
+    with Stack(broker=broker, viewer="none", out=folder, environment=environment) as stack:
+        say(f"all ready after {stack.ready_seconds:.1f} s")
+        deployment = load_deployment(None, stack.environment)
+        arm = load_arm(project_root() / deployment.robot)
+        with Node("demo", deployment, robot=arm.name) as node:
+            performance = Performance(node, arm, say)
+            performance.run()
+    say("the stack has stopped")
+    report = report_of(arm.name, performance.moves, performance.ledger)
+    (out / "demo.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
+    found = complaints(report, performance.ledger)
+    found += missing_files(folder, recording)
+    if with_picture:
+        found += take_picture(recording, out / "demo.png")
+    print(f"\n{text_of(report, performance.moves)}\n\nresults: {out / 'demo.json'}, {recording}, {folder}")
+    for complaint in found:
+        print(f"demo failed: {complaint}", file=sys.stderr)
+    return 1 if found else 0
+
+
+def say(text: str) -> None:
+    print(f"demo: {text}", flush=True)
+
+
+def write_deployment(path: Path, robot: str, recording: Path) -> Path:
+    """A deployment file that has the visualizer write the recording; ports come from the environment."""
+    path.write_text(f"robot = {_toml(robot)}\n\n[parameters.visualizer]\nrecording_path = {_toml(str(recording))}\n")
+    return path
+
+
+def _toml(text: str) -> str:
+    return msgspec.json.encode(text).decode()
+
+
+def missing_files(folder: Path, recording: Path) -> list[str]:
+    """What the logger and the visualizer should have left."""
+    missing = [f"there is no {pattern[2:]} recording in {folder}" for pattern in ("*.mcap", "*.csv")
+               if not any(folder.rglob(pattern))]  # fmt: skip
+    if not recording.exists():
+        missing.append(f"there is no {recording.name}")
+    return missing
+
+
+def take_picture(recording: Path, png: Path) -> list[str]:
+    """A picture of the viewer; what went wrong, if anything."""
+    from services.visualizer.picture import picture
+
+    try:
+        picture(recording, png)
+    except (RuntimeError, OSError) as error:
+        return [f"no picture: {error}"]
+    return []
+
+
+if __name__ == "__main__":
+    main()

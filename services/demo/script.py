@@ -1,0 +1,81 @@
+"""What the demonstration does: the seed's sine on the streaming topic, then a tour of planned poses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from schemas.planning import JointGoal, NamedGoal, PoseGoal
+from services.arm.chain import link_transforms
+from services.arm.description import Arm, Joint
+from services.arm.transforms import compose, inverse
+
+SINE_RATE = 10.0  # [Hz] of the targets
+SINE_TIME = 10.0  # [s]
+SINE_PERIOD = 5.0  # [s]
+SPEED_SHARE = 0.6  # of the velocity limit at the sine's fastest
+RANGE_SHARE = 0.15  # of the joint's travel, at most, to either side
+
+JOINT_TOUR = ((0.65, 0.35, 0.40), (0.35, 0.65, 0.60))  # shares of each joint's travel; repeated for more joints
+POSE_TOUR = ((0.60, 0.60, 0.30), (0.40, 0.60, 0.50), (0.55, 0.35, 0.20))
+
+Goal = PoseGoal | JointGoal | NamedGoal
+
+
+@dataclass(frozen=True)
+class Stop:
+    """One planned move of the tour."""
+
+    name: str
+    goal: Goal
+
+
+@dataclass(frozen=True)
+class Sine:
+    """One joint's target over time, in [rad] or [m]; it begins and ends at its centre."""
+
+    joint: str
+    centre: float
+    amplitude: float
+
+    def at(self, time: float) -> float:
+        return self.centre + self.amplitude * math.sin(math.tau * time / SINE_PERIOD)
+
+
+def sine_of(joint: Joint, start: float) -> Sine:
+    """A sine around where the joint is, as large as its speed and travel allow."""
+    lower, upper = (joint.lower, joint.upper) if math.isfinite(joint.lower) else (start - math.pi, start + math.pi)
+    fastest = SPEED_SHARE * joint.velocity * SINE_PERIOD / math.tau
+    sharpest = SPEED_SHARE * joint.acceleration * (SINE_PERIOD / math.tau) ** 2
+    amplitude = min(fastest, sharpest, RANGE_SHARE * (upper - lower))
+    centre = min(max(start, lower + amplitude), upper - amplitude)
+    return Sine(joint.name, centre, amplitude)
+
+
+def tour(arm: Arm) -> tuple[Stop, ...]:
+    """Every named state, some joint goals, some tool positions, and home again."""
+    named = [Stop(f"named {name}", NamedGoal(name=name)) for name in arm.named_states if name != "home"]
+    joints = [
+        Stop(f"joints {number}", JointGoal(name=arm.joint_names, position=positions_at(arm, shares)))
+        for number, shares in enumerate(JOINT_TOUR, 1)
+    ]
+    poses = [
+        Stop(f"tool {number}", PoseGoal(position=tool_at(arm, positions_at(arm, shares))))
+        for number, shares in enumerate(POSE_TOUR, 1)
+    ]
+    home = JointGoal(name=arm.joint_names, position=arm.reference_position)
+    return (*named, *joints, *poses, Stop("home", home))
+
+
+def positions_at(arm: Arm, shares: tuple[float, ...]) -> tuple[float, ...]:
+    """Joint values [rad] or [m] at these shares of their travel."""
+    return tuple(
+        joint.lower + shares[index % len(shares)] * (joint.upper - joint.lower)
+        for index, joint in enumerate(arm.joints)
+    )
+
+
+def tool_at(arm: Arm, positions: tuple[float, ...]) -> tuple[float, ...]:
+    """Where the tool is in the base frame [m]."""
+    links = link_transforms(arm.model, dict(zip(arm.joint_names, positions, strict=True)))
+    return tuple(compose(inverse(links[arm.base_frame]), links[arm.tool_frame])[0])
