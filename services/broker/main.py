@@ -11,7 +11,7 @@ from pathlib import Path
 from schemas.deployment import Broker, Deployment
 from services.broker import mosquitto
 from services.broker.ports import PortTaken, require_free
-from services.runtime.deployment import DeploymentError, load_deployment, project_root
+from services.runtime.deployment import DeploymentError, load_deployment
 from services.runtime.readiness import Readiness
 
 log = logging.getLogger("broker")
@@ -32,17 +32,22 @@ def run(deployment: Deployment) -> int:
     """Serves; the readiness file is beaten once a second for as long as connections are accepted."""
     section = deployment.mqtt
     require_free(section.host, section.port, "choose another with GEMELO_MQTT_PORT or [mqtt] port in deploy/local.toml")
-    folder = project_root() / deployment.paths.run
+    folder = Path(deployment.paths.run)
     folder.mkdir(parents=True, exist_ok=True)
     readiness = Readiness(folder, "broker")
+
+    def beat() -> None:
+        readiness.ready()
+        readiness.beat()
+
     log.info("%s listens on %s port %d", section.broker, section.host, section.port)
     if section.broker is Broker.MOSQUITTO:
-        return mosquitto.serve(section, folder, readiness.ready, readiness.not_ready)
+        return mosquitto.serve(section, folder, beat, readiness.not_ready)
     # amqtt takes half a second to import, which mosquitto need not wait for.
     from services.broker import embedded
 
     try:
-        return embedded.serve(section, readiness.ready)
+        return embedded.serve(section, beat)
     finally:
         readiness.not_ready()
 

@@ -108,6 +108,7 @@ class Stack:
                     **self.environment,
                     "PC_SOCKET_PATH": str(self.socket),
                     "PC_LOG_FILE": str(self.folder / "process-compose.log"),
+                    "PROC_COMP_CONFIG": str(self.folder),
                 },
                 stdin=subprocess.DEVNULL,
                 stdout=console,

@@ -24,7 +24,7 @@ def test_every_process_is_the_console_script_of_its_name():
     for name in PROCESSES:
         script = f"gemelo-{name.replace('_', '-')}"
         assert script in SCRIPTS
-        assert COMPOSE["processes"][name]["command"] == f".venv/bin/{script}"
+        assert COMPOSE["processes"][name]["command"] == f"exec .venv/bin/{script} 2>&1"
 
 
 def test_every_console_script_is_a_process_or_the_command_line():
