@@ -1,0 +1,120 @@
+"""From words to goals, and from refusals to words."""
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from schemas.device import DeviceCommandKind
+from schemas.motion import JointTrajectory, TrajectoryPoint
+from schemas.planning import JointGoal, NamedGoal, PoseGoal, Refusal
+from services.arm.description import load_arm
+from services.cli.device import reference_request
+from services.cli.exits import CommandError, ExitCode
+from services.cli.goals import as_typed, goal_of, refusal_text, request_of
+from services.cli.main import parser
+from services.cli.move_report import MoveReport, summary, tool_error_mm
+from services.cli.units import parse_joints
+
+ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
+
+
+def test_the_command_line_becomes_a_pose_goal():
+    options = parser().parse_args(["move", "--to", "0.25", "-0.15", "-1e-3"])
+    assert goal_of(ARM, options.to, (), None) == PoseGoal(position=(0.25, -0.15, -0.001))
+
+
+def test_the_command_line_becomes_a_joint_goal():
+    options = parser().parse_args(["move", "--joints", "brazo_joint=30deg", "q3=-40mm"])
+    goal = goal_of(ARM, options.to, options.joints, options.named)
+    assert goal == JointGoal(name=("brazo_joint", "efector_joint"), position=(pytest.approx(math.pi / 6), -0.04))
+
+
+def test_the_command_line_becomes_a_named_goal():
+    assert goal_of(ARM, None, (), "ready") == NamedGoal(name="ready")
+    with pytest.raises(CommandError, match='did you mean "ready"'):
+        goal_of(ARM, None, (), "redy")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["move"],
+        ["move", "--to", "1", "2"],
+        ["move", "--to", "1", "2", "nan"],
+        ["move", "--to", "1", "2", "3", "--named", "ready"],
+        ["move", "--named", "ready", "--spede", "1"],
+        ["mvoe"],
+        [],
+    ],
+)
+def test_what_cannot_be_understood_ends_with_two(words):
+    with pytest.raises(SystemExit) as ended:
+        parser().parse_args(words)
+    assert ended.value.code == ExitCode.USAGE
+
+
+@pytest.mark.parametrize("speed", [0.0, -0.1, 1.01])
+def test_a_speed_outside_its_range_is_refused(speed):
+    with pytest.raises(CommandError, match=r"not in \(0, 1\]"):
+        request_of(NamedGoal(name="ready"), speed)
+
+
+def test_a_refusal_says_why_what_would_do_and_the_remedy():
+    goal = PoseGoal(position=(2.0, 0.0, 0.1))
+    refusal = Refusal(
+        check="reach", subject="tool", message="2.000 m is out of reach", nearest=(0.4, 0.0, 0.1), remedy="come nearer"
+    )
+    assert refusal_text(refusal, goal, ARM) == (
+        "refused (reach): 2.000 m is out of reach; nearest that can: --to 0.4000 0.0000 0.1000; come nearer"
+    )
+
+
+@given(st.floats(-2.9, 2.9), st.floats(0.0, 0.2))
+def test_the_nearest_goal_can_be_typed_as_it_is_said(angle, travel):
+    goal = JointGoal(name=("brazo_joint", "efector_joint"), position=(9.0, 9.0))
+    words = as_typed(goal, (angle, travel), ARM).split()[1:]
+    values = parse_joints(words, ARM.joints)
+    assert values["brazo_joint"] == pytest.approx(angle, abs=1e-4)
+    assert values["efector_joint"] == pytest.approx(travel, abs=1e-6)
+
+
+def test_the_tool_error_of_one_step_of_the_lift_is_one_step_of_the_rack():
+    trajectory = JointTrajectory(
+        joint_names=ARM.joint_names, points=(TrajectoryPoint(positions=(0.6, -1.2, 0.08), time_from_start=1.0),)
+    )
+    assert tool_error_mm(ARM, trajectory, {"efector_joint": 1.0}) == pytest.approx(math.tau * 22.5 / 400, rel=1e-6)
+    assert tool_error_mm(ARM, trajectory, {}) == 0.0
+
+
+def test_the_last_line_of_a_move():
+    report = MoveReport(
+        robot="rm1", status="SUCCEEDED", planned_ms=1.84, duration_s=3.2, took_s=3.214, final_error_mm=0.0042,
+        final_error_steps={"brazo_joint": 0.12, "efector_joint": -0.4},
+    )  # fmt: skip
+    assert summary(report) == (
+        "planned in 1.8 ms, took 3.21 s, final error 0.004 mm, steps: brazo_joint +0.12, efector_joint -0.40"
+    )
+    assert report.exit_code is ExitCode.OK
+
+
+@pytest.mark.parametrize(
+    ("status", "interrupted", "code"),
+    [("CANCELED", True, ExitCode.CANCELLED), ("CANCELED", False, ExitCode.FAILED), ("ABORTED", True, ExitCode.FAILED)],
+)
+def test_how_a_move_that_did_not_arrive_ends(status, interrupted, code):
+    report = MoveReport(
+        robot="rm1", status=status, succeeded=False, interrupted=interrupted, reason="boot id changed", planned_ms=1.0,
+        duration_s=1.0, stopped_at={"brazo_joint": "12.000 deg"},
+    )  # fmt: skip
+    assert report.exit_code is code
+    assert "brazo_joint 12.000 deg" in summary(report)
+
+
+def test_a_reference_names_every_joint():
+    request = reference_request(ARM, ["q1=90deg"])
+    assert request.command is DeviceCommandKind.REFERENCE
+    assert request.name == ARM.joint_names
+    assert request.position == (pytest.approx(math.pi / 2), 0.0, 0.0)
