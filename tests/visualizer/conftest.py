@@ -111,6 +111,12 @@ def model():
 
 
 @pytest.fixture
+def urdf_text() -> str:
+    """The text that `model` was read from."""
+    return URDF
+
+
+@pytest.fixture
 def core(model):
     return Visualizer(model, "rm1", "efector_link")
 

@@ -1,0 +1,158 @@
+"""Messages become columns: in screen units, thinned while nothing moves, and none is lost when something does."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from schemas.device import DeviceEvent, DeviceMode, DeviceState, DeviceStatus
+from schemas.joints import JointState, StepErrors
+from schemas.planning import PlannedPath
+from schemas.system import LogLevel, LogRecord
+from services.visualizer import entities
+from services.visualizer.thinning import KEEP_ALIVE, Thinned
+from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip
+
+START = 1_795_000_000_000_000_000
+NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")
+
+
+def by_entity(updates):
+    return {update.entity: update for update in updates}
+
+
+def joint_state(*position, stamp=START, name=NAMES):
+    return JointState(stamp=stamp, name=name, position=position)
+
+
+def test_executed_positions_are_shown_in_degrees_and_millimetres(core):
+    core.on_joint_state(joint_state(math.pi / 2, -0.1, 0.04))
+    updates = by_entity(core.step(START))
+    assert updates[entities.executed("brazo_joint")].values == pytest.approx(np.array([[90.0]]))
+    assert updates[entities.executed("efector_joint")].values == pytest.approx(np.array([[40.0]]))
+    assert updates[entities.executed("brazo_joint")].times.tolist() == [START]
+
+
+def test_measured_and_commanded_arms_stand_apart(core):
+    core.on_joint_state(joint_state(0.0, 0.0, 0.0))
+    core.on_joint_command(joint_state(math.pi / 2, 0.0, 0.0))
+    updates = by_entity(core.step(START))
+    measured = updates[f"{entities.MEASURED}/base_link/brazo_link"]
+    commanded = updates[f"{entities.COMMANDED}/base_link/brazo_link"]
+    assert isinstance(measured, Poses)
+    assert measured.rotations[0] == pytest.approx((0, 0, 0, 1))
+    assert commanded.rotations[0] == pytest.approx((0, 0, math.sqrt(0.5), math.sqrt(0.5)))
+
+
+def test_joints_are_taken_by_name_whatever_their_order(core):
+    core.on_joint_state(joint_state(0.05, 1.0, name=("efector_joint", "brazo_joint")))
+    core.on_joint_state(joint_state(9.9, stamp=START + 1, name=("stranger",)))
+    updates = by_entity(core.step(START))
+    assert updates[entities.executed("efector_joint")].values[0] == pytest.approx(50.0)
+    assert updates[entities.executed("brazo_joint")].values[0] == pytest.approx(math.degrees(1.0))
+
+
+def test_the_step_error_comes_with_its_band(core):
+    core.on_step_errors(StepErrors(stamp=START, name=NAMES, error=(0.1, -0.2, 0.3)))
+    values = by_entity(core.step(START))[entities.error("antebrazo_joint")].values
+    assert values == pytest.approx(np.array([[-0.2, 0.5, -0.5]]))
+
+
+def test_a_resting_arm_sends_two_samples_a_second(core):
+    count = 0
+    for index in range(500):
+        now = START + index * 20_000_000
+        core.on_joint_state(joint_state(0.1, 0.2, 0.03, stamp=now))
+        if index % 5 == 4:
+            count += sum(len(u.times) for u in core.step(now) if u.entity == entities.executed("brazo_joint"))
+    assert count == pytest.approx(20, abs=1)
+
+
+def test_thinning_keeps_every_change_and_the_sample_before_it():
+    thinned = Thinned(1)
+    for stamp in range(0, 10):
+        thinned.add(stamp, (1.0,))
+    thinned.add(10, (2.0,))
+    thinned.add(10, (3.0,))
+    times, rows = thinned.take()
+    assert times.tolist() == [0, 9, 10]
+    assert rows[:, 0].tolist() == [1.0, 1.0, 2.0]
+    thinned.add(10 + KEEP_ALIVE, (2.0,))
+    assert thinned.take()[0].tolist() == [10 + KEEP_ALIVE]
+
+
+def test_the_trail_is_one_unbroken_line_and_rests_with_the_arm(core):
+    lines = []
+    for index in range(1, 31):
+        angle = min(index, 20) * 0.02
+        core.on_joint_state(joint_state(angle, 0.0, 0.0, stamp=START + index * 20_000_000))
+        if index % 5 == 0:
+            lines += [update.points for update in core.step(START) if isinstance(update, Strip)]
+    assert len(lines) == 4
+    for before, after in pairwise(lines):
+        assert before[-1] == pytest.approx(after[0])
+
+
+def test_the_planned_path_is_told_once_and_again_to_a_new_viewer(core):
+    core.on_planned_path(PlannedPath(stamp=START, points=((0.0, 0.0, 0.0), (0.1, 0.2, 0.3))))
+    (path,) = [update for update in core.step(START) if update.entity == entities.PATH]
+    assert path.points == pytest.approx(np.array([[0, 0, 0], [0.1, 0.2, 0.3]]))
+    assert entities.PATH not in by_entity(core.step(START + 1))
+    core.restart()
+    assert entities.PATH in by_entity(core.step(START + 2))
+
+
+def test_logs_and_events_are_lines_with_a_level(core):
+    core.on_log(LogRecord(stamp=START, node="planner", level=LogLevel.WARNING, text="slow"))
+    core.on_event(DeviceEvent(stamp=START, device="rm1", event="fault", detail="TICK_OVERRUN"))
+    (lines,) = [update for update in core.step(START) if isinstance(update, LogLines)]
+    assert lines.texts == ("11:06:40 planner: slow", "11:06:40 rm1: fault (TICK_OVERRUN)")
+    assert lines.levels == ("WARNING", "ERROR")
+
+
+def device_panel(core, now=START):
+    updates = core.step(now)
+    text = next(update.markdown for update in updates if isinstance(update, Panel))
+    mode = next(update.state for update in updates if isinstance(update, State))
+    return mode, text
+
+
+def test_before_anything_is_known_the_panel_says_so(core):
+    assert device_panel(core) == ("WAITING", "## rm1 · waiting for the device\n")
+
+
+def test_an_offline_device_says_why(core):
+    core.on_device_status(DeviceStatus(stamp=START, online=False, reason="the broker does not answer"))
+    mode, text = device_panel(core)
+    assert mode == "OFFLINE"
+    assert "the broker does not answer" in text
+
+
+def test_a_silent_device_is_not_called_present(core):
+    core.on_device_state(DeviceState(stamp=START, mode=DeviceMode.IDLE))
+    assert "SILENT for 3 s" in device_panel(core, START + 3_000_000_000)[1]
+
+
+def test_the_panel_lists_steps_and_position_per_joint(core):
+    core.on_device_status(DeviceStatus(stamp=START, online=True, firmware="1.2.3"))
+    core.on_device_state(DeviceState(stamp=START, mode=DeviceMode.FAULT, fault=1, buffered=0.3))
+    core.on_joint_state(joint_state(math.pi / 4, 0.0, 0.0123))
+    core.on_step_errors(
+        StepErrors(stamp=START, name=NAMES, commanded=(1.25, 2.0, 3.0), executed=(1, 2, 3), error=(0.25, 0.0, 0.0),
+                   max_error=(0.5, 0.1, 0.1))
+    )  # fmt: skip
+    mode, text = device_panel(core)
+    assert mode == "FAULT (fault 1)"
+    assert "| brazo_joint | 45.00° | 1.25 | 1 | **+0.25** | 0.50 |" in text
+    assert "12.30 mm" in text
+    assert "300 ms queued" in text
+    assert "firmware 1.2.3" in text
+
+
+def test_every_update_is_finite_and_ordered(core):
+    for index in range(50):
+        core.on_joint_state(joint_state(0.01 * index, 0.0, 0.0, stamp=START + index * 20_000_000))
+    for update in core.step(START):
+        if isinstance(update, Scalars | Poses):
+            assert np.all(np.diff(update.times) > 0)

@@ -1,0 +1,61 @@
+"""What is sent can be read back from a recording, and opens as a picture that is not blank."""
+
+import subprocess
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from services.visualizer import entities
+from services.visualizer.binary import rerun_binary
+from services.visualizer.picture import picture
+
+
+@pytest.fixture(scope="module")
+def printed(recording):
+    """The recording as the rerun program prints it."""
+    done = subprocess.run([rerun_binary(), "rrd", "print", recording], capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+@pytest.mark.parametrize(
+    "entity",
+    [
+        entities.MODE, entities.PANEL, entities.LOG, entities.PATH, entities.TRAIL,
+        entities.commanded("brazo_joint"), entities.executed("efector_joint"), entities.error("antebrazo_joint"),
+        f"{entities.MEASURED}/base_link/brazo_link/antebrazo_link/efector_link",
+        f"{entities.COMMANDED}/base_link/brazo_link/visual_0",
+    ],
+)  # fmt: skip
+def test_everything_a_person_looks_at_is_in_the_recording(printed, entity):
+    assert f"/{entity}" in printed
+
+
+def test_the_layout_travels_with_the_recording(recording):
+    done = subprocess.run(
+        [rerun_binary(), "rrd", "print", "-v", recording], capture_output=True, text=True, check=True
+    ).stdout
+    assert "viewport" in done
+
+
+def test_the_picture_shows_an_arm_and_its_plots(recording, tmp_path):
+    with Image.open(picture(recording, tmp_path / "view.png", size=(960, 540))) as image:
+        pixels = np.asarray(image.convert("RGB"))
+    height, width, _ = pixels.shape
+    assert width == 960
+    arm = pixels[: height * 6 // 10, : width // 2].astype(int)
+    plots = pixels[height // 10 : height * 9 // 10, width * 6 // 10 :].astype(int)
+    assert arm.std() > 8.0
+    orange = (plots[..., 0] > 180) & (plots[..., 1] < 180) & (plots[..., 2] < 120)
+    assert orange.mean() > 0.005
+
+
+def test_a_missing_recording_is_said(tmp_path):
+    with pytest.raises(RuntimeError, match=r"there is no recording .*none\.rrd"):
+        picture(tmp_path / "none.rrd", tmp_path / "view.png")
+
+
+def test_a_broken_recording_is_said_with_the_viewers_words(tmp_path):
+    (tmp_path / "broken.rrd").write_bytes(b"not a recording")
+    with pytest.raises(RuntimeError, match=r"no picture of .*broken\.rrd"):
+        picture(tmp_path / "broken.rrd", tmp_path / "view.png", timeout=4.0)
