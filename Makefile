@@ -24,7 +24,7 @@ check: setup ## ruff, mypy, import-linter, clang-format
 	@$(bin)/ruff check --quiet .
 	@$(bin)/ruff format --check --quiet . || { echo "remedy: make format"; exit 1; }
 	@$(bin)/mypy --no-error-summary schemas services firmware
-	@$(bin)/lint-imports --no-logo 2>/dev/null || $(bin)/lint-imports
+	@$(bin)/lint-imports --no-logo >/dev/null || $(bin)/lint-imports --no-logo
 	@git ls-files 'firmware/*.h' 'firmware/*.hpp' 'firmware/*.cpp' | xargs -r $(bin)/clang-format --dry-run -Werror
 	@echo "check: all good"
 
@@ -33,10 +33,10 @@ format: setup ## let ruff and clang-format write
 	@git ls-files 'firmware/*.h' 'firmware/*.hpp' 'firmware/*.cpp' | xargs -r $(bin)/clang-format -i
 
 demo: setup ## a sine and a tour, without a display: out/demo.json, recording, picture
-	@$(bin)/gemelo demo
+	@$(bin)/python -m services.demo
 
 bench: setup ## the figures: out/bench.json
-	@$(bin)/gemelo bench
+	@$(bin)/python -m services.bench
 
 lock: setup ## resolve pyproject.toml anew into requirements.lock
 	@deploy/lock

@@ -40,9 +40,14 @@ def test_every_process_says_when_it_is_ready_and_is_started_again():
     for name in PROCESSES:
         process = COMPOSE["processes"][name]
         assert process["readiness_probe"]["exec"]["command"] == f"deploy/probe {name}"
-        assert process["availability"]["restart"] == "always"
+        assert process["availability"]["restart"] == ("on_failure" if name == "viewer" else "always")
         assert process["shutdown"]["signal"] == 15
 
 
 def test_process_compose_itself_opens_no_port():
     assert re.search(r"^PC_SOCKET_PATH=\.gemelo/", (ROOT / ".pc_env").read_text(), re.MULTILINE)
+
+
+def test_the_welcome_waits_for_everything():
+    conditions = {name: each["condition"] for name, each in COMPOSE["processes"]["welcome"]["depends_on"].items()}
+    assert conditions == dict.fromkeys(PROCESSES, "process_healthy")
