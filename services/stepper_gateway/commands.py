@@ -1,0 +1,83 @@
+"""Commands to the device: sent again until it answers, and never carried out twice or too late."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from schemas.device import DeviceCommandKind
+from services.stepper_gateway.clock import ClockSync
+from services.stepper_gateway.links.frames import Command, CommandReply
+from services.stepper_gateway.moment import Moment
+
+RETRY = 0.1  # [s]
+TIME_TO_LIVE = 500_000  # [us]
+INTERNAL = 0  # ticket of the gateway's own commands
+
+
+@dataclass
+class PendingCommand:
+    """A command that the device has not answered yet."""
+
+    cmd_id: int
+    kind: DeviceCommandKind
+    positions: tuple[int, ...]  # [1/256 step] of REFERENCE
+    ticket: int
+    deadline: float  # [s] monotonic
+    sent: float = -1.0e9  # [s] monotonic, the last time
+
+
+class Commands:
+    """All commands under way to one boot of the device."""
+
+    def __init__(self, first_id: int) -> None:
+        self._next_id = first_id
+        self._pending: list[PendingCommand] = []
+
+    def ask(
+        self, kind: DeviceCommandKind, moment: Moment, timeout: float, ticket: int = INTERNAL,
+        positions: tuple[int, ...] = (),
+    ) -> None:  # fmt: skip
+        """Have `kind` sent with the next frames."""
+        self._next_id = self._next_id % 0xFFFFFFFF + 1
+        deadline = moment.monotonic + timeout
+        self._pending.append(PendingCommand(self._next_id, kind, positions, ticket, deadline))
+
+    def is_pending(self, kind: DeviceCommandKind) -> bool:
+        return any(command.kind == kind for command in self._pending)
+
+    def due(self, moment: Moment, clock: ClockSync, boot_id: int) -> list[Command]:
+        """The frames to send now."""
+        frames = []
+        for command in self._pending:
+            if moment.monotonic - command.sent >= RETRY:
+                command.sent = moment.monotonic
+                expires = clock.device_time(moment.monotonic) + TIME_TO_LIVE
+                frames.append(
+                    Command(
+                        boot_id=boot_id,
+                        cmd_id=command.cmd_id,
+                        expires_us=expires,
+                        cmd=command.kind,
+                        positions=command.positions,
+                    )
+                )
+        return frames
+
+    def answered(self, reply: CommandReply) -> PendingCommand | None:
+        """The command that this reply belongs to, once."""
+        for command in self._pending:
+            if command.cmd_id == reply.cmd_id and command.kind == reply.cmd:
+                self._pending.remove(command)
+                return command
+        return None
+
+    def expired(self, moment: Moment) -> list[PendingCommand]:
+        """Commands that the device has not answered in time; they are given up."""
+        late = [command for command in self._pending if moment.monotonic >= command.deadline]
+        self._pending = [command for command in self._pending if command not in late]
+        return late
+
+    def drop_all(self) -> list[PendingCommand]:
+        """Everything under way, given up."""
+        dropped, self._pending = self._pending, []
+        return dropped

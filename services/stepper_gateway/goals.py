@@ -1,0 +1,215 @@
+"""Goals of follow_joint_trajectory: accepted or refused, carried out, and ended with a reason."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from schemas.actions import GoalStatusCode
+from schemas.device import DeviceMode
+from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from schemas.system import LogLevel
+from services.stepper_gateway.execution import Ending, Execution
+from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.motion import PlannedMotion
+from services.stepper_gateway.mover import Mover
+from services.stepper_gateway.outputs import GoalExecuting, GoalFinished, GoalProgress
+from services.stepper_gateway.path_log import PathPoint
+from services.stepper_gateway.refusals import GoalRejected, invalid
+from services.stepper_gateway.validation import Validator
+
+FAILED = GoalStatusCode.ABORTED, FollowErrorCode.DEVICE_FAILED
+
+
+class GoalVerdict(NamedTuple):
+    """The answer to a goal request."""
+
+    accepted: bool
+    code: FollowErrorCode = FollowErrorCode.SUCCESSFUL
+    reason: str = ""
+
+
+class Goals:
+    """At most one goal moves the arm; a newer one takes over from it."""
+
+    def __init__(self, mover: Mover) -> None:
+        self._mover = mover
+        self._validator = Validator(mover.joints, mover.arm.device.tick_hz)
+        self._current: Execution | None = None
+        self._waiting: Execution | None = None  # until its stamp, or until the stream before it has ended
+
+    @property
+    def is_active(self) -> bool:
+        return self._current is not None or self._waiting is not None
+
+    def use_tick(self, tick_hz: int) -> None:
+        """The device's own figure for the tick that bounds step rates."""
+        self._validator = Validator(self._mover.joints, tick_hz)
+
+    def accept(self, goal_id: str, goal: FollowJointTrajectoryGoal, moment: Moment) -> GoalVerdict:
+        """Accept and start a goal, or say why not."""
+        mover = self._mover
+        if reason := mover.refusal(moment):
+            return GoalVerdict(False, FollowErrorCode.DEVICE_FAILED, reason)
+        try:
+            if self._current is not None and self._current.ending is not None:
+                raise invalid("the arm is still decelerating after the last goal; send this one again when it rests")
+            checked = self._validator.check(goal, moment.unix, mover.parameters)
+            self._validator.path(checked, mover.presence(moment), moment.unix, mover.parameters)
+        except GoalRejected as rejected:
+            return GoalVerdict(False, rejected.code, rejected.reason)
+        self._drop_waiting(moment)
+        self._waiting = Execution(goal_id, checked, mover.joints, moment)
+        self._start_waiting(moment)
+        return GoalVerdict(True)
+
+    def cancel(self, goal_id: str, moment: Moment) -> str:
+        """Decelerate; empty, or why there is nothing to cancel."""
+        execution = next((e for e in (self._current, self._waiting) if e is not None and e.goal_id == goal_id), None)
+        if execution is None:
+            return f"goal {goal_id} is not being carried out"
+        ending = Ending(GoalStatusCode.CANCELED, FollowErrorCode.CANCELED, "canceled: the arm decelerated on its path")
+        if execution is self._waiting:
+            self._waiting = None
+            self._finish(execution, ending, moment)
+        else:
+            self._end(ending, moment)
+        return ""
+
+    def step(self, moment: Moment, period: float) -> None:
+        """Start what has waited, and end what is late or refused."""
+        self._start_waiting(moment)
+        execution, mover = self._current, self._mover
+        if execution is None:
+            return
+        if execution.ending is not None:
+            if mover.has_stopped():
+                self._finish_current(execution.ending, moment)
+            return
+        stream = execution.stream
+        if stream is not None and stream.failure:
+            return self._end(Ending(*FAILED, stream.failure), moment)
+        if execution.deadline is not None:
+            if mover.is_held:
+                execution.deadline += period
+            if moment.monotonic > execution.deadline and mover.state is not None:
+                self._end(execution.late(mover.state, moment.monotonic), moment)
+
+    def on_ack(self) -> None:
+        """EXECUTING means that the device has taken knots of the goal."""
+        execution = self._current
+        if execution is None or execution.is_executing or execution.stream is None:
+            return
+        if execution.stream.acked > execution.first_seq:
+            execution.is_executing = True
+            self._mover.out.put(GoalExecuting(execution.goal_id))
+
+    def on_state(self, state: State, point: PathPoint, moment: Moment) -> None:
+        """Check the goal's tolerances, report progress, and see whether it is done."""
+        execution, mover = self._current, self._mover
+        if execution is not None and execution.stream is not None and state.stream == execution.stream.id:
+            self._follow(execution, state, point, moment)
+        if mover.is_resting():
+            self._start_waiting(moment)
+
+    def abort(self, reason: str, moment: Moment) -> None:
+        """The device can no longer be relied upon: end now, with the last steps known."""
+        self._drop_waiting(moment, Ending(*FAILED, reason))
+        if self._current is not None:
+            ending = self._current.ending
+            self._mover.transmission.abandon()
+            self._finish_current(Ending(*FAILED, f"{ending.reason}; then {reason}" if ending else reason), moment)
+
+    def stop(self, reason: str, moment: Moment) -> None:
+        """Decelerate and abort, for a reason outside the goal."""
+        self._drop_waiting(moment, Ending(*FAILED, reason))
+        if self._current is not None and self._current.ending is None:
+            self._end(Ending(*FAILED, reason), moment)
+
+    def _follow(self, execution: Execution, state: State, point: PathPoint, moment: Moment) -> None:
+        strayed = execution.follow(point, state)
+        stream = execution.stream
+        is_finished = stream is not None and stream.is_finished and execution.ending is None
+        if is_finished and strayed is None and execution.is_reached(state):
+            done = Ending(GoalStatusCode.SUCCEEDED, FollowErrorCode.SUCCESSFUL, "")
+            return self._finish_current(done, moment)
+        if strayed is not None and execution.ending is None:
+            return self._end(strayed, moment)
+        if execution.ending is None and state.mode == DeviceMode.HOLD and not self._mover.is_held:
+            return self._end(Ending(*FAILED, "the device holds because it lost the gateway's heartbeat"), moment)
+        self._report(execution, state, point, moment)
+
+    def _report(self, execution: Execution, state: State, point: PathPoint, moment: Moment) -> None:
+        if moment.monotonic < execution.feedback_due or not execution.is_executing:
+            return
+        period = 1.0 / self._mover.parameters.feedback_rate
+        late = moment.monotonic - execution.feedback_due
+        execution.feedback_due = (execution.feedback_due if late < period else moment.monotonic) + period
+        positions = (self._mover.reporter.positions(point.steps), self._mover.reporter.positions(state.steps))
+        feedback = execution.feedback(point, state, positions, moment.unix)
+        self._mover.out.put(GoalProgress(execution.goal_id, feedback))
+
+    def _start_waiting(self, moment: Moment) -> None:
+        execution, mover = self._waiting, self._mover
+        if execution is None or execution.goal.trajectory.stamp > moment.unix:
+            return
+        if not (mover.transmission.is_open or mover.is_resting()):
+            self._preempt(moment)
+            return
+        presence = mover.presence(moment)
+        self._waiting = None
+        try:
+            path = self._validator.path(execution.goal, presence, moment.unix, mover.parameters)
+        except GoalRejected as rejected:
+            ending = Ending(GoalStatusCode.ABORTED, rejected.code, rejected.reason)
+            return self._finish(execution, ending, moment)
+        self._preempt(moment)
+        self._begin(execution, PlannedMotion(path), moment)
+
+    def _begin(self, execution: Execution, motion: PlannedMotion, moment: Moment) -> None:
+        mover = self._mover
+        mover.lead = mover.parameters.trajectory_lead
+        self._current = execution
+        stream = mover.stream
+        ahead = 0.0
+        if stream is not None and mover.transmission.is_open:
+            start_us, execution.first_seq = stream.end_us, stream.next_seq
+            ahead = (start_us - stream.played_us(moment.monotonic, mover.session.clock)) * 1e-6
+            mover.transmission.splice(motion)
+            mover.pump(moment)
+        else:
+            start_us = 0
+            stream = mover.begin(motion, motion.start, moment)
+        late = execution.goal.time_tolerance
+        end = moment.monotonic + ahead + motion.duration_us * 1e-6
+        execution.begin(stream, start_us, motion.duration_us, None if late is None else end + late)
+
+    def _preempt(self, moment: Moment) -> None:
+        if self._current is not None:
+            reason = "a newer goal took over"
+            self._finish_current(Ending(GoalStatusCode.PREEMPTED, FollowErrorCode.PREEMPTED, reason), moment)
+
+    def _drop_waiting(self, moment: Moment, ending: Ending | None = None) -> None:
+        execution, self._waiting = self._waiting, None
+        if execution is not None:
+            reason = "a newer goal took over before this one began"
+            self._finish(
+                execution, ending or Ending(GoalStatusCode.PREEMPTED, FollowErrorCode.PREEMPTED, reason), moment
+            )
+
+    def _end(self, ending: Ending, moment: Moment) -> None:
+        """Decelerate; the goal ends once the arm stands."""
+        if self._current is not None and self._current.ending is None:
+            self._current.ending = ending
+            self._mover.stop(moment)
+
+    def _finish_current(self, ending: Ending, moment: Moment) -> None:
+        execution, self._current = self._current, None
+        if execution is not None:
+            self._finish(execution, ending, moment)
+
+    def _finish(self, execution: Execution, ending: Ending, moment: Moment) -> None:
+        result = execution.result(ending, self._mover.state, moment.monotonic)
+        self._mover.out.put(GoalFinished(execution.goal_id, ending.status, result))
+        level = LogLevel.INFO if ending.status == GoalStatusCode.SUCCEEDED else LogLevel.WARNING
+        self._mover.out.log(level, f"goal {execution.goal_id} {ending.status.name.lower()} {ending.reason}".rstrip())

@@ -1,0 +1,75 @@
+"""A knot: where every joint is to be, how fast, and bending how, at one instant."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from schemas.message import Vector
+from services.arm.description import Joint
+
+
+class Knot(NamedTuple):
+    """In joint units, in the arm's joint order."""
+
+    position: Vector  # [rad] or [m]
+    velocity: Vector  # [rad/s] or [m/s]
+    acceleration: Vector  # [rad/s^2] or [m/s^2]
+
+    @classmethod
+    def at_rest(cls, position: Vector) -> Knot:
+        zeros = (0.0,) * len(position)
+        return cls(tuple(position), zeros, zeros)
+
+    @property
+    def is_at_rest(self) -> bool:
+        return not any(self.velocity)
+
+
+class StepKnot(NamedTuple):
+    """The same on the wire: 1/256 steps and 1/256 steps/s."""
+
+    position: tuple[int, ...]
+    velocity: tuple[int, ...]
+
+
+class StepEncoder:
+    """Knots as the wire says them, for one arm; absolute, so nothing accumulates.
+
+    A limit that was computed may lie a rounding beyond what the device was told: the outermost knots are put on it.
+    """
+
+    def __init__(self, joints: tuple[Joint, ...]) -> None:
+        self._scales = tuple(joint.steps for joint in joints)
+        self._rates = tuple(joint.steps.per_unit * 256.0 for joint in joints)
+        self._fastest = tuple(
+            int(joint.velocity * rate + 1e-6) for joint, rate in zip(joints, self._rates, strict=True)
+        )
+        self._lower = tuple(_bound(joint, joint.lower) for joint in joints)
+        self._upper = tuple(_bound(joint, joint.upper) for joint in joints)
+
+    def encode(self, knot: Knot) -> StepKnot:
+        """The nearest knot within the device's limits."""
+        positions = zip(self._scales, knot.position, self._lower, self._upper, strict=True)
+        velocities = zip(self._rates, knot.velocity, self._fastest, strict=True)
+        return StepKnot(
+            tuple(min(max(scale.to_q8(p), low), high) for scale, p, low, high in positions),
+            tuple(min(max(round(v * rate), -most), most) for rate, v, most in velocities),
+        )
+
+
+def _bound(joint: Joint, limit: float) -> int:
+    """A position limit on the wire; a continuous joint has none but the wire's own."""
+    if math.isinf(limit):
+        return -(2**31) if limit < 0.0 else 2**31 - 1
+    return joint.steps.to_q8(limit)
+
+
+def whole_steps(q8: int) -> int:
+    """The step count that the device emits for a path position: floor(p + 0.5)."""
+    return (q8 + 128) >> 8
+
+
+def stop_time(knot: Knot, joints: tuple[Joint, ...]) -> float:
+    """[s] that braking from this knot to rest takes at the acceleration limits."""
+    return max(abs(v) / joint.acceleration for joint, v in zip(joints, knot.velocity, strict=True))

@@ -1,0 +1,1 @@
+"""The wires to the device: the only modules that know one."""

@@ -1,0 +1,304 @@
+"""The packed frames of firmware/PROTOCOL.md, as types, to bytes and back.
+
+Positions are Q24.8 motor steps (1/256 step), velocities Q24.8 steps/s, times microseconds.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Callable
+from enum import IntEnum, IntFlag
+
+import msgspec
+
+MAGIC = 0x67
+VERSION = 1
+MAX_KNOTS = 128
+NO_JOINT = 255
+
+Row = tuple[int, ...]
+
+_HEADER = struct.Struct("<BBBBI")
+_CRC = struct.Struct("<I")
+_TRAJ = struct.Struct("<IIQIHH")
+_ACK = struct.Struct("<IIIBBHiiHHQ")
+_CMD = struct.Struct("<IQBBH")
+_CMD_ACK = struct.Struct("<IBBBBQ")
+_HB = struct.Struct("<II")
+_SYNC = struct.Struct("<Q")
+_SYNC_R = struct.Struct("<QQQ")
+_STATE = struct.Struct("<QBBHHHIIQIII")
+
+
+class BadFrame(ValueError):
+    """Bytes that are no frame; the text says what is wrong."""
+
+
+class FrameType(IntEnum):
+    """The third byte of every frame."""
+
+    TRAJ = 1
+    ACK = 2
+    CMD = 3
+    CMD_ACK = 4
+    HB = 5
+    SYNC = 6
+    SYNC_R = 7
+    STATE = 8
+
+
+class Code(IntEnum):
+    """What the device says of a chunk or a command."""
+
+    OK = 0
+    DUPLICATE = 1
+    GAP = 2
+    NO_SPACE = 3
+    BAD_DT = 4
+    POSITION_LIMIT = 5
+    VELOCITY_LIMIT = 6
+    START_MISMATCH = 7
+    WRONG_BOOT = 8
+    EXPIRED = 9
+    RETAINED = 10
+    BAD_JOINTS = 11
+    NOT_READY = 12
+    WRONG_STREAM = 13
+    NOT_AT_REST = 14
+    UNKNOWN_CMD = 15
+    BAD_COUNT = 16
+
+
+class ChunkFlag(IntFlag):
+    """What is special about a chunk."""
+
+    FIRST = 1  # knot 0 is the present position at rest, at stream time 0
+    LAST = 2  # the last knot is at rest and the stream ends there
+
+
+class Frame(msgspec.Struct, frozen=True, kw_only=True, gc=False):
+    """What all frames carry: the boot they come from or are meant for."""
+
+    boot_id: int = 0
+
+
+class Chunk(Frame, frozen=True, kw_only=True, gc=False):
+    """TRAJ: `positions` and `velocities` have a row per knot and a column per joint."""
+
+    stream: int
+    seq: int
+    expires_us: int
+    dt_us: int
+    flags: int = 0
+    positions: tuple[Row, ...] = ()
+    velocities: tuple[Row, ...] = ()
+
+
+class Ack(Frame, frozen=True, kw_only=True, gc=False):
+    """The answer to a chunk; `value` and `limit` mean what `code` says."""
+
+    stream: int
+    seq: int
+    next_seq: int
+    code: int
+    joint: int = NO_JOINT
+    knot: int = 0
+    value: int = 0
+    limit: int = 0
+    credits: int = 0
+    buffered_ms: int = 0
+    t_us: int = 0
+
+
+class Command(Frame, frozen=True, kw_only=True, gc=False):
+    """CMD: `positions` only for REFERENCE."""
+
+    cmd_id: int
+    expires_us: int
+    cmd: int
+    positions: Row = ()
+
+
+class CommandReply(Frame, frozen=True, kw_only=True, gc=False):
+    """CMD_ACK: what became of a command, and the mode after it."""
+
+    cmd_id: int
+    cmd: int
+    code: int
+    mode: int
+    t_us: int
+
+
+class Heartbeat(Frame, frozen=True, kw_only=True, gc=False):
+    """HB: proof that the gateway's control loop runs."""
+
+    session: int
+    counter: int
+
+
+class Sync(Frame, frozen=True, kw_only=True, gc=False):
+    """SYNC: the gateway's own clock, to be echoed."""
+
+    t0: int
+
+
+class SyncReply(Frame, frozen=True, kw_only=True, gc=False):
+    """SYNC_R: `t0` echoed, `t1` and `t2` the device's clock at receipt and answer."""
+
+    t0: int
+    t1: int
+    t2: int
+
+
+class State(Frame, frozen=True, kw_only=True, gc=False):
+    """STATE: where the device is; `steps` belong to the path point at `play_us`."""
+
+    t_us: int
+    mode: int
+    fault: int = 0
+    inputs: int = 0
+    time_scale: int = 0  # Q1.15
+    buffered_ms: int = 0
+    stream: int = 0
+    next_seq: int = 0
+    play_us: int = 0
+    underruns: int = 0
+    refused: int = 0
+    bad_frames: int = 0
+    steps: Row = ()
+    velocity: Row = ()
+
+
+AnyFrame = Chunk | Ack | Command | CommandReply | Heartbeat | Sync | SyncReply | State
+
+
+def encode(frame: AnyFrame) -> bytes:
+    """The frame's bytes with header and CRC."""
+    match frame:
+        case Chunk():
+            kind, joints = FrameType.TRAJ, len(frame.positions[0]) if frame.positions else 0
+            knots = len(frame.positions)
+            numbers = [n for p, v in zip(frame.positions, frame.velocities, strict=True) for n in (*p, *v)]
+            body = _TRAJ.pack(frame.stream, frame.seq, frame.expires_us, frame.dt_us, knots, frame.flags)
+            body += _rows(numbers)
+        case Ack():
+            kind, joints = FrameType.ACK, 0
+            body = _ACK.pack(
+                frame.stream, frame.seq, frame.next_seq, frame.code, frame.joint, frame.knot,
+                frame.value, frame.limit, frame.credits, frame.buffered_ms, frame.t_us,
+            )  # fmt: skip
+        case Command():
+            kind, joints = FrameType.CMD, len(frame.positions)
+            body = _CMD.pack(frame.cmd_id, frame.expires_us, frame.cmd, 0, 0) + _rows(frame.positions)
+        case CommandReply():
+            kind, joints = FrameType.CMD_ACK, 0
+            body = _CMD_ACK.pack(frame.cmd_id, frame.cmd, frame.code, frame.mode, 0, frame.t_us)
+        case Heartbeat():
+            kind, joints, body = FrameType.HB, 0, _HB.pack(frame.session, frame.counter)
+        case Sync():
+            kind, joints, body = FrameType.SYNC, 0, _SYNC.pack(frame.t0)
+        case SyncReply():
+            kind, joints, body = FrameType.SYNC_R, 0, _SYNC_R.pack(frame.t0, frame.t1, frame.t2)
+        case State():
+            kind, joints = FrameType.STATE, len(frame.steps)
+            body = _STATE.pack(
+                frame.t_us, frame.mode, frame.fault, frame.inputs, frame.time_scale, frame.buffered_ms,
+                frame.stream, frame.next_seq, frame.play_us, frame.underruns, frame.refused, frame.bad_frames,
+            )  # fmt: skip
+            body += _rows((*frame.steps, *frame.velocity))
+    head = _HEADER.pack(MAGIC, VERSION, kind, joints, frame.boot_id) + body
+    return head + _CRC.pack(zlib.crc32(head))
+
+
+def decode(payload: bytes) -> AnyFrame:
+    """The frame in `payload`; raises `BadFrame`."""
+    if len(payload) < _HEADER.size + _CRC.size:
+        raise BadFrame(f"{len(payload)} bytes are too few for a frame")
+    magic, version, kind, joints, boot_id = _HEADER.unpack_from(payload)
+    if magic != MAGIC:
+        raise BadFrame(f"magic 0x{magic:02x} is not 0x{MAGIC:02x}")
+    if version != VERSION:
+        raise BadFrame(f"protocol version {version} is not {VERSION}")
+    reader = _READERS.get(kind)
+    if reader is None:
+        raise BadFrame(f"type {kind} is unknown")
+    if zlib.crc32(payload[:-4]) != _CRC.unpack_from(payload, len(payload) - 4)[0]:
+        raise BadFrame("the CRC does not match")
+    try:
+        return reader(boot_id, joints, payload[_HEADER.size : -4])
+    except struct.error as error:
+        raise BadFrame(f"a {FrameType(kind).name} frame of {len(payload)} bytes: {error}") from error
+
+
+def _rows(numbers: list[int] | Row) -> bytes:
+    return struct.pack(f"<{len(numbers)}i", *numbers)
+
+
+def _read_rows(body: bytes, offset: int, columns: int, rows: int) -> list[Row]:
+    flat = struct.unpack(f"<{columns * rows}i", body[offset:])
+    return [flat[i * columns : (i + 1) * columns] for i in range(rows)]
+
+
+def _read_chunk(boot_id: int, joints: int, body: bytes) -> Chunk:
+    stream, seq, expires_us, dt_us, knots, flags = _TRAJ.unpack_from(body)
+    rows = _read_rows(body, _TRAJ.size, joints, 2 * knots)
+    return Chunk(
+        boot_id=boot_id, stream=stream, seq=seq, expires_us=expires_us, dt_us=dt_us, flags=flags,
+        positions=tuple(rows[0::2]), velocities=tuple(rows[1::2]),
+    )  # fmt: skip
+
+
+def _read_ack(boot_id: int, _joints: int, body: bytes) -> Ack:
+    stream, seq, next_seq, code, joint, knot, value, limit, credits, buffered_ms, t_us = _ACK.unpack(body)
+    return Ack(
+        boot_id=boot_id, stream=stream, seq=seq, next_seq=next_seq, code=code, joint=joint, knot=knot,
+        value=value, limit=limit, credits=credits, buffered_ms=buffered_ms, t_us=t_us,
+    )  # fmt: skip
+
+
+def _read_command(boot_id: int, joints: int, body: bytes) -> Command:
+    cmd_id, expires_us, cmd, _, _ = _CMD.unpack_from(body)
+    (positions,) = _read_rows(body, _CMD.size, joints, 1)
+    return Command(boot_id=boot_id, cmd_id=cmd_id, expires_us=expires_us, cmd=cmd, positions=positions)
+
+
+def _read_reply(boot_id: int, _joints: int, body: bytes) -> CommandReply:
+    cmd_id, cmd, code, mode, _, t_us = _CMD_ACK.unpack(body)
+    return CommandReply(boot_id=boot_id, cmd_id=cmd_id, cmd=cmd, code=code, mode=mode, t_us=t_us)
+
+
+def _read_heartbeat(boot_id: int, _joints: int, body: bytes) -> Heartbeat:
+    session, counter = _HB.unpack(body)
+    return Heartbeat(boot_id=boot_id, session=session, counter=counter)
+
+
+def _read_sync(boot_id: int, _joints: int, body: bytes) -> Sync:
+    return Sync(boot_id=boot_id, t0=_SYNC.unpack(body)[0])
+
+
+def _read_sync_reply(boot_id: int, _joints: int, body: bytes) -> SyncReply:
+    t0, t1, t2 = _SYNC_R.unpack(body)
+    return SyncReply(boot_id=boot_id, t0=t0, t1=t1, t2=t2)
+
+
+def _read_state(boot_id: int, joints: int, body: bytes) -> State:
+    t_us, mode, fault, inputs, scale, buffered, stream, next_seq, play_us, *counts = _STATE.unpack_from(body)
+    steps, velocity = _read_rows(body, _STATE.size, joints, 2)
+    return State(
+        boot_id=boot_id, t_us=t_us, mode=mode, fault=fault, inputs=inputs, time_scale=scale, buffered_ms=buffered,
+        stream=stream, next_seq=next_seq, play_us=play_us, underruns=counts[0], refused=counts[1],
+        bad_frames=counts[2], steps=steps, velocity=velocity,
+    )  # fmt: skip
+
+
+_READERS: dict[int, Callable[[int, int, bytes], AnyFrame]] = {
+    FrameType.TRAJ: _read_chunk,
+    FrameType.ACK: _read_ack,
+    FrameType.CMD: _read_command,
+    FrameType.CMD_ACK: _read_reply,
+    FrameType.HB: _read_heartbeat,
+    FrameType.SYNC: _read_sync,
+    FrameType.SYNC_R: _read_sync_reply,
+    FrameType.STATE: _read_state,
+}

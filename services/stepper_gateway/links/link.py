@@ -1,0 +1,52 @@
+"""What the gateway asks of any wire to the device."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import NamedTuple, Protocol
+
+
+class Kind(StrEnum):
+    """The channels of firmware/PROTOCOL.md; the values are the last part of the MQTT topics."""
+
+    STATUS = "status"
+    TRAJ = "traj"
+    TRAJ_ACK = "traj/ack"
+    CMD = "cmd"
+    CMD_ACK = "cmd/ack"
+    HB = "hb"
+    SYNC = "sync"
+    SYNC_R = "sync/r"
+    STATE = "state"
+    EVENT = "event"
+
+
+FROM_DEVICE = (Kind.STATUS, Kind.TRAJ_ACK, Kind.CMD_ACK, Kind.SYNC_R, Kind.STATE, Kind.EVENT)
+
+
+class Received(NamedTuple):
+    """One payload as it came, and when it came."""
+
+    kind: Kind
+    payload: bytes
+    retained: bool
+    arrival: int  # [ns] monotonic clock
+
+
+class Link(Protocol):
+    """A wire: sends at once or not at all, keeps what arrives until it is taken."""
+
+    @property
+    def connected(self) -> bool: ...
+
+    @property
+    def reason(self) -> str:
+        """Why it is not connected, as a sentence with a remedy."""
+
+    def send(self, kind: Kind, payload: bytes) -> bool:
+        """False: not connected, and nothing was queued."""
+
+    def take(self) -> list[Received]:
+        """Everything that arrived since the last call, oldest first."""
+
+    def close(self) -> None: ...

@@ -1,0 +1,21 @@
+"""One instant on both clocks of this machine."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Moment(NamedTuple):
+    """`unix` for stamps, `monotonic` for durations; the same instant."""
+
+    unix: int  # [ns] UNIX time
+    monotonic: float  # [s]
+
+    @property
+    def micros(self) -> int:
+        """[us] on the monotonic clock: what SYNC frames carry."""
+        return round(self.monotonic * 1e6)
+
+    def unix_at(self, monotonic: float) -> int:
+        """[ns] UNIX time of another instant of the monotonic clock."""
+        return self.unix + round((monotonic - self.monotonic) * 1e9)

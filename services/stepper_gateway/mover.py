@@ -1,0 +1,170 @@
+"""Moves the device: starts and splices motions, keeps them fed, stops them, and knows where the arm is meanwhile."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from schemas.device import DeviceCommandKind, DeviceEvent, DeviceMode
+from schemas.message import Vector
+from schemas.system import LogLevel
+from schemas.topics import COMMAND_ACKS, COMMANDS, DEVICE_EVENTS
+from services.arm.description import Arm
+from services.stepper_gateway.commands import Commands
+from services.stepper_gateway.knots import Knot, whole_steps
+from services.stepper_gateway.links.frames import Ack, Chunk, State, encode
+from services.stepper_gateway.links.link import Kind
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.motion import Motion
+from services.stepper_gateway.outputs import Outbox
+from services.stepper_gateway.parameters import GatewayParameters
+from services.stepper_gateway.path_log import PathPoint
+from services.stepper_gateway.reporting import Reporter
+from services.stepper_gateway.session import DeviceSession
+from services.stepper_gateway.stream import SentChunk, Stream
+from services.stepper_gateway.transmission import Transmission
+from services.stepper_gateway.validation import Presence
+
+HISTORY = 1.0  # [s] of measured positions: a trajectory may have been planned from any of them
+STOP_AGAIN = 0.5  # [s] between STOPs for a device that does not obey
+MOVING = (DeviceMode.RUN, DeviceMode.HOLD)
+
+
+class Mover:
+    """What goals and streamed targets have in common."""
+
+    def __init__(self, arm: Arm, session_id: int, parameters: GatewayParameters, out: Outbox) -> None:
+        self.arm = arm
+        self.joints = arm.joints
+        self.parameters = parameters
+        self.out = out
+        self.session = DeviceSession(arm.device.name, len(arm.joints), session_id)
+        self.commands = Commands(session_id)
+        self.transmission = Transmission(arm.joints, session_id)
+        self.reporter = Reporter(arm.joints)
+        self.is_held = False  # by a person's command, who will resume
+        self.lead = parameters.trajectory_lead  # [s]
+        self._history: deque[tuple[float, Vector]] = deque()
+        self._stop_asked = -1.0e9  # [s] monotonic
+        self._stopped_us = -1  # device time of its answer to the latest STOP
+
+    @property
+    def state(self) -> State | None:
+        return self.session.state
+
+    @property
+    def stream(self) -> Stream | None:
+        return self.transmission.stream
+
+    def is_resting(self) -> bool:
+        """Whether the device stands idle with nothing under way to it."""
+        if self.session.mode != DeviceMode.IDLE:
+            return False
+        stream = self.stream
+        return stream is None or stream.is_abandoned or stream.is_finished
+
+    def refusal(self, moment: Moment) -> str:
+        """Why nothing may be started now, empty if it may."""
+        return self.session.absence(moment, self.parameters.state_timeout) or self.session.hindrance()
+
+    def begin(self, motion: Motion, position: Vector, moment: Moment) -> Stream:
+        """A new stream from rest; its first chunk leaves at once."""
+        status = self.session.status
+        capacity = status.queue_capacity if status is not None and status.queue_capacity else 128
+        self.reporter.motion_begins()
+        stream = self.transmission.begin(motion, Knot.at_rest(position), self.session.boot_id, capacity)
+        self.pump(moment)
+        return stream
+
+    def pump(self, moment: Moment) -> None:
+        """Send what is due of the present stream."""
+        if self.session.is_fresh(moment, self.parameters.state_timeout):
+            self._send(self.transmission.pump(moment, self.session.clock, self.lead), moment)
+
+    def on_ack(self, ack: Ack, arrival: float, moment: Moment) -> None:
+        """Account for a chunk's answer, and fill a gap that it tells of."""
+        stream, round_trip = self.stream, 0.0
+        if stream is not None and ack.stream == stream.id and ack.boot_id == stream.boot_id:
+            round_trip, lost = stream.on_ack(ack, arrival)
+            self._send(self.transmission.again(lost, moment, self.session.clock), moment)
+        steps = self.state.steps if self.state is not None else ()
+        self.out.publish(COMMAND_ACKS, self.reporter.ack(ack, round_trip, moment.unix_at(arrival), steps))
+
+    def on_state(self, state: State, arrival: float) -> None:
+        """Account for what the device says of the stream."""
+        stream = self.stream
+        if stream is not None and state.stream == stream.id:
+            stream.on_state(state)
+        self._history.append((arrival, self.reporter.positions(state.steps)))
+        while self._history[0][0] < arrival - HISTORY:
+            self._history.popleft()
+        if state.mode not in MOVING:
+            self.is_held = False
+
+    def commanded(self, state: State) -> PathPoint:
+        """What the path asks for at the instant of `state`; where it is, if it follows no path of ours."""
+        stream = self.stream
+        if stream is None or state.stream != stream.id:
+            return PathPoint(tuple(float(count) for count in state.steps), (0.0,) * len(state.steps))
+        return stream.commanded(state.play_us)
+
+    def rest_position(self) -> Vector:
+        """[rad] or [m] where the arm rests: the path's own end if the device stands on it, else its step counts."""
+        state, stream = self.state, self.stream
+        if state is None:
+            return self.arm.reference_position
+        if stream is None or not stream.is_finished or state.stream != stream.id:
+            return self.reporter.positions(state.steps)
+        path_end = tuple(whole_steps(q8) for q8 in stream.log.last_steps.position)
+        return stream.log.last.position if path_end == state.steps else self.reporter.positions(state.steps)
+
+    def presence(self, moment: Moment) -> Presence:
+        """From where a new motion would start, and the range that the arm sweeps until then."""
+        stream = self.stream
+        if self.is_resting() or stream is None:
+            return Presence.at_rest(self.rest_position())
+        last = stream.log.last
+        start = last if self.transmission.is_open else Knot.at_rest(last.position)
+        ahead = stream.log.knots_between(stream.played_us(moment.monotonic, self.session.clock), stream.end_us)
+        rows = [position for _, position in self._history] + [knot.position for knot in ahead]
+        columns = list(zip(*rows, strict=True))
+        return Presence(start, tuple(map(min, columns)), tuple(map(max, columns)))
+
+    def stop(self, moment: Moment) -> None:
+        """Decelerate along the path and forget the rest of it."""
+        self.transmission.abandon()
+        self.is_held = False
+        self._stop_asked, self._stopped_us = moment.monotonic, -1
+        self.commands.ask(DeviceCommandKind.STOP, moment, self.parameters.command_timeout)
+
+    def has_stopped(self) -> bool:
+        """Whether the device has answered the latest STOP and has said since that it stands."""
+        state = self.state
+        return state is not None and 0 <= self._stopped_us < state.t_us and state.mode not in MOVING
+
+    def stop_answered(self, t_us: int) -> None:
+        self._stopped_us = t_us
+
+    def stop_strangers(self, moment: Moment) -> None:
+        """Stop a motion that is not ours: of a gateway before us, or one that was given up while the link was down."""
+        state, stream = self.state, self.stream
+        if state is None or state.mode not in MOVING or self.is_held:
+            return
+        if stream is not None and not stream.is_abandoned and state.stream == stream.id:
+            return
+        if moment.monotonic - self._stop_asked >= STOP_AGAIN and not self.session.absence(
+            moment, self.parameters.state_timeout
+        ):
+            self.event("stopping", f"the device moves along stream {state.stream}, which nobody follows", moment)
+            self.stop(moment)
+
+    def event(self, event: str, detail: str, moment: Moment, level: LogLevel = LogLevel.WARNING) -> None:
+        """Say something once, on the bus and in the log."""
+        self.out.publish(
+            DEVICE_EVENTS, DeviceEvent(stamp=moment.unix, device=self.arm.device.name, event=event, detail=detail)
+        )
+        self.out.log(level, f"{event}: {detail}" if detail else event)
+
+    def _send(self, chunks: list[tuple[Chunk, SentChunk]], moment: Moment) -> None:
+        for frame, sent in chunks:
+            self.out.send(Kind.TRAJ, encode(frame))
+            self.out.publish(COMMANDS, self.reporter.chunk(frame, sent, moment))

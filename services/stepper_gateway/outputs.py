@@ -1,0 +1,96 @@
+"""What the core wants done: frames to send, messages to publish, news of goals, answers, log lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from schemas.actions import GoalStatusCode
+from schemas.device import DeviceCommandResponse
+from schemas.message import Message
+from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryResult
+from schemas.system import LogLevel
+from schemas.topics import Topic
+from services.stepper_gateway.links.link import Kind
+
+
+@dataclass(frozen=True, slots=True)
+class SendFrame:
+    """Bytes for the device, now or never."""
+
+    kind: Kind
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Publish:
+    """A message for the bus."""
+
+    topic: Topic[Any]
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class GoalExecuting:
+    """The device has taken the first knots of a goal."""
+
+    goal_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class GoalProgress:
+    """Feedback on a goal."""
+
+    goal_id: str
+    feedback: FollowJointTrajectoryFeedback
+
+
+@dataclass(frozen=True, slots=True)
+class GoalFinished:
+    """A goal's end."""
+
+    goal_id: str
+    status: GoalStatusCode
+    result: FollowJointTrajectoryResult
+
+
+@dataclass(frozen=True, slots=True)
+class CommandAnswer:
+    """The answer to the device command that was asked for under `ticket`."""
+
+    ticket: int
+    response: DeviceCommandResponse
+
+
+@dataclass(frozen=True, slots=True)
+class LogLine:
+    """A line for people."""
+
+    level: LogLevel
+    text: str
+
+
+Output = SendFrame | Publish | GoalExecuting | GoalProgress | GoalFinished | CommandAnswer | LogLine
+
+
+class Outbox:
+    """Collects outputs in order until the shell takes them."""
+
+    def __init__(self) -> None:
+        self._items: list[Output] = []
+
+    def put(self, item: Output) -> None:
+        self._items.append(item)
+
+    def send(self, kind: Kind, payload: bytes) -> None:
+        self._items.append(SendFrame(kind, payload))
+
+    def publish(self, topic: Topic[Any], message: Message) -> None:
+        self._items.append(Publish(topic, message))
+
+    def log(self, level: LogLevel, text: str) -> None:
+        self._items.append(LogLine(level, text))
+
+    def take(self) -> list[Output]:
+        items, self._items = self._items, []
+        return items

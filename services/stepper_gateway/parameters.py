@@ -1,0 +1,48 @@
+"""What a person may set on the gateway."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+
+class GatewayParameters(msgspec.Struct, frozen=True, kw_only=True):
+    """Defaults that suit MQTT on a good network."""
+
+    trajectory_lead: Annotated[
+        float, Meta(ge=0.1, le=1.5, description="[s] of path the device holds, beyond half its stopping time")
+    ] = 0.30
+    streaming_lead: Annotated[float, Meta(ge=0.06, le=1.5, description="[s] the same for streamed targets")] = 0.15
+    stream_silence: Annotated[
+        float, Meta(ge=0.05, le=10.0, description="[s] without a target until streaming brakes to rest")
+    ] = 0.5
+    goal_time_tolerance: Annotated[
+        float, Meta(ge=0.1, le=600.0, description="[s] a goal may end late, where it does not say itself")
+    ] = 2.0
+    tolerance_factor: Annotated[
+        float, Meta(gt=0.0, le=1000.0, description="scales the path and goal tolerances of robot.toml")
+    ] = 1.0
+    start_tolerance: Annotated[
+        float, Meta(ge=0.0, le=1.0, description="[rad] between a trajectory's start and the arm")
+    ] = 0.01
+    start_tolerance_linear: Annotated[float, Meta(ge=0.0, le=1.0, description="[m] the same for sliding joints")] = (
+        0.002
+    )
+    velocity_margin: Annotated[
+        float, Meta(ge=0.0, le=1e-4, description="share by which a trajectory may exceed a velocity limit")
+    ] = 1e-5
+    acceleration_margin: Annotated[
+        float, Meta(ge=0.0, le=0.06, description="share by which a trajectory may exceed an acceleration limit")
+    ] = 0.05
+    corner_time: Annotated[
+        float, Meta(ge=0.02, le=1.0, description="[s] over which corners of a positions-only trajectory are rounded")
+    ] = 0.1
+    state_timeout: Annotated[
+        float, Meta(ge=0.1, le=10.0, description="[s] of silence after which the device is offline")
+    ] = 0.5
+    command_timeout: Annotated[
+        float, Meta(ge=0.2, le=10.0, description="[s] after which an unanswered device command has failed")
+    ] = 2.0
+    feedback_rate: Annotated[float, Meta(ge=1.0, le=50.0, description="[Hz] of goal feedback")] = 20.0

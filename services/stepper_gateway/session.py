@@ -1,0 +1,166 @@
+"""The device as known through its link: who it is, which boot, how it is, what time it has, whether it is there."""
+
+from __future__ import annotations
+
+from schemas.device import DeviceMode, DeviceStatus
+from services.stepper_gateway.clock import ClockSync
+from services.stepper_gateway.links.frames import Heartbeat, State, Sync, SyncReply
+from services.stepper_gateway.links.reports import StatusReport
+from services.stepper_gateway.moment import Moment
+
+HEARTBEAT = 0.2  # [s]
+SYNC = 0.5  # [s]
+SYNC_AT_FIRST = 0.03  # [s] until the clock is known
+OLD_BOOTS = 16  # remembered, so that a late frame of one does not look like a reboot
+
+
+class DeviceSession:
+    """What is known of one device; refuses what belongs to another boot or comes out of order."""
+
+    def __init__(self, device: str, joints: int, session_id: int) -> None:
+        self._device = device
+        self._joints = joints
+        self._session_id = session_id
+        self._counter = 0
+        self._heartbeat_due = self._sync_due = 0.0
+        self._old_boots: list[int] = []
+        self.link_up = False
+        self.link_reason = "no connection yet"
+        self.status: StatusReport | None = None
+        self.state: State | None = None
+        self.state_arrival = -1.0e9  # [s] monotonic
+        self.boot_id = 0
+        self.clock = ClockSync()
+
+    def on_link(self, connected: bool, reason: str) -> None:
+        self.link_up, self.link_reason = connected, reason
+        if connected:
+            self._heartbeat_due = self._sync_due = 0.0
+        else:
+            self.state_arrival = -1.0e9
+
+    def on_status(self, status: StatusReport) -> bool:
+        """Take a status; true if it tells of a new boot."""
+        if status.boot_id in self._old_boots:
+            return False
+        self.status = status
+        return status.online and self._meet(status.boot_id)
+
+    def on_state(self, state: State, arrival: float) -> tuple[bool, bool]:
+        """(is it news, does it tell of a new boot)."""
+        if len(state.steps) != self._joints or state.boot_id in self._old_boots:
+            return False, False
+        if state.mode not in DeviceMode._value2member_map_:
+            return False, False
+        is_new_boot = self._meet(state.boot_id)
+        if self.state is not None and state.t_us <= self.state.t_us:
+            return False, is_new_boot
+        self.state, self.state_arrival = state, arrival
+        return True, is_new_boot
+
+    def on_sync_reply(self, reply: SyncReply, arrival_us: int) -> None:
+        if reply.boot_id == self.boot_id:
+            self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us)
+
+    def due(self, moment: Moment) -> list[Heartbeat | Sync]:
+        """Heartbeat and clock frames to send now; called by the control loop itself."""
+        frames: list[Heartbeat | Sync] = []
+        if not self.link_up:
+            return frames
+        if moment.monotonic >= self._heartbeat_due:
+            self._heartbeat_due = _next_beat(self._heartbeat_due, moment.monotonic, HEARTBEAT)
+            self._counter = (self._counter + 1) & 0xFFFFFFFF
+            frames.append(Heartbeat(boot_id=self.boot_id, session=self._session_id, counter=self._counter))
+        if moment.monotonic >= self._sync_due:
+            period = SYNC if self.clock.is_synchronised else SYNC_AT_FIRST
+            self._sync_due = _next_beat(self._sync_due, moment.monotonic, period)
+            frames.append(Sync(boot_id=self.boot_id, t0=moment.micros))
+        return frames
+
+    def is_fresh(self, moment: Moment, timeout: float) -> bool:
+        """Whether a state has arrived within `timeout` seconds."""
+        return self.link_up and moment.monotonic - self.state_arrival <= timeout
+
+    @property
+    def mode(self) -> DeviceMode:
+        return DeviceMode(self.state.mode) if self.state is not None else DeviceMode.BOOT
+
+    @property
+    def tick_hz(self) -> int:
+        return self.status.tick_hz if self.status is not None else 0
+
+    def absence(self, moment: Moment, timeout: float) -> str:
+        """Why the device cannot be reached, empty if it can."""
+        name = self._device
+        if not self.link_up:
+            return f'no link to device "{name}": {self.link_reason}'
+        if self.status is None:
+            return f'device "{name}" has not said that it is there: is it switched on and does it use the same broker?'
+        if not self.status.online or self.status.boot_id != self.boot_id:
+            return f'device "{name}" is offline: switch it on, or check its network'
+        if self.status.joints != self._joints:
+            return (
+                f'device "{name}" has {self.status.joints} joints, this arm has {self._joints}: the wrong robot.toml '
+                "or the wrong device"
+            )
+        if not self.is_fresh(moment, timeout):
+            return f'device "{name}" is silent for more than {timeout:g} s: check its power and network'
+        if not self.clock.is_synchronised:
+            return f'the clock of device "{name}" is not known yet: try again in a second'
+        return ""
+
+    def hindrance(self) -> str:
+        """Why the device, though there, cannot start a motion; empty if it can."""
+        name = self._device
+        match self.mode:
+            case DeviceMode.IDLE | DeviceMode.RUN:
+                return ""
+            case DeviceMode.UNREFERENCED:
+                return (
+                    f'device "{name}" does not know where its joints stand: put the arm into its reference pose and '
+                    "run `gemelo reference`"
+                )
+            case DeviceMode.HOLD:
+                return f'device "{name}" holds: run `gemelo resume` or `gemelo stop` first'
+            case DeviceMode.FAULT:
+                fault = self.state.fault if self.state is not None else 0
+                return f'device "{name}" has fault {fault}: find its cause, then run `gemelo reset`'
+            case DeviceMode.ESTOP:
+                return f'the emergency stop of device "{name}" is pressed: release it, then run `gemelo reset`'
+            case mode:
+                return f'device "{name}" is in mode {mode.name}: wait until it is IDLE'
+
+    def status_message(self, moment: Moment, timeout: float) -> DeviceStatus:
+        """What the bus is told."""
+        reason = self.absence(moment, timeout)
+        status = self.status or StatusReport(online=False)
+        return DeviceStatus(
+            stamp=moment.unix,
+            online=not reason,
+            reason=reason or self.hindrance(),
+            device=self._device,
+            firmware=status.firmware,
+            boot_id=self.boot_id,
+            reset_cause=status.reset_cause,
+            joints=status.joints,
+            tick_hz=status.tick_hz,
+            queue_capacity=status.queue_capacity,
+        )
+
+    def _meet(self, boot_id: int) -> bool:
+        """Adopt a boot id; true if it replaces another one."""
+        if boot_id == self.boot_id:
+            return False
+        is_reboot = self.boot_id != 0
+        if is_reboot:
+            self._old_boots = [*self._old_boots[1 - OLD_BOOTS :], self.boot_id]
+        self.boot_id = boot_id
+        self.state = None
+        self.clock.reset()
+        self._sync_due = 0.0
+        return is_reboot
+
+
+def _next_beat(due: float, now: float, period: float) -> float:
+    """The next beat of a steady rhythm, or a new rhythm after a pause."""
+    return due + period if now - due < period else now + period

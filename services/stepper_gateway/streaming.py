@@ -1,0 +1,82 @@
+"""Streamed joint targets: tracked while nothing else moves the arm, braked when they fall silent."""
+
+from __future__ import annotations
+
+from schemas.joints import JointTargets
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.mover import Mover
+from services.stepper_gateway.refusals import GoalRejected, invalid
+from services.stepper_gateway.targets import TargetStream
+
+COMPLAINT = 1.0  # [s] between two of them
+
+
+class Streaming:
+    """Feeds targets to the mover."""
+
+    def __init__(self, mover: Mover) -> None:
+        self._mover = mover
+        self._targets = TargetStream(mover.joints)
+        self._complained = -1.0e9  # [s] monotonic
+        self._unsaid = 0
+
+    def on_targets(self, targets: JointTargets, goal_is_active: bool, moment: Moment) -> None:
+        """Take the newest target, or refuse it and keep the one before."""
+        silence = self._mover.parameters.stream_silence
+        self._targets.heard(moment.monotonic, silence)
+        try:
+            if goal_is_active:
+                raise invalid("a goal is being carried out; cancel it first")
+            if reason := self._mover.refusal(moment):
+                raise invalid(reason)
+            self._targets.require_uninterrupted(silence)
+            columns = self._targets.checked(targets)
+        except GoalRejected as rejected:
+            return self._complain(rejected.reason, moment)
+        self._targets.take(columns, self._mover.presence(moment).start.position)
+        self._begin(moment)
+
+    def step(self, moment: Moment) -> None:
+        """Brake on silence, begin when the arm rests, notice the end."""
+        stream = self._mover.stream
+        if self._targets.is_active and (stream is None or not self._mover.transmission.is_open):
+            self._end(stream is not None and bool(stream.failure), moment)
+        if self._targets.is_silent(moment.monotonic, self._mover.parameters.stream_silence):
+            self._targets.fall_silent()
+        self._begin(moment)
+
+    def yield_to_goal(self) -> None:
+        """A goal takes over from where the targets have led."""
+        self._targets.end()
+
+    def interrupt(self) -> None:
+        """The arm is stopped for another reason; targets count again after a silence."""
+        self._targets.end(interrupted=True)
+
+    @property
+    def is_active(self) -> bool:
+        return self._targets.is_active
+
+    def _begin(self, moment: Moment) -> None:
+        mover = self._mover
+        if self._targets.target is None or self._targets.is_active or not mover.is_resting():
+            return
+        start = mover.presence(moment).start
+        mover.lead = mover.parameters.streaming_lead
+        mover.begin(self._targets.motion(start), start.position, moment)
+
+    def _end(self, failed: bool, moment: Moment) -> None:
+        stream = self._mover.stream
+        if failed and stream is not None:
+            self._complain(stream.failure, moment)
+            self._mover.stop(moment)
+        self._targets.end(interrupted=failed)
+
+    def _complain(self, reason: str, moment: Moment) -> None:
+        """Once a second at most: targets come fast."""
+        if moment.monotonic - self._complained < COMPLAINT:
+            self._unsaid += 1
+            return
+        more = f" (and {self._unsaid} more)" if self._unsaid else ""
+        self._complained, self._unsaid = moment.monotonic, 0
+        self._mover.event("target_refused", reason + more, moment)
