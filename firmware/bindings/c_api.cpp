@@ -42,6 +42,8 @@ void gemelo_receive(VirtualDevice* device, const uint8_t* bytes, size_t size, in
 
 void gemelo_advance(VirtualDevice* device, uint64_t until_us) { device->advance(until_us); }
 
+void gemelo_halt(VirtualDevice* device) { device->machine().halt(); }
+
 void gemelo_report_status(VirtualDevice* device) { device->machine().report_status(); }
 
 // The oldest output's size, or -1 for none; taken out of the queue only if `capacity` suffices.

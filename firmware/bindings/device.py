@@ -117,12 +117,16 @@ class Device:
 
     def take(self) -> list[OutFrame]:
         """All that was said since the last call, oldest first."""
-        frames = []
+        frames: list[OutFrame] = []
         while True:
             size = self._library.gemelo_take(self._handle, c.byref(self._output), self._buffer, LARGEST_OUTPUT)
             if size < 0:
                 return frames
-            frames.append(OutFrame(OUTPUTS[self._output.value], bytes(self._buffer[:size])))
+            frames.append(OutFrame(OUTPUTS[self._output.value], c.string_at(self._buffer, size)))
+
+    def halt(self) -> None:
+        """Slow down along the path and hold, because the platform is about to stop."""
+        self._library.gemelo_halt(self._handle)
 
     def report_status(self) -> None:
         """Say `status` again, as after a reconnection."""

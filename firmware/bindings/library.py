@@ -78,6 +78,7 @@ def load_library(path: Path = LIBRARY) -> c.CDLL:
         "destroy": (None, [device]),
         "receive": (None, [device, c.c_char_p, size, c.c_int, u64]),
         "advance": (None, [device, u64]),
+        "halt": (None, [device]),
         "report_status": (None, [device]),
         "take": (c.c_int64, [device, u8, u8, size]),
         "snapshot": (None, [device, c.POINTER(SnapshotRecord)]),

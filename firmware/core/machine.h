@@ -40,6 +40,10 @@ class Machine {
     void receive(const Arrival& arrival, uint64_t now_us);
     void slot(uint64_t slot_start_us);
     void report_status() const;
+    // The platform is about to stop: slow down along the path.
+    void halt() {
+        if (mode_ == Mode::Run) hold("shutdown");
+    }
 
     Stepper& stepper() { return stepper_; }
     const Stepper& stepper() const { return stepper_; }

@@ -1,0 +1,120 @@
+"""The virtual ESP32's MQTT: paho's thread only puts into an inbox, with the time of arrival."""
+
+from __future__ import annotations
+
+import logging
+import queue
+import socket
+import time
+from dataclasses import dataclass
+
+from paho.mqtt import client as paho
+from paho.mqtt.enums import CallbackAPIVersion
+
+log = logging.getLogger("virtual_esp32")
+
+PREFIX = "gemelo/v1"
+COMMANDS = {"traj": 1, "cmd": 1, "hb": 0, "sync": 0}  # QoS of the subscription
+REPORTS = {"traj/ack": 0, "cmd/ack": 1, "sync/r": 0, "state": 0, "event": 1, "status": 1}  # QoS of the publication
+FRAME_TYPES = {"traj": 1, "cmd": 3, "hb": 5, "sync": 6}
+LARGEST_FRAME = 16_384  # [bytes] the largest chunk has 8,228
+FULL_INBOX = 4096  # [messages]
+KEEP_ALIVE = 5  # [s]
+
+
+@dataclass(frozen=True)
+class Arrived:
+    """One message; what is on the wrong topic or too long for a frame comes as no bytes at all."""
+
+    payload: bytes
+    retained: bool
+    monotonic: float  # [s]
+
+
+@dataclass(frozen=True)
+class Connected:
+    """The broker has accepted us."""
+
+
+@dataclass(frozen=True)
+class Disconnected:
+    """The connection is gone; paho tries again by itself."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class Stop:
+    """The process is asked to end."""
+
+
+Item = Arrived | Connected | Disconnected | Stop
+
+
+class DeviceLink:
+    """One device's topics at one broker."""
+
+    def __init__(self, host: str, port: int, device: str, will: bytes, inbox: queue.SimpleQueue[Item]) -> None:
+        self._topic = f"{PREFIX}/{device}/"
+        self._inbox = inbox
+        self._client = paho.Client(
+            CallbackAPIVersion.VERSION2,
+            client_id=f"gemelo-device-{device}",
+            clean_session=True,
+            protocol=paho.MQTTv311,
+        )
+        self._client.will_set(self._topic + "status", will, qos=1, retain=True)
+        self._client.on_socket_open = _send_at_once
+        self._client.on_connect = self._on_connect
+        self._client.on_disconnect = self._on_disconnect
+        self._client.on_message = self._on_message
+        self._client.connect_timeout = 2.0
+        self._client.reconnect_delay_set(min_delay=0.2, max_delay=1.0)  # type: ignore[arg-type]
+        self._address = (host, port)
+
+    def start(self) -> None:
+        """Connect, and again for as long as it takes, in paho's own thread."""
+        host, port = self._address
+        self._client.connect_async(host, port, keepalive=KEEP_ALIVE)
+        self._client.loop_start()
+
+    def publish(self, kind: str, payload: bytes) -> None:
+        """Send a report; what cannot be sent now is dropped by paho or the caller, never blocks."""
+        self._client.publish(self._topic + kind, payload, qos=REPORTS[kind], retain=kind == "status")
+
+    def close(self, farewell: bytes) -> None:
+        """Leave a retained status behind and end; waits at most a second for the broker."""
+        if self._client.is_connected():
+            sent = self._client.publish(self._topic + "status", farewell, qos=1, retain=True)
+            try:
+                sent.wait_for_publish(timeout=1.0)
+            except RuntimeError as error:
+                log.warning("the broker did not take our farewell: %s", error)
+        self._client.disconnect()
+        self._client.loop_stop()
+
+    def _on_connect(self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
+        if getattr(reason, "is_failure", False):
+            self._inbox.put(Disconnected(f"the broker refuses us: {reason}"))
+            return
+        client.subscribe([(self._topic + kind, qos) for kind, qos in COMMANDS.items()])
+        self._inbox.put(Connected())
+
+    def _on_disconnect(self, _client: paho.Client, _data: object, _flags: object, reason: object, _p: object) -> None:
+        self._inbox.put(Disconnected(str(reason)))
+
+    def _on_message(self, _client: paho.Client, _data: object, message: paho.MQTTMessage) -> None:
+        arrival = time.monotonic()
+        # A flood may fill the memory but not starve the steps.
+        if self._inbox.qsize() > FULL_INBOX:
+            return
+        expected = FRAME_TYPES.get(message.topic.removeprefix(self._topic))
+        payload = bytes(message.payload)
+        fits = 3 <= len(payload) <= LARGEST_FRAME and payload[2] == expected
+        self._inbox.put(Arrived(payload if fits else b"", message.retain, arrival))
+
+
+def _send_at_once(_client: paho.Client, _data: object, sock: object) -> None:
+    # Without it Nagle's algorithm and delayed acknowledgements cost 20 to 40 ms a frame.
+    if isinstance(sock, socket.socket):
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
