@@ -54,6 +54,8 @@ class StepperJoint(RobotRecord, frozen=True, kw_only=True):
     max_speed_rpm: float = 15.0  # [rev/min] of the output shaft
     ramp_time: float = 1.0  # [s] from rest to max_speed_rpm: gives the acceleration
     jerk_time: float = 0.1  # [s] from zero to full acceleration: gives the jerk
+    mechanical_lower: float | None = None  # [rad] or [m] where the mechanics end; the URDF may not go beyond
+    mechanical_upper: float | None = None  # [rad] or [m]
     reference_position: float = 0.0  # [rad] or [m] of the pose that `gemelo reference` declares
     path_tolerance_steps: float = 4.0  # default of FollowJointTrajectory
     goal_tolerance_steps: float = 0.75  # half a step is the physical limit

@@ -43,12 +43,12 @@ class Configuration:
 
     def to_pinocchio(self, positions: Sequence[float] | Vector) -> Vector:
         """`positions` (n,) [rad] or [m] in the arm's order, as pinocchio wants them."""
-        values = np.asarray(positions, dtype=float)
+        values: Vector = np.asarray(positions, dtype=float)
         if values.shape != (self._size,):
             raise ValueError(f"{values.shape} positions for {self._size} joints")
         if self._is_same:
             return values
-        q = self._neutral.copy()
+        q: Vector = self._neutral.copy()
         for entry in self._entries:
             value = entry.multiplier * values[entry.source] + entry.offset
             if entry.is_circle:

@@ -125,7 +125,7 @@ def _joint(drive: StepperJoint, drivers: dict[str, Driver], model: UrdfModel, pa
         scale, speed = step_scale(drive), speed_limits(drive)
     except DescriptionError as error:
         raise DescriptionError(f"{path}: {error}") from error
-    lower, upper, velocity = _urdf_limits(urdf, where)
+    lower, upper, velocity = _limits(urdf, drive, where)
     return Joint(
         name=drive.name,
         wire_name=drive.wire_name,
@@ -154,17 +154,22 @@ def _require_transmission(drive: StepperJoint, urdf: UrdfJoint, where: str) -> N
         raise DescriptionError(f'{where} is {urdf.kind} in the URDF, so transmission must be "{needed}"')
 
 
-def _urdf_limits(urdf: UrdfJoint, where: str) -> tuple[float, float, float]:
-    """Lower, upper and velocity; `gemelo check` says more about limits that are odd but usable."""
+def _limits(urdf: UrdfJoint, drive: StepperJoint, where: str) -> tuple[float, float, float]:
+    """Lower, upper and velocity, within the mechanics; `gemelo check` says more about limits that are odd."""
     if urdf.limit is None:
         raise DescriptionError(f"{where}: the URDF has no <limit> for it")
     if not urdf.limit.velocity > 0.0:
         raise DescriptionError(f"{where}: the URDF's velocity limit is {urdf.limit.velocity}, it must be above 0")
     if urdf.kind is JointKind.CONTINUOUS:
         return -math.inf, math.inf, urdf.limit.velocity
-    if not urdf.limit.lower < urdf.limit.upper:
-        raise DescriptionError(f"{where}: the URDF's limits {urdf.limit.lower} to {urdf.limit.upper} leave no travel")
-    return urdf.limit.lower, urdf.limit.upper, urdf.limit.velocity
+    lower, upper = urdf.limit.lower, urdf.limit.upper
+    if drive.mechanical_lower is not None:
+        lower = max(lower, drive.mechanical_lower)
+    if drive.mechanical_upper is not None:
+        upper = min(upper, drive.mechanical_upper)
+    if not lower < upper:
+        raise DescriptionError(f"{where}: the limits {lower} to {upper} leave no travel")
+    return lower, upper, urdf.limit.velocity
 
 
 def _require_frames(robot: RobotFile, model: UrdfModel, path: Path) -> None:

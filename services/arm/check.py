@@ -1,0 +1,85 @@
+"""`gemelo check`: everything that can be known to be wrong with a robot's folder before anything moves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+
+from schemas.robot import RobotFile
+from services.arm.check_motors import check_motors
+from services.arm.check_srdf import check_srdf
+from services.arm.check_urdf import check_urdf
+from services.arm.description import ROBOT_FILE, load_arm
+from services.arm.errors import DescriptionError
+from services.arm.findings import Finding, Severity, error
+from services.arm.robot_file import dotted, parse_toml, read_text, unknown_keys
+from services.arm.srdf import read_srdf
+from services.arm.urdf import read_urdf
+
+__all__ = ["Finding", "Severity", "check"]
+
+
+def check(folder: Path) -> list[Finding]:
+    """Every finding in `folder`, errors first; empty where all is well."""
+    folder = Path(folder)
+    try:
+        text = read_text(folder / ROBOT_FILE)
+        data = parse_toml(folder / ROBOT_FILE, text)
+    except DescriptionError as problem:
+        return [error(ROBOT_FILE, "file", str(problem), f"a robot is a folder with a {ROBOT_FILE}")]
+    findings = _unknown_keys(data, text)
+    try:
+        robot = msgspec.convert(_known(data), RobotFile)
+    except msgspec.ValidationError as problem:
+        return [*findings, error(ROBOT_FILE, "types", str(problem), "see schemas/robot.py")]
+    findings += _files(folder, robot)
+    if not any(finding.severity is Severity.ERROR for finding in findings):
+        findings += _whole(folder)
+    return sorted(findings, key=lambda finding: finding.severity is not Severity.ERROR)
+
+
+def _unknown_keys(data: dict[str, object], text: str) -> list[Finding]:
+    return [
+        error(ROBOT_FILE, f"line {key.line}", f"unknown key `{dotted(key.path)}`{key.hint}", "correct or remove it")
+        for key in unknown_keys(data, text)
+    ]
+
+
+def _known(data: dict[str, object]) -> object:
+    """`data` without the keys that its types do not have, so that one of them does not hide what else is wrong."""
+    unknown = {key.path for key in unknown_keys(data, "")}
+
+    def keep(value: object, path: tuple[str | int, ...]) -> object:
+        if isinstance(value, dict):
+            return {k: keep(v, (*path, k)) for k, v in value.items() if (*path, k) not in unknown}
+        if isinstance(value, list):
+            return [keep(v, (*path, i)) for i, v in enumerate(value)]
+        return value
+
+    return keep(data, ())
+
+
+def _files(folder: Path, robot: RobotFile) -> list[Finding]:
+    """Each file for itself, then the motors against the URDF."""
+    findings: list[Finding] = []
+    try:
+        model = read_urdf(folder / robot.urdf)
+    except DescriptionError as problem:
+        return [error(robot.urdf, "file", str(problem))]
+    findings += check_urdf(model, folder / robot.urdf)
+    findings += check_motors(robot, model)
+    try:
+        findings += check_srdf(read_srdf(folder / robot.srdf), robot, model)
+    except DescriptionError as problem:
+        findings.append(error(robot.srdf, "file", str(problem)))
+    return findings
+
+
+def _whole(folder: Path) -> list[Finding]:
+    """What only shows when all of it is put together."""
+    try:
+        load_arm(folder)
+    except DescriptionError as problem:
+        return [error(ROBOT_FILE, "robot", str(problem))]
+    return []

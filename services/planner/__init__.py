@@ -1,0 +1,1 @@
+"""Goals in, verified and timed trajectories out, or a refusal that explains itself."""

@@ -1,0 +1,162 @@
+"""The planner: a request and the present state in, a verified trajectory or a refusal out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.joints import JointState
+from schemas.motion import JointTrajectory
+from schemas.planning import JointGoal, NamedGoal, PlanCode, PlannedPath, PlanRequest, PlanResponse, PoseGoal, Refusal
+from services.arm.description import Arm
+from services.arm.interpolation import TrajectorySampler
+from services.arm.kinematics import Kinematics
+from services.planner.clearance import CLEARANCE, last_free
+from services.planner.goals import Goals, timed_out
+from services.planner.profile import JointLimits, NoProfile, joint_limits, straight_line
+from services.planner.refusals import NoPlan, in_collision, scaling_refused
+from services.planner.start import resolve_start
+from services.planner.verify import (
+    BadTrajectory,
+    first_collision,
+    require_ends,
+    require_within_limits,
+    sample,
+)
+
+Array = NDArray[np.float64]
+Start = tuple[float, ...]
+Goal = PoseGoal | JointGoal | NamedGoal
+
+PATH_POINTS = 100
+
+
+def never() -> bool:
+    """No clock: the search may take as long as it takes."""
+    return False
+
+
+class GoalTouches(Exception):
+    """A posture at which links are nearer than the clearance."""
+
+
+class Planner:
+    """Plans straight lines of the joints from rest to rest for one arm."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics | None = None) -> None:
+        self.arm = arm
+        self.kinematics = kinematics or Kinematics(arm)
+        self._goals = Goals(arm, self.kinematics)
+
+    def plan(
+        self,
+        request: PlanRequest,
+        present: JointState | None,
+        age: float = 0.0,
+        is_late: Callable[[], bool] = never,
+    ) -> PlanResponse:
+        """The answer; `age` [s] is how old `present` is, `is_late` says when the allowed time is over."""
+        try:
+            return self._plan(request, present, age, is_late)
+        except NoPlan as no_plan:
+            return PlanResponse(code=no_plan.code, refusal=no_plan.refusal)
+
+    def planned_path(self, trajectory: JointTrajectory, stamp: int) -> PlannedPath:
+        """The way of the tool, for eyes; `stamp` [ns] UNIX."""
+        sampler = TrajectorySampler(trajectory)
+        times = np.linspace(0.0, sampler.duration, min(PATH_POINTS, 2 * len(trajectory.points)))
+        points = (self.kinematics.tool(sampler.at(t)[0]).position.tolist() for t in times.tolist())
+        return PlannedPath(stamp=stamp, frame=self.arm.base_frame, points=tuple((x, y, z) for x, y, z in points))
+
+    def _plan(
+        self, request: PlanRequest, present: JointState | None, age: float, is_late: Callable[[], bool]
+    ) -> PlanResponse:
+        limits = self._limits(request)
+        start = resolve_start(self.arm, request.start, present, age)
+        margin = self._start_margin(start)
+        refusal: NoPlan | None = None
+        for goal in self._goals.candidates(request.goal, start, is_late):
+            try:
+                trajectory = self._to(goal, start, limits, margin)
+            except GoalTouches:
+                refusal = refusal or self._goal_refused(request.goal, goal, start, is_late)
+            except NoPlan as no_plan:
+                refusal = refusal or no_plan
+            else:
+                return self._success(trajectory, goal)
+            if is_late():
+                break
+        raise refusal or timed_out()
+
+    def _success(self, trajectory: JointTrajectory, goal: Start) -> PlanResponse:
+        return PlanResponse(
+            code=PlanCode.SUCCESS,
+            trajectory=trajectory,
+            duration=trajectory.points[-1].time_from_start,
+            tool_goal=tuple(self.kinematics.tool(goal).position.tolist()),
+        )
+
+    def _limits(self, request: PlanRequest) -> JointLimits:
+        for name in ("velocity_scaling", "acceleration_scaling"):
+            value = getattr(request, name)
+            if not 0.0 < value <= 1.0:
+                raise scaling_refused(name, value)
+        return joint_limits(self.arm, request.velocity_scaling, request.acceleration_scaling)
+
+    def _start_margin(self, start: Start) -> float:
+        """[m] to keep on the way: an arm that already stands nearer than the clearance may come away from there."""
+        distance = self.kinematics.collisions.distance(start)
+        if distance <= 0.0:
+            pairs = self.kinematics.self_collisions(start)
+            remedy = (
+                "move the arm free by hand, then `gemelo reference`; or check the reference: the arm may be elsewhere"
+            )
+            raise in_collision(PlanCode.START_STATE_IN_COLLISION, "where the arm stands", pairs, 0.0, (), remedy)
+        return min(CLEARANCE, 0.9 * distance)
+
+    def _to(self, goal: Start, start: Start, limits: JointLimits, margin: float) -> JointTrajectory:
+        """The timed straight line to one posture, verified; raises `GoalTouches` or `NoPlan`."""
+        if self.kinematics.collisions.distance(goal) <= CLEARANCE:
+            raise GoalTouches
+        try:
+            trajectory = straight_line(self.arm.joint_names, start, goal, limits)
+            samples = sample(trajectory)
+            require_ends(trajectory, start, goal)
+            require_within_limits(self.arm, samples, limits)
+        except (NoProfile, BadTrajectory) as error:
+            raise NoPlan(
+                PlanCode.PLANNING_FAILED,
+                Refusal(
+                    check="verification",
+                    message=f"the timed trajectory did not pass its verification: {error}",
+                    remedy="a larger scaling or a goal farther away; if it stays, report this as a defect",
+                ),
+            ) from error
+        touching = first_collision(self.kinematics.collisions, samples.positions, margin)
+        if touching is not None:
+            raise self._way_refused(touching, margin)
+        return trajectory
+
+    def _goal_refused(self, asked: Goal, goal: Start, start: Start, is_late: Callable[[], bool]) -> NoPlan:
+        """The refusal of a goal at which links touch, with the last free posture on the way, in the goal's own form."""
+        pairs = self.kinematics.self_collisions(goal, CLEARANCE)
+        last = last_free(self.kinematics.collisions, np.array(start), np.array(goal))
+        values = dict(zip(self.arm.joint_names, (round(value, 4) for value in last.tolist()), strict=True))
+        named = ", ".join(f"{joint.name} {values[joint.name]:g} {joint.unit}" for joint in self.arm.joints)
+        match asked:
+            case PoseGoal():
+                nearest = self._goals.shown_point(asked, start, last, is_late)
+            case JointGoal():
+                nearest = tuple(values[name] for name in asked.name)
+            case NamedGoal():
+                nearest = tuple(values.values())
+        remedy = f"the last posture on the way there that is free: {named}"
+        return in_collision(PlanCode.GOAL_IN_COLLISION, "at the goal", pairs, CLEARANCE, nearest, remedy)
+
+    def _way_refused(self, touching: Array, margin: float) -> NoPlan:
+        pairs = self.kinematics.self_collisions(touching, margin) or [("?", "?")]
+        named = ", ".join(self.arm.named_states)
+        remedy = f"go by way of another posture, for example a named one ({named})"
+        return in_collision(PlanCode.PLANNING_FAILED, "on the straight way to the goal", pairs, margin, (), remedy)

@@ -1,0 +1,51 @@
+"""The process: answers `plan` from the newest joint state, and shows the way it planned."""
+
+from __future__ import annotations
+
+import msgspec
+
+from schemas.deployment import Deployment
+from schemas.planning import PlanCode, PlanRequest, PlanResponse
+from schemas.topics import JOINT_STATES, PLAN, PLANNED_PATH
+from services.arm.description import load_arm
+from services.planner.core import Planner
+from services.runtime.application import service
+from services.runtime.deployment import project_root
+from services.runtime.node import Node
+
+
+def run(node: Node, deployment: Deployment) -> None:
+    """Serve until the node is stopped; ready while it knows where the arm is."""
+    planner = Planner(load_arm(project_root() / deployment.robot))
+    states = node.latest(JOINT_STATES)
+    path = node.publisher(PLANNED_PATH)
+
+    def plan(request: PlanRequest) -> PlanResponse:
+        began = node.monotonic()
+        response = planner.plan(
+            request,
+            states.message,
+            states.age(node.now()) if states.message is not None else 0.0,
+            is_late=lambda: node.monotonic() - began > request.allowed_time,
+        )
+        took = node.monotonic() - began
+        if response.code is PlanCode.SUCCESS:
+            path.put(planner.planned_path(response.trajectory, node.now()))
+        elif response.refusal is not None:
+            node.log.info(f"refused: {response.refusal.message}")
+        return msgspec.structs.replace(response, planning_time=took)
+
+    def step(_now: int) -> None:
+        node.set_ready(not states.is_stale, "no fresh joint_states: is the stepper_gateway running?")
+
+    node.serve(PLAN, plan)
+    node.spin(step, rate=10.0)
+
+
+def main() -> None:
+    """Console script `gemelo-planner`."""
+    service("planner", run)
+
+
+if __name__ == "__main__":
+    main()

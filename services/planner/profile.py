@@ -1,0 +1,118 @@
+"""Time along a straight line of the joints: jerk-limited, every joint at the same share of its way at every moment.
+
+ruckig times one variable, the way along the line; the joints follow in proportion. That is phase synchronisation
+without its exception: ruckig's own falls back to curved lines where another joint's limit would be exceeded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from ruckig import InputParameter, Result, Ruckig, Trajectory
+
+from schemas.motion import JointTrajectory, TrajectoryPoint
+from services.arm.description import Arm
+
+Array = NDArray[np.float64]
+
+SPACING = 0.05  # [s] between points, where the profile does not change its jerk
+MOST_POINTS = 400
+SHORTEST = 1e-4  # [s] two points nearer than that are one: below it the quintic's coefficients lose their digits
+MARGIN = 0.997  # share of the limits that is used, for what SHORTEST leaves out
+STANDSTILL = 1e-9  # [s] at full speed: a way so short is no way
+HOLD = 0.1  # [s] that a plan to where the arm already is takes
+
+
+class NoProfile(ValueError):
+    """ruckig found no profile; the text has its result."""
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """(n,) each: [rad/s] or [m/s], and their derivatives."""
+
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+
+def joint_limits(arm: Arm, velocity_scaling: float = 1.0, acceleration_scaling: float = 1.0) -> JointLimits:
+    """The arm's limits; the acceleration's scaling slows the jerk as well, so that its ramp keeps its duration."""
+    return JointLimits(
+        velocity=velocity_scaling * np.array([joint.velocity for joint in arm.joints]),
+        acceleration=acceleration_scaling * np.array([joint.acceleration for joint in arm.joints]),
+        jerk=acceleration_scaling * np.array([joint.jerk for joint in arm.joints]),
+    )
+
+
+def straight_line(
+    names: Sequence[str], start: Sequence[float], goal: Sequence[float], limits: JointLimits
+) -> JointTrajectory:
+    """From rest to rest, `start` and `goal` exact to the bit; raises `NoProfile`.
+
+    The points stand wherever the profile's jerk changes, and between, so that the quintic through them IS the profile.
+    """
+    way = np.subtract(goal, start)
+    length = float(np.max(np.abs(way) / limits.velocity))  # [s] at full speed
+    if length < STANDSTILL:
+        return _trajectory(names, [_rest(start, 0.0), _rest(goal, HOLD)])
+    direction = way / length
+    profile, changes = _time_way(length, direction, limits)
+    inner = _inner_points(start, direction, profile, _times(changes, profile.duration))
+    return _trajectory(names, [_rest(start, 0.0), *inner, _rest(goal, profile.duration)])
+
+
+def _time_way(length: float, direction: Array, limits: JointLimits) -> tuple[Trajectory, list[float]]:
+    """The profile of the way [s at full speed], and the times [s] at which its jerk changes."""
+    share = np.abs(direction)
+    moving = share > 0.0
+    demand = InputParameter(1)
+    demand.target_position = [length]
+    demand.max_velocity = [MARGIN * float(np.min(limits.velocity[moving] / share[moving]))]
+    demand.max_acceleration = [MARGIN * float(np.min(limits.acceleration[moving] / share[moving]))]
+    demand.max_jerk = [MARGIN * float(np.min(limits.jerk[moving] / share[moving]))]
+    profile = Trajectory(1)
+    result = Ruckig(1).calculate(demand, profile)
+    if result not in (Result.Working, Result.Finished):
+        raise NoProfile(f"no jerk-limited profile for a way of {length:.3g} s at full speed: {result.name}")
+    return profile, np.cumsum(profile.profiles[0][0].t).tolist()
+
+
+def _times(changes: Sequence[float], duration: float) -> list[float]:
+    """Times [s] strictly inside, ascending: the jerk's changes, and a grid between them."""
+    spacing = max(SPACING, duration / MOST_POINTS)
+    times: list[float] = []
+    last = 0.0
+    for change in [*changes, duration]:
+        if change - last < SHORTEST or (change < duration and duration - change < SHORTEST):
+            continue
+        parts = max(1, round((change - last) / spacing))
+        times += [last + (change - last) * part / parts for part in range(1, parts + 1)]
+        last = change
+    return [t for t in times if t < duration - 0.5 * SHORTEST]
+
+
+def _inner_points(
+    start: Sequence[float], direction: Array, profile: Trajectory, times: list[float]
+) -> list[TrajectoryPoint]:
+    """The profile at `times` [s], spread over the joints."""
+    ways = np.array([profile.at_time(t) for t in times]).reshape(len(times), 3, 1) * direction  # (m, 3, n)
+    ways[:, 0] += start
+    return [
+        TrajectoryPoint(positions=tuple(p), velocities=tuple(v), accelerations=tuple(a), time_from_start=t)
+        for t, (p, v, a) in zip(times, ways.tolist(), strict=True)
+    ]
+
+
+def _rest(positions: Sequence[float], t: float) -> TrajectoryPoint:
+    zeros = (0.0,) * len(positions)
+    return TrajectoryPoint(
+        positions=tuple(float(p) for p in positions), velocities=zeros, accelerations=zeros, time_from_start=t
+    )
+
+
+def _trajectory(names: Sequence[str], points: list[TrajectoryPoint]) -> JointTrajectory:
+    return JointTrajectory(joint_names=tuple(names), points=tuple(points))

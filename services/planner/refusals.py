@@ -1,0 +1,168 @@
+"""Why there is no plan: every refusal names the check, the thing, its value, its limit and what would do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from schemas.message import Vector
+from schemas.planning import PlanCode, Refusal
+from services.arm.description import Arm, Joint
+from services.arm.errors import nearest_name, suggestion
+
+Point = Sequence[float]
+
+
+class NoPlan(Exception):
+    """A refusal on its way out of the planner."""
+
+    def __init__(self, code: PlanCode, refusal: Refusal) -> None:
+        super().__init__(refusal.message)
+        self.code = code
+        self.refusal = refusal
+
+
+def scaling_refused(which: str, value: float) -> NoPlan:
+    """0 is not 1: it is refused."""
+    return NoPlan(
+        PlanCode.INVALID_GOAL_CONSTRAINTS,
+        Refusal(
+            check="scaling",
+            subject=which,
+            value=value if value == value and abs(value) < 1e300 else None,
+            limit=1.0,
+            nearest=(1.0 if value > 1.0 else 0.1,),
+            message=f"{which} is {value:g}: it must be above 0 and at most 1",
+            remedy=f"give {which} in (0, 1]; 1 is the arm's full speed",
+        ),
+    )
+
+
+def unknown_name(code: PlanCode, check: str, name: str, known: Iterable[str], where: str) -> NoPlan:
+    """A joint, state or frame that is not there."""
+    names = sorted(known)
+    near = nearest_name(name, names)
+    return NoPlan(
+        code,
+        Refusal(
+            check=check,
+            subject=name,
+            message=f'{where} has no {check.removeprefix("unknown ")} "{name}"{suggestion(name, names)}',
+            remedy=f'use "{near}"' if near else f"use one of {', '.join(names)}",
+        ),
+    )
+
+
+def malformed(code: PlanCode, subject: str, message: str, remedy: str, check: str = "request") -> NoPlan:
+    """A request that says too little, too much or two things at once."""
+    return NoPlan(code, Refusal(check=check, subject=subject, message=message, remedy=remedy))
+
+
+def beyond_limit(arm: Arm, joint: Joint, value: float, nearest: Vector) -> NoPlan:
+    """A goal beyond a joint's limit."""
+    limit = joint.clamp(value)
+    side = "above its upper" if value > joint.upper else "below its lower"
+    return NoPlan(
+        PlanCode.INVALID_GOAL_CONSTRAINTS,
+        Refusal(
+            check="joint limit",
+            subject=joint.name,
+            value=value,
+            limit=limit,
+            nearest=nearest,
+            message=f'joint "{joint.name}": {value:.6g} {joint.unit} is {side} limit of {limit:g} {joint.unit}'
+            f" ({arm.urdf_path.name})",
+            remedy=f"the nearest is {limit:g} {joint.unit}",
+        ),
+    )
+
+
+def start_beyond_limit(joint: Joint, value: float) -> NoPlan:
+    """The arm stands, or is said to stand, where it must not be."""
+    limit = joint.clamp(value)
+    return NoPlan(
+        PlanCode.INVALID_ROBOT_STATE,
+        Refusal(
+            check="start state",
+            subject=joint.name,
+            value=value,
+            limit=limit,
+            nearest=(limit,),
+            message=f'the start of "{joint.name}" is {value:.6g} {joint.unit}, beyond its limit of {limit:g}',
+            remedy="move the joint back by hand and reference the arm again with `gemelo reference`",
+        ),
+    )
+
+
+def moving_start(joint: Joint, velocity: float, limit: float) -> NoPlan:
+    """Plans begin at rest."""
+    return NoPlan(
+        PlanCode.INVALID_ROBOT_STATE,
+        Refusal(
+            check="moving start",
+            subject=joint.name,
+            value=velocity,
+            limit=limit,
+            message=f'"{joint.name}" moves at {velocity:.4g} {joint.unit}/s; a plan begins at rest'
+            f" (below {limit:.4g} {joint.unit}/s)",
+            remedy="wait until the arm stands, or cancel what it does",
+        ),
+    )
+
+
+def stale_state(age: float | None, limit: float) -> NoPlan:
+    """Nobody knows where the arm is now."""
+    told = "no joint state has come yet" if age is None else f"the newest joint state is {age:.3f} s old"
+    return NoPlan(
+        PlanCode.ROBOT_STATE_STALE,
+        Refusal(
+            check="joint state",
+            subject="joint_states",
+            value=age,
+            limit=limit,
+            message=f"{told}, so where the arm is now is not known (at most {limit:g} s)",
+            remedy="see that stepper_gateway runs and the device is online (`gemelo state`), or give a start state",
+        ),
+    )
+
+
+def in_collision(
+    code: PlanCode, where: str, pairs: Sequence[tuple[str, str]], margin: float, nearest: Vector, remedy: str
+) -> NoPlan:
+    """Two links would touch."""
+    named = " and ".join(f"{first} with {second}" for first, second in pairs)
+    return NoPlan(
+        code,
+        Refusal(
+            check="self-collision",
+            subject=" / ".join(pairs[0]),
+            limit=margin,
+            nearest=nearest,
+            message=f"{where}, {named} would be nearer than {1000 * margin:g} mm",
+            remedy=remedy,
+        ),
+    )
+
+
+def out_of_reach(arm: Arm, goal: Point, nearest: Point, shown: Vector, held: Sequence[str]) -> NoPlan:
+    """No posture brings the tool there; `shown` is the nearest point in the goal's own frame."""
+    missing = [a - b for a, b in zip(goal, nearest, strict=True)]
+    distance = sum(value * value for value in missing) ** 0.5
+    axis = max(range(3), key=lambda index: abs(missing[index]))
+    is_one_axis = abs(missing[axis]) > 0.98 * distance
+    limits = f", held by {', '.join(held)}" if held else ""
+    return NoPlan(
+        PlanCode.NO_IK_SOLUTION,
+        Refusal(
+            check="reach",
+            subject="xyz"[axis] if is_one_axis else "tool position",
+            value=goal[axis] if is_one_axis else distance,
+            limit=nearest[axis] if is_one_axis else 0.0,
+            nearest=shown,
+            message=f"{arm.tool_frame} cannot be at {_point(goal)} m: {1000 * distance:.1f} mm out of reach{limits}",
+            remedy=f"the nearest point it can be at is {_point(shown)} m",
+        ),
+    )
+
+
+def _point(values: Sequence[float]) -> str:
+    return " ".join(f"{value:.4f}" for value in values)

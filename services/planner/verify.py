@@ -1,0 +1,104 @@
+"""The finished trajectory, looked at densely before anybody may have it: limits, continuity, collisions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.motion import JointTrajectory
+from services.arm.collisions import SelfCollisions
+from services.arm.description import Arm
+from services.planner.profile import JointLimits
+
+Array = NDArray[np.float64]
+
+DENSITY = 10  # samples between two points
+ROUNDING = 1e-9  # [rad] or [m], and a share of limits: what floating point may add
+MOST_LOOKS = 50_000
+
+
+class BadTrajectory(ValueError):
+    """A trajectory that must not be executed; the text names the joint, the value and the limit."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Rows in time: `times` (m,) [s] and positions, velocities, accelerations (m, n)."""
+
+    times: Array
+    positions: Array
+    velocities: Array
+    accelerations: Array
+
+
+def sample(trajectory: JointTrajectory, density: int = DENSITY) -> Samples:
+    """The quintic through the points at `density` instants a segment, all at once, with both ends of every segment."""
+    times = np.array([point.time_from_start for point in trajectory.points])
+    p = np.array([point.positions for point in trajectory.points])
+    v = np.array([point.velocities for point in trajectory.points])
+    a = np.array([point.accelerations for point in trajectory.points])
+    dt = np.diff(times)[:, None]
+    rise = p[1:] - p[:-1] - (v[:-1] + 0.5 * a[:-1] * dt) * dt
+    climb = (v[1:] - v[:-1] - a[:-1] * dt) * dt
+    bend = (a[1:] - a[:-1]) * dt * dt
+    third, fourth, fifth = (
+        10 * rise - 4 * climb + bend / 2,
+        -15 * rise + 7 * climb - bend,
+        6 * rise - 3 * climb + bend / 2,
+    )
+    u = np.linspace(0.0, 1.0, density + 1)[:, None, None]  # share of the segment
+    positions = p[:-1] + u * dt * (v[:-1] + u * dt * a[:-1] / 2) + u**3 * (third + u * (fourth + u * fifth))
+    velocities = v[:-1] + u * dt * a[:-1] + u**2 * (3 * third + u * (4 * fourth + u * 5 * fifth)) / dt
+    accelerations = a[:-1] + u * (6 * third + u * (12 * fourth + u * 20 * fifth)) / dt**2
+    instants = (times[:-1] + u[:, :, 0] * dt[:, 0]).T.reshape(-1)
+    rows = (values.transpose(1, 0, 2).reshape(-1, p.shape[1]) for values in (positions, velocities, accelerations))
+    return Samples(instants, *rows)
+
+
+def require_within_limits(arm: Arm, samples: Samples, limits: JointLimits) -> None:
+    """Position, velocity and acceleration of every sample; raises `BadTrajectory`."""
+    lower = np.array([joint.lower for joint in arm.joints]) - ROUNDING
+    upper = np.array([joint.upper for joint in arm.joints]) + ROUNDING
+    loose = 1.0 + ROUNDING
+    checks = (
+        ("position", np.maximum(samples.positions - upper, lower - samples.positions), samples.positions),
+        ("velocity", np.abs(samples.velocities) - loose * limits.velocity, samples.velocities),
+        ("acceleration", np.abs(samples.accelerations) - loose * limits.acceleration, samples.accelerations),
+    )
+    for what, excess, values in checks:
+        if float(excess.max()) > 0.0:
+            row, column = np.unravel_index(int(excess.argmax()), excess.shape)
+            value, over = values[row, column], excess[row, column]
+            name, t = arm.joint_names[int(column)], samples.times[row]
+            raise BadTrajectory(f'{what} of "{name}" is {value:.6g} at {t:.3f} s, {over:.2g} beyond its limit')
+
+
+def require_ends(trajectory: JointTrajectory, start: tuple[float, ...], goal: tuple[float, ...]) -> None:
+    """Exactly from the start to the goal, at rest at both; raises `BadTrajectory`."""
+    first, last = trajectory.points[0], trajectory.points[-1]
+    if first.positions != start or last.positions != goal or first.time_from_start != 0.0:
+        raise BadTrajectory("the trajectory does not lead from the start to the goal")
+    if any(first.velocities + first.accelerations + last.velocities + last.accelerations):
+        raise BadTrajectory("the trajectory is not at rest at its ends")
+
+
+def first_collision(collisions: SelfCollisions, positions: Array, margin: float) -> Array | None:
+    """The first posture along the rows of `positions` (m, n) whose links are nearer than `margin` [m], or None.
+
+    Between two looks no point of the arm moves farther than the clearance just seen, or than half the margin where
+    there is none to spare, so that nothing is skipped (conservative advancement).
+    """
+    moved = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(positions, axis=0)) @ collisions.reach)))  # [m] at most
+    columns = positions.T
+    least = max(0.5 * margin, float(moved[-1]) / MOST_LOOKS)
+    along, end = 0.0, float(moved[-1])
+    while True:
+        posture = np.array([np.interp(along, moved, column) for column in columns])
+        clearance = collisions.distance(posture) - margin
+        if clearance <= 0.0:
+            return posture
+        if along >= end:
+            return None
+        along = min(end, along + max(clearance, least))

@@ -1,0 +1,1 @@
+"""Joint states in, frames out; the robot's description, latched."""

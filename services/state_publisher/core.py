@@ -1,0 +1,95 @@
+"""From joint states to the poses of links: pure, one message in, one message out."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from schemas.frames import FrameTransform, FrameTransforms
+from schemas.joints import JointState
+from services.arm.chain import complete, joint_transform, origin_of
+from services.arm.description import Arm
+from services.arm.errors import suggestion
+from services.arm.transforms import to_message
+from services.arm.urdf import JointKind
+from services.state_publisher.decimation import Decimator
+
+
+@dataclass(frozen=True)
+class Frames:
+    """What one joint state gives: moving frames, if they are due, and what is to be said about it, once."""
+
+    frames: FrameTransforms | None = None
+    warnings: tuple[str, ...] = ()
+
+
+class StatePublisher:
+    """Static frames once, moving ones for every joint state, with that state's own stamp."""
+
+    def __init__(self, arm: Arm, rate: float = 0.0) -> None:
+        self._arm = arm
+        self._moving = [j for j in arm.model.joints if j.kind is not JointKind.FIXED]
+        self._origins = {joint.name: origin_of(joint) for joint in arm.model.joints}
+        self._names = {joint.name for joint in self._moving}
+        self._has_mimics = any(joint.mimic for joint in self._moving)
+        self._said: set[str] = set()
+        self.decimator = Decimator(rate)
+        self.dropped: Counter[str] = Counter()  # by joint name, or what was wrong
+
+    def static_frames(self, now: int) -> FrameTransforms:
+        """The poses of all fixed links; `now` [ns] UNIX."""
+        fixed = (joint for joint in self._arm.model.joints if joint.kind is JointKind.FIXED)
+        return FrameTransforms(
+            transforms=tuple(
+                FrameTransform(
+                    stamp=now, parent=joint.parent, child=joint.child, transform=to_message(self._origins[joint.name])
+                )
+                for joint in fixed
+            )
+        )
+
+    def on_joint_state(self, state: JointState) -> Frames:
+        """The frames of the joints in `state` and of those that mimic them; None where none is due or there is none."""
+        if len(state.position) != len(state.name):
+            return Frames(warnings=self._drop("sizes", _sizes(state)))
+        warnings: tuple[str, ...] = ()
+        positions: dict[str, float] = {}
+        for name, position in zip(state.name, state.position, strict=True):
+            if name in self._names:
+                positions[name] = position
+            else:
+                warnings += self._drop(name, self._unknown(name))
+        if not positions or not self.decimator.passes(state.stamp):
+            return Frames(warnings=warnings)
+        return Frames(self._frames(state.stamp, positions), warnings)
+
+    def _frames(self, stamp: int, positions: dict[str, float]) -> FrameTransforms:
+        known = complete(self._arm.model, positions) if self._has_mimics else positions
+        return FrameTransforms(
+            transforms=tuple(
+                FrameTransform(
+                    stamp=stamp,
+                    parent=joint.parent,
+                    child=joint.child,
+                    transform=to_message(joint_transform(joint, known[joint.name], self._origins[joint.name])),
+                )
+                for joint in self._moving
+                if joint.name in known
+            )
+        )
+
+    def _drop(self, kind: str, warning: str) -> tuple[str, ...]:
+        """Count it; say it the first time only."""
+        self.dropped[kind] += 1
+        if kind in self._said:
+            return ()
+        self._said.add(kind)
+        return (warning,)
+
+    def _unknown(self, name: str) -> str:
+        hint = suggestion(name, self._names)
+        return f'joint_states: "{name}" is no moving joint of {self._arm.name}{hint}; it is dropped from now on'
+
+
+def _sizes(state: JointState) -> str:
+    return f"joint_states: {len(state.name)} names with {len(state.position)} positions; such messages are dropped"

@@ -1,0 +1,67 @@
+"""The process: description and static frames once, latched; moving frames on every joint state."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from schemas.deployment import Deployment
+from schemas.frames import RobotDescription
+from schemas.joints import JointState
+from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
+from services.arm.description import Arm, load_arm
+from services.runtime.application import service
+from services.runtime.deployment import project_root
+from services.runtime.node import Node
+from services.state_publisher.core import StatePublisher
+
+
+class StatePublisherParameters(msgspec.Struct, frozen=True, kw_only=True):
+    """What can be set at run time."""
+
+    rate: Annotated[float, msgspec.Meta(ge=0.0, description="frames a second [Hz]; 0: one for every joint state")] = 0.0
+
+
+def describe(arm: Arm) -> RobotDescription:
+    """The robot's own files."""
+    return RobotDescription(
+        robot=arm.name,
+        urdf=arm.urdf_path.read_text(encoding="utf-8"),
+        srdf=arm.srdf_path.read_text(encoding="utf-8"),
+        robot_toml=arm.robot_path.read_text(encoding="utf-8"),
+    )
+
+
+def run(node: Node, deployment: Deployment) -> None:
+    """Publish until the node is stopped; ready while fresh joint states give frames."""
+    arm = load_arm(project_root() / deployment.robot)
+    publisher = StatePublisher(arm)
+    parameters = node.parameters(StatePublisherParameters)
+    states = node.latest(JOINT_STATES)
+    frames = node.publisher(FRAMES)
+    node.publisher(DESCRIPTION).put(describe(arm))
+    node.publisher(STATIC_FRAMES).put(publisher.static_frames(node.now()))
+
+    def on_joint_state(state: JointState) -> None:
+        found = publisher.on_joint_state(state)
+        for warning in found.warnings:
+            node.log.warning(warning)
+        if found.frames is not None:
+            frames.put(found.frames)
+
+    def step(_now: int) -> None:
+        publisher.decimator.rate = parameters.value.rate
+        node.set_ready(not states.is_stale, "no fresh joint_states: is the stepper_gateway running?")
+
+    node.subscribe(JOINT_STATES, on_joint_state)
+    node.spin(step, rate=10.0)
+
+
+def main() -> None:
+    """Console script `gemelo-state-publisher`."""
+    service("state_publisher", run)
+
+
+if __name__ == "__main__":
+    main()
