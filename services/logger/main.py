@@ -21,34 +21,42 @@ WRITE_RATE = 2.0  # [Hz] a batch and an MCAP chunk each: what a kill -9 can cost
 
 def run(node: Node, deployment: Deployment) -> None:
     """Collect between writes; the disk's trouble shows in the readiness and in the log."""
-    root = project_root()
     parameters = node.parameters(LoggerParameters)
     logger = Logger()
-    disk = Disk(node.robot, origin(node.robot, root), node.log.warning)
+    disk = Disk(node.robot, origin(node.robot, project_root()), node.log.warning)
     for topic in recorded_topics():
         _subscribe(node, logger, topic)
-    default_folder = root / deployment.paths.out / "recordings"
     said = ""
 
     def write(now: int, batch: Batch) -> None:
         nonlocal said
-        if parameters.value.enable_logging:
-            folder = Path(parameters.value.log_dir)
-            disk.write(logger, batch, root / folder if folder.parts else default_folder, parameters.value, now)
+        present = parameters.value
+        if present.enable_logging:
+            disk.write(logger, batch, _folder(deployment, present), present, now)
         else:
             disk.close()
-        node.set_ready(not disk.trouble, disk.trouble)
         if logger.losses.sentence != said:
             said = logger.losses.sentence
             node.log.warning(said)
 
-    node.spin(lambda now: write(now, logger.step(now)), rate=WRITE_RATE)
-    write(node.now(), logger.finish(node.now()))
+    def step(now: int) -> None:
+        write(now, logger.step(now))
+        node.set_ready(not disk.trouble, disk.trouble)
+
+    node.spin(step, rate=WRITE_RATE)
+    now = node.now()
+    write(now, logger.finish(now))
     disk.close()
 
 
 def _subscribe(node: Node, logger: Logger, topic: Topic[Message]) -> None:
-    node.subscribe(topic, lambda message: logger.on_message(topic, message, node.now()))
+    node.subscribe(topic, lambda message: logger.on_message(topic, message, node.now()), own=True)
+
+
+def _folder(deployment: Deployment, parameters: LoggerParameters) -> Path:
+    """Where to record: what a person chose, relative to the project, or the deployment's own place."""
+    chosen = Path(parameters.log_dir) if parameters.log_dir else Path(deployment.paths.out) / "recordings"
+    return project_root() / chosen
 
 
 def main() -> None:

@@ -64,7 +64,7 @@ def _visualizer(node: Node, message: RobotDescription) -> Visualizer:
     node.subscribe(DEVICE_STATUS, core.on_device_status)
     node.subscribe(DEVICE_EVENTS, core.on_event)
     node.subscribe(PLANNED_PATH, core.on_planned_path)
-    node.subscribe(LOG, core.on_log)
+    node.subscribe(LOG, core.on_log, own=True)
     return core
 
 

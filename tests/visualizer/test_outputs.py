@@ -1,0 +1,109 @@
+"""A viewer that goes and comes back is told everything again; the service never waits for it."""
+
+import os
+import subprocess
+import time
+from contextlib import contextmanager
+
+import pytest
+from rerun.experimental import ViewerClient
+
+from schemas.deployment import ViewerMode, ViewerSection
+from schemas.joints import JointState
+from services.visualizer import entities
+from services.visualizer.binary import environment, rerun_binary
+from services.visualizer.outputs import Outputs
+from services.visualizer.parameters import VisualizerParameters
+from services.visualizer.picture import free_port
+
+START = 1_795_000_000_000_000_000
+NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")
+
+
+@contextmanager
+def headless_viewer(port):
+    command = [rerun_binary(), "--headless", "--bind", "127.0.0.1", "--port", str(port), "--memory-limit", "200MB"]
+    process = subprocess.Popen(
+        command, env=environment(os.environ), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        yield f"rerun+http://127.0.0.1:{port}/proxy"
+    finally:
+        process.kill()
+        process.wait()
+
+
+class Rig:
+    def __init__(self, core, folder, viewer, **parameters):
+        self.core = core
+        self.outputs = Outputs(viewer, folder, folder, VisualizerParameters(**parameters))
+        self.batch = 0
+        self.slowest = 0.0
+
+    def step(self):
+        self.batch += 1
+        now = START + self.batch * 100_000_000
+        self.core.on_joint_state(JointState(stamp=now, name=NAMES, position=(0.01 * self.batch, 0.0, 0.0)))
+        began = time.monotonic()
+        trouble = self.outputs.step(self.core, now, began)
+        self.slowest = max(self.slowest, time.monotonic() - began)
+        return trouble
+
+    def step_until(self, is_done, timeout=12.0):
+        deadline = time.monotonic() + timeout
+        while not is_done():
+            assert time.monotonic() < deadline, self.step()
+            self.step()
+            time.sleep(0.1)
+
+
+def shows_the_arm(url):
+    """Whether the viewer there has a recording with the static and the moving parts of the arm."""
+    try:
+        schema = ViewerClient.connect(url).get_recording_schema(paths_only=True)
+    except (RuntimeError, ValueError, ConnectionError):
+        return False
+    text = str(schema)
+    visual = f"/{entities.MEASURED}/base_link/brazo_link/visual_0"
+    return visual in text and f"/{entities.executed('brazo_joint')}" in text
+
+
+def test_a_viewer_that_comes_back_is_told_everything_again(core, tmp_path):
+    viewer = ViewerSection(mode=ViewerMode.WEB, port=free_port())
+    rig = Rig(core, tmp_path, viewer)
+    assert rig.step() == f"no viewer at 127.0.0.1:{viewer.port}"
+    for _ in range(2):
+        with headless_viewer(viewer.port) as url:
+            rig.step_until(lambda: not rig.step())
+            rig.step_until(lambda url=url: shows_the_arm(url))
+        rig.step_until(lambda: bool(rig.step()))
+    began = time.monotonic()
+    rig.outputs.close()
+    assert time.monotonic() - began < 1.5
+    assert rig.slowest < 1.0
+
+
+def test_without_a_viewer_only_the_recording_is_written(core, tmp_path):
+    rig = Rig(core, tmp_path, ViewerSection(mode=ViewerMode.NONE), recording_path="deep/view.rrd")
+    assert rig.step() == ""
+    rig.outputs.close()
+    printed = subprocess.run(
+        [rerun_binary(), "rrd", "print", tmp_path / "deep" / "view.rrd"], capture_output=True, text=True, check=True
+    )
+    assert f"/{entities.executed('brazo_joint')}" in printed.stdout
+
+
+def test_a_recording_that_cannot_be_written_is_said_and_nothing_dies(core, tmp_path):
+    (tmp_path / "file").touch()
+    rig = Rig(core, tmp_path, ViewerSection(mode=ViewerMode.NONE), recording_path="file/view.rrd")
+    assert "cannot write the recording" in rig.step()
+    assert "cannot write the recording" in rig.step()
+    rig.outputs.close()
+
+
+@pytest.mark.parametrize("mode", [ViewerMode.NONE, ViewerMode.WEB])
+def test_closing_at_once_does_not_wait(core, tmp_path, mode):
+    rig = Rig(core, tmp_path, ViewerSection(mode=mode, port=free_port()))
+    began = time.monotonic()
+    rig.outputs.close()
+    assert time.monotonic() - began < 0.5

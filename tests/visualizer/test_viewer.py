@@ -1,0 +1,171 @@
+"""The viewer as a process: ready when it answers, on loopback only, and gone when it is told to go."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+
+from schemas.deployment import ViewerMode, ViewerSection
+from services.visualizer.connection import Watch
+from services.visualizer.picture import free_port
+from services.visualizer.viewer import address, command, resolved, taken_port
+
+
+class Viewer:
+    """A gemelo-viewer with its own ports and run folder."""
+
+    def __init__(self, run, mode="web"):
+        self.run = run
+        self.section = ViewerSection(mode=ViewerMode(mode), port=free_port(), web_port=free_port())
+        self.process = None
+
+    def start(self):
+        environment = {
+            **os.environ, "GEMELO_PATHS_RUN": str(self.run), "GEMELO_VIEWER_MODE": self.section.mode.value,
+            "GEMELO_VIEWER_PORT": str(self.section.port), "GEMELO_VIEWER_WEB_PORT": str(self.section.web_port),
+        }  # fmt: skip
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "services.visualizer.viewer"],
+            env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        return self.process
+
+    def wait_until_ready(self, timeout=15.0):
+        deadline = time.monotonic() + timeout
+        while not (self.run / "viewer.ready").exists():
+            assert self.process.poll() is None, self.process.communicate()
+            assert time.monotonic() < deadline, "not ready"
+            time.sleep(0.05)
+
+    def children(self):
+        return psutil.Process(self.process.pid).children(recursive=True)
+
+    def end(self):
+        if self.process is not None:
+            self.process.kill()
+            self.process.communicate()
+
+
+@pytest.fixture
+def viewer(tmp_path):
+    viewer = Viewer(tmp_path / "run")
+    yield viewer
+    viewer.end()
+
+
+@pytest.fixture
+def idle_viewer(tmp_path):
+    viewer = Viewer(tmp_path / "run", mode="none")
+    yield viewer
+    viewer.end()
+
+
+def answers(port):
+    with socket.socket() as probe:
+        probe.settimeout(0.3)
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+def gone(processes, timeout=3.0):
+    return not psutil.wait_procs(processes, timeout=timeout)[1]
+
+
+def test_it_gets_ready_listens_on_loopback_only_and_stops_without_orphans(viewer):
+    viewer.start()
+    viewer.wait_until_ready()
+    children = viewer.children()
+    listening = {
+        (each.laddr.ip, each.laddr.port)
+        for child in children
+        for each in child.net_connections("inet")
+        if each.status == psutil.CONN_LISTEN
+    }
+    assert listening == {("127.0.0.1", viewer.section.port), ("127.0.0.1", viewer.section.web_port)}
+    began = time.monotonic()
+    viewer.process.send_signal(signal.SIGTERM)
+    output, _ = viewer.process.communicate(timeout=5.0)
+    assert time.monotonic() - began < 3.0
+    assert viewer.process.returncode == 0
+    assert gone(children)
+    assert f"http://127.0.0.1:{viewer.section.web_port}/?url=" in output
+    assert not (viewer.run / "viewer.ready").exists()
+
+
+def test_kill_9_of_the_parent_leaves_no_orphan(viewer):
+    viewer.start()
+    viewer.wait_until_ready()
+    children = viewer.children()
+    assert children
+    viewer.process.kill()
+    viewer.process.communicate()
+    assert gone(children)
+
+
+def test_it_ends_with_an_error_when_the_program_dies(viewer):
+    viewer.start()
+    viewer.wait_until_ready()
+    viewer.children()[0].kill()
+    _, errors = viewer.process.communicate(timeout=5.0)
+    assert viewer.process.returncode == 1
+    assert "the rerun program ended with code -9" in errors
+
+
+def test_a_taken_port_is_named_with_its_remedy(viewer):
+    with socket.create_server(("127.0.0.1", viewer.section.web_port)):
+        viewer.start()
+        _, errors = viewer.process.communicate(timeout=10.0)
+    assert viewer.process.returncode == 1
+    assert f"127.0.0.1:{viewer.section.web_port}" in errors
+    assert "GEMELO_VIEWER_WEB_PORT" in errors
+
+
+def test_without_a_viewer_it_idles_ready(idle_viewer):
+    idle_viewer.start()
+    idle_viewer.wait_until_ready()
+    assert idle_viewer.children() == []
+    idle_viewer.process.send_signal(signal.SIGTERM)
+    assert idle_viewer.process.wait(3.0) == 0
+
+
+@pytest.mark.parametrize(
+    ("mode", "environment", "expected"),
+    [
+        ("auto", {}, "web"), ("auto", {"DISPLAY": ":0"}, "native"), ("auto", {"WAYLAND_DISPLAY": "w"}, "native"),
+        ("web", {"DISPLAY": ":0"}, "web"), ("none", {}, "none"),
+    ],
+)  # fmt: skip
+def test_auto_is_native_where_there_is_a_display(mode, environment, expected):
+    assert resolved(ViewerMode(mode), environment, "linux").value == expected
+
+
+def test_the_program_is_always_bound_and_limited(tmp_path):
+    for mode in (ViewerMode.WEB, ViewerMode.NATIVE):
+        line = " ".join(command(tmp_path / "rerun", ViewerSection(), mode, "1GB"))
+        assert "--bind 127.0.0.1 --port 9876" in line
+        assert "memory-limit 1GB" in line
+    assert "window" in address(ViewerSection(), ViewerMode.NATIVE)
+
+
+def test_a_free_port_is_not_taken():
+    assert taken_port(ViewerSection(port=free_port(), web_port=free_port()), ViewerMode.WEB) == ""
+
+
+def test_the_watch_sees_the_end_and_the_return_of_a_viewer():
+    watch = Watch("127.0.0.1", free_port())
+    assert not watch.is_new(0.0)
+    assert not watch.is_alive
+    with socket.create_server(("127.0.0.1", watch.port)) as server:
+        assert not watch.is_new(0.5)
+        assert watch.is_new(1.0)
+        server.accept()[0].close()
+        deadline = time.monotonic() + 2.0
+        while watch.is_alive and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert not watch.is_alive
+        assert watch.is_new(2.0)
+        watch.close()
