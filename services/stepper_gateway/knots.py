@@ -36,25 +36,21 @@ class StepKnot(NamedTuple):
 class StepEncoder:
     """Knots as the wire says them, for one arm; absolute, so nothing accumulates.
 
-    A limit that was computed may lie a rounding beyond what the device was told: the outermost knots are put on it.
+    A position that was computed may lie a rounding beyond the limit that the device was told: it is put on it.
     """
 
     def __init__(self, joints: tuple[Joint, ...]) -> None:
         self._scales = tuple(joint.steps for joint in joints)
         self._rates = tuple(joint.steps.per_unit * 256.0 for joint in joints)
-        self._fastest = tuple(
-            int(joint.velocity * rate + 1e-6) for joint, rate in zip(joints, self._rates, strict=True)
-        )
         self._lower = tuple(_bound(joint, joint.lower) for joint in joints)
         self._upper = tuple(_bound(joint, joint.upper) for joint in joints)
 
     def encode(self, knot: Knot) -> StepKnot:
         """The nearest knot within the device's limits."""
         positions = zip(self._scales, knot.position, self._lower, self._upper, strict=True)
-        velocities = zip(self._rates, knot.velocity, self._fastest, strict=True)
         return StepKnot(
             tuple(min(max(scale.to_q8(p), low), high) for scale, p, low, high in positions),
-            tuple(min(max(round(v * rate), -most), most) for rate, v, most in velocities),
+            tuple(round(v * rate) for rate, v in zip(self._rates, knot.velocity, strict=True)),
         )
 
 

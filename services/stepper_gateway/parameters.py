@@ -31,8 +31,8 @@ class GatewayParameters(msgspec.Struct, frozen=True, kw_only=True):
         0.002
     )
     velocity_margin: Annotated[
-        float, Meta(ge=0.0, le=1e-4, description="share by which a trajectory may exceed a velocity limit")
-    ] = 1e-5
+        float, Meta(ge=0.0, le=0.01, description="share by which a trajectory may exceed a velocity limit")
+    ] = 0.001
     acceleration_margin: Annotated[
         float, Meta(ge=0.0, le=0.06, description="share by which a trajectory may exceed an acceleration limit")
     ] = 0.05

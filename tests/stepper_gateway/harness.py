@@ -1,0 +1,263 @@
+"""The gateway's core and the real firmware core, joined by a wire that delays, loses, doubles and reorders.
+
+Everything runs in virtual time, faster than real time, and repeats exactly for the same seed.
+"""
+
+from __future__ import annotations
+
+import random
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from firmware.bindings.device import Device
+from firmware.platform.host.configure import device_config, reference_steps
+from schemas.actions import GoalStatusCode
+from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse
+from schemas.joints import JointTargets
+from schemas.message import Vector
+from schemas.motion import (
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
+    JointTrajectory,
+    TrajectoryPoint,
+)
+from schemas.topics import Topic
+from services.arm.description import Arm, load_arm
+from services.stepper_gateway.core import GatewayCore
+from services.stepper_gateway.goals import GoalVerdict
+from services.stepper_gateway.knots import Knot
+from services.stepper_gateway.limits import Limits
+from services.stepper_gateway.links.link import Kind, Received
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.outputs import (
+    CommandAnswer,
+    GoalExecuting,
+    GoalFinished,
+    GoalProgress,
+    LogLine,
+    Output,
+    Publish,
+    SendFrame,
+)
+from services.stepper_gateway.parameters import GatewayParameters
+from services.stepper_gateway.paths import profile
+
+ROOT = Path(__file__).resolve().parents[2]
+UNIX = 1_700_000_000_000_000_000  # [ns] at the start of virtual time
+GATEWAY_ZERO = 1000.0  # [s] of the gateway's monotonic clock at the start
+SAFE = ("status", "event")  # a broker keeps these until they are delivered
+
+
+@cache
+def rm1() -> Arm:
+    return load_arm(ROOT / "urdf" / "rm1")
+
+
+@dataclass
+class Wire:
+    """How both directions treat frames."""
+
+    delay: float = 0.001  # [s]
+    jitter: float = 0.0  # [s] more, uniformly: reorders
+    loss: float = 0.0
+    duplicates: float = 0.0
+    is_cut: bool = False
+
+
+class Rig:
+    """A gateway, a device and their wire; `run` lets time pass."""
+
+    def __init__(
+        self,
+        wire: Wire | None = None,
+        seed: int = 1,
+        start: Vector | None = None,
+        referenced: bool = True,
+        parameters: GatewayParameters | None = None,
+    ) -> None:
+        self.arm = rm1()
+        self.wire = wire or Wire()
+        self.rng = random.Random(seed)
+        self.now_us = 0
+        steps = reference_steps(self.arm)
+        if start is not None:
+            steps = tuple(round(j.steps.to_steps(p)) for j, p in zip(self.arm.joints, start, strict=True))
+        self._device_zero = -5_000_000  # [us] of virtual time at which the device booted
+        self.device = Device(device_config(self.arm), 77, 5_000_000, steps, referenced)
+        self.device_is_on = self.gateway_is_on = True
+        self.published: dict[str, list[Any]] = defaultdict(list)
+        self.finished: dict[str, tuple[GoalStatusCode, FollowJointTrajectoryResult]] = {}
+        self.executing: list[str] = []
+        self.feedback: list[FollowJointTrajectoryFeedback] = []
+        self.answers: dict[int, DeviceCommandResponse] = {}
+        self.log: list[str] = []
+        self.sent: list[tuple[float, str, bytes]] = []
+        self.path: list[tuple[float, ...]] = []  # [steps] of the device's path, every millisecond
+        self._flying: list[tuple[int, int, bool, str, bytes]] = []  # due, order, to the device?, kind, payload
+        self._order = 0
+        self.new_gateway(parameters)
+
+    def new_gateway(self, parameters: GatewayParameters | None = None) -> None:
+        """The gateway's process starts, perhaps again."""
+        self.core = GatewayCore(self.arm, self.rng.randrange(1, 2**31), parameters)
+        self._do(self.core.on_link(True, "", self.moment))
+        self.device.report_status()
+
+    @property
+    def moment(self) -> Moment:
+        return Moment(UNIX + self.now_us * 1000, GATEWAY_ZERO + self.now_us * 1e-6)
+
+    @property
+    def now(self) -> float:
+        """[s] since the start."""
+        return self.now_us * 1e-6
+
+    @property
+    def position(self) -> Vector:
+        """[rad] or [m] executed."""
+        return tuple(j.steps.to_position(s) for j, s in zip(self.arm.joints, self.device.steps, strict=True))
+
+    def run(self, seconds: float, until: Callable[[], bool] | None = None) -> bool:
+        """Let time pass; true as soon as `until` holds."""
+        end = self.now_us + round(seconds * 1e6)
+        while self.now_us < end:
+            if until is not None and until():
+                return True
+            self._millisecond()
+        return until is None or until()
+
+    def ready(self) -> Rig:
+        """Run until the gateway may accept goals."""
+        assert self.run(3.0, lambda: not self.core.not_ready(self.moment)), self.core.not_ready(self.moment)
+        return self
+
+    def goal(self, goal: FollowJointTrajectoryGoal | JointTrajectory, goal_id: str = "g") -> GoalVerdict:
+        if isinstance(goal, JointTrajectory):
+            goal = FollowJointTrajectoryGoal(trajectory=goal)
+        verdict, outputs = self.core.on_goal(goal_id, goal, self.moment)
+        self._do(outputs)
+        return verdict
+
+    def finish(self, goal_id: str = "g", seconds: float = 60.0) -> tuple[GoalStatusCode, FollowJointTrajectoryResult]:
+        assert self.run(seconds, lambda: goal_id in self.finished), f"{goal_id} has not ended"
+        return self.finished[goal_id]
+
+    def cancel(self, goal_id: str = "g") -> str:
+        reason, outputs = self.core.on_cancel(goal_id, self.moment)
+        self._do(outputs)
+        return reason
+
+    def target(self, **positions: float) -> None:
+        """Stream a target for the joints named."""
+        targets = JointTargets(name=tuple(positions), position=tuple(positions.values()))
+        self._do(self.core.on_targets(targets, self.moment))
+
+    def command(self, kind: DeviceCommandKind, ticket: int = 1, **positions: float) -> None:
+        request = DeviceCommandRequest(command=kind, name=tuple(positions), position=tuple(positions.values()))
+        self._do(self.core.on_command(request, ticket, self.moment))
+
+    def receive(self, kind: Kind, payload: bytes, retained: bool = False) -> None:
+        """Hand the gateway a payload as if it came over the wire."""
+        received = Received(kind, payload, retained, round(self.moment.monotonic * 1e9))
+        self._do(self.core.on_received(received, self.moment))
+
+    def link(self, up: bool) -> None:
+        """The gateway loses or regains its own connection to the broker."""
+        self.wire.is_cut = not up
+        self._flying.clear()
+        self._do(self.core.on_link(up, "" if up else "the broker is gone", self.moment))
+        if up:
+            self.device.report_status()
+
+    def reboot(self, boot_id: int, referenced: bool = True) -> None:
+        """The device loses power and starts again where it stands, with a clock of its own."""
+        self._device_zero = self.now_us
+        self.device = Device(device_config(self.arm), boot_id, 0, self.device.steps, referenced)
+
+    def messages(self, topic: Topic[Any]) -> list[Any]:
+        return self.published[topic.key]
+
+    def events(self) -> list[str]:
+        return [event.event for event in self.published["device/events"]]
+
+    def _millisecond(self) -> None:
+        self.now_us += 1000
+        self._deliver()
+        if self.device_is_on:
+            self.device.advance(self.now_us - self._device_zero)
+            self.path.append(self.device.commanded_steps)
+            for frame in self.device.take():
+                self._launch(False, frame.kind, frame.payload)
+        if self.gateway_is_on and self.now_us % 20_000 == 0:
+            self._do(self.core.step(self.moment))
+
+    def _launch(self, to_device: bool, kind: str, payload: bytes) -> None:
+        if self.wire.is_cut:
+            return
+        is_safe = kind in SAFE
+        copies = 1
+        if not is_safe:
+            copies = (self.rng.random() >= self.wire.loss) + (self.rng.random() < self.wire.duplicates)
+        for _ in range(copies):
+            late = self.wire.delay + (0.0 if is_safe else self.rng.random() * self.wire.jitter)
+            self._order += 1
+            self._flying.append((self.now_us + round(late * 1e6), self._order, to_device, kind, payload))
+
+    def _deliver(self) -> None:
+        if not self._flying:
+            return
+        due = sorted(item for item in self._flying if item[0] <= self.now_us)
+        self._flying = [item for item in self._flying if item[0] > self.now_us]
+        for _, _, to_device, kind, payload in due:
+            if to_device and self.device_is_on:
+                self.device.receive(payload)
+            elif not to_device and self.gateway_is_on:
+                self.receive(Kind(kind), payload)
+
+    def _do(self, outputs: list[Output]) -> None:
+        for output in outputs:
+            match output:
+                case SendFrame(kind, payload):
+                    self.sent.append((self.now, kind, payload))
+                    self._launch(True, kind, payload)
+                case Publish(topic, message):
+                    self.published[topic.key].append(message)
+                case GoalExecuting(goal_id):
+                    self.executing.append(goal_id)
+                case GoalProgress(_, feedback):
+                    self.feedback.append(feedback)
+                case GoalFinished(goal_id, status, result):
+                    assert goal_id not in self.finished, f"{goal_id} ends twice"
+                    self.finished[goal_id] = (status, result)
+                case CommandAnswer(ticket, response):
+                    self.answers[ticket] = response
+                case LogLine(_, text):
+                    self.log.append(text)
+
+
+def move(start: Vector, end: Vector, period: float = 0.05, slower: float = 1.0) -> JointTrajectory:
+    """A jerk-limited move from rest to rest in points of `period` seconds, as the planner makes them."""
+    arm = rm1()
+    path = profile(Knot.at_rest(start), Knot.at_rest(end), Limits.of(arm.joints))
+    assert path is not None
+    count = max(1, round(path.duration / period))
+    times = [path.duration * i / count for i in range(count + 1)]
+    knots = [path.at(t) for t in times]
+    points = [
+        TrajectoryPoint(
+            positions=knot.position,
+            velocities=tuple(v / slower for v in knot.velocity),
+            accelerations=tuple(a / slower**2 for a in knot.acceleration),
+            time_from_start=t * slower,
+        )
+        for t, knot in zip(times, knots, strict=True)
+    ]
+    last = TrajectoryPoint(
+        positions=end, velocities=(0.0,) * 3, accelerations=(0.0,) * 3, time_from_start=times[-1] * slower
+    )
+    return JointTrajectory(joint_names=arm.joint_names, points=(*points[:-1], last))
