@@ -1,0 +1,5 @@
+"""`python -m services.bench`."""
+
+from services.bench.main import main
+
+main()

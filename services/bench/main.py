@@ -1,0 +1,70 @@
+"""`make bench`: every figure of architecture.md, measured here and now, into out/bench.json and a table.
+
+A figure that cannot be measured says why; nothing is estimated. Exit code 1 if one is missing; a goal that is not met
+is said, and is not an error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Callable, Iterable
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+
+import msgspec
+
+from services.bench.figure import Figure, guarded
+from services.bench.report import report_of, text_of
+from services.bench.stacks import Stacks
+from services.runtime.deployment import project_root
+
+ALONE = ("frame_lookup_us", "plan_ms", "lost_of_45000_at_25hz", "cli_start_ms")  # before any stack disturbs them
+ON_A_STACK = ("stack_idle_cpu_percent", "stack_rss_mb", "state_to_frame_ms", "move_accept_to_first_step_ms")
+BROKERS = {"chunk_ack_ms": "mosquitto", "chunk_ack_ms_amqtt": "amqtt"}
+LAST = ("ready_s",)
+NAMES = (*ALONE, *ON_A_STACK, *BROKERS, *LAST)
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(prog="make bench", description="Measure the figures of architecture.md.")
+    parser.add_argument("--only", nargs="+", choices=NAMES, metavar="NAME", help=", ".join(NAMES))
+    parser.add_argument("--out", type=Path, default=project_root() / "out/bench.json")
+    options = parser.parse_args()
+    sys.exit(bench(options.only or NAMES, options.out))
+
+
+def bench(names: Iterable[str], out: Path) -> int:
+    """Measures, writes, prints; the exit code."""
+    names = [name for name in NAMES if name in set(names)]
+    figures: dict[str, Figure] = {}
+    with Stacks() as stacks:
+        for name in names:
+            print(f"bench: {name} ...", flush=True)
+            figures[name] = measured(name, stacks)
+    report = report_of(figures, project_root())
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
+    print(f"\n{text_of(report)}\n\nwritten to {out}")
+    return 1 if any(figure.median is None for figure in figures.values()) else 0
+
+
+def measured(name: str, stacks: Stacks) -> Figure:
+    """One figure, by the module that bears its name."""
+    module = module_of(name)
+    measure: Callable[..., Figure] = module.measure
+    if name in BROKERS:
+        return guarded(partial(measure, stacks, BROKERS[name]), module.UNIT)
+    return guarded(partial(measure, *(() if name in ALONE else (stacks,))), module.UNIT)
+
+
+def module_of(name: str) -> ModuleType:
+    """Imported only when asked for: pinocchio and yourdfpy are slow to import."""
+    return importlib.import_module(f"services.bench.{name.removesuffix('_amqtt')}")
+
+
+if __name__ == "__main__":
+    main()

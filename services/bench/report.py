@@ -1,0 +1,87 @@
+"""`out/bench.json` and the table that a person reads."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+import textwrap
+from collections.abc import Mapping
+from pathlib import Path
+
+import msgspec
+import psutil
+
+from services.bench.figure import Figure
+from services.cli.columns import table
+
+
+class BenchReport(msgspec.Struct, frozen=True):
+    """Exactly what `out/bench.json` holds."""
+
+    commit: str
+    machine: str
+    figures: dict[str, Figure]
+
+
+def report_of(figures: Mapping[str, Figure], root: Path) -> BenchReport:
+    return BenchReport(commit(root), machine(), dict(figures))
+
+
+def commit(root: Path) -> str:
+    """The commit that was measured; `+` where the tree differs from it."""
+    try:
+        head = _git(root, "rev-parse", "--short=12", "HEAD")
+        return head + ("+" if _git(root, "status", "--porcelain", "--untracked-files=no") else "")
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
+def _git(root: Path, *arguments: str) -> str:
+    done = subprocess.run(["git", *arguments], cwd=root, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def machine() -> str:
+    """What it was measured on, without naming the machine."""
+    memory = psutil.virtual_memory().total / 2**30
+    return (
+        f"{processor()}, {psutil.cpu_count()} cores, {memory:.0f} GiB, {platform.system()} {platform.machine()}, "
+        f"Python {platform.python_version()}"
+    )
+
+
+def processor() -> str:
+    """The processor's own name, where Linux says it."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or "unknown processor"
+
+
+def text_of(report: BenchReport) -> str:
+    """The table, and a note under each figure that has one."""
+    rows = [
+        (name, figure.unit, _number(figure.median), _number(figure.p99), figure.goal or "-", _verdict(figure),
+         ", ".join(f"{what} {value:g}" for what, value in figure.reference.items()))
+        for name, figure in report.figures.items()
+    ]  # fmt: skip
+    notes = [
+        textwrap.fill(f"{name}: {figure.note}", 116, subsequent_indent="    ")
+        for name, figure in report.figures.items()
+        if figure.note
+    ]
+    headings = ("figure", "unit", "median", "p99", "goal", "met", "reference")
+    return f"{report.machine}, commit {report.commit}\n\n{table(headings, rows)}\n\n" + "\n".join(notes)
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:g}"
+
+
+def _verdict(figure: Figure) -> str:
+    if figure.median is None:
+        return "NO FIGURE"
+    return "-" if figure.met is None else "yes" if figure.met else "NO"
