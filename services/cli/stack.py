@@ -40,6 +40,7 @@ class Stack:
     """Starts on entering, stops on leaving; every process can be looked at and killed by name.
 
     `viewer="none"` leaves the viewer's process out. `environment` is added to what the stack gets.
+    `command` starts it in another way, for example ("make", "up").
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class Stack:
         out: Path | None = None,
         processes: Sequence[str] | None = None,
         environment: Mapping[str, str] | None = None,
+        command: Sequence[str] | None = None,
         ready_timeout: float = 60.0,
     ) -> None:
         self.root = project_root()
@@ -59,10 +61,11 @@ class Stack:
         left_out = ("viewer",) if viewer == "none" else ()
         self.processes = tuple(processes or (name for name in PROCESSES if name not in left_out))
         self.ready_seconds = 0.0
+        self._command = command
         self._ready_timeout = ready_timeout
         self.socket = self.folder / "process-compose.sock"
         self.compose = Compose(self.socket)
-        self._server: subprocess.Popen[bytes] | None = None
+        self.server: subprocess.Popen[bytes] | None = None
         router, mqtt, grpc, web = free_ports(4)
         self.deployment: dict[str, str] = {
             "GEMELO_ROUTER_PORT": str(router),
@@ -99,9 +102,9 @@ class Stack:
         self.run.mkdir(parents=True, exist_ok=True)
         self.out.mkdir(parents=True, exist_ok=True)
         started = time.monotonic()
-        arguments = [str(_process_compose(self.root)), "up", "-t=false", "--no-deps", *self.processes]
+        arguments = self._command or (str(_process_compose(self.root)), "up", "-t=false", "--no-deps", *self.processes)
         with (self.folder / "console.log").open("wb") as console:
-            self._server = subprocess.Popen(
+            self.server = subprocess.Popen(
                 arguments,
                 cwd=self.root,
                 env={
@@ -120,7 +123,7 @@ class Stack:
 
     def stop(self) -> int | None:
         """Ends all processes as Ctrl-C would; the exit code of process-compose."""
-        server, self._server = self._server, None
+        server, self.server = self.server, None
         code = None
         if server is not None:
             server.send_signal(signal.SIGTERM)
@@ -145,7 +148,7 @@ class Stack:
         deadline = time.monotonic() + timeout
         missing = wanted
         while time.monotonic() < deadline:
-            if self._server is None or self._server.poll() is not None:
+            if self.server is None or self.server.poll() is not None:
                 raise StackError(f"process-compose ended by itself:\n{self.console()[-2000:]}")
             missing = tuple(name for name in missing if not self.is_ready(name))
             if not missing:

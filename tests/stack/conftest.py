@@ -1,0 +1,22 @@
+"""One stack for all tests of a file, started through process-compose as a user starts it."""
+
+from __future__ import annotations
+
+import pytest
+
+from services.cli.stack import Stack
+from tests.stack.person import Operator
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory):
+    with Stack(broker="mosquitto", out=tmp_path_factory.mktemp("out")) as running:
+        yield running
+
+
+@pytest.fixture
+def operator(stack):
+    stack.wait_ready(20.0)
+    person = Operator(stack)
+    yield person
+    person.close()

@@ -1,0 +1,125 @@
+"""A person at the command: moves the arm, watches every joint state, and frees a device that holds."""
+
+from __future__ import annotations
+
+import time
+from itertools import pairwise
+
+from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceMode
+from schemas.joints import JointState
+from schemas.motion import FollowJointTrajectoryGoal
+from schemas.planning import JointGoal, PlanCode, PlanRequest
+from schemas.topics import DEVICE_COMMAND, DEVICE_STATE, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, PLAN
+from services.arm.description import load_arm
+from services.cli.device import reference_request
+from services.runtime.deployment import load_deployment, project_root
+from services.runtime.errors import GoalRefused, NoAnswer, Refused
+from services.runtime.node import Node
+from services.runtime.stopping import StopRequest
+
+HERE_OR_THERE = (0.45, -0.35)  # of the way from a joint's middle to its limits: two poses to go between
+SETTLE = 10.0  # [s] for a stack to accept a goal again
+
+
+class Operator:
+    """A node of the test's own on the stack's bus."""
+
+    def __init__(self, stack):
+        self.stack = stack
+        deployment = load_deployment(None, stack.environment)
+        self.arm = load_arm(project_root() / deployment.robot)
+        self.node = Node("operator", deployment, robot=self.arm.name, stop=StopRequest())
+        self.seen: list[JointState] = []
+        self.node.subscribe(JOINT_STATES, self._see)
+        self.follow = self.node.action(FOLLOW_JOINT_TRAJECTORY)
+        self.device = self.node.latest(DEVICE_STATE)
+
+    def close(self):
+        self.node.close()
+
+    def _see(self, state):
+        self.seen.append(state)
+
+    def wait_for(self, condition, timeout):
+        """Handles the inbox until `condition()`; whether it came true."""
+        deadline = time.monotonic() + timeout
+        while not condition():
+            if time.monotonic() > deadline:
+                return False
+            self.node.wait(0.02)
+        return True
+
+    def pose(self, share):
+        """A joint position inside the limits: `share` of the way from the middle to a limit."""
+        middles = [(joint.lower + joint.upper) / 2 for joint in self.arm.joints]
+        spans = [(joint.upper - joint.lower) / 2 for joint in self.arm.joints]
+        return tuple(middle + share * span for middle, span in zip(middles, spans, strict=True))
+
+    def plan(self, speed=1.0):
+        """A trajectory to whichever of two poses is farther away."""
+        self.seen.clear()
+        assert self.wait_for(lambda: self.seen, 5.0), "no joint states"
+        here = self.seen[-1].position
+        poses = [self.pose(share) for share in HERE_OR_THERE]
+        there = max(poses, key=lambda pose: max(abs(a - b) for a, b in zip(pose, here, strict=True)))
+        request = PlanRequest(
+            goal=JointGoal(name=self.arm.joint_names, position=there),
+            velocity_scaling=speed,
+            acceleration_scaling=speed,
+        )
+        plan = self.node.call(PLAN, request, timeout=5.0)
+        assert plan.code is PlanCode.SUCCESS, plan.refusal
+        return plan
+
+    def send(self, plan):
+        """The handle of a goal; joint states are kept from here on."""
+        self.seen.clear()
+        goal = FollowJointTrajectoryGoal(trajectory=plan.trajectory)
+        return self.follow.send(goal)
+
+    def move(self, speed=1.0):
+        """Plans and moves; the outcome."""
+        plan = self.plan(speed)
+        return self.send(plan).wait(plan.duration + 10.0)
+
+    def is_moving(self):
+        """Whether the last joint state says that some joint moves."""
+        return bool(self.seen) and any(abs(velocity) > 1e-3 for velocity in self.seen[-1].velocity)
+
+    def move_again(self):
+        """Moves as soon as the stack lets it, doing what its refusals ask for; the outcome and what was done."""
+        deadline = time.monotonic() + SETTLE
+        done = []
+        while True:
+            try:
+                done += self._free()
+                return self.move(), done
+            except (AssertionError, GoalRefused, NoAnswer, Refused):
+                if time.monotonic() > deadline:
+                    raise
+                self.node.wait(0.1)
+
+    def _free(self):
+        self.wait_for(lambda: self.device.message is not None and not self.device.is_stale, 1.0)
+        match self.device.message.mode:
+            case DeviceMode.UNREFERENCED:
+                request = reference_request(self.arm, ())
+            case DeviceMode.HOLD:
+                request = DeviceCommandRequest(command=DeviceCommandKind.STOP)
+            case _:
+                return []
+        answer = self.node.call(DEVICE_COMMAND, request, timeout=3.0)
+        return [request.command] if answer.accepted else []
+
+
+def jumps(arm, states):
+    """Every place where a joint went farther between two states than its speed limit allows."""
+    found = []
+    for before, after in pairwise(states):
+        dt = (after.stamp - before.stamp) * 1e-9
+        for joint, old, new in zip(arm.joints, before.position, after.position, strict=True):
+            # Two steps of rounding, and 2 ms by which the mapping of the device's clock may be off.
+            allowed = joint.velocity * (max(dt, 0.0) + 0.002) + 2 / joint.steps.per_unit
+            if abs(new - old) > allowed:
+                found.append(f"{joint.name} went {new - old:.6f} in {dt * 1e3:.1f} ms, allowed {allowed:.6f}")
+    return found
