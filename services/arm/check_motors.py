@@ -140,8 +140,8 @@ def _pulses(drive: StepperJoint, driver: Driver, tick_hz: int, thing: str) -> li
     findings = []
     if rate > fastest:
         message = (
-            f"{rate:.0f} steps/s at {drive.max_speed_rpm:g} RPM, but {driver.name} needs {driver.step_high_us:g} us high and "
-            f"{driver.step_low_us:g} us low: {fastest:.0f} steps/s at a tick of {tick:g} us"
+            f"{rate:.0f} steps/s at {drive.max_speed_rpm:g} RPM, but {driver.name} needs {driver.step_high_us:g} us "
+            f"high and {driver.step_low_us:g} us low: {fastest:.0f} steps/s at a tick of {tick:g} us"
         )
         findings.append(
             error(ROBOT_FILE, thing, message, "a lower max_speed_rpm, fewer microsteps or a higher tick_hz")

@@ -7,16 +7,20 @@ import msgspec
 from schemas.deployment import Deployment
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
 from schemas.topics import JOINT_STATES, PLAN, PLANNED_PATH
-from services.arm.description import load_arm
+from services.arm.description import Arm, load_arm
+from services.arm.errors import DescriptionError
 from services.planner.core import Planner
+from services.planner.start import STALE_AFTER
 from services.runtime.application import service
-from services.runtime.deployment import project_root
+from services.runtime.deployment import DeploymentError, project_root
 from services.runtime.node import Node
+
+NOT_READY = "no fresh joint_states: is the stepper_gateway running?"
 
 
 def run(node: Node, deployment: Deployment) -> None:
     """Serve until the node is stopped; ready while it knows where the arm is."""
-    planner = Planner(load_arm(project_root() / deployment.robot))
+    planner = Planner(_arm(deployment))
     states = node.latest(JOINT_STATES)
     path = node.publisher(PLANNED_PATH)
 
@@ -25,7 +29,7 @@ def run(node: Node, deployment: Deployment) -> None:
         response = planner.plan(
             request,
             states.message,
-            states.age(node.now()) if states.message is not None else 0.0,
+            states.age(),
             is_late=lambda: node.monotonic() - began > request.allowed_time,
         )
         took = node.monotonic() - began
@@ -36,10 +40,18 @@ def run(node: Node, deployment: Deployment) -> None:
         return msgspec.structs.replace(response, planning_time=took)
 
     def step(_now: int) -> None:
-        node.set_ready(not states.is_stale, "no fresh joint_states: is the stepper_gateway running?")
+        node.set_ready(states.age() < STALE_AFTER, "" if states.age() < STALE_AFTER else NOT_READY)
 
-    node.serve(PLAN, plan)
+    # In the worker: a plan may take its whole allowed_time, and readiness keeps beating meanwhile.
+    node.serve(PLAN, plan, worker=True)
     node.spin(step, rate=10.0)
+
+
+def _arm(deployment: Deployment) -> Arm:
+    try:
+        return load_arm(project_root() / deployment.robot)
+    except DescriptionError as error:
+        raise DeploymentError(str(error)) from error
 
 
 def main() -> None:

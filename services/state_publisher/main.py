@@ -11,10 +11,13 @@ from schemas.frames import RobotDescription
 from schemas.joints import JointState
 from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
 from services.arm.description import Arm, load_arm
+from services.arm.errors import DescriptionError
 from services.runtime.application import service
-from services.runtime.deployment import project_root
+from services.runtime.deployment import DeploymentError, project_root
 from services.runtime.node import Node
 from services.state_publisher.core import StatePublisher
+
+FRESH = 0.5  # [s] a joint state counts as fresh: as long as the device waits for a heartbeat
 
 
 class StatePublisherParameters(msgspec.Struct, frozen=True, kw_only=True):
@@ -35,7 +38,7 @@ def describe(arm: Arm) -> RobotDescription:
 
 def run(node: Node, deployment: Deployment) -> None:
     """Publish until the node is stopped; ready while fresh joint states give frames."""
-    arm = load_arm(project_root() / deployment.robot)
+    arm = _arm(deployment)
     publisher = StatePublisher(arm)
     parameters = node.parameters(StatePublisherParameters)
     states = node.latest(JOINT_STATES)
@@ -52,10 +55,18 @@ def run(node: Node, deployment: Deployment) -> None:
 
     def step(_now: int) -> None:
         publisher.decimator.rate = parameters.value.rate
-        node.set_ready(not states.is_stale, "no fresh joint_states: is the stepper_gateway running?")
+        is_fresh = states.age() < FRESH
+        node.set_ready(is_fresh, "" if is_fresh else "no fresh joint_states: is the stepper_gateway running?")
 
     node.subscribe(JOINT_STATES, on_joint_state)
     node.spin(step, rate=10.0)
+
+
+def _arm(deployment: Deployment) -> Arm:
+    try:
+        return load_arm(project_root() / deployment.robot)
+    except DescriptionError as error:
+        raise DeploymentError(str(error)) from error
 
 
 def main() -> None:
