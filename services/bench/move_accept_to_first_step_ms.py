@@ -29,7 +29,12 @@ GRID = 0.0002  # [s] to which the trajectory's own first step is found
 def measure(stacks: Stacks) -> Figure:
     running = stacks.any_broker()
     started: list[DeviceEvent] = []
-    running.node.subscribe(DEVICE_EVENTS, lambda event: event.event == "started" and started.append(event))
+
+    def on_event(event: DeviceEvent) -> None:
+        if event.event == "started":
+            started.append(event)
+
+    running.node.subscribe(DEVICE_EVENTS, on_event)
     raw, due = [], []
     for number in range(ROUNDS):
         joint = running.arm.joints[0].name

@@ -18,7 +18,7 @@ def families(stack: Stack) -> dict[str, list[psutil.Process]]:
 
 def cpu_seconds(processes: list[psutil.Process]) -> float:
     """[s] of processor time that they have used so far."""
-    return sum(times.user + times.system for times in (process.cpu_times() for process in processes))
+    return sum(float(t.user + t.system) for t in (process.cpu_times() for process in processes))
 
 
 def rss_mb(processes: list[psutil.Process]) -> float:

@@ -6,7 +6,6 @@ gave to that device time, and `frames` bear the same stamp.
 
 from __future__ import annotations
 
-import socket
 import time
 
 from paho.mqtt.client import Client, MQTTMessage
@@ -15,6 +14,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 from schemas.device import DeviceState
 from schemas.frames import FrameTransforms
 from schemas.topics import DEVICE_STATE, FRAMES
+from services.bench.echo import send_at_once
 from services.bench.figure import Figure, Goal, NotMeasured, of_samples
 from services.bench.stacks import Running, Stacks
 from services.stepper_gateway.links.frames import BadFrame, State, decode
@@ -60,14 +60,14 @@ def listen(running: Running, arrivals: dict[int, float]) -> Client:
     def on_message(client: Client, userdata: object, message: MQTTMessage) -> None:
         now = time.monotonic()
         try:
-            frame = decode(message.payload)
+            frame = decode(bytes(message.payload))
         except BadFrame:
             return
         if isinstance(frame, State):
             arrivals[frame.t_us] = now
 
     client = Client(CallbackAPIVersion.VERSION2, client_id=f"bench-state-{time.time_ns()}")
-    client.on_socket_open = lambda c, userdata, sock: sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    client.on_socket_open = send_at_once
     client.on_connect = lambda c, userdata, flags, code, properties: c.subscribe(
         f"gemelo/v1/{running.arm.device.name}/state", qos=0
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from schemas.actions import GoalStatusCode
 from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
 from schemas.planning import PlanRequest, PlanResponse
@@ -57,7 +59,7 @@ def follow(session: Session, plan: PlanResponse, quiet: bool = False) -> MoveRep
     return report_of(session, plan, outcome.status, outcome.result, interrupt.is_set)
 
 
-def cancel_once(handle: GoalHandle, interrupt: Interrupt, quiet: bool) -> None:
+def cancel_once(handle: GoalHandle[Any, Any], interrupt: Interrupt, quiet: bool) -> None:
     """Cancels when Ctrl-C has been pressed for the first time."""
     if interrupt.is_set and not interrupt.is_answered:
         interrupt.is_answered = True
