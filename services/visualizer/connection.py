@@ -33,7 +33,7 @@ class Watch:
         if self._socket is None:
             return False
         try:
-            if self._socket.recv(4096, socket.MSG_DONTWAIT) == b"":
+            if self._socket.recv(4096) == b"":
                 self.close()
         except BlockingIOError:
             return True
@@ -48,6 +48,7 @@ class Watch:
         self._retry_at = now + RETRY
         try:
             self._socket = socket.create_connection((self.host, self.port), CONNECT_TIMEOUT)
+            self._socket.setblocking(False)
         except OSError:
             return False
         return True

@@ -86,9 +86,11 @@ def test_it_gets_ready_listens_on_loopback_only_and_stops_without_orphans(viewer
         if each.status == psutil.CONN_LISTEN
     }
     assert listening == {("127.0.0.1", viewer.section.port), ("127.0.0.1", viewer.section.web_port)}
+    time.sleep(1.2)
     began = time.monotonic()
     viewer.process.send_signal(signal.SIGTERM)
     output, _ = viewer.process.communicate(timeout=5.0)
+    assert output.count("viewer: ") == 1
     assert time.monotonic() - began < 3.0
     assert viewer.process.returncode == 0
     assert gone(children)
@@ -162,7 +164,9 @@ def test_the_watch_sees_the_end_and_the_return_of_a_viewer():
     with socket.create_server(("127.0.0.1", watch.port)) as server:
         assert not watch.is_new(0.5)
         assert watch.is_new(1.0)
-        server.accept()[0].close()
+        peer, _ = server.accept()
+        assert all(watch.is_alive for _ in range(5))
+        peer.close()
         deadline = time.monotonic() + 2.0
         while watch.is_alive and time.monotonic() < deadline:
             time.sleep(0.01)
