@@ -1,0 +1,1 @@
+"""How services speak: the node, its bus, requests, actions and parameters."""

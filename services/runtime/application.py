@@ -1,0 +1,78 @@
+"""What every service's `main` has in common: arguments, deployment, node, exit code."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from schemas.deployment import Deployment
+from services.runtime.deployment import DeploymentError, load_deployment
+from services.runtime.errors import BusError, Refused
+from services.runtime.logs import LEVELS, line_logger
+from services.runtime.node import Node
+from services.runtime.stopping import StopRequest, stop_on_signals
+
+Run = Callable[[Node, Deployment], None]
+EXPECTED = (DeploymentError, BusError, Refused)  # a sentence says all; anything else shows where it happened
+
+
+def service(name: str, run: Run, arguments: Sequence[str] | None = None) -> None:
+    """Opens the node `name`, runs `run(node, deployment)`, and ends the process: 0 when stopped, 1 for an error."""
+    options = _parse(name, arguments)
+    stop = StopRequest()
+    with stop_on_signals(stop):
+        code = _run(name, run, options, stop)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        if any(not each.daemon for each in threading.enumerate() if each is not threading.main_thread()):
+            os._exit(code)  # a library's thread must not keep the process
+    sys.exit(code)
+
+
+def _run(name: str, run: Run, options: argparse.Namespace, stop: StopRequest) -> int:
+    log = line_logger(name, options.log_level)
+    try:
+        deployment = load_deployment(options.config)
+        overrides = dict(options.set)
+        with Node(name, deployment, overrides=overrides, log_level=options.log_level, stop=stop) as node:
+            log = node.log
+            return _guarded(run, node, deployment, stop)
+    except EXPECTED as error:
+        log.error("%s", error)
+        return 1
+
+
+def _guarded(run: Run, node: Node, deployment: Deployment, stop: StopRequest) -> int:
+    try:
+        run(node, deployment)
+    except KeyboardInterrupt:
+        return 0 if stop.is_set else 130
+    except EXPECTED as error:
+        node.log.error("%s", error)
+        return 1
+    except Exception as error:
+        if not getattr(error, "is_logged", False):
+            node.log.exception("ended by an error")
+        return 1
+    return 0
+
+
+def _parse(name: str, arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog=f"gemelo-{name.replace('_', '-')}")
+    parser.add_argument("--config", type=Path, default=None, metavar="FILE", help="deployment file [deploy/local.toml]")
+    parser.add_argument(
+        "--set", type=_assignment, action="append", default=[], metavar="NAME=VALUE", help="a parameter; repeatable"
+    )
+    parser.add_argument("--log-level", default="info", choices=LEVELS)
+    return parser.parse_args(arguments)
+
+
+def _assignment(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise argparse.ArgumentTypeError(f'"{text}": write it as name=value')
+    return name, value

@@ -1,0 +1,106 @@
+"""The bus as the node sees it: bytes under keys. `ZenohBus` and `MemoryBus` keep this contract.
+
+Keys are relative to the robot. Callbacks come on threads of the bus: they must only put into an
+inbox and return. A bus delivers its own publications only to subscriptions that ask for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from schemas.topics import Delivery
+
+ENCODING = "application/msgpack"  # the schema's name follows after a semicolon
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """One message as it came: `schema` is empty where the sender named none."""
+
+    key: str
+    schema: str
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """One reply to a request; `ok` is False where the payload is a `Failure`."""
+
+    ok: bool
+    schema: str
+    payload: bytes
+
+
+class Query(Protocol):
+    """A request that waits for exactly one of `reply` and `fail`, from any thread."""
+
+    @property
+    def arrival(self) -> Arrival: ...
+
+    def reply(self, schema: str, payload: bytes) -> None: ...
+
+    def fail(self, schema: str, payload: bytes) -> None: ...
+
+
+class Declaration(Protocol):
+    """Something that the bus does until it is closed."""
+
+    def close(self) -> None: ...
+
+
+class Publication(Declaration, Protocol):
+    """The right to publish on one key."""
+
+    def put(self, payload: bytes) -> None: ...
+
+
+class Bus(Protocol):
+    """A connection to all other nodes of one robot."""
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether messages can leave now; False while the router is away."""
+        ...
+
+    def publish(self, key: str, schema: str, delivery: Delivery) -> Publication:
+        """EVERY and LATCHED are kept for readers that miss them while the router is away."""
+        ...
+
+    def subscribe(
+        self,
+        key: str,
+        delivery: Delivery,
+        on_arrival: Callable[[Arrival], None],
+        on_miss: Callable[[int], None],
+        own: bool = False,
+    ) -> Declaration:
+        """`on_miss(n)`: n messages of an EVERY or LATCHED key are lost for good; `own`: hear this bus too."""
+        ...
+
+    def serve(self, key: str, on_query: Callable[[Query], None]) -> Declaration:
+        """Requests under `key` come to `on_query`."""
+        ...
+
+    def wait_served(self, key: str, timeout: float) -> bool:
+        """Whether somebody serves `key`, waiting up to `timeout` [s] for it."""
+        ...
+
+    def ask(
+        self, key: str, schema: str, payload: bytes, timeout: float, on_answer: Callable[[Answer | None], None]
+    ) -> None:
+        """Sends one request; `on_answer` comes exactly once, with None where no answer came in `timeout` [s]."""
+        ...
+
+    def declare_alive(self, key: str) -> Declaration:
+        """A token that vanishes when this process does."""
+        ...
+
+    def alive(self, pattern: str) -> set[str]:
+        """The keys of the living tokens; a `*` in `pattern` stands for one chunk."""
+        ...
+
+    def close(self) -> None:
+        """Ends everything declared here; never hangs."""
+        ...

@@ -1,0 +1,35 @@
+"""Opens the bus, waiting for the router where it is not there yet."""
+
+from __future__ import annotations
+
+import logging
+
+from schemas.deployment import RouterSection
+from services.runtime.bus import Bus
+from services.runtime.stopping import StopRequest
+
+LOOK_EVERY = 0.1  # [s]
+
+
+def connect(router: RouterSection, robot: str, log: logging.Logger, stop: StopRequest) -> Bus:
+    """A session of the router; ends the process cleanly where it is asked to stop while waiting."""
+    from services.runtime.zenoh_bus import BusNotOpen, ZenohBus, router_answers
+
+    is_said = False
+    while not stop.is_set:
+        if router_answers(router.host, router.port):
+            try:
+                bus = ZenohBus(router.host, router.port, robot)
+            except BusNotOpen as error:
+                reason = f" ({error})"
+            else:
+                if is_said:
+                    log.info("the router is there")
+                return bus
+        else:
+            reason = ""
+        if not is_said:
+            is_said = True
+            log.warning("waiting for the router at %s:%d%s; `make up` starts it", router.host, router.port, reason)
+        stop.wait(LOOK_EVERY)
+    raise SystemExit(0)

@@ -1,0 +1,103 @@
+"""Reads a deployment file, with overrides from the environment; what is wrong is one sentence."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from schemas.deployment import Deployment
+
+DEFAULT_FILE = "deploy/local.toml"
+PREFIX = "GEMELO_"
+
+
+class DeploymentError(ValueError):
+    """A deployment that cannot be used; the text names the file, the key and what would do."""
+
+
+def project_root() -> Path:
+    """The folder that holds pyproject.toml, above this file or above the working directory."""
+    for start in (Path(__file__).resolve(), Path.cwd() / "here"):
+        for folder in start.parents:
+            if (folder / "pyproject.toml").is_file():
+                return folder
+    raise DeploymentError("no pyproject.toml above this program or the working directory: run it from the project")
+
+
+def load_deployment(path: Path | None = None, environ: Mapping[str, str] | None = None) -> Deployment:
+    """The deployment of `path`, else of $GEMELO_CONFIG, else of deploy/local.toml; its paths are absolute."""
+    environ = os.environ if environ is None else environ
+    root = project_root()
+    chosen = path or Path(environ.get("GEMELO_CONFIG") or root / DEFAULT_FILE)
+    file = chosen if chosen.is_absolute() or chosen.exists() else root / chosen
+    raw = _read(file)
+    _require_known(raw, _defaults(), file, ())
+    sources = _override(raw, environ)
+    try:
+        deployment = msgspec.convert(raw, Deployment, strict=not sources)
+    except msgspec.ValidationError as error:
+        said = f" (with {', '.join(sources)} from the environment)" if sources else ""
+        raise DeploymentError(f"{file}{said}: {error}") from error
+    return _with_absolute_paths(deployment, root)
+
+
+def robot_name(deployment: Deployment) -> str:
+    """The `name` in the arm's robot.toml: the first chunk of every key."""
+    file = project_root() / deployment.robot / "robot.toml"
+    name = _read(file).get("name")
+    if not isinstance(name, str) or not name or "/" in name:
+        raise DeploymentError(f'{file}: key "name" must be a text without "/"')
+    return name
+
+
+def _read(file: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise DeploymentError(f"{file}: there is no such file; name another with --config or GEMELO_CONFIG") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise DeploymentError(f"{file}: {error}") from error
+
+
+def _defaults() -> dict[str, Any]:
+    return msgspec.to_builtins(Deployment())  # type: ignore[no-any-return]
+
+
+def _require_known(raw: dict[str, Any], known: dict[str, Any], file: Path, path: tuple[str, ...]) -> None:
+    for key, value in raw.items():
+        if key not in known:
+            name = ".".join((*path, key))
+            near = difflib.get_close_matches(key, known, n=1)
+            hint = f'did you mean "{near[0]}"?' if near else f"known here: {', '.join(known)}"
+            raise DeploymentError(f'{file}: unknown key "{name}": {hint}')
+        if key != "parameters" and isinstance(value, dict) and isinstance(known[key], dict):
+            _require_known(value, known[key], file, (*path, key))
+
+
+def _override(raw: dict[str, Any], environ: Mapping[str, str]) -> list[str]:
+    """Writes GEMELO_<KEY> and GEMELO_<SECTION>_<KEY> into `raw`; returns the variables used."""
+    used = []
+    for key, default in _defaults().items():
+        if isinstance(default, dict):
+            for name in default:
+                variable = f"{PREFIX}{key}_{name}".upper()
+                if environ.get(variable):
+                    raw[key] = {**raw.get(key, {}), name: environ[variable]}
+                    used.append(variable)
+        elif environ.get(f"{PREFIX}{key}".upper()):
+            raw[key] = environ[f"{PREFIX}{key}".upper()]
+            used.append(f"{PREFIX}{key}".upper())
+    return used
+
+
+def _with_absolute_paths(deployment: Deployment, root: Path) -> Deployment:
+    paths = msgspec.structs.replace(
+        deployment.paths, run=str(root / deployment.paths.run), out=str(root / deployment.paths.out)
+    )
+    return msgspec.structs.replace(deployment, robot=str(root / deployment.robot), paths=paths)

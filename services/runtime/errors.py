@@ -1,0 +1,36 @@
+"""What can go wrong between nodes; every text is a sentence for the person who reads it."""
+
+from __future__ import annotations
+
+
+class BusError(Exception):
+    """The bus cannot be used: no router, a name that is taken, a bus that is closed."""
+
+
+class NodeNameTaken(BusError):
+    """Another living node has this name."""
+
+
+class Refused(Exception):
+    """A server would not do what was asked; raised by handlers, and again at the client."""
+
+    def __init__(self, message: str, kind: str = "refused") -> None:
+        super().__init__(message)
+        self.kind = kind  # as in `Failure.kind`
+
+
+class GoalRefused(Refused):
+    """An action's server did not accept the goal; `code` is the action's own."""
+
+    def __init__(self, code: int, reason: str) -> None:
+        super().__init__(reason)
+        self.code = code
+        self.reason = reason
+
+
+class NoAnswer(Exception):
+    """Nobody serves the request, or the answer did not come in time."""
+
+
+class ServerLost(Exception):
+    """The server of a goal fell silent or forgot the goal; what became of the motion is not known."""

@@ -1,0 +1,285 @@
+"""The node that every service and every script is made of."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import msgspec
+
+from schemas.deployment import Deployment
+from schemas.message import Message
+from schemas.system import Empty, NodeInfo, Parameter, Parameters, ParameterValue, SetParameter
+from schemas.topics import LOG, STATISTICS, Action, Request, Topic
+from services.runtime import identity, requests
+from services.runtime.action_client import ActionClient
+from services.runtime.action_server import ActionServer, OnCancel, OnGoal
+from services.runtime.bus import Bus
+from services.runtime.connection import connect
+from services.runtime.deployment import load_deployment, project_root, robot_name
+from services.runtime.errors import Refused
+from services.runtime.logs import BusHandler, line_logger
+from services.runtime.loop import Loop
+from services.runtime.parameters import ParameterSet, nearest
+from services.runtime.readiness import Readiness
+from services.runtime.requests import Pending, Server
+from services.runtime.statistics import LoopStatistics
+from services.runtime.stopping import StopRequest, stop_on_signals
+from services.runtime.topics import Latest, Publisher, Subscription
+from services.runtime.worker import Worker
+
+M = TypeVar("M", bound=Message)
+Q = TypeVar("Q", bound=Message)
+R = TypeVar("R", bound=Message)
+G = TypeVar("G", bound=Message)
+F = TypeVar("F", bound=Message)
+P = TypeVar("P", bound=msgspec.Struct)
+
+BEAT = 1.0  # [s] between two touches of the readiness file
+
+
+class Node:
+    """One node: one inbox, and one thread of logic in which every handler and the step run.
+
+    A node does not hear its own publications unless a subscription asks for it (`own=True`).
+    """
+
+    def __init__(
+        self,
+        name: str,
+        deployment: Deployment | None = None,
+        robot: str | None = None,
+        bus: Bus | None = None,
+        overrides: Mapping[str, ParameterValue] | None = None,
+        log_level: str = "info",
+        stop: StopRequest | None = None,
+    ) -> None:
+        """Waits for the router; raises `NodeNameTaken` where `name` lives already. `overrides` are parameters."""
+        self._identity = identity.identify(name)
+        self.name = name
+        self.deployment = deployment if deployment is not None else load_deployment()
+        self.robot = robot or robot_name(self.deployment)
+        self.log = line_logger(name, log_level)
+        self._overrides = dict(overrides or {})
+        self._signals = stop is None
+        self._stop = stop or StopRequest()
+        self._loop = Loop(self._stop)
+        self._worker = Worker()
+        self._readiness: Readiness | None = None
+        self._publishers: dict[str, Publisher[Any]] = {}
+        self._subscriptions: list[Subscription[Any]] = []
+        self._servers: list[Server[Any, Any]] = []
+        self._actions: list[ActionServer[Any, Any, Any]] = []
+        self._parameters: list[ParameterSet[Any]] = []
+        self._is_closed = False
+        with stop_on_signals(self._stop) if self._signals else nullcontext():
+            self._bus = bus or connect(self.deployment.router, self.robot, self.log, self._stop)
+        try:
+            identity.claim(self._bus, self._identity)
+            self._serve_about_itself()
+        except BaseException:
+            self._bus.close()
+            raise
+        self.log.addHandler(BusHandler(lambda record: self.publisher(LOG).put(record)))
+        self._statistics = LoopStatistics(name)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    # What it says and hears.
+
+    def publisher(self, topic: Topic[M]) -> Publisher[M]:
+        """The publisher of a topic; the same one for every call."""
+        if topic.key not in self._publishers:
+            self._publishers[topic.key] = Publisher(self._bus, topic)
+        return self._publishers[topic.key]
+
+    def subscribe(self, topic: Topic[M], on_message: Callable[[M], object], own: bool = False) -> Subscription[M]:
+        """`on_message(message)` runs in the thread of logic; `own`: also for what this node publishes."""
+        subscription = Subscription(self._bus, self._loop.inbox, topic, on_message, self.log.warning, own)
+        self._subscriptions.append(subscription)
+        return subscription
+
+    def latest(self, topic: Topic[M]) -> Latest[M]:
+        """The newest message of a topic, with its age."""
+        latest = Latest(topic)
+        self.subscribe(topic, latest.on_message)
+        return latest
+
+    def serve(self, request: Request[Q, R], handler: Callable[[Q], R], worker: bool = False) -> None:
+        """Answers `request` with `handler(question)`; `Refused` raised there reaches the client.
+
+        With `worker` the handler runs in the node's one worker thread, for answers that take longer
+        than a period of the loop; what it shares with the thread of logic is its own care.
+        """
+        self._serve(request, lambda question, pending: pending.reply(handler(question)), worker)
+
+    def call(self, request: Request[Q, R], question: Q, timeout: float = 2.0) -> R:
+        """Asks and blocks; raises `Refused`, or `NoAnswer` after `timeout` [s] at most."""
+        return requests.call(self._bus, request, question, timeout)
+
+    def serve_action(self, action: Action[G, F, R], on_goal: OnGoal[G], on_cancel: OnCancel) -> ActionServer[G, F, R]:
+        """Serves an action: `on_goal(goal_id, goal)` accepts or refuses, `on_cancel(goal_id)` says "" or why not."""
+        server = ActionServer(action, on_goal, on_cancel, self._serve, self.publisher)
+        self._loop.every(ActionServer.HEARTBEAT, server.beat)
+        self._actions.append(server)
+        return server
+
+    def action(self, action: Action[G, F, R]) -> ActionClient[G, F, R]:
+        """A client of an action."""
+        client = ActionClient(action, self._bus, self._loop, self.subscribe, self._identity.key)
+        self._loop.every(ActionClient.TICK, client.tick)
+        return client
+
+    # What can be set, and how it is.
+
+    def parameters(self, kind: type[P]) -> ParameterSet[P]:
+        """Declares the fields of `kind`, with the values of the deployment file and of the command line."""
+        declared = ParameterSet(kind, self.name)
+        from_file = self.deployment.parameters.get(self.name, {})
+        declared.set_all(from_file, f"[parameters.{self.name}] of the deployment", strict=True)
+        declared.set_all(self._overrides, "--set", strict=False)
+        self._parameters.append(declared)
+        return declared
+
+    def set_ready(self, ok: bool, reason: str = "") -> None:
+        """Says whether this node's state is valid; `reason` is logged when it changes."""
+        if self._readiness is None:
+            self._readiness = Readiness(project_root() / Path(self.deployment.paths.run), self.name)
+        if ok == self._readiness.is_ready:
+            return
+        self.log.info("%s%s", "ready" if ok else "not ready", f": {reason}" if reason else "")
+        (self._readiness.ready if ok else self._readiness.not_ready)()
+
+    @property
+    def is_ready(self) -> bool:
+        return self._readiness is not None and self._readiness.is_ready
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether the router is there."""
+        return self._bus.is_connected
+
+    def alive(self) -> set[str]:
+        """The names of all living nodes of the robot, this one too."""
+        return identity.alive(self._bus)
+
+    # Time.
+
+    def now(self) -> int:
+        """[ns] UNIX time: for stamps."""
+        return time.time_ns()
+
+    def monotonic(self) -> float:
+        """[s] for durations."""
+        return time.monotonic()
+
+    def spin(self, step: Callable[[int], object] = lambda now: None, rate: float = 50.0) -> None:
+        """Calls `step(now [ns])` at `rate` [Hz], with the inbox between, until SIGTERM, SIGINT or `stop()`.
+
+        What a handler or the step raises is logged and ends the spin.
+        """
+        self._loop.every(BEAT, self._beat)
+        try:
+            with stop_on_signals(self._stop) if self._signals else nullcontext():
+                self._loop.spin(step, rate)
+        except Exception as error:
+            self.log.exception("ended by an error")
+            error.is_logged = True  # type: ignore[attr-defined]
+            raise
+        finally:
+            self._loop.forget(self._beat)
+            if self._readiness is not None:
+                self._readiness.not_ready()
+
+    def wait(self, seconds: float) -> None:
+        """Handles the inbox for so long: for scripts that do not spin."""
+        self._loop.wait(seconds)
+
+    def post(self, task: Callable[[], None]) -> None:
+        """`task` runs in the thread of logic; from any thread, for what a library's own threads hear."""
+        self._loop.inbox.put(task)
+
+    def stop(self) -> None:
+        """Lets `spin` return; from any thread."""
+        self._stop.set()
+
+    def close(self) -> None:
+        """Leaves the bus; a node that was closed is of no more use."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        if self._readiness is not None:
+            self._readiness.not_ready()
+        self._worker.close()
+        self._bus.close()
+
+    # What it tells about itself.
+
+    def _serve(
+        self, request: Request[Q, R], handler: Callable[[Q, Pending[R]], None], worker: bool = False
+    ) -> Server[Q, R]:
+        put = self._worker.put if worker else self._loop.inbox.put
+        server = Server(self._bus, put, request, handler, self.log.warning)
+        self._servers.append(server)
+        return server
+
+    def _serve_about_itself(self) -> None:
+        about, parameters = f"@node/{self.name}/info", f"@node/{self.name}/parameters"
+        self.serve(Request(about, Empty, NodeInfo, self.name, "who this is"), lambda empty: self.info())
+        self.serve(Request(f"{parameters}/list", Empty, Parameters, self.name, ""), lambda empty: self._listed())
+        self.serve(Request(f"{parameters}/set", SetParameter, Parameter, self.name, ""), self._set_parameter)
+
+    def info(self) -> NodeInfo:
+        """Who this node is and what it speaks."""
+        from importlib.metadata import version
+
+        return NodeInfo(
+            node=self.name,
+            robot=self.robot,
+            host=socket.gethostname(),
+            pid=os.getpid(),
+            version=version("gemelo"),
+            started=self._identity.started,
+            publishes=tuple(sorted(self._publishers)),
+            subscribes=tuple(sorted({each.topic.key for each in self._subscriptions})),
+            serves=tuple(sorted(each.request.key for each in self._servers if not each.request.key.startswith("@"))),
+            actions=tuple(each.action.key for each in self._actions),
+        )
+
+    def _listed(self) -> Parameters:
+        return Parameters(parameters=tuple(each for declared in self._parameters for each in declared.listed()))
+
+    def _set_parameter(self, wanted: SetParameter) -> Parameter:
+        for declared in self._parameters:
+            if wanted.name in declared.names:
+                parameter = declared.set(wanted.name, wanted.value)
+                self.log.info("parameter %s = %r", parameter.name, parameter.value)
+                return parameter
+        known = [name for declared in self._parameters for name in declared.names]
+        raise Refused(f'{self.name} has no parameter "{wanted.name}": {nearest(wanted.name, known)}')
+
+    def _beat(self) -> None:
+        if self._readiness is not None:
+            self._readiness.beat()
+        for subscription in self._subscriptions:
+            subscription.report_losses()
+        speakers: list[Subscription[Any] | Server[Any, Any]] = [*self._subscriptions, *self._servers]
+        topics = tuple(each.statistics for each in speakers)
+        figures = self._statistics.report(self._loop.take_figures(), topics)
+        if figures is not None:
+            self.publisher(STATISTICS).put(figures)
+
+
+def node_names(bus: Bus) -> set[str]:
+    """The names of all living nodes on a bus."""
+    return identity.alive(bus)

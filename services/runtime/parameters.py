@@ -1,0 +1,97 @@
+"""Parameters: a frozen struct of scalars, declared by a node, read and set at run time."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any, Generic, TypeVar, cast
+
+import msgspec
+
+from schemas.system import Parameter, ParameterValue
+from services.runtime.errors import Refused
+
+P = TypeVar("P", bound=msgspec.Struct)
+
+KINDS: dict[type, str] = {bool: "bool", int: "int", float: "float", str: "str"}
+
+
+class ParameterSet(Generic[P]):
+    """The declared parameters of a node; `value` is the present struct, replaced as a whole."""
+
+    def __init__(self, kind: type[P], node: str) -> None:
+        self._kind, self._node = kind, node
+        self._declared = {field.name: _declared(field, node) for field in msgspec.structs.fields(kind)}
+        self.value = kind()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self._declared)
+
+    def listed(self) -> tuple[Parameter, ...]:
+        """All parameters with their present values."""
+        return tuple(self._with_value(name) for name in self._declared)
+
+    def set(self, name: str, value: ParameterValue, strict: bool = True) -> Parameter:
+        """Sets one; raises `Refused` with the nearest name, the type or the range. Text is converted if not strict."""
+        self._require(name)
+        declared = self._declared[name]
+        if strict and isinstance(value, bool) != (declared.type == "bool"):
+            raise Refused(f'{self._node}: parameter "{name}" is a {declared.type}: {value!r} is not')
+        values = {each: getattr(self.value, each) for each in self._declared} | {name: value}
+        try:
+            self.value = msgspec.convert(values, self._kind, strict=strict)
+        except (msgspec.ValidationError, ValueError) as error:
+            raise Refused(f'{self._node}: parameter "{name}" cannot be {value!r}: {error}') from error
+        return self._with_value(name)
+
+    def set_all(self, values: Mapping[str, ParameterValue], origin: str, strict: bool) -> None:
+        """Sets those named in a file or on a command line; raises `Refused` that says so."""
+        for name, value in values.items():
+            try:
+                self.set(name, value, strict)
+            except Refused as error:
+                raise Refused(f"{origin}: {error}") from error
+
+    def _require(self, name: str) -> None:
+        if name not in self._declared:
+            raise Refused(f'{self._node} has no parameter "{name}": {nearest(name, self._declared)}')
+
+    def _with_value(self, name: str) -> Parameter:
+        return msgspec.structs.replace(self._declared[name], value=getattr(self.value, name))
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A hint for a name that is not known."""
+    names = list(known)
+    near = difflib.get_close_matches(name, names, n=1)
+    return f'did you mean "{near[0]}"?' if near else f"it has {', '.join(names) or 'none'}"
+
+
+def _declared(field: msgspec.structs.FieldInfo, node: str) -> Parameter:
+    described = msgspec.inspect.type_info(field.type)
+    description = ""
+    if isinstance(described, msgspec.inspect.Metadata):
+        schema = described.extra_json_schema or {}
+        description, described = schema.get("description", ""), described.type
+    kind = KINDS.get(_python_type(described))
+    if kind is None or field.default is msgspec.NODEFAULT:
+        raise TypeError(f"{node}: parameter {field.name} must be a bool, int, float or str with a default")
+    bounds = [getattr(described, name, None) for name in ("ge", "gt", "le", "lt")]
+    lower, upper = (
+        [float(each) for each in bounds[:2] if each is not None],
+        [float(e) for e in bounds[2:] if e is not None],
+    )
+    default = cast("ParameterValue", field.default)
+    return Parameter(
+        name=field.name, type=kind, value=default, default=default, description=description,
+        minimum=lower[0] if lower else None, maximum=upper[0] if upper else None,
+    )  # fmt: skip
+
+
+def _python_type(described: Any) -> type:
+    inspect = msgspec.inspect
+    kinds: dict[type, type] = {
+        inspect.BoolType: bool, inspect.IntType: int, inspect.FloatType: float, inspect.StrType: str,
+    }  # fmt: skip
+    return kinds.get(type(described), object)

@@ -1,0 +1,69 @@
+"""`gemelo-router`: the Zenoh router of a local run, on loopback unless the deployment says otherwise."""
+
+from __future__ import annotations
+
+import argparse
+import socket
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import zenoh
+
+from schemas.deployment import RouterSection
+from services.runtime.deployment import DeploymentError, load_deployment
+from services.runtime.errors import BusError
+from services.runtime.logs import LEVELS, line_logger
+from services.runtime.readiness import Readiness
+from services.runtime.stopping import StopRequest, stop_on_signals
+from services.runtime.zenoh_config import router_config
+
+BEAT = 1.0  # [s]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs until SIGTERM; 1 with one sentence where it cannot start."""
+    parser = argparse.ArgumentParser(prog="gemelo-router", description=__doc__)
+    parser.add_argument("--config", type=Path, default=None, metavar="FILE", help="deployment file [deploy/local.toml]")
+    parser.add_argument("--log-level", default="info", choices=LEVELS)
+    options = parser.parse_args(arguments)
+    log = line_logger("router", options.log_level)
+    stop = StopRequest()
+    try:
+        deployment = load_deployment(options.config)
+        section = deployment.router
+        with stop_on_signals(stop):
+            require_free(section)
+            with zenoh.open(router_config(section.host, section.port)):
+                log.info("listening on %s port %d", section.host, section.port)
+                _beat_until(stop, Readiness(Path(deployment.paths.run), "router"))
+    except (DeploymentError, BusError, zenoh.ZError) as error:
+        log.error("%s", error)
+        return 1
+    return 0
+
+
+def require_free(section: RouterSection) -> None:
+    """Raises `BusError` where another program listens at the router's address."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((section.host, section.port))
+        except OSError as error:
+            raise BusError(
+                f"port {section.port} on {section.host} is taken by another program ({error.strerror}); "
+                "set GEMELO_ROUTER_PORT, or [router] port in the deployment file, to another"
+            ) from error
+
+
+def _beat_until(stop: StopRequest, readiness: Readiness) -> None:
+    readiness.ready()
+    try:
+        while not stop.wait(BEAT):
+            readiness.beat()
+    finally:
+        readiness.not_ready()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

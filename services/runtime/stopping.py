@@ -1,0 +1,87 @@
+"""SIGTERM and SIGINT: the first asks for a clean stop, and a process that does not follow is ended."""
+
+from __future__ import annotations
+
+import _thread
+import faulthandler
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from queue import Empty, SimpleQueue
+from types import FrameType
+
+GRACE = 2.0  # [s] from the signal to the end of the process, whatever its callbacks do
+SIGNALS = (signal.SIGTERM, signal.SIGINT)
+
+
+class StopRequest:
+    """Whether the process has been asked to stop; safe to set in a signal handler."""
+
+    def __init__(self) -> None:
+        self.is_set = False
+        self._listeners: list[Callable[[], None]] = []
+        self._wake: SimpleQueue[None] = SimpleQueue()
+
+    def set(self) -> None:
+        self.is_set = True
+        self._wake.put(None)
+        for each in self._listeners:
+            each()
+
+    def wait(self, timeout: float) -> bool:
+        """Whether it is set, after waiting up to `timeout` [s] for it; for one thread."""
+        if not self.is_set:
+            with suppress(Empty):
+                self._wake.get(timeout=timeout)
+        return self.is_set
+
+    def on_set(self, listener: Callable[[], None]) -> None:
+        """`listener` must be safe in a signal handler."""
+        self._listeners.append(listener)
+
+
+@contextmanager
+def stop_on_signals(stop: StopRequest) -> Iterator[None]:
+    """Sets `stop` at the first signal, until the block ends; does nothing outside the main thread.
+
+    A block that has not ended `GRACE` after the signal is ended with the process, exit code 1.
+    A second SIGINT raises KeyboardInterrupt.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signals = 0
+    is_over = False
+
+    def guard() -> None:
+        time.sleep(GRACE)
+        if not is_over:
+            _end()
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        nonlocal signals
+        signals += 1
+        if signals == 1:
+            _thread.start_new_thread(guard, ())  # a Thread's locks may be held by the code that was interrupted
+            stop.set()
+        elif number == signal.SIGINT:
+            raise KeyboardInterrupt
+
+    before = {each: signal.signal(each, on_signal) for each in SIGNALS}
+    try:
+        yield
+    finally:
+        is_over = True
+        for each, handler in before.items():
+            signal.signal(each, handler)
+
+
+def _end() -> None:
+    print(f"did not stop within {GRACE:g} s: ended where it stands:", file=sys.stderr)
+    faulthandler.dump_traceback(file=sys.stderr)
+    sys.stderr.flush()
+    os._exit(1)

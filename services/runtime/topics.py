@@ -1,0 +1,105 @@
+"""Publishers and subscriptions by a row of the table."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Generic, Protocol, TypeVar
+
+from schemas.message import BadMessage, Message
+from schemas.system import TopicStatistics
+from schemas.topics import Delivery, Topic
+from services.runtime.bus import Arrival, Bus
+from services.runtime.inbox import EveryBox, Inbox, LatestBox
+from services.runtime.wire import from_arrival, schema_of, to_payload
+
+M = TypeVar("M", bound=Message)
+
+DEFAULT_PATIENCE = 1.0  # [s] after which a topic without a rate counts as stale
+PERIODS_TO_STALE = 5.0
+
+
+class Complain(Protocol):
+    """Where a sentence about a bad message goes."""
+
+    def __call__(self, text: str, /) -> None: ...
+
+
+class Publisher(Generic[M]):
+    """The right to publish on one topic."""
+
+    def __init__(self, bus: Bus, topic: Topic[M]) -> None:
+        self.topic = topic
+        self._publication = bus.publish(topic.key, schema_of(topic.message), topic.delivery)
+
+    def put(self, message: M) -> None:
+        """Raises `TypeError` for another message than the table's, `BadMessage` where it is too large."""
+        if type(message) is not self.topic.message:
+            raise TypeError(f"{self.topic.key} carries {schema_of(self.topic.message)}, not {type(message).__name__}")
+        self._publication.put(to_payload(message))
+
+
+class Subscription(Generic[M]):
+    """Decodes what arrives on one topic and hands it to `handler` in the thread of logic."""
+
+    def __init__(
+        self, bus: Bus, inbox: Inbox, topic: Topic[M], handler: Callable[[M], object], complain: Complain, own: bool
+    ) -> None:
+        self.topic = topic
+        self._handler, self._complain = handler, complain
+        self._received, self._bad, self._lost_said = 0, 0, False
+        latest = topic.delivery is Delivery.LATEST
+        self._box = LatestBox(inbox, self._handle) if latest else EveryBox(inbox, self._handle)
+        self._declaration = bus.subscribe(topic.key, topic.delivery, self._box.on_arrival, self._box.on_miss, own)
+
+    @property
+    def statistics(self) -> TopicStatistics:
+        return TopicStatistics(key=self.topic.key, received=self._received, dropped=self._box.dropped, bad=self._bad)
+
+    def close(self) -> None:
+        self._declaration.close()
+
+    def report_losses(self) -> None:
+        """Says once that an EVERY topic has lost messages."""
+        if self._box.dropped and self.topic.delivery is not Delivery.LATEST and not self._lost_said:
+            self._lost_said = True
+            self._complain(f"{self.topic.key}: {self._box.dropped} messages lost (counted from now on in statistics)")
+
+    def _handle(self, arrival: Arrival) -> None:
+        try:
+            message = from_arrival(self.topic.message, arrival)
+        except BadMessage as error:
+            self._bad += 1
+            if self._bad == 1:
+                self._complain(f"{self.topic.key}: dropped a bad message: {error} (further ones are only counted)")
+            return
+        self._received += 1
+        self._handler(message)
+
+
+class Latest(Generic[M]):
+    """The newest message of a topic."""
+
+    def __init__(self, topic: Topic[M]) -> None:
+        self.topic = topic
+        self.message: M | None = None
+        self._arrived = 0.0  # [s] monotonic
+        self._arrived_unix = 0  # [ns]
+
+    def on_message(self, message: M) -> None:
+        self.message = message
+        self._arrived, self._arrived_unix = time.monotonic(), time.time_ns()
+
+    def age(self, now: int | None = None) -> float:
+        """[s] since the message came, up to `now` [ns UNIX] where given; infinite before the first."""
+        if self.message is None:
+            return float("inf")
+        return time.monotonic() - self._arrived if now is None else (now - self._arrived_unix) * 1e-9
+
+    @property
+    def is_stale(self) -> bool:
+        """Older than five periods of the topic's rate, or never heard; a latched message stays valid."""
+        if self.message is not None and self.topic.delivery is Delivery.LATCHED:
+            return False
+        patience = DEFAULT_PATIENCE if self.topic.rate is None else PERIODS_TO_STALE / self.topic.rate
+        return self.age() > patience

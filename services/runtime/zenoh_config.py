@@ -1,0 +1,52 @@
+"""Zenoh's settings, all named: its defaults wait ten seconds and listen everywhere."""
+
+from __future__ import annotations
+
+import json
+
+import zenoh
+
+LEASE_MS = 1000  # a frozen or unplugged peer is seen after this
+LONGEST_BLOCK_US = 1_000_000  # a put of EVERY waits this long for a stalled reader, then the link is dropped
+MAX_MESSAGE_BYTES = 16 * 1024 * 1024
+
+
+def client_config(host: str, port: int, robot: str) -> zenoh.Config:
+    """A client of the router that sees only `robot`'s keys; reconnects within half a second."""
+    return _config(
+        mode="client",
+        namespace=robot,
+        connect={
+            "endpoints": [f"tcp/{host}:{port}"],
+            "timeout_ms": 2000,
+            "exit_on_failure": True,
+            "retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5},
+        },
+    )
+
+
+def router_config(host: str, port: int) -> zenoh.Config:
+    """A router that listens on one address."""
+    return _config(
+        mode="router",
+        listen={"endpoints": [f"tcp/{host}:{port}"], "timeout_ms": 0, "exit_on_failure": True},
+    )
+
+
+def _config(**settings: object) -> zenoh.Config:
+    transport = {
+        "link": {
+            "tx": {
+                "lease": LEASE_MS,
+                "keep_alive": 4,
+                "queue": {"congestion_control": {"block": {"wait_before_close": LONGEST_BLOCK_US}}},
+            },
+            "rx": {"max_message_size": MAX_MESSAGE_BYTES},
+        }
+    }
+    common = {
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "timestamping": {"enabled": True},
+        "transport": transport,
+    }
+    return zenoh.Config.from_json5(json.dumps(common | settings))

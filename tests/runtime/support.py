@@ -1,0 +1,114 @@
+"""A router in a process of its own, buses of either kind, and nodes that spin in threads."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from schemas.deployment import Deployment, PathsSection, RouterSection
+from services.runtime.bus import Bus
+from services.runtime.node import Node
+from services.runtime.zenoh_bus import router_answers
+
+ROOT = Path(__file__).parents[2]
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def until(is_true: Callable[[], object], timeout: float = 5.0) -> bool:
+    """Waits for something that other threads or processes do."""
+    end = time.monotonic() + timeout
+    while not is_true():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.005)
+    return True
+
+
+class RouterProcess:
+    """`gemelo-router` as a user starts it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.port = free_port()
+        self.folder = folder
+        self.environ = os.environ | {
+            "GEMELO_ROUTER_PORT": str(self.port), "GEMELO_PATHS_RUN": str(folder / "run"),
+            "GEMELO_PATHS_OUT": str(folder / "out"), "PYTHONPATH": str(ROOT),
+        }  # fmt: skip
+        self.start()
+
+    def start(self) -> None:
+        command = [sys.executable, "-m", "services.runtime.router"]
+        self.process = subprocess.Popen(command, cwd=ROOT, env=self.environ, stderr=subprocess.PIPE, text=True)
+        assert until(lambda: router_answers("127.0.0.1", self.port), 10.0)
+
+    def kill(self) -> None:
+        self.process.kill()
+        self._reap()
+
+    def stop(self) -> int:
+        self.process.send_signal(signal.SIGTERM)
+        return self._reap()
+
+    def _reap(self) -> int:
+        self.process.communicate(timeout=5.0)
+        return self.process.returncode
+
+    @property
+    def deployment(self) -> Deployment:
+        paths = PathsSection(run=str(self.folder / "run"), out=str(self.folder / "out"))
+        return Deployment(router=RouterSection(port=self.port), paths=paths)
+
+
+class Buses:
+    """Opens any number of buses of one kind, and closes them at the end."""
+
+    def __init__(self, make: Callable[[str], Bus], deployment: Deployment) -> None:
+        self._make, self.deployment = make, deployment
+        self.opened: list[Bus | Node] = []
+
+    def open(self, robot: str = "rm1") -> Bus:
+        bus = self._make(robot)
+        self.opened.append(bus)
+        return bus
+
+    def node(self, name: str, **options: object) -> Node:
+        node = Node(name, self.deployment, robot="rm1", bus=self._make("rm1"), **options)
+        self.opened.append(node)
+        return node
+
+    def close(self) -> None:
+        for each in reversed(self.opened):
+            each.close()
+
+
+@contextmanager
+def spinning(node: Node, step: Callable[[int], object] = lambda now: None, rate: float = 50.0) -> Iterator[Node]:
+    """The node spins in a thread of its own."""
+    failures: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            node.spin(step, rate)
+        except BaseException as error:
+            failures.append(error)
+
+    thread = threading.Thread(target=run, name=node.name)
+    thread.start()
+    yield node
+    node.stop()
+    thread.join(timeout=3.0)
+    assert not thread.is_alive(), "the loop did not stop"
+    assert not failures, failures

@@ -1,0 +1,154 @@
+"""What every bus promises, whatever carries it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from queue import SimpleQueue
+
+from schemas.topics import EVERY, LATCHED, LATEST
+from services.runtime.bus import Answer, Arrival, Query
+from tests.runtime.support import Buses, until
+
+
+def ignore(count: int) -> None:
+    pass
+
+
+def test_a_message_arrives_with_its_key_schema_and_bytes(buses: Buses) -> None:
+    for delivery in (LATEST, EVERY, LATCHED):
+        heard: list[Arrival] = []
+        key = f"joint_states/{delivery.value}"
+        buses.open().subscribe(key, delivery, heard.append, ignore)
+        publication = buses.open().publish(key, "JointState", delivery)
+        publication.put(b"\x80")
+        assert until(lambda heard=heard: heard)
+        assert heard == [Arrival(key, "JointState", b"\x80")]
+
+
+def test_every_keeps_order_and_loses_nothing_in_a_flood(buses: Buses) -> None:
+    heard: list[bytes] = []
+    buses.open().subscribe("commands", EVERY, lambda arrival: heard.append(arrival.payload), ignore)
+    publication = buses.open().publish("commands", "CommandChunk", EVERY)
+    sent = [index.to_bytes(4, "big") * 50 for index in range(20_000)]
+    for payload in sent:
+        publication.put(payload)
+    assert until(lambda: len(heard) == len(sent), 10.0)
+    assert heard == sent
+
+
+def test_a_late_joiner_gets_the_last_latched_message_and_nothing_else(buses: Buses) -> None:
+    writer = buses.open()
+    latched, every = writer.publish("description", "Text", LATCHED), writer.publish("events", "Text", EVERY)
+    for payload in (b"old", b"new"):
+        latched.put(payload)
+        every.put(payload)
+    heard: list[bytes] = []
+    late = buses.open()
+    late.subscribe("description", LATCHED, lambda arrival: heard.append(arrival.payload), ignore)
+    late.subscribe("events", EVERY, lambda arrival: heard.append(arrival.payload), ignore)
+    assert until(lambda: heard)
+    time.sleep(0.1)
+    assert heard == [b"new"]
+
+
+def test_a_latched_reader_also_hears_a_writer_that_comes_later(buses: Buses) -> None:
+    heard: list[bytes] = []
+    buses.open().subscribe("description", LATCHED, lambda arrival: heard.append(arrival.payload), ignore)
+    publication = buses.open().publish("description", "Text", LATCHED)
+    publication.put(b"one")
+    assert until(lambda: heard == [b"one"])
+    publication.put(b"two")
+    assert until(lambda: heard == [b"one", b"two"])
+
+
+def test_own_publications_are_heard_only_where_asked_for(buses: Buses) -> None:
+    for delivery in (LATEST, EVERY, LATCHED):
+        bus = buses.open()
+        key = f"log/{delivery.value}"
+        foreign: list[bytes] = []
+        own: list[bytes] = []
+        bus.subscribe(key, delivery, lambda arrival, heard=foreign: heard.append(arrival.payload), ignore)
+        bus.subscribe(key, delivery, lambda arrival, heard=own: heard.append(arrival.payload), ignore, own=True)
+        bus.publish(key, "LogRecord", delivery).put(b"x")
+        assert until(lambda own=own: own == [b"x"])
+        time.sleep(0.05)
+        assert foreign == []
+
+
+def test_a_closed_subscription_hears_nothing_more(buses: Buses) -> None:
+    heard: list[bytes] = []
+    subscription = buses.open().subscribe("log", EVERY, lambda arrival: heard.append(arrival.payload), ignore)
+    publication = buses.open().publish("log", "LogRecord", EVERY)
+    publication.put(b"1")
+    assert until(lambda: heard)
+    subscription.close()
+    publication.put(b"2")
+    time.sleep(0.1)
+    assert heard == [b"1"]
+
+
+def test_robots_do_not_hear_one_another(buses: Buses) -> None:
+    heard: list[bytes] = []
+    buses.open("parol6").subscribe("log", EVERY, lambda arrival: heard.append(arrival.payload), ignore)
+    buses.open("rm1").publish("log", "LogRecord", EVERY).put(b"1")
+    buses.open("rm1").declare_alive("@alive/planner")
+    time.sleep(0.1)
+    assert heard == []
+    assert buses.open("parol6").alive("@alive/*") == set()
+
+
+def ask(bus: object, key: str, payload: bytes, timeout: float = 1.0) -> Answer | None:
+    answers: SimpleQueue[Answer | None] = SimpleQueue()
+    bus.ask(key, "Question", payload, timeout, answers.put)
+    return answers.get(timeout=timeout + 1.0)
+
+
+def test_a_request_gets_one_answer_from_any_thread(buses: Buses) -> None:
+    def answer(query: Query) -> None:
+        if query.arrival.payload == b"later":
+            threading.Timer(0.05, query.reply, ("Answer", b"late")).start()
+        elif query.arrival.payload == b"no":
+            query.fail("Failure", b"why")
+        else:
+            query.reply("Answer", query.arrival.schema.encode())
+
+    buses.open().serve("plan", answer)
+    client = buses.open()
+    assert client.wait_served("plan", 1.0)
+    assert ask(client, "plan", b"x") == Answer(True, "Answer", b"Question")
+    assert ask(client, "plan", b"later") == Answer(True, "Answer", b"late")
+    assert ask(client, "plan", b"no") == Answer(False, "Failure", b"why")
+
+
+def test_a_request_without_an_answer_ends_in_time(buses: Buses) -> None:
+    kept: list[Query] = []
+    buses.open().serve("plan", kept.append)
+    client = buses.open()
+    assert client.wait_served("plan", 1.0)
+    begin = time.monotonic()
+    assert ask(client, "plan", b"", timeout=0.3) is None
+    assert 0.2 < time.monotonic() - begin < 0.8
+    assert not client.wait_served("nobody", 0.1)
+    assert ask(client, "nobody", b"") is None
+
+
+def test_wait_served_wakes_when_a_server_comes_and_knows_when_it_is_gone(buses: Buses) -> None:
+    client, server = buses.open(), buses.open()
+    threading.Timer(0.2, server.serve, ("plan", lambda query: query.reply("Answer", b""))).start()
+    begin = time.monotonic()
+    assert client.wait_served("plan", 2.0)
+    assert 0.1 < time.monotonic() - begin < 1.0
+    server.close()
+    assert until(lambda: not client.wait_served("plan", 0.0), 1.0)
+
+
+def test_tokens_live_as_long_as_their_bus(buses: Buses) -> None:
+    planner, gateway, observer = buses.open(), buses.open(), buses.open()
+    planner.declare_alive("@alive/planner")
+    token = gateway.declare_alive("@alive/stepper_gateway")
+    assert until(lambda: observer.alive("@alive/*") == {"@alive/planner", "@alive/stepper_gateway"}, 1.0)
+    token.close()
+    assert until(lambda: observer.alive("@alive/*") == {"@alive/planner"}, 1.0)
+    planner.close()
+    assert until(lambda: observer.alive("@alive/*") == set(), 1.0)

@@ -1,0 +1,336 @@
+"""What a node promises to the service that is made of it, on either bus."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import time
+from typing import Annotated
+
+import msgspec
+import pytest
+from msgspec import Meta
+
+from schemas.frames import RobotDescription
+from schemas.joints import JointState, JointTargets
+from schemas.message import BadMessage, encode
+from schemas.planning import PlanCode, PlanRequest, PlanResponse
+from schemas.system import Empty, LogRecord, NodeStatistics, Parameter, Parameters, SetParameter
+from schemas.topics import COMMAND_ACKS, DESCRIPTION, JOINT_STATES, LOG, PLAN, STATISTICS, Request
+from services.runtime.errors import NoAnswer, NodeNameTaken, Refused
+from tests.runtime.support import Buses, spinning, until
+
+
+class GatewayParameters(msgspec.Struct, frozen=True, kw_only=True):
+    """For these tests."""
+
+    lead: Annotated[float, Meta(description="[s] ahead of the device", ge=0.1, le=1.0)] = 0.3
+    chunk: Annotated[int, Meta(ge=1)] = 10
+    is_strict: bool = True
+    device: str = "rm1"
+
+
+def test_messages_reach_the_handler_in_the_thread_of_logic(buses: Buses) -> None:
+    heard: list[tuple[JointState, int]] = []
+    reader, writer = buses.node("reader"), buses.node("writer")
+    reader.subscribe(JOINT_STATES, lambda message: heard.append((message, threading.get_ident())))
+    message = JointState(stamp=1, name=("a",), position=(0.5,))
+    writer.publisher(JOINT_STATES).put(message)
+    reader.wait(0.2)
+    assert heard == [(message, threading.get_ident())]
+
+
+def test_latest_conflates_while_its_reader_is_busy_and_counts_it(buses: Buses) -> None:
+    heard: list[int] = []
+    reader, writer = buses.node("reader"), buses.node("writer")
+    subscription = reader.subscribe(JOINT_STATES, lambda message: heard.append(message.stamp))
+    for stamp in range(1, 501):
+        writer.publisher(JOINT_STATES).put(JointState(stamp=stamp))
+    time.sleep(0.2)
+    reader.wait(0.1)
+    assert heard == [500]
+    assert subscription.statistics.dropped == 499
+
+
+def test_every_keeps_order_through_a_node(buses: Buses) -> None:
+    heard: list[int] = []
+    reader, writer = buses.node("reader"), buses.node("writer")
+    reader.subscribe(LOG, lambda message: heard.append(message.stamp))
+    for stamp in range(1, 2001):
+        writer.publisher(LOG).put(LogRecord(stamp=stamp))
+    reader.wait(0.5)
+    assert heard == list(range(1, 2001))
+
+
+def test_an_overrun_of_every_is_counted_and_said_once(buses: Buses) -> None:
+    said: list[LogRecord] = []
+    reader, writer, observer = buses.node("reader"), buses.node("writer"), buses.node("observer")
+    observer.subscribe(LOG, said.append)
+    subscription = reader.subscribe(COMMAND_ACKS, lambda message: None)
+    publisher = writer.publisher(COMMAND_ACKS)
+    for seq in range(4096 + 500):
+        publisher.put(COMMAND_ACKS.message(seq=seq))
+    assert until(lambda: subscription.statistics.dropped == 500)
+    with spinning(reader):
+        time.sleep(0.2)
+    observer.wait(0.2)
+    assert subscription.statistics.received == 4096
+    assert len([record for record in said if "command_acks" in record.text]) == 1
+
+
+def test_latest_knows_its_age(buses: Buses) -> None:
+    reader, writer = buses.node("reader"), buses.node("writer")
+    latest = reader.latest(JOINT_STATES)
+    assert latest.message is None
+    assert latest.is_stale
+    assert latest.age() == float("inf")
+    writer.publisher(JOINT_STATES).put(JointState(stamp=7))
+    reader.wait(0.05)
+    assert latest.message == JointState(stamp=7)
+    assert not latest.is_stale
+    time.sleep(0.1)
+    assert latest.is_stale
+    assert 0.1 <= latest.age(reader.now()) < 0.5
+
+
+def test_bad_messages_are_dropped_counted_and_named_once(buses: Buses) -> None:
+    heard: list[JointState] = []
+    said: list[LogRecord] = []
+    reader, observer = buses.node("reader"), buses.node("observer")
+    observer.subscribe(LOG, said.append)
+    subscription = reader.subscribe(JOINT_STATES, heard.append)
+    stranger = buses.open()
+    good, nan = encode(JointState(stamp=3)), msgspec.msgpack.encode({"position": [float("nan")]})
+    attempts = [
+        ("JointTargets", good), ("", good), ("JointState", b"\xc1 not msgpack"), ("JointState", nan),
+        ("JointState", b""), ("JointState", bytes(1_000_000)), ("JointState", b"\x91" * 100_000),
+    ]  # fmt: skip
+    for schema, payload in attempts:
+        stranger.publish(JOINT_STATES.key, schema, JOINT_STATES.delivery).put(payload)
+        reader.wait(0.05)
+    stranger.publish(JOINT_STATES.key, "JointState", JOINT_STATES.delivery).put(good)
+    reader.wait(0.05)
+    observer.wait(0.1)
+    assert heard == [JointState(stamp=3)]
+    assert subscription.statistics.bad == len(attempts)
+    assert len(said) == 1
+    assert "joint_states" in said[0].text
+    assert "JointTargets" in said[0].text
+
+
+def test_a_publisher_takes_only_its_own_message_and_size(buses: Buses) -> None:
+    node = buses.node("writer")
+    with pytest.raises(TypeError, match="joint_states carries JointState, not JointTargets"):
+        node.publisher(JOINT_STATES).put(JointTargets())  # type: ignore[arg-type]
+    with pytest.raises(BadMessage, match="at most"):
+        node.publisher(LOG).put(LogRecord(text="x" * 1_000_000))
+    node.publisher(DESCRIPTION).put(RobotDescription(urdf="x" * 1_000_000))
+
+
+def test_a_request_is_answered_refused_or_fails_with_a_reason(buses: Buses) -> None:
+    server, client = buses.node("planner"), buses.node("client")
+
+    def plan(request: PlanRequest) -> PlanResponse:
+        if request.velocity_scaling == 0.0:
+            raise Refused("velocity_scaling is 0: it must be in (0, 1]")
+        if request.velocity_scaling < 0.0:
+            raise ZeroDivisionError("oh")
+        return PlanResponse(code=PlanCode.SUCCESS, duration=request.allowed_time)
+
+    server.serve(PLAN, plan)
+    with spinning(server):
+        assert client.call(PLAN, PlanRequest(allowed_time=0.25)).duration == 0.25
+        with pytest.raises(Refused, match="velocity_scaling is 0"):
+            client.call(PLAN, PlanRequest(velocity_scaling=0.0))
+        with pytest.raises(Refused, match="planner failed: ZeroDivisionError: oh"):
+            client.call(PLAN, PlanRequest(velocity_scaling=-1.0))
+        assert client.call(PLAN, PlanRequest()).code is PlanCode.SUCCESS
+
+
+def test_a_bad_request_is_refused_with_its_reason(buses: Buses) -> None:
+    server, client = buses.node("planner"), buses.node("client")
+    server.serve(PLAN, lambda request: PlanResponse())
+    wrong = Request(PLAN.key, JointState, PlanResponse, "planner", "another schema under the planner's key")
+    with spinning(server), pytest.raises(Refused, match="JointState") as refusal:
+        client.call(wrong, JointState())
+    assert refusal.value.kind == "bad request"
+
+
+def test_nobody_and_a_silent_server_are_told_apart(buses: Buses) -> None:
+    server, client = buses.node("planner"), buses.node("client")
+    begin = time.monotonic()
+    with pytest.raises(NoAnswer, match="nobody serves plan: is planner running"):
+        client.call(PLAN, PlanRequest())
+    assert time.monotonic() - begin < 1.5
+    server.serve(PLAN, lambda request: PlanResponse())  # and does not spin
+    with pytest.raises(NoAnswer, match="did not answer plan within"):
+        client.call(PLAN, PlanRequest(), timeout=0.3)
+
+
+def test_a_slow_handler_in_the_worker_does_not_hold_up_the_loop(buses: Buses) -> None:
+    server, client = buses.node("planner"), buses.node("client")
+
+    def plan(request: PlanRequest) -> PlanResponse:
+        time.sleep(0.4)
+        return PlanResponse(code=PlanCode.SUCCESS)
+
+    steps: list[float] = []
+    server.serve(PLAN, plan, worker=True)
+    with spinning(server, lambda now: steps.append(time.monotonic())):
+        assert client.call(PLAN, PlanRequest()).code is PlanCode.SUCCESS
+    assert max(after - before for before, after in itertools.pairwise(steps)) < 0.2
+
+
+def test_parameters_are_listed_set_and_checked_at_run_time(buses: Buses) -> None:
+    node, client = buses.node("gateway", overrides={"chunk": "12"}), buses.node("client")
+    parameters = node.parameters(GatewayParameters)
+    list_all = Request("@node/gateway/parameters/list", Empty, Parameters, "gateway", "")
+    set_one = Request("@node/gateway/parameters/set", SetParameter, Parameter, "gateway", "")
+    with spinning(node):
+        listed = {each.name: each for each in client.call(list_all, Empty()).parameters}
+        assert listed["chunk"].value == 12
+        assert listed["chunk"].default == 10
+        assert (listed["lead"].minimum, listed["lead"].maximum) == (0.1, 1.0)
+        assert listed["lead"].description == "[s] ahead of the device"
+        assert client.call(set_one, SetParameter(name="lead", value=0.5)).value == 0.5
+        assert client.call(set_one, SetParameter(name="lead", value=1)).value == 1.0
+        for name, value, reason in (
+            ("lead", 1.5, "<= 1"), ("lead", "fast", "float"), ("leed", 0.5, 'did you mean "lead"'),
+            ("chunk", 1.5, "int"), ("chunk", True, "is a int"), ("is_strict", 1, "is a bool"), ("lead", True, "float"),
+        ):  # fmt: skip
+            with pytest.raises(Refused, match=reason):
+                client.call(set_one, SetParameter(name=name, value=value))
+    assert parameters.value == GatewayParameters(lead=1.0, chunk=12)
+
+
+def test_parameters_from_the_deployment_and_the_command_line_are_checked(buses: Buses) -> None:
+    replace = msgspec.structs.replace
+    buses.deployment = replace(buses.deployment, parameters={"gateway": {"lead": 0.7}})
+    assert buses.node("gateway").parameters(GatewayParameters).value.lead == 0.7
+    buses.deployment = replace(buses.deployment, parameters={"second": {"leda": 0.7}})
+    with pytest.raises(Refused, match=r'parameters.second.*did you mean "lead"'):
+        buses.node("second").parameters(GatewayParameters)
+    with pytest.raises(Refused, match="--set: third"):
+        buses.node("third", overrides={"chunk": "0"}).parameters(GatewayParameters)
+
+
+def test_nodes_know_one_another(buses: Buses) -> None:
+    planner, client = buses.node("planner"), buses.node("client")
+    planner.publisher(LOG)
+    planner.serve(PLAN, lambda request: PlanResponse())
+    assert until(lambda: client.alive() == {"planner", "client"}, 1.0)
+    from schemas.system import NodeInfo
+
+    with spinning(planner):
+        info = client.call(Request("@node/planner/info", Empty, NodeInfo, "planner", ""), Empty())
+    assert (info.node, info.robot, info.serves) == ("planner", "rm1", ("plan",))
+    planner.close()
+    assert until(lambda: client.alive() == {"client"}, 1.0)
+
+
+def test_a_name_has_one_bearer(buses: Buses) -> None:
+    first = buses.node("planner")
+    with pytest.raises(NodeNameTaken, match=r'another node named "planner" is alive \(process \d+'):
+        buses.node("planner")
+    first.close()
+    buses.node("planner")
+    with pytest.raises(ValueError, match="lower-case"):
+        buses.node("Planner/1")
+
+
+def test_a_node_that_replaces_a_dying_one_waits_for_its_end(buses: Buses) -> None:
+    first = buses.node("planner")
+    threading.Timer(0.5, first.close).start()
+    buses.node("planner")
+
+
+def test_the_log_reaches_the_bus(buses: Buses, capsys: pytest.CaptureFixture[str]) -> None:
+    said: list[LogRecord] = []
+    planner, observer = buses.node("planner"), buses.node("observer")
+    observer.subscribe(LOG, said.append)
+    planner.log.info("planned in %d ms", 3)
+    observer.wait(0.1)
+    assert [(record.node, record.level, record.text) for record in said] == [("planner", 20, "planned in 3 ms")]
+    assert capsys.readouterr().err.endswith(" planner INFO planned in 3 ms\n")
+
+
+def test_statistics_come_once_a_second(buses: Buses) -> None:
+    heard: list[NodeStatistics] = []
+    planner, observer = buses.node("planner"), buses.node("observer")
+    planner.latest(JOINT_STATES)
+    observer.subscribe(STATISTICS, heard.append)
+    with spinning(planner, rate=50.0):
+        observer.wait(2.4)
+    assert len(heard) in (2, 3)
+    assert 47.0 < heard[-1].loop_rate < 53.0
+    assert "joint_states" in {topic.key for topic in heard[-1].topics}
+
+
+def test_the_rate_is_exact_and_a_slow_step_does_not_shift_it(buses: Buses) -> None:
+    node = buses.node("loop")
+    begins: list[float] = []
+
+    def step(now: int) -> None:
+        begins.append(time.monotonic())
+        if len(begins) == 20:
+            time.sleep(0.055)
+
+    with spinning(node, step, rate=50.0):
+        time.sleep(1.05)
+    phases = [((begin - begins[0]) * 50.0 + 0.5) % 1.0 - 0.5 for begin in begins]
+    assert sorted(abs(phase) for phase in phases)[len(phases) // 2] < 0.1
+    assert len(begins) == pytest.approx(51, abs=3)
+
+
+def test_a_flood_does_not_starve_the_step(buses: Buses) -> None:
+    node = buses.node("loop")
+    steps: list[float] = []
+    for _ in range(2000):
+        node._loop.inbox.put(lambda: time.sleep(0.0005))
+    with spinning(node, lambda now: steps.append(time.monotonic()), rate=50.0):
+        time.sleep(0.6)
+    assert len(steps) >= 25
+
+
+def test_a_slow_step_does_not_starve_the_inbox(buses: Buses) -> None:
+    reader, writer = buses.node("reader"), buses.node("writer")
+    latest = reader.latest(JOINT_STATES)
+    with spinning(reader, lambda now: time.sleep(0.02), rate=100.0):
+        writer.publisher(JOINT_STATES).put(JointState(stamp=5))
+        assert until(lambda: latest.message is not None, 1.0)
+
+
+def test_what_a_callback_raises_ends_the_spin(buses: Buses) -> None:
+    reader, writer = buses.node("reader"), buses.node("writer")
+
+    def fail(message: JointState) -> None:
+        raise ZeroDivisionError("in a callback")
+
+    reader.subscribe(JOINT_STATES, fail)
+    writer.publisher(JOINT_STATES).put(JointState())
+    with pytest.raises(ZeroDivisionError, match="in a callback"):
+        reader.spin()
+
+
+def test_waiting_inside_a_callback_is_refused(buses: Buses) -> None:
+    node = buses.node("reader")
+    with pytest.raises(RuntimeError, match="cannot be called from a callback"):
+        node.spin(lambda now: node.wait(0.1))
+
+
+def test_readiness_is_a_file_that_is_kept_fresh(buses: Buses) -> None:
+    from pathlib import Path
+
+    node = buses.node("planner")
+    file = Path(node.deployment.paths.run) / "planner.ready"
+    node.set_ready(False, "no description yet")
+    assert not file.exists()
+    with spinning(node):
+        node.set_ready(True)
+        first = file.stat().st_mtime
+        assert file.read_text() == f"{node.info().pid}\n"
+        assert until(lambda: file.stat().st_mtime > first, 2.0)
+        node.set_ready(False, "no joint states for 2 s")
+        assert not file.exists()
+        node.set_ready(True)
+    assert not file.exists()
