@@ -204,7 +204,7 @@ class GatewayCore:
         self.mover.event("rebooted", f"{reason}: its position and boot id are read anew", moment)
         self._fail(reason, moment)
         self.desk.give_up(reason)
-        self.mover.transmission.forget()
+        self.mover.rebooted()
 
     def _lose(self, reason: str, moment: Moment) -> None:
         """The device cannot be reached: whatever it does now it does by itself, and nothing of it is continued."""

@@ -98,7 +98,7 @@ class Goals:
     def on_ack(self) -> None:
         """EXECUTING means that the device has taken knots of the goal."""
         execution = self._current
-        if execution is None or execution.is_executing or execution.stream is None:
+        if execution is None or execution.is_executing or execution.stream is None or execution.ending is not None:
             return
         if execution.stream.acked > execution.first_seq:
             execution.is_executing = True

@@ -71,6 +71,7 @@ class Mover:
         status = self.session.status
         capacity = status.queue_capacity if status is not None and status.queue_capacity else 128
         self.reporter.motion_begins()
+        self._stopped_us = -1
         stream = self.transmission.begin(motion, Knot.at_rest(position), self.session.boot_id, capacity)
         self.pump(moment)
         return stream
@@ -141,6 +142,12 @@ class Mover:
         state = self.state
         return state is not None and 0 <= self._stopped_us < state.t_us and state.mode not in MOVING
 
+    def rebooted(self) -> None:
+        """Another boot: neither the stream nor any STOP concerns it."""
+        self.transmission.forget()
+        self._history.clear()
+        self._stopped_us, self._stop_asked = -1, -1.0e9
+
     def stop_answered(self, t_us: int) -> None:
         self._stopped_us = t_us
 
@@ -151,9 +158,10 @@ class Mover:
             return
         if stream is not None and not stream.is_abandoned and state.stream == stream.id:
             return
-        if moment.monotonic - self._stop_asked >= STOP_AGAIN and not self.session.absence(
-            moment, self.parameters.state_timeout
-        ):
+        is_obeying = state.mode == DeviceMode.HOLD and self._stopped_us >= 0
+        if is_obeying or self.session.absence(moment, self.parameters.state_timeout):
+            return
+        if moment.monotonic - self._stop_asked >= STOP_AGAIN:
             self.event("stopping", f"the device moves along stream {state.stream}, which nobody follows", moment)
             self.stop(moment)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from typing import Protocol
 
-from ruckig import InputParameter, Result, Ruckig, Synchronization, Trajectory
+from ruckig import InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 
 from schemas.message import Vector
 from schemas.motion import JointTrajectory
@@ -113,7 +113,7 @@ def profile(start: Knot, target: Knot, limits: Limits, duration: float | None = 
     trajectory = Trajectory(len(start.position))
     try:
         result = Ruckig(len(start.position)).calculate(problem, trajectory)
-    except RuntimeError:  # ruckig raises on inputs that no profile satisfies
+    except RuckigError:  # no profile satisfies this, or rounding hides the one that does
         return None
     if result not in (Result.Working, Result.Finished):
         return None

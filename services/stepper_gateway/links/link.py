@@ -46,7 +46,7 @@ class Link(Protocol):
     def send(self, kind: Kind, payload: bytes) -> bool:
         """False: not connected, and nothing was queued."""
 
-    def take(self) -> list[Received]:
-        """Everything that arrived since the last call, oldest first."""
+    def take(self, most: int) -> list[Received]:
+        """What arrived since the last call, oldest first, at most so many."""
 
     def close(self) -> None: ...

@@ -59,10 +59,10 @@ class MqttLink:
         qos = 1 if kind in ACKNOWLEDGED else 0
         return client.publish(self._prefix + kind, payload, qos).rc == paho.MQTT_ERR_SUCCESS
 
-    def take(self) -> list[Received]:
-        taken = []
+    def take(self, most: int) -> list[Received]:
+        taken: list[Received] = []
         with contextlib.suppress(IndexError):
-            while True:
+            while len(taken) < most:
                 taken.append(self._inbox.popleft())
         return taken
 

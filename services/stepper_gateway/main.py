@@ -1,0 +1,47 @@
+"""The process: one arm, one device, one MQTT link."""
+
+from __future__ import annotations
+
+import secrets
+from contextlib import closing
+
+from schemas.deployment import Deployment
+from services.arm.description import Arm, load_arm
+from services.arm.errors import DescriptionError
+from services.runtime.application import service
+from services.runtime.deployment import DeploymentError, project_root
+from services.runtime.node import Node
+from services.stepper_gateway.core import GatewayCore
+from services.stepper_gateway.links.mqtt import MqttLink
+from services.stepper_gateway.parameters import GatewayParameters
+from services.stepper_gateway.shell import Shell
+
+RATE = 50.0  # [Hz]
+
+
+def run(node: Node, deployment: Deployment) -> None:
+    """Serve until the node is stopped; ready while the device is online, synchronised and its state fresh."""
+    arm = _arm(deployment)
+    parameters = node.parameters(GatewayParameters)
+    core = GatewayCore(arm, secrets.randbelow(2**31 - 1) + 1, parameters.value)
+    shell = Shell(node, core, parameters)
+    mqtt = deployment.mqtt
+    with closing(MqttLink(mqtt.host, mqtt.port, arm.device.name, shell.wake)) as link:
+        shell.use(link)
+        node.spin(shell.step, rate=RATE)
+
+
+def _arm(deployment: Deployment) -> Arm:
+    try:
+        return load_arm(project_root() / deployment.robot)
+    except DescriptionError as error:
+        raise DeploymentError(str(error)) from error
+
+
+def main() -> None:
+    """Console script `gemelo-stepper-gateway`."""
+    service("stepper_gateway", run)
+
+
+if __name__ == "__main__":
+    main()
