@@ -12,23 +12,22 @@ from schemas.deployment import Broker, Deployment
 from services.broker import mosquitto
 from services.broker.ports import PortTaken, require_free
 from services.runtime.deployment import DeploymentError, load_deployment
+from services.runtime.logs import LEVELS, line_logger
 from services.runtime.readiness import Readiness
-
-log = logging.getLogger("broker")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs until SIGTERM; 1 with one sentence where it cannot start."""
     options = _parse(arguments)
-    logging.basicConfig(level=options.log_level.upper(), format="%(levelname)s %(name)s: %(message)s")
+    log = line_logger("broker", options.log_level)
     try:
-        return run(load_deployment(options.config))
+        return run(load_deployment(options.config), log)
     except (DeploymentError, PortTaken, mosquitto.NotInstalled) as error:
         log.error("%s", error)
         return 1
 
 
-def run(deployment: Deployment) -> int:
+def run(deployment: Deployment, log: logging.Logger) -> int:
     """Serves; the readiness file is beaten once a second for as long as connections are accepted."""
     section = deployment.mqtt
     require_free(section.host, section.port, "choose another with GEMELO_MQTT_PORT or [mqtt] port in deploy/local.toml")
@@ -55,7 +54,7 @@ def run(deployment: Deployment) -> int:
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gemelo-broker", description=__doc__)
     parser.add_argument("--config", type=Path, default=None, help="deployment file [deploy/local.toml]")
-    parser.add_argument("--log-level", default="info", choices=("debug", "info", "warning", "error"))
+    parser.add_argument("--log-level", default="info", choices=LEVELS)
     return parser.parse_args(arguments)
 
 
