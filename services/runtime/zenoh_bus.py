@@ -6,7 +6,6 @@ writer, and recovery by the reader, so that a router that restarts costs nothing
 
 from __future__ import annotations
 
-import atexit
 import socket
 import threading
 from collections.abc import Callable
@@ -102,7 +101,7 @@ class ZenohBus:
         self._tokens: list[ZenohDeclaration] = []
         self._presence: dict[str, Presence] = {}
         self._lock = threading.Lock()
-        atexit.register(self.close)  # a session left open would never let the process end
+        _close_with_the_program(self)
 
     @property
     def is_connected(self) -> bool:
@@ -199,10 +198,28 @@ class ZenohBus:
         return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
 
     def close(self) -> None:
-        atexit.unregister(self.close)
+        _open.discard(self)
         closing = threading.Thread(target=self._session.close, daemon=True, name="close")
         closing.start()
         closing.join(CLOSE_TIMEOUT)
+
+
+_open: set[ZenohBus] = set()
+_watch: list[threading.Thread] = []
+
+
+def _close_with_the_program(bus: ZenohBus) -> None:
+    """A session that its program forgets to close would never let the process end: Zenoh's threads do not."""
+    _open.add(bus)
+    if not _watch:
+        _watch.append(threading.Thread(target=_close_all_after_main, daemon=True, name="close"))
+        _watch[0].start()
+
+
+def _close_all_after_main() -> None:
+    threading.main_thread().join()
+    for bus in list(_open):
+        bus.close()
 
 
 def router_answers(host: str, port: int, timeout: float = 0.5) -> bool:

@@ -1,0 +1,254 @@
+"""Services as processes: clean stops, exit codes, waiting for the router, and no hanging exit."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from schemas.topics import JOINT_STATES
+from services.runtime.node import Node
+from tests.runtime.support import ROOT, RouterProcess, until
+
+PROMPT = 3.0  # [s] within which every process ends after SIGTERM
+
+HEAD = """
+import sys, time
+from schemas.joints import JointState
+from schemas.topics import JOINT_STATES, LOG
+from services.runtime.application import service
+from services.runtime.node import Node
+"""
+
+Start = Callable[..., subprocess.Popen[str]]
+
+
+@pytest.fixture
+def start(router: RouterProcess, tmp_path: Path) -> Iterator[Start]:
+    started: list[subprocess.Popen[str]] = []
+
+    def start_program(text: str, *arguments: str, **environ: str) -> subprocess.Popen[str]:
+        file = tmp_path / f"program_{len(started)}.py"
+        file.write_text(HEAD + textwrap.dedent(text), encoding="utf-8")
+        process = subprocess.Popen(
+            [sys.executable, str(file), *arguments], cwd=ROOT, env=router.environ | environ, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
+        started.append(process)
+        return process
+
+    yield start_program
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def await_line(process: subprocess.Popen[str], wanted: str) -> None:
+    assert process.stdout is not None
+    assert process.stdout.readline().strip() == wanted
+
+
+def end(process: subprocess.Popen[str], number: int = signal.SIGTERM) -> tuple[int, str]:
+    begin = time.monotonic()
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=10.0)
+    assert time.monotonic() - begin < PROMPT
+    return process.returncode, errors
+
+
+SPINNER = """
+def run(node, deployment):
+    node.subscribe(LOG, lambda message: None)
+    latest = node.latest(JOINT_STATES)
+    publisher = node.publisher(JOINT_STATES)
+    node.set_ready(True)
+    print("spins", flush=True)
+    node.spin(lambda now: publisher.put(JointState(stamp=now)), rate=50.0)
+    print("after the spin", flush=True)
+
+service("spinner", run)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_service_stops_cleanly(start: Start, router: RouterProcess, number: int) -> None:
+    process = start(SPINNER)
+    await_line(process, "spins")
+    ready = router.folder / "run" / "spinner.ready"
+    assert until(ready.exists, 1.0)
+    code, errors = end(process, number)
+    assert code == 0
+    assert not ready.exists()
+    assert "Traceback" not in errors
+
+
+def test_a_service_stops_cleanly_while_the_router_is_dead(start: Start, tmp_path: Path) -> None:
+    own = RouterProcess(tmp_path)
+    process = start(SPINNER, GEMELO_ROUTER_PORT=str(own.port))
+    await_line(process, "spins")
+    own.kill()
+    time.sleep(0.5)
+    code, errors = end(process)
+    assert (code, "Traceback" in errors) == (0, False)
+
+
+def test_a_service_that_waits_for_the_router_says_so_and_can_be_stopped(start: Start, tmp_path: Path) -> None:
+    own = RouterProcess(tmp_path)
+    own.kill()
+    process = start(SPINNER, GEMELO_ROUTER_PORT=str(own.port))
+    assert process.stderr is not None
+    line = process.stderr.readline()
+    assert f"spinner WARNING waiting for the router at 127.0.0.1:{own.port}" in line
+    code, errors = end(process)
+    assert (code, errors) == (0, "")
+
+
+def test_a_service_starts_when_the_router_comes(start: Start, tmp_path: Path) -> None:
+    own = RouterProcess(tmp_path)
+    own.kill()
+    process = start(SPINNER, GEMELO_ROUTER_PORT=str(own.port))
+    time.sleep(0.5)
+    own.start()
+    await_line(process, "spins")
+    assert end(process)[0] == 0
+    assert own.stop() == 0
+
+
+def test_a_callback_that_never_returns_does_not_keep_the_process(start: Start) -> None:
+    process = start(
+        """
+        def step(now):
+            print("stuck", flush=True)
+            while True:
+                time.sleep(1.0)
+
+        service("stuck", lambda node, deployment: node.spin(step))
+        """
+    )
+    await_line(process, "stuck")
+    code, errors = end(process)
+    assert code == 1
+    assert "did not stop within" in errors
+    assert "in step" in errors
+
+
+def test_a_callback_that_raises_ends_the_process_with_one_report(start: Start, router: RouterProcess) -> None:
+    process = start(
+        """
+        def fail(message):
+            raise ZeroDivisionError("oh")
+
+        def run(node, deployment):
+            node.subscribe(JOINT_STATES, fail)
+            print("spins", flush=True)
+            node.spin()
+
+        service("failing", run)
+        """
+    )
+    await_line(process, "spins")
+    with Node("writer", router.deployment, robot="rm1") as writer:
+        writer.publisher(JOINT_STATES).put(JOINT_STATES.message())
+        _, errors = process.communicate(timeout=PROMPT)
+    assert process.returncode == 1
+    assert "failing ERROR ended by an error" in errors
+    assert errors.count("ZeroDivisionError: oh") == 1
+
+
+def test_an_error_before_the_spin_ends_the_process(start: Start) -> None:
+    process = start("service('failing', lambda node, deployment: {}['no such key'])")
+    _, errors = process.communicate(timeout=PROMPT)
+    assert process.returncode == 1
+    assert "KeyError" in errors
+
+
+def test_a_script_that_forgets_to_close_its_node_ends_all_the_same(start: Start) -> None:
+    process = start(
+        """
+        node = Node("forgetful")
+        node.subscribe(JOINT_STATES, print)
+        node.wait(0.1)
+        """
+    )
+    _, errors = process.communicate(timeout=PROMPT + 1.0)
+    assert (process.returncode, errors) == (0, "")
+
+
+def test_a_name_that_is_taken_and_parameters_that_do_not_exist_are_one_sentence(start: Start) -> None:
+    first = start(SPINNER)
+    await_line(first, "spins")
+    second = start(SPINNER)
+    _, errors = second.communicate(timeout=PROMPT + 2.0)
+    assert second.returncode == 1
+    assert f'another node named "spinner" is alive (process {first.pid} on' in errors
+    assert len(errors.splitlines()) == 1
+    program = """
+        import msgspec
+
+        class Own(msgspec.Struct, frozen=True):
+            lead: float = 0.3
+
+        def run(node, deployment):
+            print(node.parameters(Own).value.lead, flush=True)
+
+        service("own", run)
+        """
+    good = start(program, "--set", "lead=0.5")
+    assert good.communicate(timeout=PROMPT)[0] == "0.5\n"
+    assert good.returncode == 0
+    bad = start(program, "--set", "leda=0.5")
+    _, errors = bad.communicate(timeout=PROMPT)
+    assert bad.returncode == 1
+    assert 'own has no parameter "leda": did you mean "lead"?' in errors
+
+
+def test_a_killed_node_can_be_started_again_at_once(start: Start) -> None:
+    first = start(SPINNER)
+    await_line(first, "spins")
+    first.kill()
+    first.wait()
+    second = start(SPINNER)
+    await_line(second, "spins")
+    assert end(second)[0] == 0
+
+
+def test_the_router_stops_cleanly_and_says_when_its_port_is_taken(tmp_path: Path) -> None:
+    own = RouterProcess(tmp_path)
+    ready = tmp_path / "run" / "router.ready"
+    assert until(ready.exists, 2.0)
+    command = [sys.executable, "-m", "services.runtime.router"]
+    second = subprocess.run(command, cwd=ROOT, env=own.environ, capture_output=True, text=True, timeout=5.0)
+    assert second.returncode == 1
+    assert f"port {own.port} on 127.0.0.1 is taken by another program" in second.stderr
+    assert "GEMELO_ROUTER_PORT" in second.stderr
+    assert ready.exists()
+    assert own.stop() == 0
+    assert not ready.exists()
+
+
+def test_an_idle_node_at_50_hz_needs_little(start: Start) -> None:
+    import psutil
+
+    process = start(SPINNER)
+    await_line(process, "spins")
+    observed = psutil.Process(process.pid)
+    time.sleep(0.5)
+    before, begin = sum(observed.cpu_times()[:2]), time.monotonic()
+    time.sleep(2.0)
+    share = (sum(observed.cpu_times()[:2]) - before) / (time.monotonic() - begin)
+    assert share < 0.05
+    assert end(process)[0] == 0
+
+
+def test_importing_the_node_is_fast_and_light() -> None:
+    program = "import services.runtime.node, sys; print('zenoh' in sys.modules, 'numpy' in sys.modules)"
+    begin = time.monotonic()
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=10.0)
+    assert done.stdout == "False False\n", done.stderr
+    assert time.monotonic() - begin < 2.0

@@ -1,0 +1,109 @@
+"""kill -9 of the router and its return: everything that was declared works again, nothing of EVERY is lost."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from schemas.actions import GoalStatusCode
+from schemas.frames import RobotDescription
+from schemas.joints import JointState
+from schemas.planning import PlanCode, PlanRequest, PlanResponse
+from schemas.system import LogRecord
+from schemas.topics import DESCRIPTION, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, LOG, PLAN
+from services.runtime.errors import NoAnswer, ServerLost
+from services.runtime.node import Node
+from tests.runtime.support import RouterProcess, spinning, until
+from tests.runtime.test_actions import Arm, goal_of
+
+RECOVERY = 3.0  # [s]
+
+
+@pytest.fixture
+def own_router(tmp_path: Path) -> Iterator[RouterProcess]:
+    process = RouterProcess(tmp_path)
+    yield process
+    process.kill()
+
+
+def open_node(router: RouterProcess, name: str) -> Node:
+    return Node(name, router.deployment, robot="rm1")
+
+
+def test_everything_works_again_after_the_router_was_killed(own_router: RouterProcess) -> None:
+    with open_node(own_router, "planner") as planner, open_node(own_router, "client") as client:
+        heard: list[int] = []
+        states = client.latest(JOINT_STATES)
+        client.subscribe(LOG, lambda record: heard.append(record.stamp))
+        descriptions: list[str] = []
+        client.subscribe(DESCRIPTION, lambda message: descriptions.append(message.urdf))
+        planner.serve(PLAN, lambda request: PlanResponse(code=PlanCode.SUCCESS))
+        log, description = planner.publisher(LOG), planner.publisher(DESCRIPTION)
+        log.put(LogRecord(stamp=1))
+        with spinning(planner), spinning(client):
+            assert client.call(PLAN, PlanRequest()).code is PlanCode.SUCCESS
+            own_router.kill()
+            assert until(lambda: not client.is_connected, 1.0)
+            for stamp in range(2, 300):
+                log.put(LogRecord(stamp=stamp))
+            description.put(RobotDescription(urdf="while away"))
+            with pytest.raises(NoAnswer, match="the router is away"):
+                client.call(PLAN, PlanRequest(), timeout=0.3)
+            own_router.start()
+            back = time.monotonic()
+            log.put(LogRecord(stamp=300))
+            assert client.call(PLAN, PlanRequest(), timeout=RECOVERY).code is PlanCode.SUCCESS
+            assert until(lambda: client.alive() == {"planner", "client"}, RECOVERY)
+            assert until(lambda: heard == list(range(1, 301)), RECOVERY), heard[-5:]
+            assert until(lambda: descriptions == ["while away"], RECOVERY)
+            planner.publisher(JOINT_STATES).put(JointState(stamp=9))
+            assert until(lambda: states.message == JointState(stamp=9), 1.0)
+            assert time.monotonic() - back < RECOVERY
+            with open_node(own_router, "late") as late:
+                newest = late.latest(DESCRIPTION)
+                late.wait(0.3)
+                assert newest.message == RobotDescription(urdf="while away")
+
+
+def test_the_result_of_a_goal_comes_when_the_router_is_back(own_router: RouterProcess) -> None:
+    with open_node(own_router, "stepper_gateway") as gateway, open_node(own_router, "client") as client:
+        arm = Arm(gateway)
+        with spinning(gateway, arm.step, rate=100.0):
+            handle = client.action(FOLLOW_JOINT_TRAJECTORY).send(goal_of(100))
+            own_router.kill()
+            assert until(lambda: not arm.left, 3.0), "the motion needs no router"
+            time.sleep(1.5)  # longer away than a server may be silent
+            client.wait(0.05)
+            own_router.start()
+            assert handle.wait(RECOVERY + 1.0).status is GoalStatusCode.SUCCEEDED
+
+
+def test_a_router_that_stays_away_ends_the_waiting(own_router: RouterProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("services.runtime.goal_handle.ROUTER_PATIENCE", 1.0)
+    with open_node(own_router, "stepper_gateway") as gateway, open_node(own_router, "client") as client:
+        arm = Arm(gateway)
+        with spinning(gateway, arm.step, rate=100.0):
+            handle = client.action(FOLLOW_JOINT_TRAJECTORY).send(goal_of(10_000))
+            own_router.kill()
+            with pytest.raises(ServerLost, match="the router has been away"):
+                handle.wait(60.0)
+
+
+def test_a_frozen_router_blocks_a_publisher_for_a_bounded_time(own_router: RouterProcess) -> None:
+    import signal
+
+    with open_node(own_router, "gateway") as gateway, open_node(own_router, "reader") as reader:
+        reader.subscribe(LOG, lambda record: None)
+        publisher = gateway.publisher(LOG)
+        own_router.process.send_signal(signal.SIGSTOP)
+        longest = 0.0
+        for _ in range(3000):
+            begin = time.monotonic()
+            publisher.put(LogRecord(text="x" * 8000))
+            longest = max(longest, time.monotonic() - begin)
+        own_router.process.send_signal(signal.SIGCONT)
+        assert longest < 2.0
+        assert until(lambda: gateway.is_connected, RECOVERY)
