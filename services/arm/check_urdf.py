@@ -42,7 +42,21 @@ def _tree(model: UrdfModel, file: str) -> list[Finding]:
     roots = [name for name in model.link_names if name not in children]
     if len(roots) != 1:
         findings.append(error(file, "tree", f"has {len(roots)} roots ({', '.join(roots)})", "join them with a joint"))
+    loose = sorted(set(model.link_names) - _connected(model, roots))
+    findings += [error(file, f'link "{x}"', "is not connected to a root: its joints form a ring") for x in loose]
     return findings
+
+
+def _connected(model: UrdfModel, roots: list[str]) -> set[str]:
+    """Every link that a chain of joints leads to from a root."""
+    reached, front = set(roots), list(roots)
+    while front:
+        parent = front.pop()
+        for joint in model.joints:
+            if joint.parent == parent and joint.child not in reached:
+                reached.add(joint.child)
+                front.append(joint.child)
+    return reached
 
 
 def _references(joint: UrdfJoint, model: UrdfModel, file: str) -> list[Finding]:

@@ -12,7 +12,8 @@ class Decimator:
 
     def __init__(self, rate: float = 0.0) -> None:
         self.rate = rate
-        self._due = 0.0  # [ns]
+        self._due = 0  # [ns]
+        self._carry = 0.0  # [ns] what the integer periods have lost
         self._last = 0  # [ns]
 
     def passes(self, stamp: int) -> bool:
@@ -21,9 +22,10 @@ class Decimator:
             return True
         period = 1e9 / self.rate
         if stamp < self._last or stamp - self._due > 2.0 * period:
-            self._due = float(stamp)  # the clock jumped back, or the stream had stopped
+            self._due = stamp  # the clock jumped back, or the stream is slower or had stopped
         self._last = stamp
-        if stamp < self._due - 1.0:
+        if stamp < self._due:
             return False
-        self._due += period
+        whole = int(period + self._carry)
+        self._due, self._carry = self._due + whole, period + self._carry - whole
         return True

@@ -1,0 +1,95 @@
+"""rm1's own files: figures of the seed, meshes, and the pairs that the SRDF excuses."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import warnings
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+
+SEED = {
+    "antebrazo_joint": (0.20188, -0.00037, 0.15187),
+    "efector_joint": (0.20445, 0.001, -0.13418),
+}  # [m]; the sign of the last z is explained in the URDF
+
+
+def test_the_origins_are_the_seeds(rm1: Arm):
+    for name, xyz in SEED.items():
+        assert rm1.model.joint(name).origin.xyz == xyz
+    assert rm1.model.joint("brazo_joint").origin.xyz == (0.0, 0.0, 0.0)
+
+
+def test_forearm_and_effector_have_the_seeds_size(rm1: Arm):
+    sizes = {
+        link.get("name"): box.get("size")
+        for link in ET.parse(rm1.urdf_path).getroot().findall("link")
+        for box in link.findall("collision/geometry/box")
+    }
+    assert sizes["antebrazo_link"] == "0.252 0.077 0.064"
+    assert sizes["efector_link"] == "0.024 0.042 0.191"
+
+
+def test_every_named_state_is_within_limits_and_free(rm1: Arm):
+    kinematics = Kinematics(rm1)
+    assert {"home", "ready"} <= set(rm1.named_states)
+    for posture in rm1.named_states.values():
+        assert all(joint.is_within(value) for joint, value in zip(rm1.joints, posture, strict=True))
+        assert kinematics.self_collisions(posture, margin=0.004) == []
+
+
+def test_base_and_forearm_never_come_near_and_the_checked_pairs_sometimes_touch(rm1: Arm):
+    """What the SRDF says, by sampling: "Never" is never, and what is checked is worth checking."""
+    model = pin.buildModelFromUrdf(str(rm1.urdf_path))
+    geometry = pin.buildGeomFromUrdf(model, str(rm1.urdf_path), pin.GeometryType.COLLISION)
+    links = [model.frames[shape.parentFrame].name for shape in geometry.geometryObjects]
+    geometry.addAllCollisionPairs()
+    data, geometry_data = model.createData(), geometry.createData()
+    nearest: dict[frozenset[str], float] = {}
+    for q in postures(rm1, 5000):
+        pin.computeDistances(model, data, geometry, geometry_data, q)
+        for pair, result in zip(geometry.collisionPairs, geometry_data.distanceResults, strict=True):
+            key = frozenset((links[pair.first], links[pair.second]))
+            nearest[key] = min(nearest.get(key, 1.0), result.min_distance)
+    assert nearest[frozenset(("base_link", "antebrazo_link"))] > 0.06
+    assert nearest[frozenset(("base_link", "efector_link"))] < 0.0
+    assert nearest[frozenset(("brazo_link", "efector_link"))] < 0.0
+
+
+def postures(arm: Arm, count: int) -> np.ndarray:
+    generator = np.random.default_rng(7)
+    return generator.uniform([j.lower for j in arm.joints], [j.upper for j in arm.joints], (count, len(arm.joints)))
+
+
+def test_the_meshes_load_and_are_small(rm1: Arm):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import yourdfpy
+
+        robot = yourdfpy.URDF.load(str(rm1.urdf_path))
+        low, high = robot.scene.bounds
+    assert (high - low).tolist() == pytest.approx((0.508, 0.18, 0.259), abs=0.01)
+    for mesh in (rm1.folder / "meshes").iterdir():
+        assert mesh.stat().st_size < 150_000
+
+
+def test_the_meshes_are_what_their_script_draws(rm1: Arm, tmp_path: Path):
+    script = Path(shutil.copy(rm1.folder / "make_meshes.py", tmp_path))
+    subprocess.run([sys.executable, str(script)], check=True, capture_output=True)
+    names = sorted(path.name for path in (rm1.folder / "meshes").iterdir())
+    assert names == sorted(path.name for path in (tmp_path / "meshes").iterdir())
+    for name in names:
+        assert (tmp_path / "meshes" / name).stat().st_size == (rm1.folder / "meshes" / name).stat().st_size
+
+
+def test_nothing_refers_to_a_ros_package(rm1: Arm):
+    assert not re.search(r"package://|file://", rm1.urdf_path.read_text())
