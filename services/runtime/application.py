@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
-import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -14,7 +12,7 @@ from services.runtime.deployment import DeploymentError, load_deployment
 from services.runtime.errors import BusError, Refused
 from services.runtime.logs import LEVELS, line_logger
 from services.runtime.node import Node
-from services.runtime.stopping import StopRequest, stop_on_signals
+from services.runtime.stopping import StopRequest, end_soon, stop_on_signals
 
 Run = Callable[[Node, Deployment], None]
 EXPECTED = (DeploymentError, BusError, Refused)  # a sentence says all; anything else shows where it happened
@@ -26,10 +24,7 @@ def service(name: str, run: Run, arguments: Sequence[str] | None = None) -> None
     stop = StopRequest()
     with stop_on_signals(stop):
         code = _run(name, run, options, stop)
-        sys.stdout.flush()
-        sys.stderr.flush()
-        if any(not each.daemon for each in threading.enumerate() if each is not threading.main_thread()):
-            os._exit(code)  # a library's thread must not keep the process
+    end_soon(code)  # whatever threads a library has left behind
     sys.exit(code)
 
 

@@ -80,6 +80,17 @@ def stop_on_signals(stop: StopRequest) -> Iterator[None]:
             signal.signal(each, handler)
 
 
+def end_soon(code: int) -> None:
+    """Ends the process with `code` after `GRACE`, where it has not ended by itself."""
+
+    def guard() -> None:
+        time.sleep(GRACE)
+        sys.stderr.flush()
+        os._exit(code)
+
+    _thread.start_new_thread(guard, ())
+
+
 def _end() -> None:
     print(f"did not stop within {GRACE:g} s: ended where it stands:", file=sys.stderr)
     faulthandler.dump_traceback(file=sys.stderr)

@@ -205,14 +205,14 @@ class ZenohBus:
 
 
 _open: set[ZenohBus] = set()
-_watch: list[threading.Thread] = []
+_watch: list[threading.Thread] = []  # not a daemon, which would be cut off in the middle of closing
 
 
 def _close_with_the_program(bus: ZenohBus) -> None:
     """A session that its program forgets to close would never let the process end: Zenoh's threads do not."""
     _open.add(bus)
     if not _watch:
-        _watch.append(threading.Thread(target=_close_all_after_main, daemon=True, name="close"))
+        _watch.append(threading.Thread(target=_close_all_after_main, name="close"))
         _watch[0].start()
 
 

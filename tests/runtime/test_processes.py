@@ -161,6 +161,21 @@ def test_a_callback_that_raises_ends_the_process_with_one_report(start: Start, r
     assert errors.count("ZeroDivisionError: oh") == 1
 
 
+def test_a_thread_that_a_library_left_behind_does_not_keep_the_process(start: Start) -> None:
+    process = start(
+        """
+        import threading
+
+        def run(node, deployment):
+            threading.Thread(target=time.sleep, args=(60,)).start()
+
+        service("threads", run)
+        """
+    )
+    process.communicate(timeout=PROMPT)
+    assert process.returncode == 0
+
+
 def test_an_error_before_the_spin_ends_the_process(start: Start) -> None:
     process = start("service('failing', lambda node, deployment: {}['no such key'])")
     _, errors = process.communicate(timeout=PROMPT)
