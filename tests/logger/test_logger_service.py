@@ -1,0 +1,191 @@
+"""The logger as a node, and as a process that is killed."""
+
+import csv
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+
+import msgspec
+import pytest
+from mcap.exceptions import EndOfFile
+from mcap.reader import make_reader
+from mcap.records import Channel
+from mcap.records import Message as McapMessage
+from mcap.stream_reader import StreamReader
+
+from schemas.device import DeviceEvent
+from schemas.frames import RobotDescription
+from schemas.joints import JointState
+from schemas.system import SetParameter
+from schemas.topics import COMMAND_ACKS, COMMANDS, DESCRIPTION, DEVICE_EVENTS, JOINT_STATES
+from services.logger.main import run
+from services.runtime.deployment import load_deployment
+from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.node import Node
+
+
+@pytest.fixture
+def environment(tmp_path):
+    return {
+        "GEMELO_PATHS_RUN": str(tmp_path / "run"), "GEMELO_PATHS_OUT": str(tmp_path / "out"),
+        "GEMELO_ROUTER_PORT": str(free_port()),
+    }  # fmt: skip
+
+
+@pytest.fixture
+def deployment(environment):
+    return load_deployment(environ=environment)
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@contextmanager
+def running(deployment, network, **parameters):
+    """The logger in a thread of its own."""
+    with Node("logger", deployment, bus=MemoryBus(network), overrides=parameters) as node:
+        thread = threading.Thread(target=run, args=(node, deployment))
+        thread.start()
+        try:
+            wait_for(lambda: node.is_ready)
+            yield node
+        finally:
+            node.stop()
+            thread.join(5.0)
+            assert not thread.is_alive()
+
+
+def wait_for(is_done, timeout=10.0):
+    deadline = time.monotonic() + timeout
+    while not is_done():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def messages(path):
+    with path.open("rb") as file:
+        return [(channel.topic, json.loads(message.data)) for _, channel, message in make_reader(file).iter_messages()]
+
+
+def recordings(tmp_path, kind):
+    return sorted((tmp_path / "out" / "recordings").glob(f"*{kind}"))
+
+
+def test_what_is_said_on_the_bus_is_in_the_files(deployment, tmp_path, chunk, ack):
+    network = MemoryNetwork()
+    with Node("gateway", deployment, bus=MemoryBus(network)) as gateway:
+        gateway.publisher(DESCRIPTION).put(RobotDescription(robot="rm1", urdf="<robot/>"))
+        with running(deployment, network):
+            for seq in range(40):
+                gateway.publisher(COMMANDS).put(chunk(seq))
+                gateway.publisher(COMMAND_ACKS).put(ack(seq))
+                gateway.publisher(DEVICE_EVENTS).put(DeviceEvent(device="rm1", event="started", detail=str(seq)))
+            gateway.publisher(JOINT_STATES).put(JointState(stamp=5, name=("a",), position=(0.5,)))
+            time.sleep(0.1)
+    (mcap,) = recordings(tmp_path, ".mcap")
+    found = messages(mcap)
+    assert [m["seq"] for topic, m in found if topic == "commands"] == list(range(40))
+    assert [m["detail"] for topic, m in found if topic == "device/events"] == [str(seq) for seq in range(40)]
+    assert ("description", "rm1") in [(topic, m.get("robot")) for topic, m in found]
+    assert [m["position"] for topic, m in found if topic == "joint_states"] == [[0.5]]
+    (table,) = recordings(tmp_path, ".csv")
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    assert len(rows) == 200
+    assert {row["ack_code"] for row in rows} == {"0"}
+    assert table.stem == mcap.stem
+
+
+def test_logging_is_switched_off_and_on_while_it_runs(deployment, tmp_path):
+    network = MemoryNetwork()
+    with Node("gateway", deployment, bus=MemoryBus(network)) as gateway, running(deployment, network) as logger:
+        set_parameter(logger, "enable_logging", False)
+        time.sleep(0.7)
+        gateway.publisher(DEVICE_EVENTS).put(DeviceEvent(event="unheard"))
+        time.sleep(0.7)
+        set_parameter(logger, "enable_logging", True)
+        gateway.publisher(DEVICE_EVENTS).put(DeviceEvent(event="heard"))
+        time.sleep(0.1)
+    events = [m["event"] for path in recordings(tmp_path, ".mcap") for topic, m in messages(path)
+              if topic == "device/events"]  # fmt: skip
+    assert events == ["heard"]
+
+
+def set_parameter(node, name, value):
+    node._set_parameter(SetParameter(name=name, value=value))
+
+
+def test_a_disk_that_refuses_is_not_ready_until_it_is_mended(deployment, tmp_path):
+    (tmp_path / "out").write_text("in the way")
+    with Node("logger", deployment, bus=MemoryBus(MemoryNetwork())) as node:
+        thread = threading.Thread(target=run, args=(node, deployment))
+        thread.start()
+        time.sleep(1.0)
+        assert thread.is_alive()
+        assert not node.is_ready
+        (tmp_path / "out").unlink()
+        wait_for(lambda: node.is_ready)
+        node.stop()
+        thread.join(5.0)
+
+
+@contextmanager
+def process(module, environment, *arguments):
+    with subprocess.Popen(
+        [sys.executable, "-m", module, *arguments], env={**os.environ, **environment}, stderr=subprocess.PIPE
+    ) as started:
+        try:
+            yield started
+        finally:
+            started.kill()
+
+
+def test_kill_9_of_the_service_leaves_a_file_that_can_be_read(environment, deployment, tmp_path):
+    run_folder = tmp_path / "run"
+    with process("services.runtime.router", environment), process("services.logger.main", environment) as logger:
+        wait_for(lambda: (run_folder / "logger.ready").exists())
+        with Node("gateway", deployment) as gateway:
+            for index in range(300):
+                gateway.publisher(DEVICE_EVENTS).put(DeviceEvent(event=str(index)))
+            wait_for(lambda: sum(path.stat().st_size for path in recordings(tmp_path, ".mcap")) > 3000)
+            time.sleep(0.6)
+        os.kill(logger.pid, signal.SIGKILL)
+        logger.wait()
+    (path,) = recordings(tmp_path, ".mcap")
+    assert events_before_the_end(path) == [str(index) for index in range(300)]
+
+
+def events_before_the_end(path):
+    events = []
+    with path.open("rb") as file, pytest.raises(EndOfFile):
+        events.extend(recorded_events(StreamReader(file).records))
+    return events
+
+
+def recorded_events(records):
+    topics = {}
+    for record in records:
+        if isinstance(record, Channel):
+            topics[record.id] = record.topic
+        elif isinstance(record, McapMessage) and topics[record.channel_id] == "device/events":
+            yield msgspec.json.decode(record.data)["event"]
+
+
+def test_sigterm_ends_it_with_a_finished_file(environment, tmp_path):
+    with process("services.runtime.router", environment), process("services.logger.main", environment) as logger:
+        wait_for(lambda: (tmp_path / "run" / "logger.ready").exists())
+        time.sleep(0.6)
+        logger.terminate()
+        assert logger.wait(3.0) == 0
+    (path,) = recordings(tmp_path, ".mcap")
+    with path.open("rb") as file:
+        assert make_reader(file).get_summary().statistics.message_count > 0
+    assert not (tmp_path / "run" / "logger.ready").exists()
