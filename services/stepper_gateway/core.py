@@ -155,7 +155,10 @@ class GatewayCore:
 
     def _on_event(self, event: EventReport, moment: Moment) -> None:
         level = LogLevel.WARNING if event.event in ("fault", "hold", "underrun") else LogLevel.INFO
-        self.mover.event(event.event, event.detail, moment, level)
+        clock = self.mover.session.clock
+        happened = clock.monotonic(event.t_us) if clock.is_synchronised and event.t_us else moment.monotonic
+        happened = min(happened, moment.monotonic)
+        self.mover.event(event.event, event.detail, Moment(moment.unix_at(happened), happened), level)
 
     def _on_state(self, state: State, arrival: float, moment: Moment) -> None:
         mover = self.mover

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -19,7 +20,7 @@ from services.stepper_gateway.links.frames import State
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.path_log import PathPoint
 from services.stepper_gateway.stream import Stream
-from services.stepper_gateway.validation import CheckedGoal
+from services.stepper_gateway.validation import CheckedGoal, Presence
 
 
 class Ending(NamedTuple):
@@ -38,6 +39,7 @@ class Execution:
     goal: CheckedGoal
     joints: tuple[Joint, ...]
     accepted: Moment
+    accepted_from: Presence | None = None  # where the arm was then, if the goal was to start at once
     stream: Stream | None = None
     start_us: int = 0  # stream time at which it begins
     duration_us: int = 0
@@ -90,14 +92,15 @@ class Execution:
     def late(self, state: State, now: float) -> Ending:
         """The ending for a goal that was not reached in time."""
         errors = self.goal_errors(state)
-        index = max(range(len(errors)), key=lambda i: abs(errors[i]))
-        joint, bound = self.joints[index], self.goal.goal_tolerance[index]
+        bounds = [math.inf if bound is None else bound for bound in self.goal.goal_tolerance]
+        index = max(range(len(errors)), key=lambda i: abs(errors[i]) - bounds[i])
+        joint, bound = self.joints[index], bounds[index]
         return Ending(
             GoalStatusCode.ABORTED,
             FollowErrorCode.GOAL_TOLERANCE_VIOLATED,
             f'joint "{joint.name}" is {errors[index]:+.2f} steps ({errors[index] / joint.steps.per_unit:+.5f} '
             f"{joint.unit}) from its goal {now - self.accepted.monotonic:.2f} s after acceptance, when it should have "
-            f"been within {0.0 if bound is None else bound:g} steps: the device played the path "
+            f"been within {bound:g} steps: the device played the path "
             f"{self.elapsed(state):.2f} s far",
         )
 

@@ -15,6 +15,7 @@ from services.stepper_gateway.motion import PlannedMotion
 from services.stepper_gateway.mover import Mover
 from services.stepper_gateway.outputs import GoalExecuting, GoalFinished, GoalProgress
 from services.stepper_gateway.path_log import PathPoint
+from services.stepper_gateway.paths import Path
 from services.stepper_gateway.refusals import GoalRejected, invalid
 from services.stepper_gateway.validation import Validator
 
@@ -55,12 +56,15 @@ class Goals:
             if self._current is not None and self._current.ending is not None:
                 raise invalid("the arm is still decelerating after the last goal; send this one again when it rests")
             checked = self._validator.check(goal, moment.unix, mover.parameters)
-            self._validator.path(checked, mover.presence(moment), moment.unix, mover.parameters)
+            presence = mover.presence(moment)
+            path = self._validator.path(checked, presence, moment.unix, mover.parameters)
         except GoalRejected as rejected:
             return GoalVerdict(False, rejected.code, rejected.reason)
         self._drop_waiting(moment)
         self._waiting = Execution(goal_id, checked, mover.joints, moment)
-        self._start_waiting(moment)
+        if checked.trajectory.stamp <= moment.unix:
+            self._waiting.accepted_from = presence
+        self._start_waiting(moment, path)
         return GoalVerdict(True)
 
     def cancel(self, goal_id: str, moment: Moment) -> str:
@@ -149,7 +153,8 @@ class Goals:
         feedback = execution.feedback(point, state, positions, moment.unix)
         self._mover.out.put(GoalProgress(execution.goal_id, feedback))
 
-    def _start_waiting(self, moment: Moment) -> None:
+    def _start_waiting(self, moment: Moment, path: Path | None = None) -> None:
+        """Begin the goal that waits if its time has come; `path` is known if it was accepted this very moment."""
         execution, mover = self._waiting, self._mover
         if execution is None or execution.goal.trajectory.stamp > moment.unix:
             return
@@ -157,9 +162,11 @@ class Goals:
             self._preempt(moment)
             return
         presence = mover.presence(moment)
+        if execution.accepted_from is not None:
+            presence = presence.joined(execution.accepted_from)
         self._waiting = None
         try:
-            path = self._validator.path(execution.goal, presence, moment.unix, mover.parameters)
+            path = path or self._validator.path(execution.goal, presence, moment.unix, mover.parameters)
         except GoalRejected as rejected:
             ending = Ending(GoalStatusCode.ABORTED, rejected.code, rejected.reason)
             return self._finish(execution, ending, moment)

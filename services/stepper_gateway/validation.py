@@ -48,6 +48,11 @@ class Presence:
     def at_rest(cls, position: Vector) -> Presence:
         return cls(Knot.at_rest(position), position, position)
 
+    def joined(self, other: Presence) -> Presence:
+        """From here, having swept the other's range too."""
+        lowest = tuple(map(min, self.lowest, other.lowest))
+        return Presence(self.start, lowest, tuple(map(max, self.highest, other.highest)))
+
 
 class Validator:
     """Validation for one arm."""

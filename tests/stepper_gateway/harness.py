@@ -10,6 +10,7 @@ from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -261,3 +262,46 @@ def move(start: Vector, end: Vector, period: float = 0.05, slower: float = 1.0) 
         positions=end, velocities=(0.0,) * 3, accelerations=(0.0,) * 3, time_from_start=times[-1] * slower
     )
     return JointTrajectory(joint_names=arm.joint_names, points=(*points[:-1], last))
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The largest speed and acceleration of one joint, as shares of its limits."""
+
+    velocity: float
+    acceleration: float
+
+
+WINDOW = 40  # [ms] over which rates are taken
+KNOT_NOISE = 3.0 / 256.0  # [steps] by which rounding to the wire may bend a window
+
+
+def peaks(rig: Rig, since: int = 0) -> list[Peak]:
+    """Of the device's path from the millisecond `since` on; the wire's rounding is allowed for."""
+    found = []
+    seconds = WINDOW * 1e-3
+    for column, joint in enumerate(rig.arm.joints):
+        track = _without_starts([row[column] for row in rig.path[since:]])
+        rates = [(track[i + WINDOW] - track[i]) / seconds for i in range(len(track) - WINDOW)]
+        bends = [abs(rates[i + WINDOW] - rates[i]) / seconds for i in range(len(rates) - WINDOW)]
+        noise = KNOT_NOISE / seconds
+        speed = max(0.0, max(map(abs, rates), default=0.0) - noise)
+        bend = max(0.0, max(bends, default=0.0) - noise / seconds)
+        scale = joint.steps.per_unit
+        found.append(Peak(speed / scale / joint.velocity, bend / scale / joint.acceleration))
+    return found
+
+
+def _without_starts(track: list[float]) -> list[float]:
+    """A stream may begin up to a step beside where the path ended, at rest and without a pulse: no motion."""
+    rises = [b - a for a, b in pairwise(track)]
+    moved = [0.0 if before == 0.0 and 0.01 < abs(rise) <= 1.0 else rise for before, rise in pairwise([0.0, *rises])]
+    return [track[0] + rise for rise in accumulate(moved, initial=0.0)]
+
+
+def assert_within_limits(rig: Rig, since: int = 0) -> None:
+    """The device's path kept every limit and every slot was executed to half a step."""
+    for joint, peak in zip(rig.arm.joints, peaks(rig, since), strict=True):
+        assert peak.velocity <= 1.005, f"{joint.name} {peak}"
+        assert peak.acceleration <= 1.1, f"{joint.name} {peak}"
+    assert rig.device.max_slot_error <= 128

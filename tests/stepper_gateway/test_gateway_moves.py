@@ -1,0 +1,292 @@
+"""Moves on the real firmware core: exact to half a step, in their own time, spliced and cancelled within limits."""
+
+from __future__ import annotations
+
+import pytest
+
+from schemas.actions import GoalStatusCode
+from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
+from schemas.topics import COMMAND_ACKS, COMMANDS, JOINT_STATES, STEP_ERRORS
+from tests.stepper_gateway.harness import Rig, Wire, assert_within_limits, move, rm1
+
+HOME = (0.0, 0.0, 0.0)
+READY = (0.6, -1.2, 0.08)
+
+
+def expected_steps(position: tuple[float, ...]) -> tuple[int, ...]:
+    return tuple((joint.steps.to_q8(p) + 128) >> 8 for joint, p in zip(rm1().joints, position, strict=True))
+
+
+def test_a_move_ends_on_the_exact_steps() -> None:
+    rig = Rig().ready()
+    assert rig.goal(move(HOME, READY)).accepted
+    status, result = rig.finish()
+    assert status == GoalStatusCode.SUCCEEDED
+    assert result.executed_steps == rig.device.steps == expected_steps(READY)
+    assert all(abs(error) <= 0.5 for error in result.final_error)
+    assert all(error <= 0.505 for error in result.max_following_error)
+    assert rig.executing == ["g"]
+    assert_within_limits(rig)
+
+
+def test_every_state_is_within_half_a_step_of_the_command() -> None:
+    rig = Rig().ready()
+    rig.goal(move(HOME, READY))
+    rig.finish()
+    errors = rig.messages(STEP_ERRORS)
+    assert max(abs(error) for message in errors for error in message.error) <= 0.505
+    assert len(rig.messages(JOINT_STATES)) >= 50 * 3
+
+
+def test_the_first_chunk_leaves_with_the_acceptance() -> None:
+    rig = Rig().ready()
+    before = len(rig.sent)
+    rig.goal(move(HOME, READY))
+    assert rig.sent[before][1] == "traj"
+
+
+def test_a_lossy_wire_loses_nothing() -> None:
+    rig = Rig(Wire(delay=0.003, jitter=0.008, loss=0.1, duplicates=0.2), seed=5).ready()
+    places = [READY, (-0.5, 0.8, 0.02), (1.0, 0.0, 0.15), HOME]
+    here = HOME
+    for index, place in enumerate(places):
+        assert rig.goal(move(here, place), f"g{index}").accepted
+        assert rig.finish(f"g{index}")[0] == GoalStatusCode.SUCCEEDED
+        assert rig.device.steps == expected_steps(place)
+        here = rig.position
+    assert_within_limits(rig)
+    sent = {(chunk.stream, chunk.seq) for chunk in rig.messages(COMMANDS)}
+    assert len(rig.messages(COMMANDS)) > len(sent)  # some went twice
+    assert {(ack.stream, ack.seq) for ack in rig.messages(COMMAND_ACKS)} <= sent
+
+
+def test_defect_1_a_streamed_move_keeps_what_is_left_of_the_last_command() -> None:
+    """The seed's relative `move()` ended a 90 degree command after 48 and 4 steps; absolute knots end on the target."""
+    rig = Rig().ready()
+    quarter = 1.5707963267948966
+    for index in range(60):
+        rig.target(brazo_joint=quarter * min(1.0, index / 20), antebrazo_joint=quarter * min(1.0, index / 20))
+        rig.run(0.1)
+    assert rig.device.steps[:2] == expected_steps((quarter, quarter, 0.0))[:2] == (4666, 100)
+    assert rig.messages(STEP_ERRORS)[-1].executed == rig.device.steps
+
+
+def test_defect_2_a_goal_without_all_joints_is_refused_by_name_and_a_target_moves_what_it_names() -> None:
+    """The seed's firmware ignored every message that lacked q3, silently."""
+    rig = Rig().ready()
+    whole = move(HOME, READY)
+    partial = JointTrajectory(
+        joint_names=whole.joint_names[:2],
+        points=tuple(
+            TrajectoryPoint(positions=p.positions[:2], time_from_start=p.time_from_start) for p in whole.points
+        ),
+    )
+    verdict = rig.goal(partial)
+    assert verdict.code == FollowErrorCode.INVALID_JOINTS
+    assert "efector_joint" in verdict.reason
+    for _ in range(30):
+        rig.target(brazo_joint=0.2, antebrazo_joint=0.1)
+        rig.run(0.1)
+    assert rig.device.steps == expected_steps((0.2, 0.1, 0.0))
+
+
+def slow_points(count: int, spacing: float) -> JointTrajectory:
+    """Positions only, `spacing` seconds apart, along a gentle smooth way."""
+    share = [(3 * u * u - 2 * u**3) for u in (i / (count - 1) for i in range(count))]
+    return JointTrajectory(
+        joint_names=rm1().joint_names,
+        points=tuple(
+            TrajectoryPoint(positions=(0.4 * s, -0.3 * s, 0.01 * s), time_from_start=i * spacing)
+            for i, s in enumerate(share)
+        ),
+    )
+
+
+def test_defect_6_points_100_ms_apart_take_their_own_time() -> None:
+    rig = Rig().ready()
+    trajectory = slow_points(31, 0.1)
+    begun = rig.now
+    assert rig.goal(trajectory).accepted
+    status, result = rig.finish()
+    assert status == GoalStatusCode.SUCCEEDED
+    assert 3.0 <= rig.now - begun <= 3.2
+    assert 3.0 <= result.duration <= 3.2
+    assert rig.device.steps == expected_steps((0.4, -0.3, 0.01))
+    assert_within_limits(rig)
+
+
+def test_defect_6_success_is_never_said_before_the_device_has_executed_the_steps() -> None:
+    rig = Rig().ready()
+    rig.goal(move(HOME, READY))
+    while "g" not in rig.finished:
+        executed = rig.device.steps
+        rig.run(0.001)
+    assert executed == expected_steps(READY)
+    assert rig.core.mover.stream is not None
+    assert rig.core.mover.stream.acked == rig.core.mover.stream.next_seq
+
+
+def test_defect_6_without_a_device_a_goal_is_refused_not_simulated() -> None:
+    rig = Rig()
+    rig.device_is_on = False
+    rig._flying.clear()
+    rig.run(1.0)
+    verdict = rig.goal(move(HOME, READY))
+    assert not verdict.accepted
+    assert verdict.code == FollowErrorCode.DEVICE_FAILED
+    assert '"rm1"' in verdict.reason
+
+
+def test_cancel_decelerates_on_the_path_within_the_limits() -> None:
+    rig = Rig().ready()
+    rig.goal(move(HOME, READY))
+    rig.run(1.5)
+    assert rig.cancel() == ""
+    status, result = rig.finish()
+    assert status == GoalStatusCode.CANCELED
+    assert result.error_code == FollowErrorCode.CANCELED
+    assert result.executed_steps == rig.device.steps
+    assert_within_limits(rig)
+    share = [s / t for s, t in zip(rig.device.steps, expected_steps(READY), strict=True)]
+    assert max(share) - min(share) < 0.02  # still on the straight line of the move
+    here = rig.position
+    rig.run(1.0)
+    assert rig.position == here
+
+
+def test_a_cancel_at_once_and_one_at_the_end_both_end_the_goal() -> None:
+    rig = Rig().ready()
+    rig.goal(move(HOME, READY), "early")
+    assert rig.cancel("early") == ""
+    assert rig.finish("early", 5.0)[0] == GoalStatusCode.CANCELED
+    rig.goal(move(rig.position, READY), "late")
+    stream = rig.core.mover.stream
+    assert stream is not None
+    rig.run(20.0, lambda: stream.is_complete)
+    rig.run(0.2)
+    assert rig.cancel("late") == ""
+    assert rig.finish("late", 5.0)[0] == GoalStatusCode.CANCELED
+    assert "not being carried out" in rig.cancel("late")
+    assert_within_limits(rig)
+
+
+def test_a_new_goal_is_spliced_continuously_in_velocity() -> None:
+    rig = Rig().ready()
+    rig.goal(move(HOME, (1.2, -1.2, 0.08)), "first")
+    rig.run(1.5)
+    speed = abs(rig.path[-1][0] - rig.path[-2][0])
+    assert speed > 0.1
+    splice = len(rig.path)
+    now_at = rig.messages(JOINT_STATES)[-1].position
+    assert rig.goal(move(now_at, (-0.5, 0.5, 0.01)), "second").accepted
+    assert rig.finished["first"][0] == GoalStatusCode.PREEMPTED
+    assert rig.finish("second")[0] == GoalStatusCode.SUCCEEDED
+    assert rig.device.steps == expected_steps((-0.5, 0.5, 0.01))
+    assert_within_limits(rig)
+    # Nowhere between the two goals did the arm stand still but at its turning point.
+    still = sum(a == b for a, b in zip(rig.path[splice:], rig.path[splice + 1 : -300], strict=False))
+    assert still <= 5
+
+
+def test_many_goals_after_another_keep_the_limits() -> None:
+    rig = Rig(seed=9).ready()
+    for index in range(12):
+        here = rig.messages(JOINT_STATES)[-1].position
+        goal = (rig.rng.uniform(-1, 1), rig.rng.uniform(-1, 1), rig.rng.uniform(0.0, 0.15))
+        verdict = rig.goal(move(here, goal), f"g{index}")
+        assert verdict.accepted, verdict.reason
+        rig.run(rig.rng.uniform(0.05, 1.5))
+    assert rig.finish("g11")[0] == GoalStatusCode.SUCCEEDED
+    assert [rig.finished[f"g{i}"][0] for i in range(11)] == [GoalStatusCode.PREEMPTED] * 11
+    assert rig.device.steps == expected_steps(goal)
+    assert_within_limits(rig)
+
+
+def test_a_goal_that_arrives_while_the_last_knots_are_played_starts_after_them() -> None:
+    rig = Rig().ready()
+    rig.goal(move(HOME, (0.2, -0.2, 0.02)), "first")
+    stream = rig.core.mover.stream
+    assert stream is not None
+    assert rig.run(10.0, lambda: stream.is_complete)
+    here = rig.messages(JOINT_STATES)[-1].position
+    assert rig.goal(move(here, (0.5, 0.1, 0.05)), "second").accepted
+    assert rig.finished["first"][0] == GoalStatusCode.PREEMPTED
+    assert rig.finish("second")[0] == GoalStatusCode.SUCCEEDED
+    assert_within_limits(rig)
+
+
+def test_a_goal_that_starts_elsewhere_while_moving_is_refused_and_the_move_goes_on() -> None:
+    rig = Rig().ready()
+    rig.goal(move(HOME, READY), "first")
+    rig.run(1.0)
+    verdict = rig.goal(move((-0.5, 0.0, 0.0), HOME), "second")
+    assert not verdict.accepted
+    assert "brazo_joint" in verdict.reason
+    assert rig.finish("first")[0] == GoalStatusCode.SUCCEEDED
+
+
+def test_a_single_point_is_reached_in_the_time_given() -> None:
+    rig = Rig().ready()
+    point = TrajectoryPoint(positions=(0.5, 0.2, 0.01), time_from_start=3.0)
+    begun = rig.now
+    assert rig.goal(JointTrajectory(joint_names=rm1().joint_names, points=(point,))).accepted
+    assert rig.finish()[0] == GoalStatusCode.SUCCEEDED
+    assert rig.now - begun == pytest.approx(3.0, abs=0.08)
+    assert rig.device.steps == expected_steps(point.positions)
+    assert_within_limits(rig)
+
+
+def test_a_stamp_in_the_future_starts_then() -> None:
+    rig = Rig().ready()
+    plan = move(HOME, READY)
+    later = JointTrajectory(stamp=rig.moment.unix + 1_000_000_000, joint_names=plan.joint_names, points=plan.points)
+    assert rig.goal(later).accepted
+    rig.run(0.9)
+    assert rig.device.steps == (0, 0, 0)
+    assert not rig.device.moving
+    assert rig.finish()[0] == GoalStatusCode.SUCCEEDED
+
+
+def test_a_goal_where_the_arm_already_is_succeeds() -> None:
+    rig = Rig().ready()
+    point = TrajectoryPoint(positions=HOME, velocities=HOME, time_from_start=0.0)
+    assert rig.goal(JointTrajectory(joint_names=rm1().joint_names, points=(point,))).accepted
+    assert rig.finish()[0] == GoalStatusCode.SUCCEEDED
+
+
+def test_feedback_comes_20_times_a_second_and_names_the_point() -> None:
+    rig = Rig().ready()
+    plan = move(HOME, READY)
+    rig.goal(plan)
+    rig.finish()
+    duration = plan.points[-1].time_from_start
+    assert 18 * duration <= len(rig.feedback) <= 21 * duration
+    assert [f.index for f in rig.feedback] == sorted(f.index for f in rig.feedback)
+    assert rig.feedback[-1].points == len(plan.points)
+    assert max(abs(e) for f in rig.feedback for e in f.error.positions[:1]) < 0.001
+
+
+def test_a_goal_tolerance_below_what_steps_can_do_is_violated_by_name_and_number() -> None:
+    rig = Rig().ready()
+    goal = FollowJointTrajectoryGoal(
+        trajectory=move(HOME, (0.6001, -1.203, 0.0801)),
+        goal_tolerance=(JointTolerance(name="antebrazo_joint", position=1e-6),),
+        goal_time_tolerance=0.5,
+    )
+    assert rig.goal(goal).accepted
+    status, result = rig.finish()
+    assert (status, result.error_code) == (GoalStatusCode.ABORTED, FollowErrorCode.GOAL_TOLERANCE_VIOLATED)
+    assert "antebrazo_joint" in result.error_string
+    assert "steps" in result.error_string
+
+
+def test_a_path_tolerance_violation_names_joint_error_and_time_and_decelerates() -> None:
+    rig = Rig().ready()
+    goal = FollowJointTrajectoryGoal(
+        trajectory=move(HOME, READY), path_tolerance=(JointTolerance(name="brazo_joint", position=1e-5),)
+    )
+    assert rig.goal(goal).accepted
+    status, result = rig.finish()
+    assert (status, result.error_code) == (GoalStatusCode.ABORTED, FollowErrorCode.PATH_TOLERANCE_VIOLATED)
+    assert "brazo_joint" in result.error_string
+    assert_within_limits(rig)
