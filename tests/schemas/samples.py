@@ -1,0 +1,107 @@
+"""One sample of every message, made from its annotations: what the golden bytes are bytes of.
+
+`python -m tests.schemas.samples` writes golden.json anew for messages and fields that are NEW. It refuses
+to change what is there: bytes that were once spoken must stay readable, see test_golden.py.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import pkgutil
+import sys
+from collections.abc import Iterator
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import inspect
+
+import schemas
+from schemas.message import Message, encode
+
+GOLDEN = Path(__file__).with_name("golden.json")
+
+
+def messages() -> list[type[Message]]:
+    """Every message class of `schemas`, by name."""
+    for module in pkgutil.iter_modules(schemas.__path__):
+        importlib.import_module(f"schemas.{module.name}")
+    return sorted(_subclasses(Message), key=lambda kind: kind.__name__)
+
+
+def sample(kind: type[Message]) -> Message:
+    """A message in which no field has its default where its type allows another value."""
+    values = {field.name: _value(field.type, field.name) for field in msgspec.structs.fields(kind)}
+    return kind(**values)
+
+
+def golden() -> dict[str, dict[str, Any]]:
+    """Name of the message -> {"hex": what `sample` gave when it was added, "fields": the same for eyes}."""
+    return json.loads(GOLDEN.read_text(encoding="utf-8")) if GOLDEN.exists() else {}
+
+
+def record(kind: type[Message]) -> dict[str, Any]:
+    payload = encode(sample(kind))
+    return {"hex": payload.hex(), "fields": msgspec.msgpack.decode(payload)}
+
+
+def _subclasses(kind: type[Message]) -> Iterator[type[Message]]:
+    for each in kind.__subclasses__():
+        if each.__module__.startswith("schemas."):
+            yield each
+            yield from _subclasses(each)
+
+
+def _value(annotation: Any, name: str) -> Any:
+    return _value_of(inspect.type_info(annotation), annotation, name)
+
+
+def _value_of(info: inspect.Type, annotation: Any, name: str) -> Any:
+    match info:
+        case inspect.Metadata():
+            return _value_of(info.type, annotation, name)
+        case inspect.BoolType():
+            return True
+        case inspect.IntType():
+            return 100_000 + len(name)
+        case inspect.FloatType():
+            return 0.5 + len(name)
+        case inspect.StrType():
+            return name
+        case inspect.EnumType():
+            return _last(info.cls)
+        case inspect.StructType():
+            return sample(info.cls)
+        case inspect.UnionType():
+            return _value_of(next(each for each in info.types if not isinstance(each, inspect.NoneType)), None, name)
+        case inspect.VarTupleType():
+            return (_value_of(info.item_type, None, name),) * 2
+        case inspect.TupleType():
+            return tuple(_value_of(each, None, name) for each in info.item_types)
+        case inspect.RawType():
+            return msgspec.Raw(b"\x80")
+        case _:
+            raise NotImplementedError(f"a sample for field {name} of {info}")
+
+
+def _last(kind: type[Enum]) -> Enum:
+    return list(kind)[-1]
+
+
+def main() -> int:
+    """Adds what is new; 1 where something that was recorded cannot be read any more."""
+    kept = golden()
+    for name in sorted(set(kept) - {kind.__name__ for kind in messages()}):
+        print(f"{name} is gone: remove it from golden.json by hand, if no recording and no node needs it")
+        return 1
+    for kind in messages():
+        kept.setdefault(kind.__name__, record(kind))
+    GOLDEN.write_text(json.dumps(kept, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    print(f"{len(kept)} messages in {GOLDEN.name}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,116 @@
+"""Every message: unknown fields are ignored, missing ones take defaults, nothing that is not finite gets in."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import struct
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from schemas.joints import JointState
+from schemas.message import BadMessage, Message, decode, encode
+from schemas.motion import JointTrajectory, TrajectoryPoint
+from schemas.planning import JointGoal, PlanRequest, PoseGoal
+from tests.schemas.samples import messages, sample
+
+KINDS = st.sampled_from(messages())
+NOT_FINITE = st.sampled_from([math.nan, math.inf, -math.inf])
+SCALARS = st.none() | st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats() | st.text() | st.binary()
+VALUES = st.recursive(SCALARS, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=8)
+
+
+@pytest.mark.parametrize("kind", messages(), ids=lambda kind: kind.__name__)
+def test_it_comes_back_as_it_went(kind: type[Message]) -> None:
+    message = sample(kind)
+    assert encode(decode(kind, encode(message))) == encode(message)
+
+
+@pytest.mark.parametrize("kind", messages(), ids=lambda kind: kind.__name__)
+def test_missing_fields_take_their_defaults(kind: type[Message]) -> None:
+    assert encode(decode(kind, msgspec.msgpack.encode(_tagged(kind, {})))) == encode(kind())
+
+
+@pytest.mark.parametrize("kind", messages(), ids=lambda kind: kind.__name__)
+def test_it_is_frozen_documented_and_has_defaults(kind: type[Message]) -> None:
+    assert kind.__struct_config__.frozen
+    assert kind.__doc__
+    assert not any(field.required for field in msgspec.structs.fields(kind))
+
+
+@given(KINDS, st.dictionaries(st.text(min_size=1).map(lambda name: f"x_{name}"), VALUES, max_size=3))
+def test_unknown_fields_are_ignored(kind: type[Message], unknown: dict[str, object]) -> None:
+    known = msgspec.msgpack.decode(encode(sample(kind)))
+    assert encode(decode(kind, msgspec.msgpack.encode(known | unknown))) == encode(sample(kind))
+
+
+@given(st.data(), NOT_FINITE)
+def test_a_float_that_is_not_finite_is_refused_wherever_it_stands(data: st.DataObject, value: float) -> None:
+    kind = data.draw(st.sampled_from([each for each in messages() if _floats(encode(sample(each)))]))
+    payload = bytearray(encode(sample(kind)))
+    place = data.draw(st.sampled_from(_floats(payload)))
+    struct.pack_into(">d", payload, place, value)
+    with pytest.raises(BadMessage, match="finite"):
+        decode(kind, bytes(payload))
+
+
+@given(NOT_FINITE)
+def test_it_cannot_be_made_with_a_float_that_is_not_finite(value: float) -> None:
+    with pytest.raises(ValueError, match=r"position\[1\]"):
+        JointState(position=(0.0, value))
+    with pytest.raises(ValueError, match="time_from_start"):
+        TrajectoryPoint(time_from_start=value)
+
+
+@given(KINDS, st.binary(max_size=200))
+def test_random_bytes_are_a_message_or_a_bad_message(kind: type[Message], payload: bytes) -> None:
+    with contextlib.suppress(BadMessage):
+        assert isinstance(decode(kind, payload), kind)
+
+
+@given(KINDS, st.dictionaries(st.text(), VALUES, max_size=4), st.data())
+def test_wrong_types_are_a_bad_message(kind: type[Message], other: dict[str, object], data: st.DataObject) -> None:
+    names = list(kind.__struct_fields__)
+    wrong = data.draw(st.dictionaries(st.sampled_from(names), VALUES, max_size=3)) if names else {}
+    try:
+        message = decode(kind, msgspec.msgpack.encode(other | wrong))
+    except BadMessage:
+        return
+    assert encode(decode(kind, encode(message))) == encode(message)
+
+
+def test_a_deep_nest_is_a_bad_message() -> None:
+    with pytest.raises(BadMessage):
+        decode(PlanRequest, b"\x81\xa4goal" + b"\x91" * 100_000)
+
+
+def test_a_refusal_names_the_message_the_field_and_the_value() -> None:
+    nan = TrajectoryPoint(positions=(0.0,))
+    payload = encode(JointTrajectory(points=(nan,))).replace(struct.pack(">d", 0.0), struct.pack(">d", math.nan), 1)
+    with pytest.raises(BadMessage, match=r"JointTrajectory.*positions\[0\].* is nan.*points"):
+        decode(JointTrajectory, payload)
+    with pytest.raises(BadMessage, match=r"JointState.*`int`.*name"):
+        decode(JointState, msgspec.msgpack.encode({"name": [1]}))
+
+
+def test_a_goal_travels_as_what_it_is() -> None:
+    for goal in (PoseGoal(position=(0.1, 0.2, 0.3)), JointGoal(name=("q",), position=(0.5,))):
+        assert decode(PlanRequest, encode(PlanRequest(goal=goal))).goal == goal
+
+
+def _tagged(kind: type[Message], fields: dict[str, object]) -> dict[str, object]:
+    tag, name = kind.__struct_config__.tag, kind.__struct_config__.tag_field
+    return fields if tag is None else {name: tag, **fields}
+
+
+def _floats(payload: bytes | bytearray) -> list[int]:
+    """Where the samples' floats stand: 0xcb and eight bytes, of which the sample's are 0.5 + a small integer."""
+    places = []
+    for place in range(1, len(payload) - 7):
+        value = struct.unpack_from(">d", payload, place)[0]
+        if payload[place - 1] == 0xCB and 1.0 <= value < 100.0 and value % 1.0 == 0.5:
+            places.append(place)
+    return places

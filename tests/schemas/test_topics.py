@@ -1,0 +1,51 @@
+"""The table of keys: no key twice, every writer known, every row says what it is."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from schemas.message import Message
+from schemas.topics import ACTIONS, REQUESTS, TOPICS, Action, Delivery, Request, Topic
+from tests.schemas.samples import messages
+
+WRITERS = {"stepper_gateway", "state_publisher", "planner", "logger", "visualizer", "any"}
+Row = Topic[Message] | Request[Message, Message] | Action[Message, Message, Message]
+ROWS: tuple[Row, ...] = (*TOPICS, *REQUESTS, *ACTIONS)
+
+
+def test_no_key_stands_twice() -> None:
+    keys = [row.key for row in ROWS]
+    assert len(keys) == len(set(keys))
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.key)
+def test_every_row_has_a_plain_key_a_known_writer_and_a_sentence(row: Row) -> None:
+    assert re.fullmatch(r"[a-z][a-z_]*(/[a-z][a-z_]*)*", row.key)
+    assert (row.writer if isinstance(row, Topic) else row.server) in WRITERS
+    assert row.about
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.key)
+def test_only_what_may_be_dropped_has_a_rate(topic: Topic[Message]) -> None:
+    assert topic.rate is None or topic.rate > 0.0
+    assert topic.rate is None or topic.delivery is Delivery.LATEST
+
+
+def test_every_message_of_the_table_is_one_of_ours() -> None:
+    known = set(messages())
+    for row in ROWS:
+        match row:
+            case Topic():
+                assert row.message in known
+            case Request():
+                assert {row.request, row.response} <= known
+            case Action():
+                assert {row.goal, row.feedback, row.result} <= known
+
+
+def test_names_of_messages_are_unique() -> None:
+    """The name travels in the encoding: it must say which message it is."""
+    names = [kind.__name__ for kind in messages()]
+    assert len(names) == len(set(names))
