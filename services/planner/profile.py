@@ -23,6 +23,7 @@ MOST_POINTS = 400
 SHORTEST = 1e-4  # [s] two points nearer than that are one: below it the quintic's coefficients lose their digits
 MARGIN = 0.997  # share of the limits that is used, for what SHORTEST leaves out
 STANDSTILL = 1e-9  # [s] at full speed: a way so short is no way
+NEGLIGIBLE = 1e-12  # share of its full speed below which a joint limits nothing
 HOLD = 0.1  # [s] that a plan to where the arm already is takes
 
 
@@ -68,7 +69,7 @@ def straight_line(
 def _time_way(length: float, direction: Array, limits: JointLimits) -> tuple[Trajectory, list[float]]:
     """The profile of the way [s at full speed], and the times [s] at which its jerk changes."""
     share = np.abs(direction)
-    moving = share > 0.0
+    moving = share > NEGLIGIBLE * limits.velocity
     demand = InputParameter(1)
     demand.target_position = [length]
     demand.max_velocity = [MARGIN * float(np.min(limits.velocity[moving] / share[moving]))]

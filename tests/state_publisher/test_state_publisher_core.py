@@ -88,9 +88,7 @@ def test_fixed_links_are_static_and_mimics_follow(tmp_path: Path):
     (tmp_path / "robot.urdf").write_text(
         '<robot name="grip"><link name="base"/><link name="left"/><link name="right"/><link name="eye"/>'
         + joint.format("left", "prismatic", "base", "left", limit)
-        + joint.format(
-            "right", "prismatic", "base", "right", limit + '<mimic joint="left" multiplier="-1" offset="1"/>'
-        )
+        + joint.format("right", "prismatic", "base", "right", limit + mimic)
         + joint.format("eye", "fixed", "left", "eye", '<origin xyz="1 2 3"/>')
         + "</robot>"
     )

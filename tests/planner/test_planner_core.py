@@ -1,0 +1,136 @@
+"""Plans that succeed: where they lead, from where, and how they are verified."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from schemas.joints import JointState
+from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
+from services.arm.description import Arm, load_arm
+from services.planner.core import Planner
+from services.planner.profile import joint_limits
+from services.planner.verify import require_within_limits, sample
+
+ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
+PLANNER = Planner(ARM)
+POSTURES = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])
+
+
+def standing(posture: tuple[float, ...]) -> JointState:
+    return JointState(name=ARM.joint_names, position=posture)
+
+
+def test_the_readmes_goal_is_reached(planner: Planner, home: JointState):
+    response = planner.plan(PlanRequest(goal=PoseGoal(position=(0.25, 0.15, 0.10))), home)
+    assert response.code is PlanCode.SUCCESS
+    assert response.tool_goal == pytest.approx((0.25, 0.15, 0.10), abs=1e-6)
+    last = response.trajectory.points[-1]
+    assert planner.kinematics.tool(last.positions).position == pytest.approx((0.25, 0.15, 0.10), abs=1e-6)
+    assert response.duration == last.time_from_start
+    assert response.trajectory.joint_names == planner.arm.joint_names
+
+
+def test_every_named_state_is_reached_from_every_other(planner: Planner, rm1: Arm):
+    for start in rm1.named_states.values():
+        for name, goal in rm1.named_states.items():
+            response = planner.plan(PlanRequest(goal=NamedGoal(name=name)), standing(start))
+            assert response.code is PlanCode.SUCCESS, (start, name, response.refusal)
+            assert response.trajectory.points[-1].positions == goal
+
+
+def test_a_joint_goal_leaves_the_other_joints_alone(planner: Planner, rm1: Arm):
+    start = rm1.named_states["ready"]
+    response = planner.plan(PlanRequest(goal=JointGoal(name=("brazo_joint",), position=(0.5,))), standing(start))
+    assert response.trajectory.points[-1].positions == (0.5, *start[1:])
+
+
+def test_a_start_in_the_request_is_used_and_completed(planner: Planner, home: JointState):
+    given_start = JointState(name=("brazo_joint",), position=(0.7,))
+    response = planner.plan(PlanRequest(goal=NamedGoal(name="ready"), start=given_start), home)
+    assert response.trajectory.points[0].positions == (0.7, 0.0, 0.0)
+
+
+def test_a_whole_start_needs_no_present_state(planner: Planner, home: JointState):
+    assert planner.plan(PlanRequest(goal=NamedGoal(name="ready"), start=home), None).code is PlanCode.SUCCESS
+
+
+def test_a_goal_in_a_links_frame_moves_with_that_link(planner: Planner):
+    start = (0.3, 0.8, 0.05)
+    request = PlanRequest(goal=PoseGoal(position=(0.15, 0.1, -0.05), frame="antebrazo_link"))
+    response = planner.plan(request, standing(start))
+    link = planner.kinematics.link_poses(start)["antebrazo_link"]
+    cosine, sine = np.cos(1.1), np.sin(1.1)
+    offset = (0.15 * cosine - 0.1 * sine, 0.15 * sine + 0.1 * cosine, -0.05)
+    expected = np.add(link.translation, offset)
+    assert response.tool_goal == pytest.approx(expected, abs=1e-6)
+
+
+def test_scaling_slows(planner: Planner, home: JointState):
+    fast, slow = (
+        planner.plan(
+            PlanRequest(goal=NamedGoal(name="left"), velocity_scaling=s, acceleration_scaling=s), home
+        ).duration
+        for s in (1.0, 0.25)
+    )
+    assert slow > 2.0 * fast
+
+
+def test_a_goal_where_the_arm_is_is_a_plan_that_stands(planner: Planner, home: JointState):
+    response = planner.plan(PlanRequest(goal=NamedGoal(name="home")), home)
+    assert response.code is PlanCode.SUCCESS
+    assert response.duration == 0.1
+
+
+def test_a_start_rounded_to_whole_steps_beyond_a_limit_is_still_a_start(planner: Planner, rm1: Arm):
+    scale = rm1.joint("antebrazo_joint").steps
+    rounded = scale.to_position(round(scale.to_steps(2.95)))
+    assert rounded > 2.95
+    response = planner.plan(PlanRequest(goal=NamedGoal(name="home")), standing((0.0, rounded, 0.2)))
+    assert response.code is PlanCode.SUCCESS
+    assert response.trajectory.points[0].positions == (0.0, 2.95, 0.2)
+
+
+@settings(max_examples=150, deadline=None)
+@given(POSTURES, POSTURES)
+def test_whatever_comes_out_is_within_limits_and_free(start: tuple[float, ...], goal: tuple[float, ...]):
+    point = tuple(PLANNER.kinematics.tool(goal).position.tolist())
+    response = PLANNER.plan(PlanRequest(goal=PoseGoal(position=point)), standing(start))
+    if response.code is not PlanCode.SUCCESS:
+        assert response.refusal is not None
+        assert response.refusal.check == "self-collision"
+        assert response.trajectory.points == ()
+        return
+    assert response.tool_goal == pytest.approx(point, abs=1e-6)
+    assert response.trajectory.points[0].positions == start
+    samples = sample(response.trajectory)
+    require_within_limits(ARM, samples, joint_limits(ARM))
+    assert all(PLANNER.kinematics.collisions.distance(row) > 0.0 for row in samples.positions[::7])
+
+
+def test_the_planned_path_is_the_tools_way(planner: Planner, home: JointState):
+    response = planner.plan(PlanRequest(goal=NamedGoal(name="ready")), home)
+    path = planner.planned_path(response.trajectory, stamp=7)
+    assert (path.stamp, path.frame) == (7, "base_link")
+    assert path.points[0] == pytest.approx(planner.kinematics.tool((0.0, 0.0, 0.0)).position)
+    assert path.points[-1] == pytest.approx(response.tool_goal)
+    assert len(path.points) <= 100
+
+
+def test_the_same_request_has_the_same_answer(planner: Planner, home: JointState):
+    request = PlanRequest(goal=PoseGoal(position=(0.1, -0.2, 0.15)))
+    assert planner.plan(request, home) == planner.plan(request, home)
+
+
+def test_a_plan_takes_milliseconds(planner: Planner, home: JointState):
+    """The goal is 2 ms; this bound only catches a planner that has become something else."""
+    request = PlanRequest(goal=PoseGoal(position=(0.25, 0.15, 0.10)))
+    began = time.perf_counter()
+    for _ in range(20):
+        planner.plan(request, home)
+    assert time.perf_counter() - began < 1.0

@@ -1,0 +1,208 @@
+"""Every refusal names the check, the thing, its value and limit, and what would do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from schemas.joints import JointState
+from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PlanResponse, PoseGoal, Refusal
+from services.arm.description import Arm, load_arm
+from services.planner.core import Planner
+
+ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
+PLANNER = Planner(ARM)
+STANDING = JointState(name=ARM.joint_names, position=(0.0, 0.0, 0.0))
+
+
+def refused(response: PlanResponse, code: PlanCode) -> Refusal:
+    assert response.code is code
+    assert response.trajectory.points == ()
+    assert response.refusal is not None
+    assert response.refusal.check
+    assert response.refusal.message
+    assert response.refusal.remedy
+    return response.refusal
+
+
+@pytest.mark.parametrize("scaling", [0.0, -1.0, 1.0001])
+@pytest.mark.parametrize("which", ["velocity_scaling", "acceleration_scaling"])
+def test_a_scaling_of_zero_is_not_one(planner: Planner, home: JointState, which: str, scaling: float):
+    request = PlanRequest(goal=NamedGoal(name="ready"), **{which: scaling})
+    refusal = refused(planner.plan(request, home), PlanCode.INVALID_GOAL_CONSTRAINTS)
+    assert (refusal.subject, refusal.value) == (which, scaling)
+
+
+def test_a_scaling_that_is_not_a_number_never_becomes_a_request():
+    with pytest.raises(ValueError, match=r"velocity_scaling.*finite"):
+        PlanRequest(velocity_scaling=float("nan"))
+
+
+def test_an_unknown_state_has_a_nearest_name(planner: Planner, home: JointState):
+    refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="redy")), home), PlanCode.INVALID_GOAL_CONSTRAINTS)
+    assert refusal.subject == "redy"
+    assert refusal.remedy == 'use "ready"'
+
+
+def test_an_unknown_joint_has_a_nearest_name(planner: Planner, home: JointState):
+    goal = JointGoal(name=("braso_joint",), position=(0.0,))
+    refusal = refused(planner.plan(PlanRequest(goal=goal), home), PlanCode.INVALID_GOAL_CONSTRAINTS)
+    assert refusal.remedy == 'use "brazo_joint"'
+
+
+def test_an_unknown_frame_has_a_nearest_name(planner: Planner, home: JointState):
+    goal = PoseGoal(position=(0.0, 0.0, 0.0), frame="base_lnk")
+    refusal = refused(planner.plan(PlanRequest(goal=goal), home), PlanCode.FRAME_TRANSFORM_FAILURE)
+    assert refusal.remedy == 'use "base_link"'
+
+
+def test_a_joint_beyond_its_limit_is_clamped_in_the_goals_own_form(planner: Planner, home: JointState):
+    goal = JointGoal(name=("efector_joint", "brazo_joint"), position=(0.1, -3.5))
+    refusal = refused(planner.plan(PlanRequest(goal=goal), home), PlanCode.INVALID_GOAL_CONSTRAINTS)
+    assert (refusal.check, refusal.subject, refusal.value, refusal.limit) == ("joint limit", "brazo_joint", -3.5, -2.95)
+    assert refusal.nearest == (0.1, -2.95)
+
+
+@pytest.mark.parametrize(
+    "goal",
+    [
+        JointGoal(),
+        JointGoal(name=("brazo_joint",)),
+        JointGoal(name=("brazo_joint", "brazo_joint"), position=(0.0, 1.0)),
+        PoseGoal(position=(0.1, 0.2)),
+    ],
+)
+def test_a_goal_that_says_too_little_or_two_things_is_refused(planner: Planner, home: JointState, goal: Any):
+    refused(planner.plan(PlanRequest(goal=goal), home), PlanCode.INVALID_GOAL_CONSTRAINTS)
+
+
+def test_an_orientation_is_refused_by_an_arm_that_cannot_choose_it(planner: Planner, home: JointState):
+    goal = PoseGoal(position=(0.25, 0.15, 0.1), orientation=(0.0, 0.0, 0.0, 1.0))
+    refusal = refused(planner.plan(PlanRequest(goal=goal), home), PlanCode.INVALID_GOAL_CONSTRAINTS)
+    assert "3 joints: it can place its tool, but not choose how the tool is turned" in refusal.message
+    assert "leave the orientation empty" in refusal.remedy
+
+
+@pytest.mark.parametrize(
+    ("goal", "subject", "nearest"),
+    [
+        ((0.25, 0.15, 0.3), "z", (0.25, 0.15, 0.2176)),
+        ((0.25, 0.15, -0.1), "z", (0.25, 0.15, 0.0177)),
+        ((0.6, 0.0, 0.1), "x", (0.4063, 0.0, 0.1)),
+    ],
+)
+def test_out_of_reach_names_the_axis_and_the_nearest_point(
+    planner: Planner, home: JointState, goal: tuple[float, ...], subject: str, nearest: tuple[float, ...]
+):
+    refusal = refused(planner.plan(PlanRequest(goal=PoseGoal(position=goal)), home), PlanCode.NO_IK_SOLUTION)
+    assert (refusal.check, refusal.subject) == ("reach", subject)
+    assert refusal.nearest == pytest.approx(nearest, abs=3e-4)
+
+
+def test_a_joint_that_holds_the_tool_back_is_named(planner: Planner, home: JointState):
+    response = planner.plan(PlanRequest(goal=PoseGoal(position=(0.25, 0.15, 0.3))), home)
+    assert "efector_joint at its upper limit of 0.2 m" in refused(response, PlanCode.NO_IK_SOLUTION).message
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(-0.3, 0.5)))
+def test_the_nearest_goal_of_a_refusal_is_planned_when_asked_for(goal: tuple[float, ...]):
+    response = PLANNER.plan(PlanRequest(goal=PoseGoal(position=goal)), STANDING)
+    if response.code is PlanCode.SUCCESS:
+        return
+    assert response.refusal is not None
+    again = PLANNER.plan(PlanRequest(goal=PoseGoal(position=response.refusal.nearest)), STANDING)
+    assert again.code is PlanCode.SUCCESS, (goal, response.refusal, again.refusal)
+
+
+def test_a_goal_in_self_collision_names_the_pair_and_how_far_it_can_go(planner: Planner, home: JointState):
+    goal = JointGoal(name=("antebrazo_joint",), position=(2.9,))
+    refusal = refused(planner.plan(PlanRequest(goal=goal), home), PlanCode.GOAL_IN_COLLISION)
+    assert refusal.subject == "base_link / efector_link"
+    again = planner.plan(PlanRequest(goal=JointGoal(name=goal.name, position=refusal.nearest)), home)
+    assert again.code is PlanCode.SUCCESS
+
+
+def test_a_way_through_itself_names_the_pair(planner: Planner, rm1: Arm):
+    """From above the upper arm to beside the base: the straight way sinks into the arm before it is out."""
+    start, goal = (0.0, 2.92, 0.2), (0.0, 2.66, 0.0)
+    response = planner.plan(
+        PlanRequest(goal=JointGoal(name=rm1.joint_names, position=goal)),
+        JointState(name=rm1.joint_names, position=start),
+    )
+    refusal = refused(response, PlanCode.PLANNING_FAILED)
+    assert refusal.check == "self-collision"
+    assert "efector_link" in refusal.subject
+    assert "go by way of another posture" in refusal.remedy
+
+
+def test_a_start_in_collision_is_not_planned_from(planner: Planner, rm1: Arm):
+    start = JointState(name=rm1.joint_names, position=(0.0, 2.9, 0.0))
+    refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="home")), start), PlanCode.START_STATE_IN_COLLISION)
+    assert "base_link with efector_link" in refusal.message
+
+
+def test_no_joint_state_is_said(planner: Planner):
+    refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="home")), None), PlanCode.ROBOT_STATE_STALE)
+    assert "no joint state has come yet" in refusal.message
+
+
+def test_a_stale_joint_state_is_said_with_its_age(planner: Planner, home: JointState):
+    refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="home")), home, age=3.0), PlanCode.ROBOT_STATE_STALE)
+    assert (refusal.value, refusal.limit) == (3.0, 0.5)
+
+
+def test_a_joint_state_without_a_joint_is_said(planner: Planner):
+    state = JointState(name=("brazo_joint",), position=(0.0,))
+    refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="home")), state), PlanCode.INVALID_ROBOT_STATE)
+    assert "antebrazo_joint, efector_joint" in refusal.message
+
+
+def test_a_moving_start_is_refused_with_the_joint(planner: Planner, rm1: Arm):
+    state = JointState(name=rm1.joint_names, position=(0.0, 0.0, 0.0), velocity=(0.0, 0.5, 0.0))
+    refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="ready")), state), PlanCode.INVALID_ROBOT_STATE)
+    assert (refusal.check, refusal.subject, refusal.value) == ("moving start", "antebrazo_joint", 0.5)
+
+
+def test_a_start_outside_the_limits_is_refused(planner: Planner, rm1: Arm):
+    state = JointState(name=rm1.joint_names, position=(3.0, 0.0, 0.0))
+    refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="ready")), state), PlanCode.INVALID_ROBOT_STATE)
+    assert (refusal.subject, refusal.value, refusal.limit) == ("brazo_joint", 3.0, 2.95)
+
+
+def test_a_search_without_time_is_timed_out(planner: Planner, home: JointState):
+    request = PlanRequest(goal=PoseGoal(position=(0.6, 0.0, 0.1)))
+    refusal = refused(planner.plan(request, home, is_late=lambda: True), PlanCode.TIMED_OUT)
+    assert refusal.subject == "allowed_time"
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.builds(
+    PlanRequest,
+    goal=st.one_of(
+        st.builds(NamedGoal, name=st.text(max_size=8)),
+        st.builds(
+            JointGoal,
+            name=st.lists(st.sampled_from(["brazo_joint", "efector_joint", "x"]), max_size=3).map(tuple),
+            position=st.lists(st.floats(-1e12, 1e12), max_size=3).map(tuple),
+        ),
+        st.builds(
+            PoseGoal,
+            position=st.lists(st.floats(-1e12, 1e12), max_size=4).map(tuple),
+            orientation=st.lists(st.floats(-1.0, 1.0), max_size=4).map(tuple),
+            frame=st.sampled_from(["", "base_link", "efector_link", "nowhere"]),
+        ),
+    ),
+    velocity_scaling=st.floats(-1.0, 2.0),
+    acceleration_scaling=st.floats(1e-6, 1.0),
+))  # fmt: skip
+def test_whatever_is_asked_there_is_a_plan_or_a_reason(request_: PlanRequest):
+    response = PLANNER.plan(request_, STANDING)
+    if response.code is PlanCode.SUCCESS:
+        assert response.trajectory.points
+    else:
+        refused(response, response.code)

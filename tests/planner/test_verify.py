@@ -1,0 +1,87 @@
+"""The last look at a trajectory finds what must not be executed."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from schemas.motion import JointTrajectory
+from services.arm.description import Arm
+from services.arm.interpolation import TrajectorySampler
+from services.planner.core import Planner
+from services.planner.profile import joint_limits, straight_line
+from services.planner.verify import BadTrajectory, first_collision, require_ends, require_within_limits, sample
+
+START, GOAL = (0.0, 0.0, 0.0), (1.0, -0.5, 0.1)
+
+
+@pytest.fixture
+def trajectory(rm1: Arm) -> JointTrajectory:
+    return straight_line(rm1.joint_names, START, GOAL, joint_limits(rm1))
+
+
+def test_it_samples_what_the_gateway_will_play(trajectory: JointTrajectory):
+    samples, sampler = sample(trajectory), TrajectorySampler(trajectory)
+    for row in range(0, len(samples.times), 17):
+        p, v, a = sampler.at(float(samples.times[row]))
+        assert samples.positions[row] == pytest.approx(p, abs=1e-9)
+        assert samples.velocities[row] == pytest.approx(v, abs=1e-7)
+        assert samples.accelerations[row] == pytest.approx(a, abs=1e-5)
+
+
+@pytest.mark.parametrize("what", ["velocity", "acceleration"])
+def test_a_limit_that_is_exceeded_is_named_with_joint_and_time(rm1: Arm, trajectory: JointTrajectory, what: str):
+    tight = msgspec.structs.replace  # the arm's own limits are what a faster trajectory would break
+    faster = tight(trajectory, points=tuple(_sped_up(point) for point in trajectory.points))
+    with pytest.raises(BadTrajectory, match=r'velocity of "efector_joint" is .* at .* s, .* beyond its limit'):
+        require_within_limits(rm1, sample(faster), joint_limits(rm1))
+    slow = joint_limits(rm1, 1.0, 0.5) if what == "acceleration" else joint_limits(rm1, 0.5, 1.0)
+    with pytest.raises(BadTrajectory, match=what):
+        require_within_limits(rm1, sample(trajectory), slow)
+
+
+def _sped_up(point):
+    return msgspec.structs.replace(
+        point,
+        time_from_start=point.time_from_start / 2,
+        velocities=tuple(2 * v for v in point.velocities),
+        accelerations=tuple(4 * a for a in point.accelerations),
+    )
+
+
+def test_a_position_beyond_its_limit_is_named(rm1: Arm):
+    beyond = straight_line(rm1.joint_names, START, (0.0, 3.0, 0.0), joint_limits(rm1))
+    with pytest.raises(BadTrajectory, match=r'position of "antebrazo_joint" is 3 at'):
+        require_within_limits(rm1, sample(beyond), joint_limits(rm1))
+
+
+def test_wrong_ends_are_refused(trajectory: JointTrajectory):
+    require_ends(trajectory, START, GOAL)
+    with pytest.raises(BadTrajectory, match="from the start to the goal"):
+        require_ends(trajectory, START, (1.0, -0.5, 0.100001))
+    cut = msgspec.structs.replace(trajectory, points=trajectory.points[:-1])
+    with pytest.raises(BadTrajectory, match=r"start to the goal|at rest"):
+        require_ends(cut, START, cut.points[-1].positions)
+
+
+def test_a_touch_in_the_middle_of_a_way_is_found(planner: Planner):
+    """Both ends are free; between them the effector would pass through the upper arm."""
+    collisions = planner.kinematics.collisions
+    rows = np.array([(0.0, 2.6, 0.0), (0.0, 2.9, 0.0), (0.0, 2.6, 0.0)])
+    found = first_collision(collisions, rows, 0.004)
+    assert found is not None
+    assert collisions.distance(found) <= 0.004
+    assert first_collision(collisions, rows[:1], 0.004) is None
+
+
+def test_nothing_that_dense_sampling_sees_is_missed(planner: Planner):
+    collisions, generator = planner.kinematics.collisions, np.random.default_rng(5)
+    low, high = ([getattr(joint, side) for joint in planner.arm.joints] for side in ("lower", "upper"))
+    for _ in range(60):
+        ends = generator.uniform(low, high, (2, 3))
+        rows = ends[0] + np.linspace(0.0, 1.0, 400)[:, None] * (ends[1] - ends[0])
+        is_free = min(collisions.distance(row) for row in rows) > 0.004
+        assert (first_collision(collisions, rows, 0.004) is None) <= (min(map(collisions.distance, rows)) > 0.0)
+        if is_free:
+            assert first_collision(collisions, rows[::40], 0.004 * 0.5) is None
