@@ -22,9 +22,12 @@ EPOCH = 1_700_000_000_000_000_000  # [ns] UNIX at virtual time 0
 
 
 class VirtualArm:
-    """Moves time on; hands every message of the gateway to `on_message`."""
+    """Moves time on; hands every message of the gateway to `on_message`.
 
-    def __init__(self, arm: Arm, on_message: Callable[[Message], None], seed: int = 3) -> None:
+    The gateway's loop beats `phase` [us] after the device's reports.
+    """
+
+    def __init__(self, arm: Arm, on_message: Callable[[Message], None], seed: int = 3, phase: int = 0) -> None:
         self.device = Device(device_config(arm), boot_id=1)
         self.gateway = GatewayCore(arm, session_id=1)
         self.now = 0  # [us]
@@ -35,6 +38,7 @@ class VirtualArm:
         self._back: list[tuple[int, int, Kind, bytes]] = []
         self._last = {"there": 0, "back": 0}
         self._order = count()
+        self._advance(phase)
         self.device.report_status()
         self.carry_out(self.gateway.on_link(True, "", self.moment))
 

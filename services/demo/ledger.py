@@ -4,8 +4,9 @@ Two independent sources are held against each other: `commands` says which knots
 how many steps the device itself has emitted. Nothing is taken from what the demonstration wanted.
 
 - following error: `step_errors`, which compares both sides at the same moment of the device's path.
-- lost steps: when a stream has ended and the device stands, the last knot that was sent for it, rounded to the
-  nearest step, minus the device's count. Every step lost on the way would still be missing there.
+- lost steps: when the device stands and says that it has played a stream to its end, the last knot that was sent for
+  it, rounded to the nearest step, minus the device's count. Every step lost on the way would still be missing there.
+  A stream that was stopped before its end has no such knot; its move has failed anyway.
 - chunks lost: chunks for which no `command_acks` ever said OK (or DUPLICATE, which is OK said twice).
 """
 
@@ -15,6 +16,7 @@ from schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState
 from schemas.joints import StepErrors
 
 OK, DUPLICATE = 0, 1  # firmware/PROTOCOL.md, codes of ACK
+SAME_TIME = 1e-4  # [s]
 
 
 class Ledger:
@@ -27,6 +29,7 @@ class Ledger:
         self._sent: set[tuple[int, int]] = set()  # (stream, seq)
         self._acknowledged: set[tuple[int, int]] = set()
         self._last_knot: dict[int, dict[str, int]] = {}  # by stream [1/256 step]
+        self._ends: dict[int, float] = {}  # by stream, when its last knot is due [s]
         self._streams: list[int] = []  # in the order of their first chunk
         self._differences: dict[int, dict[str, int]] = {}  # by stream [steps] at rest
 
@@ -40,8 +43,7 @@ class Ledger:
         if message.stream not in self._streams:
             self._streams.append(message.stream)
         if message.steps:
-            self._last_knot[message.stream] = dict(zip(message.name, message.steps[-1], strict=True))
-            self._differences.pop(message.stream, None)
+            self._keep_last_knot(message)
 
     def on_ack(self, message: CommandAck) -> None:
         if message.code in (OK, DUPLICATE):
@@ -52,10 +54,18 @@ class Ledger:
         self.executed = dict(zip(message.name, message.steps, strict=True))
         knot = self._last_knot.get(message.stream)
         is_at_rest = message.mode is DeviceMode.IDLE and message.buffered == 0.0 and not any(message.velocity)
-        if knot is not None and is_at_rest:
+        if knot is not None and is_at_rest and message.play_time > self._ends[message.stream] - SAME_TIME:
             self._differences[message.stream] = {
                 name: nearest_step(position) - self.executed[name] for name, position in knot.items()
             }
+
+    def _keep_last_knot(self, message: CommandChunk) -> None:
+        """A chunk that is sent again does not take the place of a later one."""
+        end = message.time + (len(message.steps) - 1) * message.dt
+        if end >= self._ends.get(message.stream, 0.0):
+            self._ends[message.stream] = end
+            self._last_knot[message.stream] = dict(zip(message.name, message.steps[-1], strict=True))
+            self._differences.pop(message.stream, None)
 
     @property
     def commanded(self) -> dict[str, int]:

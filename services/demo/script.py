@@ -53,7 +53,7 @@ def sine_of(joint: Joint, start: float) -> Sine:
 
 
 def tour(arm: Arm) -> tuple[Stop, ...]:
-    """Every named state, some joint goals, some tool positions, and home again."""
+    """Every named state, home, some joint goals, some tool positions; it ends where the step counts are not zero."""
     named = [Stop(f"named {name}", NamedGoal(name=name)) for name in arm.named_states if name != "home"]
     joints = [
         Stop(f"joints {number}", JointGoal(name=arm.joint_names, position=positions_at(arm, shares)))
@@ -64,7 +64,7 @@ def tour(arm: Arm) -> tuple[Stop, ...]:
         for number, shares in enumerate(POSE_TOUR, 1)
     ]
     home = JointGoal(name=arm.joint_names, position=arm.reference_position)
-    return (*named, *joints, *poses, Stop("home", home))
+    return (*named, Stop("home", home), *joints, *poses)
 
 
 def positions_at(arm: Arm, shares: tuple[float, ...]) -> tuple[float, ...]:

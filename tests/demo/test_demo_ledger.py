@@ -12,11 +12,11 @@ NAMES = ("brazo_joint", "efector_joint")
 
 
 def chunk(stream: int, seq: int, *last: int) -> CommandChunk:
-    return CommandChunk(stream=stream, seq=seq, name=NAMES, steps=((0, 0), last))
+    return CommandChunk(stream=stream, seq=seq, name=NAMES, dt=0.02, time=0.04 * seq, steps=((0, 0), last))
 
 
-def at_rest(stream: int, *steps: int, mode: DeviceMode = DeviceMode.IDLE, velocity: float = 0.0) -> DeviceState:
-    return DeviceState(stream=stream, name=NAMES, steps=steps, mode=mode, velocity=(velocity, 0.0))
+def at_rest(stream: int, *steps: int, mode: DeviceMode = DeviceMode.IDLE, velocity: float = 0.0, played: float = 9.0):
+    return DeviceState(stream=stream, name=NAMES, steps=steps, mode=mode, velocity=(velocity, 0.0), play_time=played)
 
 
 def a_good_run() -> Ledger:
@@ -71,6 +71,22 @@ def test_steps_are_counted_only_at_rest():
     ledger.on_state(at_rest(7, 50, 0, mode=DeviceMode.RUN, velocity=100.0))
     assert not ledger.is_settled
     assert any("not seen at rest" in text for text in complaints(report_of("rm1", MOVES, ledger), ledger))
+
+
+def test_a_stream_that_was_stopped_on_its_way_has_not_lost_steps():
+    ledger = a_good_run()
+    ledger.on_chunk(chunk(8, 0, 99_000, 0))
+    ledger.on_state(at_rest(8, 120, -1, played=0.01))
+    assert ledger.lost_steps == 0
+    assert not ledger.is_settled
+
+
+def test_a_chunk_that_is_sent_again_does_not_move_the_end_back():
+    ledger = a_good_run()
+    ledger.on_chunk(chunk(7, 0, 128, 0))
+    ledger.on_state(at_rest(7, 100, -1))
+    assert ledger.commanded["brazo_joint"] == 100
+    assert ledger.lost_steps == 0
 
 
 def test_a_loss_in_an_earlier_stream_is_not_forgotten():
