@@ -1,0 +1,174 @@
+"""The examples, as a user runs them: processes of their own against a router and a scripted robot."""
+
+from __future__ import annotations
+
+import itertools
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from schemas.actions import GoalStatusCode
+from schemas.frames import FrameTransform, FrameTransforms, Transform
+from schemas.joints import JointState, JointTargets
+from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, JOINT_TARGETS, STATIC_FRAMES
+from services.runtime.actions import ActionServer, GoalDecision, accept
+from services.runtime.node import Node
+from tests.runtime.support import ROOT, RouterProcess, spinning, until
+
+EXAMPLES = sorted(path.name for path in (ROOT / "examples").glob("*.py"))
+LONGEST = 20  # lines that do something
+
+Start = Callable[[str], subprocess.Popen[str]]
+
+
+@pytest.fixture(scope="module")
+def router(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RouterProcess]:
+    process = RouterProcess(tmp_path_factory.mktemp("router"))
+    yield process
+    process.kill()
+
+
+@pytest.fixture
+def start(router: RouterProcess) -> Iterator[Start]:
+    started: list[subprocess.Popen[str]] = []
+
+    def start_example(name: str) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [sys.executable, f"examples/{name}"], cwd=ROOT, env=router.environ, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
+        started.append(process)
+        return process
+
+    yield start_example
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def robot(router: RouterProcess) -> Iterator[Node]:
+    """A node that says what the stack of rm1 would say."""
+    with Node("stepper_gateway", router.deployment, robot="rm1") as node:
+        yield node
+
+
+def end(process: subprocess.Popen[str]) -> str:
+    process.send_signal(signal.SIGTERM)
+    output, errors = process.communicate(timeout=3.0)
+    assert process.returncode == 0, errors
+    assert "Traceback" not in errors
+    return output
+
+
+def line(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    return process.stdout.readline()
+
+
+def test_joint_monitor_prints_the_joints_and_notices_silence(start: Start, robot: Node) -> None:
+    process = start("joint_monitor.py")
+    assert line(process) == "no joint states: is stepper_gateway running?\n"
+    states = robot.publisher(JOINT_STATES)
+    with spinning(robot, lambda now: states.put(JointState(stamp=now, name=("q1", "q2"), position=(0.5, -0.25)))):
+        while "no joint" in (said := line(process)):
+            pass
+    assert said == "q1 +0.5000  q2 -0.2500\n"
+    while "no joint" not in line(process):
+        pass
+    end(process)
+
+
+def test_tool_pose_warns_while_the_frame_does_not_exist_and_then_prints_it(start: Start, robot: Node) -> None:
+    process = start("tool_pose.py")
+    assert process.stderr is not None
+    assert "tool_pose WARNING" in process.stderr.readline()
+    fixed = FrameTransform(parent="brazo_link", child="efector_link", transform=Transform(translation=(0.2, 0.0, 0.1)))
+    robot.publisher(STATIC_FRAMES).put(FrameTransforms(transforms=(fixed,)))
+    frames = robot.publisher(FRAMES)
+
+    def step(now: int) -> None:
+        moving = FrameTransform(
+            stamp=now, parent="base_link", child="brazo_link", transform=Transform(translation=(0.0, 0.0, 0.05))
+        )
+        frames.put(FrameTransforms(transforms=(moving,)))
+
+    with spinning(robot, step):
+        assert line(process) == "x +0.2000  y +0.0000  z +0.1500 m\n"
+    end(process)
+
+
+class Follower:
+    """Accepts every trajectory and 'follows' it in three steps."""
+
+    def __init__(self, node: Node) -> None:
+        self.goals: list[FollowJointTrajectoryGoal] = []
+        self.running: dict[str, int] = {}
+        self.states = node.publisher(JOINT_STATES)
+        self.server: ActionServer[
+            FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult
+        ] = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self.on_goal, lambda goal_id: "")
+
+    def on_goal(self, goal_id: str, goal: FollowJointTrajectoryGoal) -> GoalDecision:
+        self.goals.append(goal)
+        self.running[goal_id] = 0
+        return accept()
+
+    def step(self, now: int) -> None:
+        self.states.put(JointState(stamp=now, name=("q1", "q2"), position=(0.5, -0.25)))
+        for goal_id, index in list(self.running.items()):
+            self.running[goal_id] = index + 1
+            self.server.feedback(goal_id, FollowJointTrajectoryFeedback(index=index, points=3, duration=4.0))
+            if index == 3:
+                del self.running[goal_id]
+                result = FollowJointTrajectoryResult(executed_steps=(100, -40))
+                self.server.finish(goal_id, GoalStatusCode.SUCCEEDED, result)
+
+
+def test_custom_planner_moves_the_arm_and_feedback_monitor_sees_it(
+    start: Start, router: RouterProcess, robot: Node
+) -> None:
+    follower = Follower(robot)
+    with spinning(robot, follower.step):
+        monitor = start("feedback_monitor.py")
+        with Node("observer", router.deployment, robot="rm1") as observer:
+            assert until(lambda: "feedback_monitor" in observer.alive())
+        time.sleep(0.3)
+        planner = start("custom_planner.py")
+        output, errors = planner.communicate(timeout=10.0)
+        assert (planner.returncode, errors) == (0, "")
+        assert output == "SUCCEEDED  (100, -40)\n"
+        said = [line(monitor) for _ in range(3)]
+    assert said[2] == "point 2 of 3, 0.00 of 4.00 s, error 0.00000\n"
+    assert "SUCCEEDED" in end(monitor)
+    points = follower.goals[0].trajectory.points
+    assert [point.positions for point in points] == [(0.5, -0.25), (0.52, -0.23), (0.5, -0.25)]
+
+
+def test_demo_sine_streams_targets_about_where_the_arm_stands(start: Start, robot: Node) -> None:
+    heard: list[JointTargets] = []
+    robot.subscribe(JOINT_TARGETS, heard.append)
+    states = robot.publisher(JOINT_STATES)
+    with spinning(robot, lambda now: states.put(JointState(stamp=now, name=("q1",), position=(0.5,)))):
+        process = start("demo_sine.py")
+        assert until(lambda: len(heard) >= 12, 10.0)
+        end(process)
+    assert all(targets.name == ("q1",) and abs(targets.position[0] - 0.5) <= 0.02 for targets in heard)
+    gaps = [after.stamp - before.stamp for before, after in itertools.pairwise(heard)]
+    assert sorted(gaps)[len(gaps) // 2] == pytest.approx(1e8, rel=0.1)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_is_short(name: str) -> None:
+    text = (ROOT / "examples" / name).read_text(encoding="utf-8").splitlines()
+    doing = [each for each in text if each.strip() and not each.startswith(("from ", "import ", '"""'))]
+    assert len(doing) <= LONGEST
+
+
+def test_the_examples_that_are_promised_are_there() -> None:
+    assert {"joint_monitor.py", "custom_planner.py", "feedback_monitor.py", "tool_pose.py"} <= set(EXAMPLES)
