@@ -15,6 +15,14 @@ Row = tuple[str, ...]
 
 
 @dataclass(frozen=True)
+class Line:
+    """One row of the table of these joints."""
+
+    joints: tuple[str, ...]
+    cells: Row
+
+
+@dataclass(frozen=True)
 class _Pending:
     chunk: CommandChunk
     arrival: int  # [ns] UNIX time
@@ -24,12 +32,12 @@ class CommandLog:
     """Joins chunks with their acknowledgements, in the order in which the answers came."""
 
     def __init__(self) -> None:
-        self.joints: tuple[str, ...] = ()  # names of the columns, in the wire's order
         self.lost = 0  # chunks without an answer
         self.missing = 0  # chunks that never arrived here: gaps of the sequence number
+        self.malformed = 0  # chunks whose tables do not fit together; they are in the MCAP only
         self._pending: dict[tuple[int, int], _Pending] = {}
         self._newest: tuple[int, int] = (0, -1)  # stream, seq
-        self._rows: list[Row] = []
+        self._lines: list[Line] = []
 
     @property
     def pending(self) -> int:
@@ -38,39 +46,41 @@ class CommandLog:
 
     def on_chunk(self, chunk: CommandChunk, now: int) -> None:
         """Remember a chunk until its answer comes; one that is sent again ends the wait of the first."""
-        self.joints = self.joints or chunk.name
+        if not is_well_formed(chunk):
+            self.malformed += 1
+            return
         self._count_missing(chunk)
         key = chunk.stream, chunk.seq
         first = self._pending.pop(key, None)
         if first is not None:
-            self._rows += _rows(first.chunk, None, RESENT)
+            self._lines += _lines(first.chunk, None, RESENT)
         self._pending[key] = _Pending(chunk, now)
 
     def on_ack(self, ack: CommandAck) -> None:
         """Complete the rows of the chunk that is answered; an answer to none of them is ignored."""
         waiting = self._pending.pop((ack.stream, ack.seq), None)
         if waiting is not None:
-            self._rows += _rows(waiting.chunk, ack, str(ack.code))
+            self._lines += _lines(waiting.chunk, ack, str(ack.code))
 
-    def step(self, now: int) -> list[Row]:
-        """The rows completed since the last call, those of lost chunks among them."""
+    def step(self, now: int) -> list[Line]:
+        """The lines completed since the last call, those of lost chunks among them."""
         while self._pending:
             key, waiting = next(iter(self._pending.items()))
             if now - waiting.arrival < ACK_TIMEOUT:
                 break
             del self._pending[key]
             self.lost += 1
-            self._rows += _rows(waiting.chunk, None, LOST)
-        rows, self._rows = self._rows, []
-        return rows
+            self._lines += _lines(waiting.chunk, None, LOST)
+        lines, self._lines = self._lines, []
+        return lines
 
-    def finish(self, now: int) -> list[Row]:
-        """All rows that are left, with those still waiting marked as unanswered."""
-        rows = self.step(now)
+    def finish(self, now: int) -> list[Line]:
+        """All lines that are left, with those still waiting marked as unanswered."""
+        lines = self.step(now)
         for waiting in self._pending.values():
-            rows += _rows(waiting.chunk, None, UNANSWERED)
+            lines += _lines(waiting.chunk, None, UNANSWERED)
         self._pending.clear()
-        return rows
+        return lines
 
     def _count_missing(self, chunk: CommandChunk) -> None:
         stream, seq = self._newest
@@ -88,25 +98,34 @@ def header(joints: tuple[str, ...]) -> Row:
     return ("seq", "timestamp_pc_us", "timestamp_pc_iso", *motion, "command_sent", *answer, *executed)
 
 
-def _rows(chunk: CommandChunk, ack: CommandAck | None, code: str) -> list[Row]:
+def is_well_formed(chunk: CommandChunk) -> bool:
+    """Whether every table is absent or has a row per knot and a column per joint, and steps fit the wire."""
+    tables = (chunk.position, chunk.velocity, chunk.acceleration, chunk.steps, chunk.step_rate)
+    shape = [len(chunk.name)] * len(chunk.steps)
+    words = [word for table in (chunk.steps, chunk.step_rate) for row in table for word in row]
+    return all([len(row) for row in table] in ([], shape) for table in tables) and all(
+        -0x8000_0000 <= word <= 0x7FFF_FFFF for word in words
+    )
+
+
+def _lines(chunk: CommandChunk, ack: CommandAck | None, code: str) -> list[Line]:
     when = (str(chunk.seq), str(chunk.stamp // 1000), iso(chunk.stamp))
-    if ack is None:
-        answer, executed = ("", code, ""), ("",) * len(chunk.name)
-    else:
-        answer = (str(ack.stamp // 1000), code, f"{ack.round_trip * 1e3:.3f}")
-        executed = tuple(map(str, ack.steps)) or ("",) * len(chunk.name)
+    stamp, round_trip = ("", "") if ack is None else (str(ack.stamp // 1000), f"{ack.round_trip * 1e3:.3f}")
+    is_known = ack is not None and len(ack.steps) == len(chunk.name)
+    executed = tuple(map(str, ack.steps)) if ack is not None and is_known else ("",) * len(chunk.name)
     return [
-        (*when, *_motion(chunk, knot), _words(chunk, knot), str(chunk.stream), str(knot), _time(chunk, knot), *answer,
-         *executed)
+        Line(
+            chunk.name,
+            (*when, *_motion(chunk, knot), _words(chunk, knot), str(chunk.stream), str(knot), _time(chunk, knot),
+             stamp, code, round_trip, *executed),
+        )
         for knot in range(len(chunk.steps))
     ]  # fmt: skip
 
 
 def _motion(chunk: CommandChunk, knot: int) -> list[str]:
     tables = (chunk.position, chunk.velocity, chunk.acceleration)
-    return [
-        f"{table[knot][joint]:.9g}" if knot < len(table) else "" for joint in range(len(chunk.name)) for table in tables
-    ]
+    return [f"{table[knot][joint]:.9g}" if table else "" for joint in range(len(chunk.name)) for table in tables]
 
 
 def _words(chunk: CommandChunk, knot: int) -> str:

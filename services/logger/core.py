@@ -9,9 +9,10 @@ from schemas.device import CommandAck, CommandChunk
 from schemas.frames import RobotDescription
 from schemas.message import Message
 from schemas.topics import Delivery, Topic
-from services.logger.command_log import CommandLog, Row
+from services.logger.command_log import CommandLog, Line
 
 MAX_WAITING = 10_000  # messages held while the disk refuses: about half a minute of full motion
+LAST_STAMP = 2**63 - 1  # [ns] readers take times as signed 64 bits
 
 
 @dataclass(frozen=True)
@@ -24,8 +25,9 @@ class Entry:
 
     @property
     def stamp(self) -> int:
-        """The message's own time in [ns] UNIX; its arrival where it has none."""
-        return getattr(self.message, "stamp", 0) or self.arrival
+        """The message's own time in [ns] UNIX; its arrival where it has none that makes sense."""
+        stamp = getattr(self.message, "stamp", 0)
+        return stamp if 0 < stamp <= LAST_STAMP else self.arrival
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class Batch:
     """What is to be written now."""
 
     entries: tuple[Entry, ...] = ()
-    rows: tuple[Row, ...] = ()
+    lines: tuple[Line, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,7 @@ class Losses:
     dropped: dict[str, int] = field(default_factory=dict)  # by key: the disk refused for too long
     missing_chunks: int = 0  # gaps in the sequence of commands
     lost_chunks: int = 0  # commands that the device never answered
+    malformed_chunks: int = 0  # commands whose tables do not fit together
 
     @property
     def sentence(self) -> str:
@@ -51,6 +54,9 @@ class Losses:
         parts = [f"messages not written: {dropped}"] if dropped else []
         parts += [f"{self.missing_chunks} command chunks never arrived at the logger"] if self.missing_chunks else []
         parts += [f"{self.lost_chunks} command chunks were never acknowledged"] if self.lost_chunks else []
+        parts += (
+            [f"{self.malformed_chunks} malformed command chunks are not in the CSV"] if self.malformed_chunks else []
+        )
         return "; ".join(parts)
 
 
@@ -61,7 +67,7 @@ class Logger:
         self.commands = CommandLog()
         self.description: RobotDescription | None = None
         self._waiting: deque[Entry] = deque()
-        self._rows: deque[Row] = deque()
+        self._lines: deque[Line] = deque()
         self._max_waiting = max_waiting
         self._latched: dict[str, Entry] = {}
         self._dropped: Counter[str] = Counter()
@@ -82,19 +88,19 @@ class Logger:
 
     def step(self, now: int) -> Batch:
         """Everything that waits; what could not be written comes back by `give_back`."""
-        self._rows.extend(self.commands.step(now))
+        self._lines.extend(self.commands.step(now))
         return self._take()
 
     def finish(self, now: int) -> Batch:
         """Everything that is left when the logger stops."""
-        self._rows.extend(self.commands.finish(now))
+        self._lines.extend(self.commands.finish(now))
         return self._take()
 
     def give_back(self, batch: Batch) -> None:
         """Keep for later what the disk refused; the least valuable of too much is dropped and counted."""
-        self._rows.extendleft(reversed(batch.rows))
-        while len(self._rows) > self._max_waiting:
-            self._rows.popleft()
+        self._lines.extendleft(reversed(batch.lines))
+        while len(self._lines) > self._max_waiting:
+            self._lines.popleft()
             self._dropped["commands.csv"] += 1
         self._waiting.extendleft(reversed(batch.entries))
         self._drop_excess()
@@ -107,7 +113,7 @@ class Logger:
     @property
     def losses(self) -> Losses:
         """What is missing so far."""
-        return Losses(dict(self._dropped), self.commands.missing, self.commands.lost)
+        return Losses(dict(self._dropped), self.commands.missing, self.commands.lost, self.commands.malformed)
 
     def _keep(self, entry: Entry) -> None:
         self._waiting.append(entry)
@@ -130,7 +136,7 @@ class Logger:
             self._waiting = kept
 
     def _take(self) -> Batch:
-        batch = Batch(tuple(self._waiting), tuple(self._rows))
+        batch = Batch(tuple(self._waiting), tuple(self._lines))
         self._waiting.clear()
-        self._rows.clear()
+        self._lines.clear()
         return batch

@@ -74,8 +74,8 @@ class Disk:
             recording.describe(logger.description)
         if batch.entries:
             recording.write(batch.entries)
-        if batch.rows:
-            recording.write_rows(logger.commands.joints, batch.rows)
+        if batch.lines:
+            recording.write_lines(batch.lines)
 
     def _give_up(self, error: OSError, folder: Path, now: int) -> None:
         if self.recording is not None:

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 MCAP, CSV = ".mcap", ".csv"
-_NAME = r"\d{8}T\d{6}\.\d{3}Z_%s(\.\w+)"
+_NAME = r"(\d{8}T\d{6}\.\d{3}Z_%s)(_\d+)?\.\w+"
 
 
 def stem_of(robot: str, now: int) -> str:
@@ -23,11 +23,10 @@ def is_due(size: int, age: float, max_file_mb: float, max_age_minutes: float) ->
 
 def surplus(names: list[str], robot: str, keep: int) -> list[str]:
     """The files of all but the newest `keep` recordings of this robot; none where `keep` is 0."""
-    pattern = re.compile(_NAME % re.escape(robot))
-    ours = sorted(name for name in names if pattern.fullmatch(name))
-    stems = sorted({name.removesuffix(Path(name).suffix) for name in ours})
+    matches = [re.fullmatch(_NAME % re.escape(robot), name) for name in sorted(names)]
+    stems = sorted({match[1] for match in matches if match})
     old = set(stems[:-keep]) if keep else set()
-    return [name for name in ours if name.removesuffix(Path(name).suffix) in old]
+    return [match[0] for match in matches if match and match[1] in old]
 
 
 def prune(folder: Path, robot: str, keep: int) -> list[str]:

@@ -10,6 +10,7 @@ import csv
 import io
 from collections.abc import Iterable
 from contextlib import suppress
+from itertools import groupby
 from pathlib import Path
 from typing import IO
 
@@ -18,7 +19,7 @@ from mcap.writer import CompressionType, Writer
 
 from schemas.frames import RobotDescription
 from services.logger.channels import MESSAGE_ENCODING, SCHEMA_ENCODING, channel_of, recorded_topics
-from services.logger.command_log import Row, header
+from services.logger.command_log import Line, Row, header
 from services.logger.core import Entry
 from services.logger.files import CSV, MCAP
 
@@ -36,7 +37,7 @@ class Recording:
         self.started = started  # [ns] UNIX time
         self._described = ""
         self._sequences: dict[int, int] = {}
-        self._table: IO[str] | None = None
+        self._tables: dict[tuple[str, ...], IO[str]] = {}
         self._file: IO[bytes] = self.path.open("xb")
         self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
         self._writer.start(profile="gemelo")
@@ -65,17 +66,12 @@ class Recording:
         self._writer.add_metadata("robot", {"robot": description.robot, **files})
         self._writer.flush()
 
-    def write_rows(self, joints: tuple[str, ...], rows: Iterable[Row]) -> None:
-        """Add commands; the table begins with the first of them, when the joints are known."""
-        text = io.StringIO()
-        table = csv.writer(text, lineterminator="\n")
-        if self._table is None:
-            table.writerow(header(joints))
-        table.writerows(rows)
-        if self._table is None:
-            self._table = self.csv_path.open("x", encoding="utf-8", newline="")
-        self._table.write(text.getvalue())
-        self._table.flush()
+    def write_lines(self, lines: Iterable[Line]) -> None:
+        """Add commands, each to the table of its joints."""
+        for joints, group in groupby(lines, key=lambda line: line.joints):
+            table = self._tables.get(joints) or self._begin_table(joints)
+            table.write(_csv(line.cells for line in group))
+            table.flush()
 
     def close(self) -> None:
         """End the files properly, with the index that lets readers jump."""
@@ -86,10 +82,18 @@ class Recording:
 
     def abandon(self) -> None:
         """Let go of files that the disk no longer takes."""
-        for file in (self._file, self._table):
+        files: tuple[IO[bytes] | IO[str], ...] = (self._file, *self._tables.values())
+        for file in files:
             with suppress(OSError):
-                if file is not None:
-                    file.close()
+                file.close()
+
+    def _begin_table(self, joints: tuple[str, ...]) -> IO[str]:
+        """A table begins with its first command, when the joints are known; other joints get one of their own."""
+        number = f"_{len(self._tables) + 1}" if self._tables else ""
+        path = self.csv_path.with_name(self.csv_path.stem + number + CSV)
+        table = self._tables[joints] = path.open("x", encoding="utf-8", newline="")
+        table.write(_csv([header(joints)]))
+        return table
 
     def _register(self) -> dict[str, int]:
         channels = {}
@@ -100,3 +104,9 @@ class Recording:
                 channel.key, MESSAGE_ENCODING, schema, channel.metadata
             )
         return channels
+
+
+def _csv(rows: Iterable[Row]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()

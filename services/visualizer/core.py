@@ -19,7 +19,7 @@ from services.visualizer import entities
 from services.visualizer.model import Joint, Model
 from services.visualizer.panel import Facts, mode_name, panel
 from services.visualizer.rotations import Array
-from services.visualizer.thinning import Thinned
+from services.visualizer.thinning import LAST_STAMP, Thinned
 from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip, Times, Update
 
 PANEL_PERIOD = 500_000_000  # [ns]
@@ -72,12 +72,12 @@ class Visualizer:
 
     def on_log(self, message: LogRecord) -> None:
         """A line of a node."""
-        self._logs.append((message.stamp, f"{message.node}: {message.text}", message.level.name))
+        self._logs.append((_bounded(message.stamp), f"{message.node}: {message.text}", message.level.name))
 
     def on_event(self, message: DeviceEvent) -> None:
         """Something that the device reports once."""
         text = f"{message.device}: {message.event}" + (f" ({message.detail})" if message.detail else "")
-        self._logs.append((message.stamp, text, "ERROR" if message.event == "fault" else "INFO"))
+        self._logs.append((_bounded(message.stamp), text, "ERROR" if message.event == "fault" else "INFO"))
 
     def step(self, now: int) -> list[Update]:
         """Everything new; `now` in ns UNIX."""
@@ -145,7 +145,9 @@ class Visualizer:
         if self._path is None or not self._path_is_new:
             return []
         self._path_is_new = False
-        return [Strip(entities.PATH, self._path.stamp, np.array(self._path.points, dtype=float).reshape(-1, 3))]
+        return [
+            Strip(entities.PATH, _bounded(self._path.stamp), np.array(self._path.points, dtype=float).reshape(-1, 3))
+        ]
 
     def _device(self, now: int) -> list[Update]:
         if now - self._panel_at < PANEL_PERIOD:
@@ -181,6 +183,10 @@ def time_of_day(stamp: int) -> str:
     """UTC to the second, of ns UNIX."""
     minutes, seconds = divmod(stamp // 1_000_000_000 % 86_400, 60)
     return f"{minutes // 60:02d}:{minutes % 60:02d}:{seconds:02d}"
+
+
+def _bounded(stamp: int) -> int:
+    return min(max(stamp, 0), LAST_STAMP)
 
 
 def unit(joint: Joint) -> str:

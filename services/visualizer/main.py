@@ -37,7 +37,11 @@ def run(node: Node, deployment: Deployment) -> None:
     def on_description(message: RobotDescription) -> None:
         nonlocal visualizer
         if visualizer is None:
-            visualizer = _visualizer(node, message)
+            try:
+                visualizer = _visualizer(node, message)
+            except ValueError as error:
+                node.log.error(f"the description of {message.robot} cannot be drawn: {error}")
+                return
             for name in missing_meshes(visualizer.model, root / deployment.robot):
                 node.log.warning(f"mesh {name} is missing in {root / deployment.robot}: its link is drawn without it")
 

@@ -9,6 +9,8 @@ import numpy as np
 from services.visualizer.rotations import Array
 from services.visualizer.updates import Times
 
+LAST_STAMP = 2**63 - 1  # [ns] of a 64-bit time column
+CLOCK_CHANGED = 1_000_000_000  # [ns] a stamp that goes back by more is a new clock, not an old sample
 KEEP_ALIVE = 500_000_000  # [ns] between samples that say the same
 
 Sample = tuple[int, tuple[float, ...]]
@@ -31,9 +33,12 @@ class Thinned:
     def add(self, stamp: int, row: Sequence[float]) -> None:
         """A sample; one that is not newer than the last is left out."""
         sample = stamp, tuple(row)
-        if self._last is None:
+        if not 0 <= stamp <= LAST_STAMP:
+            return
+        newest = self._held or self._last
+        if self._last is None or newest is None or stamp < newest[0] - CLOCK_CHANGED:
             self._keep(sample)
-        elif stamp <= (self._held or self._last)[0]:
+        elif stamp <= newest[0]:
             return
         elif sample[1] != self._last[1]:
             # The line must stay level up to the change.

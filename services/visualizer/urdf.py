@@ -11,8 +11,11 @@ from services.visualizer.rotations import Array, quaternion
 
 
 def parse_urdf(text: str) -> Model:
-    """The model in a URDF's text; raises ValueError for what is not a tree."""
-    robot = ElementTree.fromstring(text)
+    """The model in a URDF's text; raises ValueError with what is wrong with it."""
+    try:
+        robot = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise ValueError(f"the URDF is not XML: {error}") from error
     colors = {material.get("name", ""): _color(material) for material in robot.findall("material")}
     visuals = {
         link.get("name", ""): tuple(_visual(visual, colors) for visual in link.findall("visual"))
@@ -23,7 +26,16 @@ def parse_urdf(text: str) -> Model:
     roots = [link for link in visuals if link not in children]
     if len(roots) != 1:
         raise ValueError(f"the URDF has {len(roots)} root links ({', '.join(roots)}): it must have one")
-    return _tree(robot.get("name", "robot"), roots[0], joints, visuals)
+    model = _tree(robot.get("name", "robot"), roots[0], joints, visuals)
+    _require_leaders(model)
+    return model
+
+
+def _require_leaders(model: Model) -> None:
+    names = {joint.name for joint in model.moving}
+    for joint in model.joints:
+        if joint.mimic is not None and joint.mimic[0] not in names:
+            raise ValueError(f"joint {joint.name} mimics {joint.mimic[0]}, which does not move by itself")
 
 
 def _tree(name: str, root: str, joints: list[Joint], visuals: dict[str, tuple[Visual, ...]]) -> Model:
@@ -34,6 +46,8 @@ def _tree(name: str, root: str, joints: list[Joint], visuals: dict[str, tuple[Vi
         link = links.pop(0)
         for joint in joints:
             if joint.parent == link:
+                if joint.child in paths:
+                    raise ValueError(f"link {joint.child} hangs on two joints: the URDF is not a tree")
                 ordered.append(joint)
                 paths[joint.child] = f"{paths[link]}/{joint.child}"
                 links.append(joint.child)
@@ -98,4 +112,7 @@ def _origin(element: ElementTree.Element) -> tuple[Array, Array]:
 
 def _numbers(element: ElementTree.Element | None, key: str, default: tuple[float, ...]) -> tuple[float, ...]:
     text = None if element is None else element.get(key)
-    return default if text is None else tuple(float(word) for word in text.split())
+    values = default if text is None else tuple(float(word) for word in text.split())
+    if len(values) != len(default):
+        raise ValueError(f'{key}="{text}" must have {len(default)} numbers')
+    return values

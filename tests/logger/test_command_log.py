@@ -2,6 +2,9 @@
 
 import struct
 
+import msgspec
+import pytest
+
 from schemas.device import CommandAck
 from services.logger.command_log import ACK_TIMEOUT, CommandLog, header
 
@@ -10,7 +13,7 @@ JOINTS = ("brazo_joint", "antebrazo_joint", "efector_joint")
 
 
 def table(rows):
-    return [dict(zip(header(JOINTS), row, strict=True)) for row in rows]
+    return [dict(zip(header(JOINTS), line.cells, strict=True)) for line in rows]
 
 
 def test_the_seeds_columns_come_first():
@@ -97,3 +100,27 @@ def test_an_answer_to_nothing_is_ignored_and_the_rest_is_unanswered_at_the_end(c
     log.on_chunk(chunk(0), START)
     assert {row["ack_code"] for row in table(log.finish(START))} == {"unanswered"}
     assert log.finish(START) == []
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [
+        {"steps": ((1, 2), (3,))}, {"position": ((0.0,),)}, {"steps": ((2**31, 0, 0),) * 5}, {"step_rate": ((0,),) * 5},
+        {"name": ("a",)},
+    ],
+)  # fmt: skip
+def test_a_chunk_whose_tables_do_not_fit_together_is_counted_and_left_out(chunk, ack, odd):
+    log = CommandLog()
+    log.on_chunk(msgspec.structs.replace(chunk(0), **odd), START)
+    log.on_ack(ack(0))
+    assert log.step(START + 2 * ACK_TIMEOUT) == []
+    assert log.malformed == 1
+
+
+def test_a_chunk_without_velocities_leaves_their_columns_empty(chunk, ack):
+    log = CommandLog()
+    log.on_chunk(msgspec.structs.replace(chunk(0), velocity=(), step_rate=()), START)
+    log.on_ack(msgspec.structs.replace(ack(0), steps=()))
+    row = table(log.step(START))[0]
+    assert (row["brazo_joint_vel"], row["brazo_joint_acc"], row["brazo_joint_executed_steps"]) == ("", "0", "")
+    assert len(bytes.fromhex(row["command_sent"])) == 12

@@ -19,6 +19,7 @@ from schemas.frames import FrameTransform, FrameTransforms, RobotDescription
 from schemas.joints import JointState
 from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, TOPICS
 from services.logger.channels import recorded_topics, schema_of
+from services.logger.command_log import Line
 from services.logger.core import Entry
 from services.logger.recording import Recording
 
@@ -83,12 +84,15 @@ def test_the_robots_files_and_the_origin_are_kept_beside_the_data(recording):
 
 
 def test_the_table_of_commands_is_plain_csv(recording):
-    recording.write_rows(("a",), [("0", "1"), ("1", "2")])
-    recording.write_rows(("a",), [("2", "3")])
+    recording.write_lines([Line(("a",), ("0", "1")), Line(("a",), ("1", "2")), Line(("b", "c"), ("7", "8"))])
+    recording.write_lines([Line(("a",), ("2", "3"))])
     recording.close()
     rows = list(csv.reader(recording.csv_path.read_text().splitlines()))
     assert rows[0][:4] == ["seq", "timestamp_pc_us", "timestamp_pc_iso", "a_pos"]
     assert [row[0] for row in rows[1:]] == ["0", "1", "2"]
+    other = recording.csv_path.with_name("test_2.csv").read_text().splitlines()
+    assert "b_pos" in other[0]
+    assert other[1] == "7,8"
 
 
 WRITER = """
@@ -96,6 +100,7 @@ import sys, time
 from pathlib import Path
 from schemas.joints import JointState
 from schemas.topics import JOINT_STATES
+from services.logger.command_log import Line
 from services.logger.core import Entry
 from services.logger.recording import Recording
 recording = Recording(Path(sys.argv[1]), "killed", 1, {})

@@ -82,6 +82,13 @@ def test_thinning_keeps_every_change_and_the_sample_before_it():
     assert thinned.take()[0].tolist() == [10 + KEEP_ALIVE]
 
 
+def test_one_stamp_far_ahead_does_not_freeze_the_view():
+    thinned = Thinned(1)
+    for stamp in (START, START + 10**15, START + 20_000_000, -1):
+        thinned.add(stamp, (float(stamp),))
+    assert thinned.take()[0].tolist() == [START, START + 10**15, START + 20_000_000]
+
+
 def test_the_trail_is_one_unbroken_line_and_rests_with_the_arm(core):
     lines = []
     for index in range(1, 31):

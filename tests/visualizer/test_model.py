@@ -15,6 +15,13 @@ from services.visualizer.shapes import mesh_of
 from services.visualizer.tool import tool_link
 from services.visualizer.urdf import parse_urdf
 
+
+def joint(parent, child, more=""):
+    """A joint in URDF."""
+    ends = f"<parent link='{parent}'/><child link='{child}'/>"
+    return f"<joint name='{parent}{child}' type='revolute'>{ends}{more}</joint>"
+
+
 NAMES = ["brazo_joint", "antebrazo_joint", "efector_joint"]
 angles = st.floats(-math.pi, math.pi)
 
@@ -96,6 +103,27 @@ def test_a_mimic_joint_follows_and_a_fixed_one_stays():
     assert model.tips("d", np.array([[math.pi]]), ["j"])[0] == pytest.approx(
         (-(math.pi / 2 + 0.1), 0.0, 1.0), abs=1e-12
     )
+
+
+LINKS = "<link name='a'/><link name='b'/><link name='c'/>"
+
+
+@pytest.mark.parametrize(
+    ("urdf", "complaint"),
+    [
+        ("not xml", "not XML"),
+        (f"<robot>{LINKS}" + joint("a", "b") + joint("b", "c") + joint("c", "b") + "</robot>", "hangs on two joints"),
+        (f"<robot>{LINKS}" + joint("a", "b", "<mimic joint='x'/>") + joint("b", "c") + "</robot>", "mimics x"),
+        (
+            f"<robot>{LINKS}" + joint("a", "b", "<axis xyz='0 0'/>") + joint("b", "c") + "</robot>",
+            "must have 3 numbers",
+        ),
+        (f"<robot>{LINKS}" + joint("a", "b", "<axis xyz='0 0 z'/>") + joint("b", "c") + "</robot>", "'z'"),
+    ],
+)
+def test_a_urdf_that_cannot_be_drawn_is_refused_with_the_reason(urdf, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        parse_urdf(urdf)
 
 
 def test_two_roots_are_refused_by_name():

@@ -43,6 +43,10 @@ def test_it_is_ready_when_it_knows_the_arm_and_records_what_the_arm_does(deploym
         thread.start()
         time.sleep(0.4)
         assert not node.is_ready
+        gateway.publisher(DESCRIPTION).put(RobotDescription(robot="rm1", urdf="<nonsense"))
+        gateway.publisher(DESCRIPTION).put(RobotDescription(robot="rm1", urdf=urdf_text, robot_toml="= no toml"))
+        time.sleep(0.2)
+        assert not node.is_ready
         description = RobotDescription(robot="rm1", urdf=urdf_text, robot_toml='tool_frame = "efector_link"')
         gateway.publisher(DESCRIPTION).put(description)
         wait_for(lambda: node.is_ready)

@@ -1,0 +1,94 @@
+"""No message that can be decoded, however odd, stops the logger or the visualizer."""
+
+import enum
+import types
+import typing
+
+import msgspec
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from schemas.message import Message, decode, encode
+from schemas.topics import TOPICS
+from services.logger.core import Entry, Logger
+from services.logger.recording import Recording
+from services.visualizer.core import Visualizer
+from services.visualizer.urdf import parse_urdf
+
+START = 1_795_000_000_000_000_000
+SECOND = 1_000_000_000
+texts = st.text(max_size=8)
+
+
+def values(kind):
+    """A strategy for a field's type: everything that fits on the wire."""
+    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    if origin is tuple:
+        many = arguments[-1] is Ellipsis
+        return st.lists(values(arguments[0]), max_size=3).map(tuple) if many else st.tuples(*map(values, arguments))
+    if origin in (typing.Union, types.UnionType):
+        return st.one_of(*map(values, arguments))
+    if issubclass(kind, Message):
+        return messages(kind)
+    if issubclass(kind, enum.Enum):
+        return st.sampled_from(kind)
+    plain = {
+        bool: st.booleans(), int: st.integers(-(2**63), 2**64 - 1), str: texts, types.NoneType: st.none(),
+        float: st.floats(allow_nan=False, allow_infinity=False),
+    }  # fmt: skip
+    return plain[kind]
+
+
+def messages(kind):
+    """A strategy for whole messages."""
+    hints = typing.get_type_hints(kind)
+    return st.fixed_dictionaries({name: values(hints[name]) for name in kind.__struct_fields__}).map(
+        lambda fields: kind(**fields)
+    )
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.key)
+def test_the_logger_records_any_message_of_a_topic(topic, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("log")
+    logger, recording = Logger(), Recording(folder, "any", START, {})
+
+    @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+    @given(messages(topic.message))
+    def record(message):
+        received = decode(topic.message, encode(message))
+        logger.on_message(topic, received, START)
+        for now in (START, START + 3 * SECOND):
+            batch = logger.step(now)
+            recording.write(batch.entries)
+            recording.write_lines(batch.lines)
+        assert msgspec.json.decode(msgspec.json.encode(Entry(topic, received, START).message))
+
+    try:
+        record()
+        recording.close()
+    finally:
+        recording.abandon()
+
+
+URDF = """<robot name="r"><link name="a"/><link name="b"/>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint></robot>"""
+HANDLERS = {
+    "joint_states": "on_joint_state", "joint_commands": "on_joint_command", "step_errors": "on_step_errors",
+    "planned_path": "on_planned_path", "device/status": "on_device_status", "device/state": "on_device_state",
+    "device/events": "on_event", "log": "on_log",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("topic", [topic for topic in TOPICS if topic.key in HANDLERS], ids=lambda topic: topic.key)
+def test_the_visualizer_shows_any_message_of_a_topic(topic):
+    @settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+    @given(st.lists(messages(topic.message), max_size=3))
+    def show(received):
+        core = Visualizer(parse_urdf(URDF), "r", "b")
+        for message in received:
+            getattr(core, HANDLERS[topic.key])(message)
+        for update in (*core.step(START), *core.step(START + SECOND)):
+            assert update.entity
+
+    show()
