@@ -13,14 +13,13 @@ from schemas.planning import JointGoal, NamedGoal, PlanCode, PlannedPath, PlanRe
 from services.arm.description import Arm
 from services.arm.interpolation import TrajectorySampler
 from services.arm.kinematics import Kinematics
-from services.planner.clearance import CLEARANCE, last_free
+from services.planner.clearance import CLEARANCE, first_collision, last_free
 from services.planner.goals import Goals, timed_out
 from services.planner.profile import JointLimits, NoProfile, joint_limits, straight_line
 from services.planner.refusals import NoPlan, in_collision, scaling_refused
 from services.planner.start import resolve_start
 from services.planner.verify import (
     BadTrajectory,
-    first_collision,
     require_ends,
     require_within_limits,
     sample,
@@ -152,7 +151,7 @@ class Planner:
                 nearest = tuple(values[name] for name in asked.name)
             case NamedGoal():
                 nearest = tuple(values.values())
-        remedy = f"the last posture on the way there that is free: {named}"
+        remedy = f"the farthest it can go on the straight way there: {named}"
         return in_collision(PlanCode.GOAL_IN_COLLISION, "at the goal", pairs, CLEARANCE, nearest, remedy)
 
     def _way_refused(self, touching: Array, margin: float) -> NoPlan:

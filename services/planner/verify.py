@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory
-from services.arm.collisions import SelfCollisions
 from services.arm.description import Arm
 from services.planner.profile import JointLimits
 
@@ -16,7 +15,6 @@ Array = NDArray[np.float64]
 
 DENSITY = 10  # samples between two points
 ROUNDING = 1e-9  # [rad] or [m], and a share of limits: what floating point may add
-MOST_LOOKS = 50_000
 
 
 class BadTrajectory(ValueError):
@@ -82,23 +80,3 @@ def require_ends(trajectory: JointTrajectory, start: tuple[float, ...], goal: tu
         raise BadTrajectory("the trajectory does not lead from the start to the goal")
     if any(first.velocities + first.accelerations + last.velocities + last.accelerations):
         raise BadTrajectory("the trajectory is not at rest at its ends")
-
-
-def first_collision(collisions: SelfCollisions, positions: Array, margin: float) -> Array | None:
-    """The first posture along the rows of `positions` (m, n) whose links are nearer than `margin` [m], or None.
-
-    Between two looks no point of the arm moves farther than the clearance just seen, or than half the margin where
-    there is none to spare, so that nothing is skipped (conservative advancement).
-    """
-    moved = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(positions, axis=0)) @ collisions.reach)))  # [m] at most
-    columns = positions.T
-    least = max(0.5 * margin, float(moved[-1]) / MOST_LOOKS)
-    along, end = 0.0, float(moved[-1])
-    while True:
-        posture = np.array([np.interp(along, moved, column) for column in columns])
-        clearance = collisions.distance(posture) - margin
-        if clearance <= 0.0:
-            return posture
-        if along >= end:
-            return None
-        along = min(end, along + max(clearance, least))
