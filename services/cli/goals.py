@@ -40,10 +40,10 @@ def request_of(goal: Goal, speed: float) -> PlanRequest:
 
 
 def refusal_text(refusal: Refusal, goal: Goal, arm: Arm) -> str:
-    """One sentence: why not, and the nearest goal that can be reached, as it would be typed."""
+    """One sentence: why not, and the nearest goal that can be reached, as it would be typed; else the remedy."""
     text = f"refused ({refusal.check}): {refusal.message}" if refusal.check else f"refused: {refusal.message}"
     if refusal.nearest:
-        text += f"; nearest that can: {as_typed(goal, refusal.nearest, arm)}"
+        return f"{text}; nearest that can: {as_typed(goal, refusal.nearest, arm)}"
     return f"{text}; {refusal.remedy}" if refusal.remedy else text
 
 

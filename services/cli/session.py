@@ -53,15 +53,15 @@ def require_router(deployment: Deployment) -> None:
 @contextmanager
 def connect() -> Iterator[Session]:
     """A node of this command on the robot's bus; refusals and silence become exit codes."""
-    from services.runtime.errors import NoAnswer, Refused, ServerLost
-    from services.runtime.node import Node
-
     deployment, arm = load()
     require_router(deployment)
+    from services.runtime.errors import BusError, NoAnswer, Refused, ServerLost
+    from services.runtime.node import Node
+
     try:
         with Node(f"cli-{os.getpid()}", deployment, robot=arm.name) as node:
             yield Session(deployment, arm, node)
-    except NoAnswer as error:
+    except (NoAnswer, BusError) as error:
         raise CommandError(str(error), ExitCode.NO_STACK) from error
     except (Refused, ServerLost) as error:
         raise CommandError(str(error)) from error

@@ -168,14 +168,14 @@ def state(session: Session, watch: bool, as_json: bool) -> ExitCode:
     return _watch(session, view, as_json)
 
 
-def wait_for(session: Session, view: StateView, patience: float = PATIENCE) -> None:
-    """Handles messages until all have come, or `patience` [s] is over; nothing at all is an error."""
-    deadline = session.node.monotonic() + patience
+def wait_for(session: Session, view: StateView) -> None:
+    """Handles messages until all have come, or `PATIENCE` is over; nothing at all is an error."""
+    deadline = session.node.monotonic() + PATIENCE
     while not view.is_complete and session.node.monotonic() < deadline:
         session.node.wait(0.02)
     if view.is_empty:
         raise CommandError(
-            f"nothing heard of the arm in {patience:g} s: is stepper_gateway running? `gemelo node list`",
+            f"nothing heard of the arm in {PATIENCE:g} s: is stepper_gateway running? `gemelo node list`",
             ExitCode.NO_STACK,
         )
 

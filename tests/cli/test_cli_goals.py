@@ -62,14 +62,18 @@ def test_a_speed_outside_its_range_is_refused(speed):
         request_of(NamedGoal(name="ready"), speed)
 
 
-def test_a_refusal_says_why_what_would_do_and_the_remedy():
+def test_a_refusal_says_why_and_what_would_do():
     goal = PoseGoal(position=(2.0, 0.0, 0.1))
-    refusal = Refusal(
-        check="reach", subject="tool", message="2.000 m is out of reach", nearest=(0.4, 0.0, 0.1), remedy="come nearer"
-    )
+    refusal = Refusal(check="reach", message="2.000 m is out of reach", nearest=(0.4, 0.0, 0.1), remedy="come nearer")
     assert refusal_text(refusal, goal, ARM) == (
-        "refused (reach): 2.000 m is out of reach; nearest that can: --to 0.4000 0.0000 0.1000; come nearer"
+        "refused (reach): 2.000 m is out of reach; nearest that can: --to 0.4000 0.0000 0.1000"
     )
+
+
+def test_a_refusal_without_a_nearest_goal_has_its_remedy():
+    refusal = Refusal(check="state", message="the arm's state is 3 s old", remedy="look at `gemelo state`")
+    text = refusal_text(refusal, NamedGoal(name="ready"), ARM)
+    assert text == "refused (state): the arm's state is 3 s old; look at `gemelo state`"
 
 
 @given(st.floats(-2.9, 2.9), st.floats(0.0, 0.2))

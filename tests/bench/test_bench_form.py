@@ -1,0 +1,68 @@
+"""The form of out/bench.json, and figures that say why they are missing."""
+
+import json
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from services.bench.figure import Figure, Goal, NotMeasured, guarded, of_samples, quantile
+from services.bench.main import BROKERS, NAMES, module_of
+from services.bench.report import report_of, text_of
+
+ISSUE = (
+    "chunk_ack_ms", "state_to_frame_ms", "move_accept_to_first_step_ms", "frame_lookup_us", "plan_ms",
+    "stack_idle_cpu_percent", "stack_rss_mb", "cli_start_ms", "lost_of_45000_at_25hz", "ready_s",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ISSUE)
+def test_every_figure_of_the_issue_has_a_module_of_its_name(name):
+    assert name in NAMES
+    module = module_of(name)
+    assert callable(module.measure)
+    assert module.UNIT
+    assert module.__doc__
+
+
+def test_both_brokers_are_measured():
+    assert set(BROKERS.values()) == {"mosquitto", "amqtt"}
+
+
+def test_the_json_has_the_form_of_the_architecture():
+    figure = of_samples([1.0, 2.0, 3.0], "ms", Goal(median=2.5, p99=10.0), {"echo": 0.123456}, "three")
+    report = json.loads(msgspec.json.encode(report_of({"plan_ms": figure}, Path(__file__).parents[2])))
+    assert set(report) == {"commit", "machine", "figures"}
+    assert report["figures"]["plan_ms"] == {
+        "unit": "ms", "median": 2.0, "p99": 3.0, "goal": "median <= 2.5, p99 <= 10", "met": True,
+        "reference": {"echo": 0.1235}, "note": "three",
+    }  # fmt: skip
+
+
+def test_a_goal_that_is_not_met_is_said():
+    figure = of_samples([1.0, 20.0], "ms", Goal(p99=10.0))
+    assert figure.met is False
+    assert "p99 <= 10  NO" in text_of(report_of({"plan_ms": figure}, Path(__file__).parents[2]))
+
+
+def test_a_figure_that_cannot_be_measured_says_why():
+    def measure() -> Figure:
+        raise NotMeasured("mosquitto is not installed")
+
+    figure = guarded(measure, "ms")
+    assert (figure.median, figure.met) == (None, None)
+    assert figure.note == "not measured: mosquitto is not installed"
+    assert "NO FIGURE" in text_of(report_of({"chunk_ack_ms": figure}, Path(__file__).parents[2]))
+
+
+def test_a_figure_that_breaks_does_not_take_the_others_with_it():
+    def measure() -> Figure:
+        raise RuntimeError("the stack did not start")
+
+    assert guarded(measure, "s").note == "failed: RuntimeError: the stack did not start"
+
+
+def test_quantiles_are_samples():
+    samples = [float(n) for n in range(1, 101)]
+    assert (quantile(samples, 0.5), quantile(samples, 0.99)) == (50.0, 99.0)
+    assert quantile([7.0], 0.99) == 7.0

@@ -1,0 +1,143 @@
+"""A planner and a gateway on a bus in memory, for the commands that speak with them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from schemas.actions import GoalStatusCode
+from schemas.deployment import Deployment, PathsSection
+from schemas.device import DeviceCommandRequest, DeviceCommandResponse, DeviceMode, DeviceState, DeviceStatus
+from schemas.joints import JointState, StepErrors
+from schemas.motion import (
+    FollowErrorCode,
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
+)
+from schemas.planning import PlanRequest, PlanResponse
+from schemas.topics import (
+    DEVICE_COMMAND,
+    DEVICE_STATE,
+    DEVICE_STATUS,
+    FOLLOW_JOINT_TRAJECTORY,
+    JOINT_STATES,
+    PLAN,
+    STEP_ERRORS,
+)
+from services.arm.description import Arm, load_arm
+from services.cli.session import Session
+from services.planner.core import Planner
+from services.runtime.actions import accept, refuse
+from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.node import Node
+
+MOVE_TIME = 0.4  # [s] that every goal takes here
+
+
+class PretendGateway:
+    """Accepts goals, and ends each after a while as it was told to."""
+
+    def __init__(self, node: Node, arm: Arm) -> None:
+        self.ends_as = GoalStatusCode.SUCCEEDED
+        self.reason = ""
+        self.refusal = ""
+        self.commands: list[DeviceCommandRequest] = []
+        self.mode = DeviceMode.IDLE
+        self._node, self._arm = node, arm
+        self._goal: tuple[str, float] | None = None
+        self._server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self._on_goal, self._on_cancel)
+        node.serve(DEVICE_COMMAND, self._on_command)
+        self._states, self._errors = node.publisher(JOINT_STATES), node.publisher(STEP_ERRORS)
+        self._device = node.publisher(DEVICE_STATE)
+        node.publisher(DEVICE_STATUS).put(DeviceStatus(online=True, device="rm1"))
+
+    def step(self, now: int) -> None:
+        names = self._arm.joint_names
+        self._states.put(JointState(stamp=now, name=names, position=(0.5, 0.25, 0.04), velocity=(0.0, 0.0, 0.0)))
+        self._errors.put(StepErrors(stamp=now, name=names, commanded=(1.5, 2.0, 3.0), executed=(1, 2, 3),
+                                    error=(0.5, 0.0, 0.0)))  # fmt: skip
+        self._device.put(DeviceState(stamp=now, mode=self.mode, time_scale=1.0, round_trip=0.002))
+        if self._goal is not None:
+            goal_id, started = self._goal
+            elapsed = self._node.monotonic() - started
+            self._server.feedback(goal_id, FollowJointTrajectoryFeedback(elapsed=elapsed, duration=MOVE_TIME))
+            if elapsed > MOVE_TIME:
+                self._finish(self.ends_as, self.reason)
+
+    def _on_goal(self, goal_id: str, goal: FollowJointTrajectoryGoal):
+        if self.refusal:
+            return refuse(FollowErrorCode.INVALID_GOAL, self.refusal)
+        self._goal = (goal_id, self._node.monotonic())
+        return accept()
+
+    def _on_cancel(self, goal_id: str) -> str:
+        self._finish(GoalStatusCode.CANCELED, "cancelled")
+        return ""
+
+    def _finish(self, status: GoalStatusCode, reason: str) -> None:
+        assert self._goal is not None
+        goal_id, self._goal = self._goal[0], None
+        result = FollowJointTrajectoryResult(
+            error_string=reason, joint_names=self._arm.joint_names, executed_steps=(933, -50, 113),
+            final_error=(0.25, -0.5, 0.0), max_following_error=(0.5, 0.5, 0.5), duration=MOVE_TIME,
+        )  # fmt: skip
+        self._server.finish(goal_id, status, result)
+
+    def _on_command(self, request: DeviceCommandRequest) -> DeviceCommandResponse:
+        self.commands.append(request)
+        if self.mode is DeviceMode.RUN:
+            return DeviceCommandResponse(accepted=False, reason="the arm moves", mode=self.mode)
+        return DeviceCommandResponse(accepted=True, mode=self.mode)
+
+
+@pytest.fixture(scope="session")
+def arm() -> Arm:
+    return load_arm(Path(__file__).parents[2] / "urdf/rm1")
+
+
+@pytest.fixture
+def network() -> MemoryNetwork:
+    return MemoryNetwork()
+
+
+@pytest.fixture
+def deployment(tmp_path: Path) -> Deployment:
+    return Deployment(paths=PathsSection(run=str(tmp_path / "run"), out=str(tmp_path / "out")))
+
+
+@pytest.fixture
+def gateway(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[PretendGateway]:
+    with Node("stepper_gateway", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        made = PretendGateway(node, arm)
+        thread = threading.Thread(target=lambda: node.spin(made.step, rate=50.0))
+        thread.start()
+        yield made
+        node.stop()
+        thread.join()
+
+
+@pytest.fixture
+def planner(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[None]:
+    core = Planner(arm)
+    home = JointState(name=arm.joint_names, position=(0.0,) * len(arm.joints))
+
+    def plan(request: PlanRequest) -> PlanResponse:
+        return core.plan(request, home)
+
+    with Node("planner", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        node.serve(PLAN, plan)
+        thread = threading.Thread(target=lambda: node.spin(lambda now: None, rate=10.0))
+        thread.start()
+        yield
+        node.stop()
+        thread.join()
+
+
+@pytest.fixture
+def session(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[Session]:
+    with Node("cli-1", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        yield Session(deployment, arm, node)
