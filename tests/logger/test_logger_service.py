@@ -22,7 +22,6 @@ from mcap.stream_reader import StreamReader
 from schemas.device import DeviceEvent
 from schemas.frames import RobotDescription
 from schemas.joints import JointState
-from schemas.system import SetParameter
 from schemas.topics import COMMAND_ACKS, COMMANDS, DESCRIPTION, DEVICE_EVENTS, JOINT_STATES
 from services.logger.main import run
 from services.runtime.deployment import load_deployment
@@ -120,7 +119,7 @@ def test_logging_is_switched_off_and_on_while_it_runs(deployment, tmp_path):
 
 
 def set_parameter(node, name, value):
-    node._set_parameter(SetParameter(name=name, value=value))
+    node.set_parameter(name, value)
 
 
 def test_a_disk_that_refuses_is_not_ready_until_it_is_mended(deployment, tmp_path):
