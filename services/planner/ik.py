@@ -21,7 +21,8 @@ Array = NDArray[np.float64]
 
 STARTS = 24  # beside the present posture
 BATCH = 4  # starts that are tried together before their solutions are handed out
-ITERATIONS = 60
+ITERATIONS = 40
+STALL = 1e-5  # share of the squared error by which an iteration must improve
 LARGEST_STEP = 0.8  # [rad] or [m] a joint may move in one iteration
 SAME = 1e-4  # [s] at full speed: solutions nearer than that are one
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)
@@ -45,6 +46,7 @@ class InverseKinematics:
         self._upper = np.array([min(joint.upper, math.pi) for joint in arm.joints])
         self._bounds = np.array([[j.lower for j in arm.joints], [j.upper for j in arm.joints]])
         self._speed = np.array([joint.velocity for joint in arm.joints])
+        self._identity = np.eye(len(arm.joints))
         self._starts = [self._spread(index) for index in range(1, STARTS + 1)]
 
     def solutions(self, target: Target, near: Array, is_late: Callable[[], bool]) -> Iterator[Array]:
@@ -86,7 +88,7 @@ class InverseKinematics:
             trial_error, trial_jacobian = target.error_and_jacobian(self._kinematics, trial)
             trial_cost = float(trial_error @ trial_error)
             if trial_cost < cost:
-                has_stalled = trial_cost > cost * (1.0 - 1e-5)
+                has_stalled = trial_cost > cost * (1.0 - STALL)
                 positions, error, jacobian, cost = trial, trial_error, trial_jacobian, trial_cost
                 damping = max(damping * 0.1, 1e-12)
                 if has_stalled:
@@ -104,10 +106,8 @@ class InverseKinematics:
         return free
 
     def _step(self, positions: Array, jacobian: Array, pull: Array, free: NDArray[np.bool_], damping: float) -> Array:
-        active = jacobian * free
-        normal = active.T @ active
-        normal.flat[:: len(normal) + 1] += damping
-        step = np.linalg.solve(normal, pull * free)
+        active = jacobian if free.all() else jacobian * free
+        step = np.linalg.solve(active.T @ active + damping * self._identity, pull * free)
         longest = float(np.abs(step).max())
         if longest > LARGEST_STEP:
             step *= LARGEST_STEP / longest

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from ruckig import InputParameter, Result, Ruckig, Trajectory
+from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from services.arm.description import Arm
@@ -22,6 +22,7 @@ SPACING = 0.05  # [s] between points, where the profile does not change its jerk
 MOST_POINTS = 400
 SHORTEST = 1e-4  # [s] two points nearer than that are one: below it the quintic's coefficients lose their digits
 MARGIN = 0.997  # share of the limits that is used, for what SHORTEST leaves out
+LONGEST = 86_400.0  # [s] a plan may take: beyond a day the scaling is a mistake
 STANDSTILL = 1e-9  # [s] at full speed: a way so short is no way
 NEGLIGIBLE = 1e-12  # share of its full speed below which a joint limits nothing
 HOLD = 0.1  # [s] that a plan to where the arm already is takes
@@ -60,6 +61,8 @@ def straight_line(
     length = float(np.max(np.abs(way) / limits.velocity))  # [s] at full speed
     if length < STANDSTILL:
         return _trajectory(names, [_rest(start, 0.0), _rest(goal, HOLD)])
+    if length > LONGEST:
+        raise NoProfile(f"it would take more than {length:.3g} s, {LONGEST:g} s is the most")
     direction = way / length
     profile, changes = _time_way(length, direction, limits)
     inner = _inner_points(start, direction, profile, _times(changes, profile.duration))
@@ -76,7 +79,10 @@ def _time_way(length: float, direction: Array, limits: JointLimits) -> tuple[Tra
     demand.max_acceleration = [MARGIN * float(np.min(limits.acceleration[moving] / share[moving]))]
     demand.max_jerk = [MARGIN * float(np.min(limits.jerk[moving] / share[moving]))]
     profile = Trajectory(1)
-    result = Ruckig(1).calculate(demand, profile)
+    try:
+        result = Ruckig(1).calculate(demand, profile)
+    except RuckigError as error:
+        raise NoProfile(f"no jerk-limited profile for a way of {length:.3g} s at full speed") from error
     if result not in (Result.Working, Result.Finished):
         raise NoProfile(f"no jerk-limited profile for a way of {length:.3g} s at full speed: {result.name}")
     return profile, np.cumsum(profile.profiles[0][0].t).tolist()

@@ -174,6 +174,11 @@ def test_a_start_outside_the_limits_is_refused(planner: Planner, rm1: Arm):
     assert (refusal.subject, refusal.value, refusal.limit) == ("brazo_joint", 3.0, 2.95)
 
 
+def test_a_scaling_that_would_take_days_is_refused(planner: Planner, home: JointState):
+    request = PlanRequest(goal=NamedGoal(name="ready"), velocity_scaling=1e-9)
+    assert "86400 s is the most" in refused(planner.plan(request, home), PlanCode.PLANNING_FAILED).message
+
+
 def test_a_search_without_time_is_timed_out(planner: Planner, home: JointState):
     request = PlanRequest(goal=PoseGoal(position=(0.6, 0.0, 0.1)))
     refusal = refused(planner.plan(request, home, is_late=lambda: True), PlanCode.TIMED_OUT)
@@ -198,7 +203,7 @@ def test_a_search_without_time_is_timed_out(planner: Planner, home: JointState):
         ),
     ),
     velocity_scaling=st.floats(-1.0, 2.0),
-    acceleration_scaling=st.floats(1e-6, 1.0),
+    acceleration_scaling=st.floats(1e-300, 1.0),
 ))  # fmt: skip
 def test_whatever_is_asked_there_is_a_plan_or_a_reason(request_: PlanRequest):
     response = PLANNER.plan(request_, STANDING)
