@@ -1,0 +1,66 @@
+"""The planner as a node on a bus: asked, answering, ready only while it knows where the arm is."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from schemas.deployment import Deployment, PathsSection
+from schemas.joints import JointState
+from schemas.planning import NamedGoal, PlanCode, PlanRequest, PoseGoal
+from schemas.topics import JOINT_STATES, PLAN, PLANNED_PATH
+from services.arm.description import Arm
+from services.planner.main import run
+from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.node import Node
+from services.runtime.stopping import StopRequest
+
+
+@pytest.fixture
+def asker(tmp_path: Path) -> Iterator[Node]:
+    """A node beside a running planner."""
+    network, stop = MemoryNetwork(), StopRequest()
+    deployment = Deployment(paths=PathsSection(run=str(tmp_path)))
+
+    def serve() -> None:
+        with Node("planner", deployment, bus=MemoryBus(network), stop=stop) as node:
+            run(node, deployment)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    try:
+        with Node("asker", deployment, bus=MemoryBus(network), stop=StopRequest()) as node:
+            yield node
+    finally:
+        stop.set()
+        thread.join(5.0)
+        assert not thread.is_alive()
+
+
+def tell(asker: Node, arm: Arm) -> None:
+    """A second of joint states at rest in the home pose."""
+    states = asker.publisher(JOINT_STATES)
+    for _ in range(10):
+        states.put(JointState(stamp=asker.now(), name=arm.joint_names, position=(0.0,) * len(arm.joints)))
+        asker.wait(0.03)
+
+
+def test_it_plans_from_the_newest_joint_state_and_shows_the_way(asker: Node, rm1: Arm, tmp_path: Path):
+    path = asker.latest(PLANNED_PATH)
+    tell(asker, rm1)
+    response = asker.call(PLAN, PlanRequest(goal=PoseGoal(position=(0.25, 0.15, 0.10))), timeout=5.0)
+    asker.wait(0.2)
+    assert response.code is PlanCode.SUCCESS
+    assert response.planning_time > 0.0
+    assert path.message is not None
+    assert path.message.points[-1] == pytest.approx((0.25, 0.15, 0.10), abs=1e-6)
+    assert (tmp_path / "planner.ready").exists()
+
+
+def test_without_joint_states_it_is_not_ready_and_says_why(asker: Node, tmp_path: Path):
+    response = asker.call(PLAN, PlanRequest(goal=NamedGoal(name="ready")), timeout=5.0)
+    assert response.code is PlanCode.ROBOT_STATE_STALE
+    assert not (tmp_path / "planner.ready").exists()
