@@ -11,7 +11,6 @@ from schemas.joints import JointState
 from schemas.motion import JointTrajectory
 from schemas.planning import JointGoal, NamedGoal, PlanCode, PlannedPath, PlanRequest, PlanResponse, PoseGoal, Refusal
 from services.arm.description import Arm
-from services.arm.interpolation import TrajectorySampler
 from services.arm.kinematics import Kinematics
 from services.planner.clearance import CLEARANCE, first_collision, last_free
 from services.planner.goals import Goals, timed_out
@@ -64,9 +63,9 @@ class Planner:
 
     def planned_path(self, trajectory: JointTrajectory, stamp: int) -> PlannedPath:
         """The way of the tool, for eyes; `stamp` [ns] UNIX."""
-        sampler = TrajectorySampler(trajectory)
-        times = np.linspace(0.0, sampler.duration, min(PATH_POINTS, 2 * len(trajectory.points)))
-        points = (self.kinematics.tool(sampler.at(t)[0]).position.tolist() for t in times.tolist())
+        rows = trajectory.points
+        chosen = {round(index * (len(rows) - 1) / (PATH_POINTS - 1)) for index in range(PATH_POINTS)}
+        points = (self.kinematics.tool(rows[index].positions).position.tolist() for index in sorted(chosen))
         return PlannedPath(stamp=stamp, frame=self.arm.base_frame, points=tuple((x, y, z) for x, y, z in points))
 
     def _plan(
