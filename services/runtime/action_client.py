@@ -102,7 +102,7 @@ class ActionClient(Generic[G, F, R]):
             handle.bad_feedback += 1
 
     def _on_status(self, message: GoalStatuses) -> None:
-        for handle in self._handles.values():
+        for handle in list(self._handles.values()):
             handle.on_status(message)
 
 

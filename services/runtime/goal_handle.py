@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from schemas.actions import CancelRequest, GoalStatusCode, GoalStatuses, ResultRequest, ResultResponse
+from schemas.actions import CancelRequest, CancelResponse, GoalStatusCode, GoalStatuses, ResultRequest, ResultResponse
 from schemas.message import BadMessage, Message, decode, encode
-from schemas.topics import Action
+from schemas.topics import Action, Request
 from services.runtime import action_keys as keys
 from services.runtime.bus import Answer, Bus
 from services.runtime.errors import NoAnswer, ServerLost
@@ -19,6 +20,7 @@ from services.runtime.wire import schema_of
 
 F = TypeVar("F", bound=Message)
 R = TypeVar("R", bound=Message)
+AnyRequest = Request[Message, Message]
 
 SERVER_PATIENCE = 2.0  # [s] of silence of a server that sends four signs of life a second
 ROUTER_PATIENCE = 10.0  # [s] that a router may be away before a goal counts as lost
@@ -55,7 +57,10 @@ class GoalHandle(Generic[F, R]):
         self._accepted = 0  # [ns] UNIX of the server
         self._heard = time.monotonic()
         self._away: float | None = None  # [s] monotonic since when there is no router
-        self._is_asking = False
+        self._is_asking = False  # for the result
+        self._wants_cancel = False
+        self._is_canceling = False  # the request is under way
+        self.cancel_refused = ""  # why the server goes on
 
     @property
     def is_over(self) -> bool:
@@ -84,10 +89,9 @@ class GoalHandle(Generic[F, R]):
         raise NoAnswer(f"goal {self.goal_id} of {self.action.key} has not ended within {timeout:g} s")
 
     def cancel(self) -> None:
-        """Asks the server to end the goal; how it ended is then the outcome. Does not block."""
-        request = keys.cancel_request(self.action)
-        payload = encode(CancelRequest(goal_id=self.goal_id))
-        self._bus.ask(request.key, schema_of(request.request), payload, ASK_TIMEOUT, lambda answer: None)
+        """Asks the server to end the goal, until it answers; how it ended is then the outcome. Does not block."""
+        self._wants_cancel = True
+        self._ask_cancel()
 
     def accepted_at(self, stamp: int) -> None:
         """The server's decision came."""
@@ -109,6 +113,8 @@ class GoalHandle(Generic[F, R]):
         if not self._accepted or message.stamp < self._accepted:
             return
         self.heard()
+        if self._wants_cancel:
+            self._ask_cancel()
         for goal in message.goals:
             if goal.goal_id == self.goal_id:
                 self.status = goal.status
@@ -131,17 +137,29 @@ class GoalHandle(Generic[F, R]):
         elif now - self._heard > SERVER_PATIENCE:
             self._lose(f"{self.action.server} has been silent for {SERVER_PATIENCE:g} s")
 
+    def _ask(self, request: AnyRequest, question: Message, on_answer: Callable[[Answer | None], None]) -> None:
+        def put(answer: Answer | None) -> None:
+            self._loop.inbox.put(lambda: on_answer(answer))
+
+        self._bus.ask(request.key, schema_of(request.request), encode(question), ASK_TIMEOUT, put)
+
+    def _ask_cancel(self) -> None:
+        if not self._is_canceling and not self.is_over:
+            self._is_canceling = True
+            self._ask(keys.cancel_request(self.action), CancelRequest(goal_id=self.goal_id), self._on_cancel)
+
+    def _on_cancel(self, answer: Answer | None) -> None:
+        """Without an answer the next sign of life asks again."""
+        self._is_canceling = False
+        if answer is not None and answer.ok:
+            self._wants_cancel = False
+            with suppress(BadMessage):
+                self.cancel_refused = decode(CancelResponse, answer.payload).reason
+
     def _ask_result(self) -> None:
-        if self._is_asking or self.is_over:
-            return
-        self._is_asking = True
-        request = keys.result_request(self.action)
-        payload = encode(ResultRequest(goal_id=self.goal_id))
-
-        def on_answer(answer: Answer | None) -> None:
-            self._loop.inbox.put(lambda: self._on_result(answer))
-
-        self._bus.ask(request.key, schema_of(request.request), payload, ASK_TIMEOUT, on_answer)
+        if not self._is_asking and not self.is_over:
+            self._is_asking = True
+            self._ask(keys.result_request(self.action), ResultRequest(goal_id=self.goal_id), self._on_result)
 
     def _on_result(self, answer: Answer | None) -> None:
         """Without an answer the next sign of life asks again."""

@@ -39,13 +39,14 @@ def identify(name: str) -> Identity:
 
 
 def claim(bus: Bus, identity: Identity) -> None:
-    """Declares the name; raises `NodeNameTaken` where an older living node has it."""
-    _wait_until_free(bus, identity)
+    """Declares the name; raises `NodeNameTaken` where another living node has it."""
+    _wait_until_alone(bus, identity, "")
     token = bus.declare_alive(identity.key)
-    older = sorted(key for key in _bearers(bus, identity) if key < identity.key)
-    if older:
+    try:
+        _wait_until_alone(bus, identity, identity.key)
+    except NodeNameTaken:
         token.close()
-        raise NodeNameTaken(_taken(identity.name, older[0]))
+        raise
     bus.declare_alive(f"{ALIVE}/{identity.name}")
 
 
@@ -58,10 +59,14 @@ def _bearers(bus: Bus, identity: Identity) -> set[str]:
     return bus.alive(f"@id/{identity.name}/*") - {identity.key}
 
 
-def _wait_until_free(bus: Bus, identity: Identity) -> None:
+def _wait_until_alone(bus: Bus, identity: Identity, gives_way_before: str) -> None:
+    """Raises at once for a bearer whose key is less than `gives_way_before`, else where one stays too long.
+
+    Of two that start together the younger gives way; where it did not see the older in time, the older does.
+    """
     give_up = time.monotonic() + STALE_AFTER
     while bearers := _bearers(bus, identity):
-        if time.monotonic() > give_up:
+        if min(bearers) < gives_way_before or time.monotonic() > give_up:
             raise NodeNameTaken(_taken(identity.name, min(bearers)))
         time.sleep(0.1)
 

@@ -99,7 +99,8 @@ class EveryBox:
         self._inbox.put(self._deliver)
 
     def on_miss(self, count: int) -> None:
-        self.dropped += count
+        with self._lock:
+            self.dropped += count
 
     def _deliver(self) -> None:
         with self._lock:

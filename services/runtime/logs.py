@@ -7,7 +7,6 @@ import sys
 import time
 from collections.abc import Callable
 
-from schemas.message import BadMessage
 from schemas.system import LogLevel, LogRecord
 
 LEVELS = ("debug", "info", "warning", "error")
@@ -42,8 +41,8 @@ class BusHandler(logging.Handler):
             level = max((each for each in LogLevel if each <= record.levelno), default=LogLevel.DEBUG)
             stamp = int(record.created * 1e9)
             self._put(LogRecord(stamp=stamp, node=record.name, level=level, text=text[:LONGEST_TEXT]))
-        except BadMessage:
-            self.handleError(record)
+        except Exception:
+            self.handleError(record)  # on stderr: a log that cannot be sent must not end a node
         finally:
             self._is_busy = False
 

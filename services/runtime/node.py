@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
-import os
-import socket
+import gc
 import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Self, TypeVar
 
 import msgspec
 
 from schemas.deployment import Deployment
 from schemas.message import Message
-from schemas.system import Empty, NodeInfo, Parameter, Parameters, ParameterValue, SetParameter
+from schemas.system import Empty, NodeInfo, Parameter, ParameterValue, SetParameter
 from schemas.topics import LOG, STATISTICS, Action, Request, Topic
 from services.runtime import identity, requests
 from services.runtime.action_client import ActionClient
 from services.runtime.action_server import ActionServer, OnCancel, OnGoal
 from services.runtime.bus import Bus
 from services.runtime.connection import connect
+from services.runtime.declared import Declared
 from services.runtime.deployment import load_deployment, project_root, robot_name
-from services.runtime.errors import Refused
 from services.runtime.logs import BusHandler, line_logger
 from services.runtime.loop import Loop
-from services.runtime.parameters import ParameterSet, nearest
+from services.runtime.parameter_registry import ParameterRegistry
+from services.runtime.parameters import ParameterSet
 from services.runtime.readiness import Readiness
 from services.runtime.requests import Pending, Server
 from services.runtime.statistics import LoopStatistics
@@ -66,17 +66,14 @@ class Node:
         self.deployment = deployment if deployment is not None else load_deployment()
         self.robot = robot or robot_name(self.deployment)
         self.log = line_logger(name, log_level)
-        self._overrides = dict(overrides or {})
         self._signals = stop is None
         self._stop = stop or StopRequest()
         self._loop = Loop(self._stop)
         self._worker = Worker()
         self._readiness: Readiness | None = None
-        self._publishers: dict[str, Publisher[Any]] = {}
-        self._subscriptions: list[Subscription[Any]] = []
-        self._servers: list[Server[Any, Any]] = []
-        self._actions: list[ActionServer[Any, Any, Any]] = []
-        self._parameters: list[ParameterSet[Any]] = []
+        self._declared = Declared()
+        from_file = self.deployment.parameters.get(name, {})
+        self._parameters = ParameterRegistry(name, from_file, overrides or {}, self.log)
         self._is_closed = False
         with stop_on_signals(self._stop) if self._signals else nullcontext():
             self._bus = bus or connect(self.deployment.router, self.robot, self.log, self._stop)
@@ -86,7 +83,8 @@ class Node:
         except BaseException:
             self._bus.close()
             raise
-        self.log.addHandler(BusHandler(lambda record: self.publisher(LOG).put(record)))
+        self._log_to_bus = BusHandler(lambda record: self.publisher(LOG).put(record))
+        self.log.addHandler(self._log_to_bus)
         self._statistics = LoopStatistics(name)
 
     def __enter__(self) -> Self:
@@ -95,18 +93,17 @@ class Node:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.close()
 
-    # What it says and hears.
-
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """The publisher of a topic; the same one for every call."""
-        if topic.key not in self._publishers:
-            self._publishers[topic.key] = Publisher(self._bus, topic)
-        return self._publishers[topic.key]
+        publishers = self._declared.publishers
+        if topic.key not in publishers:
+            publishers[topic.key] = Publisher(self._bus, topic)
+        return publishers[topic.key]
 
     def subscribe(self, topic: Topic[M], on_message: Callable[[M], object], own: bool = False) -> Subscription[M]:
         """`on_message(message)` runs in the thread of logic; `own`: also for what this node publishes."""
         subscription = Subscription(self._bus, self._loop.inbox, topic, on_message, self.log.warning, own)
-        self._subscriptions.append(subscription)
+        self._declared.subscriptions.append(subscription)
         return subscription
 
     def latest(self, topic: Topic[M]) -> Latest[M]:
@@ -131,7 +128,7 @@ class Node:
         """Serves an action: `on_goal(goal_id, goal)` accepts or refuses, `on_cancel(goal_id)` says "" or why not."""
         server = ActionServer(action, on_goal, on_cancel, self._serve, self.publisher)
         self._loop.every(ActionServer.HEARTBEAT, server.beat)
-        self._actions.append(server)
+        self._declared.actions.append(server)
         return server
 
     def action(self, action: Action[G, F, R]) -> ActionClient[G, F, R]:
@@ -140,16 +137,17 @@ class Node:
         self._loop.every(ActionClient.TICK, client.tick)
         return client
 
-    # What can be set, and how it is.
-
     def parameters(self, kind: type[P]) -> ParameterSet[P]:
         """Declares the fields of `kind`, with the values of the deployment file and of the command line."""
-        declared = ParameterSet(kind, self.name)
-        from_file = self.deployment.parameters.get(self.name, {})
-        declared.set_all(from_file, f"[parameters.{self.name}] of the deployment", strict=True)
-        declared.set_all(self._overrides, "--set", strict=False)
-        self._parameters.append(declared)
-        return declared
+        return self._parameters.declare(kind)
+
+    def set_parameter(self, name: str, value: ParameterValue) -> Parameter:
+        """As the request that sets it; raises `Refused`."""
+        return self._parameters.set(SetParameter(name=name, value=value))
+
+    def info(self) -> NodeInfo:
+        """Who this node is and what it speaks."""
+        return self._declared.info(self._identity, self.robot)
 
     def set_ready(self, ok: bool, reason: str = "") -> None:
         """Says whether this node's state is valid; `reason` is logged when it changes."""
@@ -173,8 +171,6 @@ class Node:
         """The names of all living nodes of the robot, this one too."""
         return identity.alive(self._bus)
 
-    # Time.
-
     def now(self) -> int:
         """[ns] UNIX time: for stamps."""
         return time.time_ns()
@@ -189,6 +185,8 @@ class Node:
         What a handler or the step raises is logged and ends the spin.
         """
         self._loop.every(BEAT, self._beat)
+        if not self._signals:
+            gc.freeze()  # what a service has loaded by now stays: no pause to look through it again
         try:
             with stop_on_signals(self._stop) if self._signals else nullcontext():
                 self._loop.spin(step, rate)
@@ -221,63 +219,30 @@ class Node:
         if self._readiness is not None:
             self._readiness.not_ready()
         self._worker.close()
+        self.log.removeHandler(self._log_to_bus)
         self._bus.close()
-
-    # What it tells about itself.
 
     def _serve(
         self, request: Request[Q, R], handler: Callable[[Q, Pending[R]], None], worker: bool = False
     ) -> Server[Q, R]:
         put = self._worker.put if worker else self._loop.inbox.put
         server = Server(self._bus, put, request, handler, self.log.warning)
-        self._servers.append(server)
+        self._declared.servers.append(server)
         return server
 
     def _serve_about_itself(self) -> None:
-        about, parameters = f"@node/{self.name}/info", f"@node/{self.name}/parameters"
-        self.serve(Request(about, Empty, NodeInfo, self.name, "who this is"), lambda empty: self.info())
-        self.serve(Request(f"{parameters}/list", Empty, Parameters, self.name, ""), lambda empty: self._listed())
-        self.serve(Request(f"{parameters}/set", SetParameter, Parameter, self.name, ""), self._set_parameter)
-
-    def info(self) -> NodeInfo:
-        """Who this node is and what it speaks."""
-        from importlib.metadata import version
-
-        return NodeInfo(
-            node=self.name,
-            robot=self.robot,
-            host=socket.gethostname(),
-            pid=os.getpid(),
-            version=version("gemelo"),
-            started=self._identity.started,
-            publishes=tuple(sorted(self._publishers)),
-            subscribes=tuple(sorted({each.topic.key for each in self._subscriptions})),
-            serves=tuple(sorted(each.request.key for each in self._servers if not each.request.key.startswith("@"))),
-            actions=tuple(each.action.key for each in self._actions),
-        )
-
-    def _listed(self) -> Parameters:
-        return Parameters(parameters=tuple(each for declared in self._parameters for each in declared.listed()))
-
-    def _set_parameter(self, wanted: SetParameter) -> Parameter:
-        for declared in self._parameters:
-            if wanted.name in declared.names:
-                parameter = declared.set(wanted.name, wanted.value)
-                self.log.info("parameter %s = %r", parameter.name, parameter.value)
-                return parameter
-        known = [name for declared in self._parameters for name in declared.names]
-        raise Refused(f'{self.name} has no parameter "{wanted.name}": {nearest(wanted.name, known)}')
+        about = Request(f"@node/{self.name}/info", Empty, NodeInfo, self.name, "who this node is")
+        self.serve(about, lambda question: self.info())
+        self.serve(self._parameters.list_request, self._parameters.listed)
+        self.serve(self._parameters.set_request, self._parameters.set)
 
     def _beat(self) -> None:
         if self._readiness is not None:
             self._readiness.beat()
-        for subscription in self._subscriptions:
-            subscription.report_losses()
-        speakers: list[Subscription[Any] | Server[Any, Any]] = [*self._subscriptions, *self._servers]
-        topics = tuple(each.statistics for each in speakers)
-        figures = self._statistics.report(self._loop.take_figures(), topics)
-        if figures is not None:
-            self.publisher(STATISTICS).put(figures)
+        self._declared.report_losses()
+        report = self._statistics.report(self._loop.take_figures(), self._declared.statistics())
+        if report is not None:
+            self.publisher(STATISTICS).put(report)
 
 
 def node_names(bus: Bus) -> set[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import traceback
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
@@ -28,12 +29,20 @@ class Pending(Generic[R]):
 
     def __init__(self, query: Query) -> None:
         self._query = query
+        self.is_answered = False
 
     def reply(self, response: R) -> None:
-        self._query.reply(schema_of(type(response)), to_payload(response))
+        """Only the first answer counts."""
+        payload = to_payload(response)
+        if not self.is_answered:
+            self.is_answered = True
+            self._query.reply(schema_of(type(response)), payload)
 
     def refuse(self, kind: str, message: str) -> None:
-        self._query.fail(schema_of(Failure), to_payload(Failure(kind=kind, message=message)))
+        """As `reply`, with why not."""
+        if not self.is_answered:
+            self.is_answered = True
+            self._query.fail(schema_of(Failure), to_payload(Failure(kind=kind, message=message)))
 
 
 class Server(Generic[Q, R]):
@@ -49,7 +58,8 @@ class Server(Generic[Q, R]):
     ) -> None:
         self.request = request
         self._put, self._handler, self._complain = put, handler, complain
-        self._waiting, self._received, self._refused, self._bad = 0, 0, 0, 0
+        self._received, self._refused, self._bad = 0, 0, 0
+        self._places = threading.BoundedSemaphore(MOST_WAITING)
         self._declaration = bus.serve(request.key, self._on_query)
 
     @property
@@ -60,15 +70,14 @@ class Server(Generic[Q, R]):
         self._declaration.close()
 
     def _on_query(self, query: Query) -> None:
-        if self._waiting >= MOST_WAITING:
+        if not self._places.acquire(blocking=False):
             self._refused += 1
             Pending[R](query).refuse("busy", f"{self.request.key}: {MOST_WAITING} requests are waiting already")
             return
-        self._waiting += 1
         self._put(lambda: self._handle(query))
 
     def _handle(self, query: Query) -> None:
-        self._waiting -= 1
+        self._places.release()
         pending: Pending[R] = Pending(query)
         try:
             question = from_arrival(self.request.request, query.arrival)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import socket
 import sys
 from collections.abc import Sequence
@@ -44,15 +45,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def require_free(section: RouterSection) -> None:
-    """Raises `BusError` where another program listens at the router's address."""
+    """Raises `BusError` where the router's address is another program's, or not of this machine."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((section.host, section.port))
-        except OSError as error:
+        except (OSError, OverflowError) as error:
+            is_taken = isinstance(error, OSError) and error.errno == errno.EADDRINUSE
+            what = "is taken by another program" if is_taken else f"cannot be listened on ({error})"
             raise BusError(
-                f"port {section.port} on {section.host} is taken by another program ({error.strerror}); "
-                "set GEMELO_ROUTER_PORT, or [router] port in the deployment file, to another"
+                f"port {section.port} on {section.host} {what}; "
+                "set GEMELO_ROUTER_PORT, or [router] in the deployment file, to another"
             ) from error
 
 

@@ -37,6 +37,16 @@ def until(is_true: Callable[[], object], timeout: float = 5.0) -> bool:
     return True
 
 
+def hear(node: Node, is_true: Callable[[], object], timeout: float = 5.0) -> bool:
+    """Handles the node's inbox until something has come."""
+    end = time.monotonic() + timeout
+    while not is_true():
+        if time.monotonic() > end:
+            return False
+        node.wait(0.01)
+    return True
+
+
 class RouterProcess:
     """`gemelo-router` as a user starts it."""
 
@@ -88,6 +98,14 @@ class Buses:
         node = Node(name, self.deployment, robot="rm1", bus=self._make("rm1"), **options)
         self.opened.append(node)
         return node
+
+    def settle(self) -> None:
+        """Waits until every bus knows what all others have declared so far."""
+        buses = [each._bus if isinstance(each, Node) else each for each in self.opened]
+        tokens = [bus.declare_alive(f"@barrier/{index}") for index, bus in enumerate(buses)]
+        assert until(lambda: all(len(bus.alive("@barrier/*")) == len(buses) for bus in buses))
+        for token in tokens:
+            token.close()
 
     def close(self) -> None:
         for each in reversed(self.opened):

@@ -19,7 +19,7 @@ from schemas.motion import (
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
 from services.runtime import action_keys as keys
 from services.runtime.actions import ActionServer, GoalDecision, accept, refuse
-from services.runtime.errors import GoalRefused, NoAnswer, ServerLost
+from services.runtime.errors import GoalRefused, NoAnswer, Refused, ServerLost
 from services.runtime.node import Node
 from tests.runtime.support import Buses, spinning, until
 
@@ -118,6 +118,7 @@ def test_a_refused_cancel_lets_the_goal_go_on(buses: Buses) -> None:
         with pytest.raises(NoAnswer, match="has not ended within"):
             handle.wait(0.2)
         assert handle.status is GoalStatusCode.EXECUTING
+        assert handle.cancel_refused == "it cannot be stopped any more"
         arm.left.clear()
 
 
@@ -205,8 +206,8 @@ def test_a_restarted_server_does_not_know_the_goal(buses: Buses) -> None:
 def test_a_client_that_was_busy_itself_does_not_give_up(buses: Buses) -> None:
     with moving(buses):
         node = buses.node("client")
-        handle = node.action(FOLLOW).send(goal_of(450))
-        time.sleep(2.5)
+        handle = node.action(FOLLOW).send(goal_of(230))
+        time.sleep(2.2)
         node.wait(0.05)
         assert not handle.is_over
         assert handle.wait(5.0).status is GoalStatusCode.SUCCEEDED
@@ -220,3 +221,22 @@ def test_a_node_that_spins_follows_its_goals_too(buses: Buses) -> None:
             handle = client.send(goal_of(5))
             assert until(lambda: handle.outcome is not None, 2.0)
             assert handle.wait(1.0).status is GoalStatusCode.SUCCEEDED
+
+
+def test_goals_that_are_no_goals_are_refused_and_nothing_dies(buses: Buses) -> None:
+    from msgspec import Raw
+
+    from schemas.actions import CancelRequest, GoalRequest
+
+    with moving(buses) as arm:
+        node = buses.node("client")
+        for goal in (Raw(b"\xc0"), Raw(b"\x93\x01\x02\x03"), Raw(b"\x81\xaatrajectory\x05")):
+            with pytest.raises(Refused, match="FollowJointTrajectoryGoal") as refusal:
+                node.call(keys.goal_request(FOLLOW), GoalRequest(goal_id="x", goal=goal))
+            assert refusal.value.kind == "bad request"
+        with pytest.raises(Refused, match="needs an id"):
+            node.call(keys.goal_request(FOLLOW), GoalRequest())
+        assert node.call(keys.cancel_request(FOLLOW), CancelRequest()).reason == "no goal is active"
+        assert "no such goal" in node.call(keys.cancel_request(FOLLOW), CancelRequest(goal_id="x")).reason
+        assert arm.moved == 0
+        assert node.action(FOLLOW).send(goal_of(1)).wait(2.0).status is GoalStatusCode.SUCCEEDED

@@ -21,6 +21,7 @@ def test_a_message_arrives_with_its_key_schema_and_bytes(buses: Buses) -> None:
         key = f"joint_states/{delivery.value}"
         buses.open().subscribe(key, delivery, heard.append, ignore)
         publication = buses.open().publish(key, "JointState", delivery)
+        buses.settle()
         publication.put(b"\x80")
         assert until(lambda heard=heard: heard)
         assert heard == [Arrival(key, "JointState", b"\x80")]
@@ -30,6 +31,7 @@ def test_every_keeps_order_and_loses_nothing_in_a_flood(buses: Buses) -> None:
     heard: list[bytes] = []
     buses.open().subscribe("commands", EVERY, lambda arrival: heard.append(arrival.payload), ignore)
     publication = buses.open().publish("commands", "CommandChunk", EVERY)
+    buses.settle()
     sent = [index.to_bytes(4, "big") * 50 for index in range(20_000)]
     for payload in sent:
         publication.put(payload)
@@ -80,6 +82,7 @@ def test_a_closed_subscription_hears_nothing_more(buses: Buses) -> None:
     heard: list[bytes] = []
     subscription = buses.open().subscribe("log", EVERY, lambda arrival: heard.append(arrival.payload), ignore)
     publication = buses.open().publish("log", "LogRecord", EVERY)
+    buses.settle()
     publication.put(b"1")
     assert until(lambda: heard)
     subscription.close()

@@ -154,7 +154,9 @@ def test_a_callback_that_raises_ends_the_process_with_one_report(start: Start, r
     )
     await_line(process, "spins")
     with Node("writer", router.deployment, robot="rm1") as writer:
-        writer.publisher(JOINT_STATES).put(JOINT_STATES.message())
+        while process.poll() is None:
+            writer.publisher(JOINT_STATES).put(JOINT_STATES.message())
+            time.sleep(0.02)
         _, errors = process.communicate(timeout=PROMPT)
     assert process.returncode == 1
     assert "failing ERROR ended by an error" in errors

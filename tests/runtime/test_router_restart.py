@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +17,7 @@ from schemas.system import LogRecord
 from schemas.topics import DESCRIPTION, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, LOG, PLAN
 from services.runtime.errors import NoAnswer, ServerLost
 from services.runtime.node import Node
-from tests.runtime.support import RouterProcess, spinning, until
+from tests.runtime.support import RouterProcess, hear, spinning, until
 from tests.runtime.test_actions import Arm, goal_of
 
 RECOVERY = 3.0  # [s]
@@ -60,11 +61,11 @@ def test_everything_works_again_after_the_router_was_killed(own_router: RouterPr
             assert until(lambda: heard == list(range(1, 301)), RECOVERY), heard[-5:]
             assert until(lambda: descriptions == ["while away"], RECOVERY)
             planner.publisher(JOINT_STATES).put(JointState(stamp=9))
-            assert until(lambda: states.message == JointState(stamp=9), 1.0)
+            assert until(lambda: states.message == JointState(stamp=9), RECOVERY)
             assert time.monotonic() - back < RECOVERY
             with open_node(own_router, "late") as late:
                 newest = late.latest(DESCRIPTION)
-                late.wait(0.3)
+                assert hear(late, lambda: newest.message)
                 assert newest.message == RobotDescription(urdf="while away")
 
 
@@ -79,6 +80,45 @@ def test_the_result_of_a_goal_comes_when_the_router_is_back(own_router: RouterPr
             client.wait(0.05)
             own_router.start()
             assert handle.wait(RECOVERY + 1.0).status is GoalStatusCode.SUCCEEDED
+
+
+def test_a_cancel_is_not_lost_with_the_router(own_router: RouterProcess) -> None:
+    with open_node(own_router, "stepper_gateway") as gateway, open_node(own_router, "client") as client:
+        arm = Arm(gateway)
+        with spinning(gateway, arm.step, rate=100.0):
+            handle = client.action(FOLLOW_JOINT_TRAJECTORY).send(goal_of(10_000))
+            own_router.kill()
+            assert until(lambda: not client.is_connected, 1.0)
+            handle.cancel()
+            own_router.start()
+            assert handle.wait(RECOVERY).status is GoalStatusCode.CANCELED
+
+
+def test_an_answer_while_the_router_is_away_harms_nobody(own_router: RouterProcess) -> None:
+    with open_node(own_router, "planner") as planner, open_node(own_router, "client") as client:
+        begun: list[float] = []
+
+        def plan(request: PlanRequest) -> PlanResponse:
+            begun.append(time.monotonic())
+            time.sleep(request.allowed_time)
+            return PlanResponse(code=PlanCode.SUCCESS)
+
+        planner.serve(PLAN, plan)
+        with spinning(planner):
+            asking = threading.Thread(target=_call_in_vain, args=(client,))
+            asking.start()
+            assert until(lambda: begun, 1.0)
+            own_router.kill()
+            time.sleep(0.5)
+            own_router.start()
+            asking.join()
+            answer = client.call(PLAN, PlanRequest(allowed_time=0.0), timeout=RECOVERY)
+            assert answer.code is PlanCode.SUCCESS
+
+
+def _call_in_vain(client: Node) -> None:
+    with pytest.raises(NoAnswer):
+        client.call(PLAN, PlanRequest(allowed_time=0.4), timeout=1.0)
 
 
 def test_a_router_that_stays_away_ends_the_waiting(own_router: RouterProcess, monkeypatch: pytest.MonkeyPatch) -> None:

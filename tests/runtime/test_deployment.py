@@ -1,0 +1,68 @@
+"""Deployment files: overrides, defaults, and refusals that a builder can act on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from schemas.deployment import Broker
+from services.runtime.deployment import DeploymentError, load_deployment, project_root, robot_name
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "site.toml"
+
+
+def test_without_anything_it_is_the_local_run() -> None:
+    deployment = load_deployment(environ={})
+    assert deployment.router.host == "127.0.0.1"
+    assert deployment.paths.run == str(project_root() / ".gemelo" / "run")
+    assert robot_name(deployment) == "rm1"
+
+
+def test_the_argument_wins_over_the_environment_and_that_over_the_default(file: Path, tmp_path: Path) -> None:
+    file.write_text("[router]\nport = 1\n")
+    other = tmp_path / "other.toml"
+    other.write_text("[router]\nport = 2\n")
+    assert load_deployment(file, {"GEMELO_CONFIG": str(other)}).router.port == 1
+    assert load_deployment(environ={"GEMELO_CONFIG": str(other)}).router.port == 2
+
+
+def test_every_key_can_be_overridden_in_the_environment(file: Path) -> None:
+    file.write_text('[paths]\nrun = "here"\n[parameters.planner]\nattempts = 3\n')
+    environ = {
+        "GEMELO_ROBOT": "urdf/parol6", "GEMELO_ROUTER_PORT": "7555", "GEMELO_MQTT_BROKER": "mosquitto",
+        "GEMELO_VIEWER_WEB_PORT": "9191", "GEMELO_PATHS_OUT": "/elsewhere", "GEMELO_OTHER": "x",
+    }  # fmt: skip
+    deployment = load_deployment(file, environ)
+    assert deployment.robot == str(project_root() / "urdf" / "parol6")
+    assert deployment.router.port == 7555
+    assert deployment.mqtt.broker is Broker.MOSQUITTO
+    assert deployment.viewer.web_port == 9191
+    assert (deployment.paths.run, deployment.paths.out) == (str(project_root() / "here"), "/elsewhere")
+    assert deployment.parameters == {"planner": {"attempts": 3}}
+
+
+@pytest.mark.parametrize(
+    ("text", "environ", "reason"),
+    [
+        ("[router]\nprot = 1\n", {}, r'site.toml: unknown key "router.prot": did you mean "port"\?'),
+        ("[ruoter]\nport = 1\n", {}, r'unknown key "ruoter": did you mean "router"\?'),
+        ("[router]\nport = 'x'\n", {}, r"site.toml: .*int.*router\.port"),
+        ("router = 5\n", {}, r"site.toml: .*object.*router"),
+        ("[mqtt]\nbroker = 'emqx'\n", {}, r"site.toml: .*'emqx'.*mqtt\.broker"),
+        ("[router\n", {}, r"site.toml: .*line 1"),
+        ("", {"GEMELO_ROUTER_PORT": "seven"}, r"with GEMELO_ROUTER_PORT from the environment.*int.*router\.port"),
+    ],
+)
+def test_a_mistake_is_named(file: Path, text: str, environ: dict[str, str], reason: str) -> None:
+    file.write_text(text)
+    with pytest.raises(DeploymentError, match=reason):
+        load_deployment(file, environ)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DeploymentError, match=r"nowhere\.toml: there is no such file"):
+        load_deployment(tmp_path / "nowhere.toml", {})
