@@ -213,7 +213,7 @@ class GatewayCore:
         """The device cannot be reached: whatever it does now it does by itself, and nothing of it is continued."""
         self._fail(reason, moment)
         self.desk.give_up(reason)
-        self.mover.is_held = False
+        self.mover.lost()
 
     def _fail(self, reason: str, moment: Moment) -> None:
         if self.goals.is_active:

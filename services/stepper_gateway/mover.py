@@ -46,6 +46,7 @@ class Mover:
         self._history: deque[tuple[float, Vector]] = deque()
         self._stop_asked = -1.0e9  # [s] monotonic
         self._stopped_us = -1  # device time of its answer to the latest STOP
+        self._awaits_stop = False
 
     @property
     def state(self) -> State | None:
@@ -57,7 +58,7 @@ class Mover:
 
     def is_resting(self) -> bool:
         """Whether the device stands idle with nothing under way to it."""
-        if self.session.mode != DeviceMode.IDLE:
+        if self.session.mode != DeviceMode.IDLE or (self._awaits_stop and not self.has_stopped()):
             return False
         stream = self.stream
         return stream is None or stream.is_abandoned or stream.is_finished
@@ -71,7 +72,7 @@ class Mover:
         status = self.session.status
         capacity = status.queue_capacity if status is not None and status.queue_capacity else 128
         self.reporter.motion_begins()
-        self._stopped_us = -1
+        self._stopped_us, self._awaits_stop = -1, False
         stream = self.transmission.begin(motion, Knot.at_rest(position), self.session.boot_id, capacity)
         self.pump(moment)
         return stream
@@ -134,7 +135,7 @@ class Mover:
         """Decelerate along the path and forget the rest of it."""
         self.transmission.abandon()
         self.is_held = False
-        self._stop_asked, self._stopped_us = moment.monotonic, -1
+        self._stop_asked, self._stopped_us, self._awaits_stop = moment.monotonic, -1, True
         self.commands.ask(DeviceCommandKind.STOP, moment, self.parameters.command_timeout)
 
     def has_stopped(self) -> bool:
@@ -142,11 +143,15 @@ class Mover:
         state = self.state
         return state is not None and 0 <= self._stopped_us < state.t_us and state.mode not in MOVING
 
+    def lost(self) -> None:
+        """The device cannot be reached: no answer to a STOP will come, nor will a person's RESUME."""
+        self.is_held = self._awaits_stop = False
+
     def rebooted(self) -> None:
         """Another boot: neither the stream nor any STOP concerns it."""
         self.transmission.forget()
         self._history.clear()
-        self._stopped_us, self._stop_asked = -1, -1.0e9
+        self._stopped_us, self._stop_asked, self._awaits_stop = -1, -1.0e9, False
 
     def stop_answered(self, t_us: int) -> None:
         self._stopped_us = t_us

@@ -1,4 +1,7 @@
-"""Streamed joint targets: tracked while nothing else moves the arm, braked when they fall silent."""
+"""Streamed joint targets: tracked while nothing else moves the arm, stopped when they fall silent.
+
+Whoever streams must go on sending (0.5 s by default), also to keep a far target: the arm does not go on to a stale one.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +45,7 @@ class Streaming:
         if self._targets.is_active and (stream is None or not self._mover.transmission.is_open):
             self._end(stream is not None and bool(stream.failure), moment)
         if self._targets.is_silent(moment.monotonic, self._mover.parameters.stream_silence):
-            self._targets.fall_silent()
+            self._fall_silent(moment)
         self._begin(moment)
 
     def yield_to_goal(self) -> None:
@@ -56,6 +59,13 @@ class Streaming:
     @property
     def is_active(self) -> bool:
         return self._targets.is_active
+
+    def _fall_silent(self, moment: Moment) -> None:
+        """Decelerate now, not behind what has been sent; a stream that rests ends with its last knot."""
+        if self._targets.is_active and not self._targets.is_resting:
+            self._mover.stop(moment)
+            self._targets.end()
+        self._targets.fall_silent()
 
     def _begin(self, moment: Moment) -> None:
         mover = self._mover

@@ -30,6 +30,11 @@ class TargetStream:
     def is_active(self) -> bool:
         return self._tracker is not None
 
+    @property
+    def is_resting(self) -> bool:
+        """Whether the newest knot stands."""
+        return self._tracker is None or self._tracker.knot.is_at_rest
+
     def checked(self, targets: JointTargets) -> dict[int, float]:
         """Column and position of every joint named; raises `GoalRejected`."""
         require_known(targets.name, self._joints)
@@ -79,7 +84,7 @@ class TargetStream:
         return now - self._latest > silence
 
     def fall_silent(self) -> None:
-        """Brake to rest where that takes it; a target that waits is too old."""
+        """Let the stream end at rest; a target that waits is too old."""
         self.target = None
         if self._tracker is not None:
             self._tracker.brake()

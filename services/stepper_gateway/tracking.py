@@ -1,7 +1,4 @@
-"""Streamed targets: the newest one is approached within the limits, by ruckig one knot at a time.
-
-A stream that falls silent is not continued towards its last target: the arm brakes to rest where that takes it.
-"""
+"""Streamed targets: the newest one is approached within the limits, by ruckig one knot at a time."""
 
 from __future__ import annotations
 

@@ -261,7 +261,8 @@ def move(start: Vector, end: Vector, period: float = 0.05, slower: float = 1.0) 
     last = TrajectoryPoint(
         positions=end, velocities=(0.0,) * 3, accelerations=(0.0,) * 3, time_from_start=times[-1] * slower
     )
-    return JointTrajectory(joint_names=arm.joint_names, points=(*points[:-1], last))
+    points = points[:-1] if path.duration > 0.0 else []
+    return JointTrajectory(joint_names=arm.joint_names, points=(*points, last))
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,6 @@ class MqttLink:
         self._reason = f"no connection yet to the MQTT broker at {host}:{port}"
         self._lost = threading.Event()
         self._stop = threading.Event()
-        self.oversized = 0
         self._thread = threading.Thread(target=self._keep_connected, name="mqtt-link", daemon=True)
         self._thread.start()
 
@@ -133,14 +132,13 @@ class MqttLink:
 
     def _on_message(self, _client: paho.Client, _data: object, message: paho.MQTTMessage) -> None:
         arrival = time.monotonic_ns()
-        if len(message.payload) > MAX_PAYLOAD:
-            self.oversized += 1
-            return
+        # What is too long for any frame comes as no bytes at all: it is counted with the other bad ones.
+        payload = bytes(message.payload) if len(message.payload) <= MAX_PAYLOAD else b""
         try:
             kind = Kind(message.topic.removeprefix(self._prefix))
         except ValueError:
             return
-        self._inbox.append(Received(kind, bytes(message.payload), message.retain, arrival))
+        self._inbox.append(Received(kind, payload, message.retain, arrival))
         self._wake()
 
 

@@ -1,0 +1,71 @@
+"""A real broker and the virtual ESP32, each as its own process on a free port of the loopback."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from schemas.deployment import Broker, Deployment, MqttSection, PathsSection
+from tests.stepper_gateway.harness import ROOT
+
+BROKER = "services.broker.main"
+DEVICE = "firmware.platform.host.main"
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Processes:
+    """Started by module name, killed with everything they have started themselves."""
+
+    def __init__(self, broker: str, folder: Path) -> None:
+        self.port = free_port()
+        self.deployment = Deployment(
+            mqtt=MqttSection(broker=Broker(broker), port=self.port),
+            paths=PathsSection(run=str(folder / "run"), out=str(folder / "out")),
+        )
+        self._environment = os.environ | {
+            "GEMELO_MQTT_BROKER": broker,
+            "GEMELO_MQTT_PORT": str(self.port),
+            "GEMELO_PATHS_RUN": self.deployment.paths.run,
+            "GEMELO_PATHS_OUT": self.deployment.paths.out,
+        }
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, module: str) -> None:
+        self._running[module] = subprocess.Popen(
+            [sys.executable, "-m", module],
+            cwd=ROOT,
+            env=self._environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+
+    def start_broker(self) -> None:
+        """Returns once it listens."""
+        self.start(BROKER)
+        end = time.monotonic() + 15.0
+        while time.monotonic() < end:
+            with socket.socket() as probe:
+                if probe.connect_ex(("127.0.0.1", self.port)) == 0:
+                    return
+            time.sleep(0.05)
+        raise AssertionError("the broker does not listen")
+
+    def kill(self, module: str) -> None:
+        process = self._running.pop(module)
+        os.killpg(process.pid, signal.SIGKILL)  # its own group, with the broker's child
+        process.wait(timeout=10)
+
+    def close(self) -> None:
+        for module in list(self._running):
+            self.kill(module)

@@ -1,0 +1,100 @@
+"""The gateway as a node: its action, its requests and its topics on a bus, with a real broker and device."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from schemas.actions import GoalStatusCode
+from schemas.device import DeviceCommandKind, DeviceCommandRequest
+from schemas.joints import JointState, JointTargets
+from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from schemas.topics import DEVICE_COMMAND, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, JOINT_TARGETS
+from services.runtime.errors import GoalRefused
+from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.node import Node
+from services.runtime.stopping import StopRequest
+from services.stepper_gateway.main import run
+from tests.stepper_gateway.harness import move
+from tests.stepper_gateway.processes import DEVICE, Processes
+
+
+class Running:
+    """The gateway's node in a thread, and a client's node."""
+
+    def __init__(self, processes: Processes) -> None:
+        network = MemoryNetwork()
+        self._stop = StopRequest()
+        self.gateway = Node(
+            "stepper_gateway", processes.deployment, robot="rm1", bus=MemoryBus(network), stop=self._stop
+        )
+        self._thread = threading.Thread(target=run, args=(self.gateway, processes.deployment))
+        self._thread.start()
+        self.client = Node("client", processes.deployment, robot="rm1", bus=MemoryBus(network), stop=StopRequest())
+        self.joints = self.client.latest(JOINT_STATES)
+
+    def until(self, is_true: Callable[[], bool], timeout: float = 10.0) -> None:
+        end = time.monotonic() + timeout
+        while not is_true():
+            assert time.monotonic() < end
+            self.client.wait(0.02)
+
+    @property
+    def here(self) -> JointState:
+        assert self.joints.message is not None
+        return self.joints.message
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join(timeout=10.0)
+        assert not self._thread.is_alive()
+        self.client.close()
+        self.gateway.close()
+
+
+@pytest.fixture
+def running(tmp_path: Path) -> Iterator[Running]:
+    with closing(Processes("mosquitto", tmp_path)) as processes:
+        processes.start_broker()
+        processes.start(DEVICE)
+        with closing(Running(processes)) as found:
+            found.until(lambda: found.gateway.is_ready and found.joints.message is not None)
+            yield found
+
+
+def test_a_client_moves_cancels_streams_and_commands(running: Running) -> None:
+    action = running.client.action(FOLLOW_JOINT_TRAJECTORY)
+    feedback: list[float] = []
+    goal = FollowJointTrajectoryGoal(trajectory=move((0.0, 0.0, 0.0), (0.1, -0.2, 0.01)))
+    outcome = action.send(goal, lambda f: feedback.append(f.elapsed)).wait(20.0)
+    assert outcome.status == GoalStatusCode.SUCCEEDED
+    assert outcome.result.executed_steps == (297, -13, 28)
+    assert len(feedback) > 5
+
+    with pytest.raises(GoalRefused) as refused:
+        action.send(goal)
+    assert refused.value.code == FollowErrorCode.INVALID_GOAL
+    assert "brazo_joint" in str(refused.value)
+
+    running.until(lambda: running.here.position[0] > 0.099)
+    handle = action.send(FollowJointTrajectoryGoal(trajectory=move(running.here.position, (1.0, 1.0, 0.1))))
+    running.client.wait(0.8)
+    handle.cancel()
+    assert handle.wait(5.0).status == GoalStatusCode.CANCELED
+
+    for _ in range(20):
+        running.client.publisher(JOINT_TARGETS).put(JointTargets(name=("brazo_joint",), position=(0.3,)))
+        running.client.wait(0.1)
+    assert running.here.position[0] == pytest.approx(0.3, abs=0.01)
+    running.client.wait(1.5)
+    answer = running.client.call(DEVICE_COMMAND, DeviceCommandRequest(command=DeviceCommandKind.RESUME), 3.0)
+    assert not answer.accepted
+    assert "NOT_READY" in answer.reason
+    answer = running.client.call(DEVICE_COMMAND, DeviceCommandRequest(command=DeviceCommandKind.REFERENCE), 3.0)
+    assert answer.accepted
+    running.until(lambda: running.here.position == (0.0, 0.0, 0.0))
