@@ -20,11 +20,14 @@ int32_t saturate(int64_t value) {
 int64_t peak_velocity(int64_t m0, int64_t c, int64_t m1, int64_t limit) {
     if (magnitude(c) <= limit) return 0;
     if (magnitude(c) > 4 * limit) return magnitude(c) / 2;
-    const int64_t a = m0 >> 16, b = c >> 16, d = m1 >> 16;
+    // Three significant values of 30 bits each, so that their products fit.
+    uint8_t shift = 0;
+    while ((magnitude(c) >> shift) >= (1 << 30)) ++shift;
+    const int64_t a = m0 >> shift, b = c >> shift, d = m1 >> shift;
     const int64_t curvature = a + d - 2 * b;
     const bool is_between = (a <= b) == (b <= d);
     if (curvature == 0 || is_between) return 0;
-    return magnitude((a * d - b * b) / curvature) << 16;
+    return magnitude((a * d - b * b) / curvature) << shift;
 }
 
 Verdict check_velocity(const Span& span, int32_t limit_q8) {

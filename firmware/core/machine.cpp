@@ -26,7 +26,7 @@ void Machine::begin(const DeviceConfig& config, const Identity& identity, const 
 void Machine::start(uint64_t now_us, const int32_t* steps, bool referenced) {
     now_us_ = alive_us_ = now_us;
     int64_t position_q20[kMaxJoints] = {};
-    for (uint8_t j = 0; j < rules_.joints; ++j) position_q20[j] = static_cast<int64_t>(steps[j]) << kFineBits;
+    for (uint8_t j = 0; j < rules_.joints; ++j) position_q20[j] = static_cast<int64_t>(steps[j]) * kFineStep;
     place(position_q20);
     is_referenced_ = referenced;
     mode_ = referenced ? Mode::Idle : Mode::Unreferenced;
@@ -62,7 +62,7 @@ void Machine::finish_slot() {
 
 void Machine::measure(const Point& point) {
     for (uint8_t j = 0; j < rules_.joints; ++j) {
-        const int64_t executed = static_cast<int64_t>(stepper_.latched(j)) << kFineBits;
+        const int64_t executed = static_cast<int64_t>(stepper_.latched(j)) * kFineStep;
         const int64_t error = point.position_q20[j] - executed;
         const int64_t size = error < 0 ? -error : error;
         if (size > max_error_q20_) max_error_q20_ = size;
@@ -106,6 +106,7 @@ void Machine::plan_slot() {
     Point& next = points_[(prepared_number_ + 1) % kPoints];
     next = before;
     path_.advance(mode_ == Mode::Hold, &next);
+    next.stream = streams_.stream();
     int32_t increment_q20[kMaxJoints] = {};
     const int64_t fastest_q20 = static_cast<int64_t>(ticks_per_slot(*config_)) << kFineBits;
     is_still_ = true;
@@ -137,7 +138,7 @@ void Machine::fail(FaultCode fault, const char* detail) {
     if (was_moving) is_referenced_ = false;
     int64_t position_q20[kMaxJoints] = {};
     for (uint8_t j = 0; j < rules_.joints; ++j)
-        position_q20[j] = static_cast<int64_t>(stepper_.executed(j)) << kFineBits;
+        position_q20[j] = static_cast<int64_t>(stepper_.executed(j)) * kFineStep;
     place(position_q20);
     event("fault", detail);
     report_status();
@@ -158,7 +159,8 @@ void Machine::report_state(const Point& point) {
     report.buffered_ms = buffered_ms();
     report.stream = streams_.stream();
     report.next_seq = streams_.next_seq();
-    report.play_us = point.play_us;
+    // Until the first slot of a new stream has been made, the arm stands where that stream begins.
+    report.play_us = point.stream == streams_.stream() ? point.play_us : 0;
     report.underruns = underruns_;
     report.refused = refused_;
     report.bad_frames = bad_frames_;

@@ -14,6 +14,7 @@ namespace gemelo {
 struct Point {
     int64_t position_q20[kMaxJoints];
     uint64_t play_us;    // stream time
+    uint32_t stream;     // that `play_us` belongs to
     uint32_t scale_q30;  // the time scale of this slot
     bool is_end;         // the stream ended here
     bool is_starved;     // the last knot that is known, and the stream goes on

@@ -9,6 +9,7 @@ namespace gemelo {
 
 constexpr uint8_t kUnitBits = 24;  // the parameter u in [0, 1] is Q24
 constexpr uint8_t kFineBits = 20;  // positions on the path are Q20 steps in 64 bits
+constexpr int64_t kFineStep = 1ll << kFineBits;
 
 // p(u) = origin + u (c1 + u (c2 + u c3)); u = 1 gives the second knot exactly.
 struct Cubic {

@@ -15,6 +15,13 @@ uint32_t ceiling_scale(const Allowance& allowance) {
     return highest > 2 * half_slot ? highest - half_slot : half_slot;
 }
 
+// Onto the ceiling, but hardly steeper than it falls: where s meets it, it is half a slot too high.
+uint32_t fall_to(uint32_t highest, uint32_t present, uint32_t slope) {
+    const uint32_t most = slope + slope / 64 > kSlowest ? slope + slope / 64 : kSlowest;
+    const uint32_t lowest = present > most ? present - most : 0;
+    return highest > lowest ? highest : lowest;
+}
+
 }  // namespace
 
 uint32_t root(uint64_t value) {
@@ -67,7 +74,7 @@ void TimeScale::advance(bool hold, const Segment& segment, const Allowance& allo
     }
     if (!unbounded) {
         const uint32_t highest = ceiling_scale(allowance);
-        if (next > highest) next = highest;
+        if (next > highest) next = fall_to(highest, s_q30_, allowance.slope_q30);
     }
     s_q30_ = next;
 }

@@ -67,9 +67,10 @@ class VirtualEsp32:
     def _turn(self) -> None:
         items = self._wait()
         now = time.monotonic()
-        stall = now - self._looked
-        if stall > STALL:
+        if now - self._looked > STALL:
             items = self._relive(items)
+        else:
+            self._advance(now)
         for item in items:
             self._handle(item)
         self._advance(time.monotonic())

@@ -1,0 +1,91 @@
+// The small parts: CRC, cubic, queue, square root, configuration.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <random>
+
+#include "crc32.h"
+#include "rig.h"
+#include "segment.h"
+#include "time_scale.h"
+
+using namespace gemelo;
+
+TEST(Crc32, IsTheOneOfZlib) {
+    const char* check = "123456789";
+    EXPECT_EQ(crc32(reinterpret_cast<const uint8_t*>(check), 9), 0xCBF43926u);
+    EXPECT_EQ(crc32(nullptr, 0), 0u);
+}
+
+TEST(Cubic, BeginsAndEndsExactlyOnItsKnots) {
+    std::mt19937 random(1);
+    std::uniform_int_distribution<int32_t> position(-20000000, 20000000), velocity(-6000000, 6000000);
+    for (int i = 0; i < 10000; ++i) {
+        const int32_t p0 = position(random), p1 = p0 + velocity(random) / 50;
+        const Cubic cubic = make_cubic(p0, velocity(random), p1, velocity(random), 20000);
+        ASSERT_EQ(cubic.at(0), static_cast<int64_t>(p0) * 4096);
+        ASSERT_EQ(cubic.at(1u << kUnitBits), static_cast<int64_t>(p1) * 4096);
+    }
+}
+
+TEST(Cubic, IsAThousandthOfAStepFromTheFormula) {
+    const int32_t p0 = 1000, v0 = 1024000, p1 = 21000, v1 = 900000;
+    const double dt = 0.020;
+    const Cubic cubic = make_cubic(p0, v0, p1, v1, 20000);
+    for (int i = 0; i <= 1000; ++i) {
+        const double u = i / 1000.0, m0 = v0 * dt, m1 = v1 * dt, d = p1 - p0;
+        const double expected = p0 + u * (m0 + u * ((3 * d - 2 * m0 - m1) + u * (m0 + m1 - 2 * d)));
+        const uint32_t u_q24 = static_cast<uint32_t>(std::lround(u * (1 << kUnitBits)));
+        EXPECT_NEAR(static_cast<double>(cubic.at(u_q24)) / 1048576.0, expected / 256.0, 1e-3);
+    }
+}
+
+TEST(Cubic, KeepsItsWidthAtTheLongestAndFastestSegment) {
+    // 50,000 steps/s for 250 ms: 12,500 steps, the most a tick of 100 kHz can do.
+    const int32_t fastest = 50000 * 256;
+    const Cubic cubic = make_cubic(0, fastest, 12500 * 256, fastest, kMaxDtUs);
+    EXPECT_EQ(cubic.at(1u << 23), 6250ll << kFineBits);
+    const Cubic reversal = make_cubic(0, fastest, 0, -fastest, kMaxDtUs);
+    EXPECT_EQ(reversal.at(1u << 23), 3125ll << kFineBits);
+}
+
+TEST(KnotQueue, GivesBackInOrderAcrossItsSeam) {
+    KnotQueue queue;
+    queue.begin(kMaxKnots);
+    Knot knot{};
+    uint32_t in = 0, out = 0;
+    for (int round = 0; round < 50; ++round) {
+        while (queue.space() > 0) {
+            knot.dt_us = in++;
+            queue.push(knot);
+        }
+        for (int i = 0; i < 37; ++i) {
+            ASSERT_EQ(queue[0].dt_us, out++);
+            queue.pop();
+        }
+    }
+    EXPECT_EQ(queue.newest().dt_us, in - 1);
+}
+
+TEST(Root, RoundsDown) {
+    for (uint64_t value : {0ull, 1ull, 2ull, 3ull, 4ull, 99ull, 100ull, (1ull << 60) - 1, 1ull << 60}) {
+        const uint64_t result = root(value);
+        EXPECT_LE(result * result, value);
+        EXPECT_GT((result + 1) * (result + 1), value);
+    }
+}
+
+TEST(Config, NamesTheJointThatIsWrong) {
+    uint8_t joint = 0;
+    DeviceConfig config = rig::two_joints();
+    EXPECT_EQ(find_fault(config, &joint), nullptr);
+    config.joint[1].max_acceleration_q8 = 0;
+    EXPECT_STREQ(find_fault(config, &joint), "its acceleration limit is not positive");
+    EXPECT_EQ(joint, 1);
+    config = rig::two_joints();
+    config.tick_hz = 44100;
+    EXPECT_NE(find_fault(config, &joint), nullptr);
+    std::memset(config.name, 'x', sizeof config.name);
+    EXPECT_NE(find_fault(config, &joint), nullptr);
+}
