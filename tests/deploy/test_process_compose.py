@@ -17,7 +17,7 @@ SCRIPTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scrip
 
 
 def test_the_processes_are_those_that_the_stack_names():
-    assert set(PROCESSES) == set(COMPOSE["processes"]) - {"welcome"}
+    assert set(PROCESSES) == set(COMPOSE["processes"]) - {"about"}
 
 
 def test_every_process_is_the_console_script_of_its_name():
@@ -49,5 +49,5 @@ def test_process_compose_itself_opens_no_port():
 
 
 def test_the_welcome_waits_for_everything():
-    conditions = {name: each["condition"] for name, each in COMPOSE["processes"]["welcome"]["depends_on"].items()}
+    conditions = {name: each["condition"] for name, each in COMPOSE["processes"]["about"]["depends_on"].items()}
     assert conditions == dict.fromkeys(PROCESSES, "process_healthy")
