@@ -124,7 +124,7 @@ class GatewayCore:
     def _dispatch(self, received: Received, moment: Moment) -> None:
         arrival = received.arrival * 1e-9
         if received.kind == Kind.STATUS:
-            return self._on_status(decode_status(received.payload), moment)
+            return self._on_status(decode_status(received.payload))
         if received.retained:
             raise BadFrame("it is retained, and only a status may be")
         if received.kind == Kind.EVENT:
@@ -144,14 +144,11 @@ class GatewayCore:
             case _:
                 raise BadFrame(f"a {type(frame).__name__} frame does not belong there")
 
-    def _on_status(self, status: StatusReport, moment: Moment) -> None:
-        session = self.mover.session
-        if session.on_status(status):
-            self._reboot(moment)
-        if status.tick_hz:
-            self.goals.use_tick(status.tick_hz)
-        if not status.online and status.boot_id == session.boot_id:
-            self._lose(self.not_ready(moment), moment)
+    def _on_status(self, status: StatusReport) -> None:
+        self.mover.session.on_status(status)
+        known = self.mover.session.status
+        if known is not None and known.tick_hz:
+            self.goals.use_tick(known.tick_hz)
 
     def _on_event(self, event: EventReport, moment: Moment) -> None:
         level = LogLevel.WARNING if event.event in ("fault", "hold", "underrun") else LogLevel.INFO
@@ -162,7 +159,7 @@ class GatewayCore:
 
     def _on_state(self, state: State, arrival: float, moment: Moment) -> None:
         mover = self.mover
-        is_news, is_reboot = mover.session.on_state(state, arrival)
+        is_news, is_reboot = mover.session.on_state(state, arrival, mover.parameters.state_timeout)
         if is_reboot:
             self._reboot(moment)
         if not is_news:

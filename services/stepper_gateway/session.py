@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 from schemas.device import DeviceMode, DeviceStatus
 from services.stepper_gateway.clock import ClockSync
-from services.stepper_gateway.links.frames import Heartbeat, State, Sync, SyncReply
+from services.stepper_gateway.links.frames import BadFrame, Heartbeat, State, Sync, SyncReply
 from services.stepper_gateway.links.reports import StatusReport
 from services.stepper_gateway.moment import Moment
 
 HEARTBEAT = 0.2  # [s]
 SYNC = 0.5  # [s]
 SYNC_AT_FIRST = 0.03  # [s] until the clock is known
+QUESTIONS = 32  # that may be under way
 OLD_BOOTS = 16  # remembered, so that a late frame of one does not look like a reboot
 
 
 class DeviceSession:
-    """What is known of one device; refuses what belongs to another boot or comes out of order."""
+    """What is known of one device; refuses what belongs to another boot or comes out of order.
+
+    Only states tell which boot lives: a status or a last will may be old.
+    """
 
     def __init__(self, device: str, joints: int, session_id: int) -> None:
         self._device = device
@@ -24,13 +30,20 @@ class DeviceSession:
         self._counter = 0
         self._heartbeat_due = self._sync_due = 0.0
         self._old_boots: list[int] = []
+        self._reports: dict[int, StatusReport] = {}  # by boot id
+        self._offline_boot = 0  # whose last will has come
+        self._questions: deque[int] = deque(maxlen=QUESTIONS)  # [us] SYNCs that may be answered
         self.link_up = False
         self.link_reason = "no connection yet"
-        self.status: StatusReport | None = None
         self.state: State | None = None
         self.state_arrival = -1.0e9  # [s] monotonic
         self.boot_id = 0
         self.clock = ClockSync()
+
+    @property
+    def status(self) -> StatusReport | None:
+        """What the present boot has said about itself."""
+        return self._reports.get(self.boot_id)
 
     def on_link(self, connected: bool, reason: str) -> None:
         self.link_up, self.link_reason = connected, reason
@@ -39,27 +52,36 @@ class DeviceSession:
         else:
             self.state_arrival = -1.0e9
 
-    def on_status(self, status: StatusReport) -> bool:
-        """Take a status; true if it tells of a new boot."""
-        if status.boot_id in self._old_boots:
-            return False
-        self.status = status
-        return status.online and self._meet(status.boot_id)
+    def on_status(self, status: StatusReport) -> None:
+        """Take what a boot says about itself, or its last will."""
+        if not status.online:
+            self._offline_boot = status.boot_id
+            return
+        if status.boot_id == self._offline_boot:
+            self._offline_boot = 0
+        self._reports[status.boot_id] = status
+        if len(self._reports) > OLD_BOOTS:
+            del self._reports[next(boot for boot in self._reports if boot != self.boot_id)]
 
-    def on_state(self, state: State, arrival: float) -> tuple[bool, bool]:
-        """(is it news, does it tell of a new boot)."""
-        if len(state.steps) != self._joints or state.boot_id in self._old_boots:
-            return False, False
+    def on_state(self, state: State, arrival: float, timeout: float) -> tuple[bool, bool]:
+        """(is it news, does it tell of a new boot); raises `BadFrame` for one that is not of this arm."""
+        if len(state.steps) != self._joints:
+            raise BadFrame(f"a state of {len(state.steps)} joints, this arm has {self._joints}")
         if state.mode not in DeviceMode._value2member_map_:
+            raise BadFrame(f"a state with the unknown mode {state.mode}")
+        is_fresh = arrival - self.state_arrival <= timeout
+        if state.boot_id in self._old_boots and is_fresh:
             return False, False
         is_new_boot = self._meet(state.boot_id)
-        if self.state is not None and state.t_us <= self.state.t_us:
+        if self.state is not None and state.t_us <= self.state.t_us and is_fresh:
             return False, is_new_boot
         self.state, self.state_arrival = state, arrival
         return True, is_new_boot
 
     def on_sync_reply(self, reply: SyncReply, arrival_us: int) -> None:
-        if reply.boot_id == self.boot_id:
+        """Take an answer to a question of ours."""
+        if reply.boot_id == self.boot_id and reply.t0 in self._questions:
+            self._questions.remove(reply.t0)
             self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us)
 
     def due(self, moment: Moment) -> list[Heartbeat | Sync]:
@@ -74,6 +96,7 @@ class DeviceSession:
         if moment.monotonic >= self._sync_due:
             period = SYNC if self.clock.is_synchronised else SYNC_AT_FIRST
             self._sync_due = _next_beat(self._sync_due, moment.monotonic, period)
+            self._questions.append(moment.micros)
             frames.append(Sync(boot_id=self.boot_id, t0=moment.micros))
         return frames
 
@@ -85,26 +108,24 @@ class DeviceSession:
     def mode(self) -> DeviceMode:
         return DeviceMode(self.state.mode) if self.state is not None else DeviceMode.BOOT
 
-    @property
-    def tick_hz(self) -> int:
-        return self.status.tick_hz if self.status is not None else 0
-
     def absence(self, moment: Moment, timeout: float) -> str:
         """Why the device cannot be reached, empty if it can."""
         name = self._device
         if not self.link_up:
             return f'no link to device "{name}": {self.link_reason}'
+        if not self.is_fresh(moment, timeout):
+            if self.state is None and not self._reports:
+                return f'device "{name}" has not been heard: is it switched on and does it use the same broker?'
+            if self._offline_boot == self.boot_id:
+                return f'device "{name}" is offline: switch it on, or check its network'
+            return f'device "{name}" is silent for more than {timeout:g} s: check its power and network'
         if self.status is None:
-            return f'device "{name}" has not said that it is there: is it switched on and does it use the same broker?'
-        if not self.status.online or self.status.boot_id != self.boot_id:
-            return f'device "{name}" is offline: switch it on, or check its network'
+            return f'device "{name}" has not said yet who it is: wait a second, or restart it'
         if self.status.joints != self._joints:
             return (
                 f'device "{name}" has {self.status.joints} joints, this arm has {self._joints}: the wrong robot.toml '
                 "or the wrong device"
             )
-        if not self.is_fresh(moment, timeout):
-            return f'device "{name}" is silent for more than {timeout:g} s: check its power and network'
         if not self.clock.is_synchronised:
             return f'the clock of device "{name}" is not known yet: try again in a second'
         return ""
@@ -154,6 +175,7 @@ class DeviceSession:
         is_reboot = self.boot_id != 0
         if is_reboot:
             self._old_boots = [*self._old_boots[1 - OLD_BOOTS :], self.boot_id]
+        self._old_boots = [boot for boot in self._old_boots if boot != boot_id]
         self.boot_id = boot_id
         self.state = None
         self.clock.reset()

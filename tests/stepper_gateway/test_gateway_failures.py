@@ -104,6 +104,21 @@ def test_a_late_frame_of_the_old_boot_is_no_reboot() -> None:
     assert_works_again(rig)
 
 
+def test_a_forged_boot_a_forged_time_and_a_stale_last_will_are_survived() -> None:
+    rig = Rig().ready()
+    forged = State(boot_id=5, t_us=2**60, mode=3, steps=(1, 2, 3), velocity=(0, 0, 0))
+    rig.receive(Kind.STATUS, b'{"online": false, "device": "rm1", "boot_id": 77}', retained=True)
+    rig.receive(Kind.STATUS, b'{"online": true, "device": "rm1", "boot_id": 5, "joints": 9}')
+    rig.run(0.1)
+    assert not rig.core.not_ready(rig.moment)
+    rig.receive(Kind.STATE, encode(forged))
+    rig.run(1.5)
+    assert not rig.core.not_ready(rig.moment)
+    rig.receive(Kind.STATE, encode(State(boot_id=77, t_us=2**60, mode=3, steps=(1, 2, 3), velocity=(0, 0, 0))))
+    rig.run(1.5)
+    assert_works_again(rig)
+
+
 def test_a_silent_gateway_stops_the_arm_on_its_path_and_a_new_one_takes_over() -> None:
     rig = moving_rig()
     rig.gateway_is_on = False
