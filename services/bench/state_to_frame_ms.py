@@ -50,7 +50,10 @@ def measure(stacks: Stacks) -> Figure:
     ]
     if not samples:
         raise NotMeasured(f"{len(arrivals)} states, {len(frames)} frames, but none belong together")
-    note = f"{len(samples)} of {len(arrivals)} states of {DURATION:g} s, broker {running.deployment.mqtt.broker}"
+    note = (
+        f"{len(samples)} of {len(arrivals)} states of {DURATION:g} s (all these topics keep only the newest), "
+        f"broker {running.deployment.mqtt.broker}"
+    )
     return of_samples(samples, UNIT, GOAL, note=note)
 
 
