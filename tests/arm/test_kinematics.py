@@ -94,7 +94,7 @@ def test_a_margin_sees_what_is_only_near():
 def test_no_distance_changes_faster_than_the_reach_says(a: tuple[float, ...], b: tuple[float, ...]):
     moved = float(np.abs(np.subtract(a, b)) @ KINEMATICS.collisions.reach)
     change = abs(KINEMATICS.collisions.distance(a) - KINEMATICS.collisions.distance(b))
-    assert change <= moved + 1e-6
+    assert change <= moved + 1e-5  # coal's GJK ends within some 1e-6 m, depending on where it began
 
 
 def test_a_shape_that_pinocchio_drops_is_an_error_and_not_free_space(rm1_folder: Path, tmp_path: Path):
