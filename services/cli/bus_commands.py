@@ -40,7 +40,8 @@ def echo_options(parser: Parser) -> None:
 
 def topic_echo(options: Options) -> ExitCode:
     from services.cli.session import connect
-    from services.cli.topics import echo, topic_of
+    from services.cli.topics import topic_of
+    from services.cli.traffic import echo
 
     topic = topic_of(options.topic)
     with connect() as session:
@@ -55,7 +56,8 @@ def hz_options(parser: Parser) -> None:
 
 def topic_hz(options: Options) -> ExitCode:
     from services.cli.session import connect
-    from services.cli.topics import hz, topic_of
+    from services.cli.topics import topic_of
+    from services.cli.traffic import hz
 
     topic = topic_of(options.topic)
     with connect() as session:
@@ -71,7 +73,8 @@ def pub_options(parser: Parser) -> None:
 
 def topic_pub(options: Options) -> ExitCode:
     from services.cli.session import connect
-    from services.cli.topics import message_of, publish, topic_of
+    from services.cli.topics import message_of, topic_of
+    from services.cli.traffic import publish
 
     topic = topic_of(options.topic)
     message = message_of(topic.message, options.message)
@@ -93,7 +96,8 @@ def call_options(parser: Parser) -> None:
 
 def request_call(options: Options) -> ExitCode:
     from services.cli.session import connect
-    from services.cli.topics import call, message_of, request_of
+    from services.cli.topics import message_of, request_of
+    from services.cli.traffic import call
 
     request = request_of(options.request)
     message = message_of(request.request, options.message)

@@ -12,7 +12,7 @@ from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.planning import JointGoal, NamedGoal, PlanRequest, PoseGoal
 from schemas.topics import JOINT_STATES, JOINT_TARGETS
-from services.cli import device, nodes, state, topics
+from services.cli import device, nodes, state, topics, traffic
 from services.cli.action_goal import send_goal
 from services.cli.exits import CommandError, ExitCode
 from services.cli.interrupt import Interrupt
@@ -117,7 +117,7 @@ def test_nothing_heard_of_the_arm_is_no_stack(session, monkeypatch):
 
 
 def test_echo_prints_yaml_documents(session, stack, capsys):
-    assert topics.echo(session, JOINT_STATES, 3, as_json=False) is ExitCode.OK
+    assert traffic.echo(session, JOINT_STATES, 3, as_json=False) is ExitCode.OK
     *documents, rest = capsys.readouterr().out.split("---\n")
     assert len(documents) == 3
     assert rest == ""
@@ -125,20 +125,20 @@ def test_echo_prints_yaml_documents(session, stack, capsys):
 
 
 def test_hz_measures_the_rate(session, stack, capsys):
-    assert topics.hz(session, JOINT_STATES, 1000, 1) is ExitCode.OK
+    assert traffic.hz(session, JOINT_STATES, 1000, 1) is ExitCode.OK
     words = capsys.readouterr().out.split()
     assert words[:2] == ["average", "rate:"]
     assert 25.0 < float(words[2]) < 100.0
 
 
 def test_hz_of_silence_says_so(session, capsys):
-    assert topics.hz(session, JOINT_STATES, 1000, 1) is ExitCode.OK
+    assert traffic.hz(session, JOINT_STATES, 1000, 1) is ExitCode.OK
     assert capsys.readouterr().out == "no new messages on joint_states\n"
 
 
 def test_only_the_writer_of_a_topic_may_publish_on_it(session):
     with pytest.raises(CommandError, match="only stepper_gateway writes joint_states"):
-        topics.publish(session, JOINT_STATES, JOINT_STATES.message(), None, 1)
+        traffic.publish(session, JOINT_STATES, JOINT_STATES.message(), None, 1)
 
 
 def test_pub_stamps_what_has_no_stamp(session, network, deployment, capsys):
@@ -149,7 +149,7 @@ def test_pub_stamps_what_has_no_stamp(session, network, deployment, capsys):
     with Node("listener", deployment, robot="rm1", bus=MemoryBus(network)) as listener:
         listener.subscribe(JOINT_TARGETS, heard.append)
         message = JOINT_TARGETS.message(name=("brazo_joint",), position=(0.1,))
-        assert topics.publish(session, JOINT_TARGETS, message, 50.0, 2) is ExitCode.OK
+        assert traffic.publish(session, JOINT_TARGETS, message, 50.0, 2) is ExitCode.OK
         listener.wait(0.1)
     assert [each.position for each in heard][-1] == (0.1,)
     assert heard[-1].stamp > 0
