@@ -100,6 +100,11 @@ void Machine::open_stream(const Chunk& chunk) {
     Knot knot{};
     chunk.read_knot(0, &knot);
     path_.start(knot);
+    // The slots that are under way still belong to the stream before.
+    for (Point& point : points_) {
+        point.play_us = 0;
+        point.is_end = point.is_starved = false;
+    }
     streams_.open(chunk.stream());
     stepper_.watch();
     awaits_first_pulse_ = true;

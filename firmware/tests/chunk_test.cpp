@@ -161,6 +161,20 @@ TEST(Chunk, MayOvershootNoSoftLimitBetweenItsKnots) {
     EXPECT_EQ(rig.send(chunk).code, Code::Ok);
 }
 
+TEST(Chunk, ThatFollowsTheEndAtOnceStartsItsOwnStream) {
+    Rig rig;
+    rig.send(kMotion.whole(7));
+    while (rig.mode() != Mode::Idle) rig.run_ms(1);
+    const Motion back = quintic({500, -300}, {0, 0});
+    ASSERT_EQ(rig.send(back.whole(8)).code, Code::Ok);
+    EXPECT_EQ(rig.device.machine().present().play_us, 0u);
+    rig.run_ms(static_cast<uint32_t>(back.duration() * 500));
+    EXPECT_EQ(rig.mode(), Mode::Run);
+    EXPECT_EQ(rig.count_events("finished"), 1);
+    rig.run_until_idle();
+    EXPECT_EQ(rig.steps(0), 0);
+}
+
 TEST(Chunk, OfOneRestingKnotEndsAtOnce) {
     Rig rig;
     ChunkSpec chunk;
