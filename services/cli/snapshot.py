@@ -43,17 +43,6 @@ class Snapshot(msgspec.Struct, frozen=True):
     round_trip_ms: float | None
 
 
-def snapshot(self) -> Snapshot:
-    return snapshot(
-        self._arm,
-        self._states.message,
-        self._errors.message,
-        self._device.message,
-        self._status.message,
-        self.tool(),
-    )
-
-
 def snapshot(
     arm: Arm,
     states: JointState | None,

@@ -52,7 +52,18 @@ class StateView:
         except FrameError:
             return None
 
-    def state(session: Session, watch: bool, as_json: bool) -> ExitCode:
+    def snapshot(self) -> Snapshot:
+        return snapshot(
+            self._arm,
+            self._states.message,
+            self._errors.message,
+            self._device.message,
+            self._status.message,
+            self.tool(),
+        )
+
+
+def state(session: Session, watch: bool, as_json: bool) -> ExitCode:
     """Prints one snapshot, or one after another until Ctrl-C."""
     view = StateView(session)
     wait_for(session, view)
