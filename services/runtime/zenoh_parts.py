@@ -1,0 +1,83 @@
+"""What a Zenoh session declares, in the shape of the bus's contract."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import zenoh
+
+from services.runtime.bus import ENCODING, Arrival
+
+
+class ZenohPublication:
+    """A declared publisher, plain or advanced."""
+
+    def __init__(self, publisher: Any) -> None:
+        self._publisher = publisher
+
+    def put(self, payload: bytes) -> None:
+        self._publisher.put(payload)
+
+    def close(self) -> None:
+        self._publisher.undeclare()
+
+
+class ZenohDeclaration:
+    """Anything that Zenoh undeclares."""
+
+    def __init__(self, *declared: Any) -> None:
+        self._declared = declared
+
+    def close(self) -> None:
+        for each in self._declared:
+            each.undeclare()
+
+
+class ZenohQuery:
+    """A query that is finalised by its one reply."""
+
+    def __init__(self, query: zenoh.Query, key: str) -> None:
+        self._query = query
+        self.arrival = Arrival(key, schema_in(query.encoding), bytes(query.payload or b""))
+
+    def reply(self, schema: str, payload: bytes) -> None:
+        with self._query as query:
+            query.reply(self.arrival.key, payload, encoding=encoding_of(schema))
+
+    def fail(self, schema: str, payload: bytes) -> None:
+        with self._query as query:
+            query.reply_err(payload, encoding=encoding_of(schema))
+
+
+class Presence:
+    """Knows whether somebody serves a key."""
+
+    def __init__(self, session: zenoh.Session, key: str) -> None:
+        self._served = threading.Event()
+        self._querier = session.declare_querier(key)
+        self._listener = self._querier.declare_matching_listener(self._on_status)
+        if self._querier.matching_status.matching:  # type: ignore[attr-defined]
+            self._served.set()
+
+    def _on_status(self, status: zenoh.MatchingStatus) -> None:
+        if status.matching:
+            self._served.set()
+        else:
+            self._served.clear()
+
+    def wait(self, timeout: float) -> bool:
+        return self._served.wait(timeout)
+
+
+def encoding_of(schema: str) -> zenoh.Encoding:
+    return zenoh.Encoding(ENCODING).with_schema(schema)
+
+
+def schema_in(encoding: zenoh.Encoding | None) -> str:
+    kind, _, schema = str(encoding or "").partition(";")
+    return schema if kind == ENCODING else ""
+
+
+def is_timeout(error: zenoh.ReplyError) -> bool:
+    return not schema_in(error.encoding)
