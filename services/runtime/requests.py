@@ -8,10 +8,10 @@ from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from typing import Generic, TypeVar
 
-from schemas.message import BadMessage, Message, decode
+from schemas.message import BadMessage, Message
 from schemas.system import Failure, TopicStatistics
 from schemas.topics import Request
-from services.runtime.bus import Answer, Bus, Query
+from services.runtime.bus import Answer, Arrival, Bus, Query
 from services.runtime.errors import NoAnswer, Refused
 from services.runtime.inbox import Task
 from services.runtime.topics import Complain
@@ -116,9 +116,10 @@ def call(bus: Bus, request: Request[Q, R], question: Q, timeout: float) -> R:
 def response_in(request: Request[Q, R], answer: Answer) -> R:
     """The response in `answer`; raises `Refused` for a failure, `NoAnswer` where it cannot be read."""
     try:
+        arrival = Arrival(request.key, answer.schema, answer.payload)
         if answer.ok:
-            return decode(request.response, answer.payload)
-        failure = decode(Failure, answer.payload)
+            return from_arrival(request.response, arrival)
+        failure = from_arrival(Failure, arrival)
     except BadMessage as error:
         raise NoAnswer(f"the answer of {request.server} to {request.key} cannot be read: {error}") from error
     raise Refused(failure.message, failure.kind)
