@@ -21,6 +21,7 @@ from schemas.deployment import Deployment
 from services.arm.description import Arm, load_arm
 from services.arm.errors import DescriptionError
 from services.runtime.deployment import DeploymentError, load_deployment, project_root
+from services.runtime.logs import LEVELS, line_logger
 from services.runtime.readiness import Readiness
 
 NAME = "virtual_esp32"
@@ -30,7 +31,7 @@ log = logging.getLogger(NAME)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs until SIGTERM or SIGINT and returns 0; 1 with one sentence where it cannot start."""
     options = _parse(arguments)
-    logging.basicConfig(level=options.log_level.upper(), format="%(levelname)s %(name)s: %(message)s")
+    line_logger(NAME, options.log_level)
     try:
         run(load_deployment(options.config))
     except (DeploymentError, DescriptionError, ConfigError, CoreMissing) as error:
@@ -78,7 +79,7 @@ def _wake(config: DeviceConfig, arm: Arm, memory: PoseMemory) -> Device:
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gemelo-virtual-esp32", description=__doc__)
     parser.add_argument("--config", type=Path, default=None, help="deployment file [deploy/local.toml]")
-    parser.add_argument("--log-level", default="info", choices=("debug", "info", "warning", "error"))
+    parser.add_argument("--log-level", default="info", choices=LEVELS)
     return parser.parse_args(arguments)
 
 
