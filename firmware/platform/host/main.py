@@ -31,7 +31,9 @@ log = logging.getLogger(NAME)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs until SIGTERM or SIGINT and returns 0; 1 with one sentence where it cannot start."""
     options = _parse(arguments)
-    line_logger(NAME, options.log_level)
+    log.setLevel(options.log_level.upper())
+    log.handlers = line_logger(NAME).handlers
+    log.propagate = False
     try:
         run(load_deployment(options.config))
     except (DeploymentError, DescriptionError, ConfigError, CoreMissing) as error:
