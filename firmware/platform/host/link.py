@@ -66,6 +66,7 @@ class DeviceLink:
         self._client.will_set(self._topic + "status", will, qos=1, retain=True)
         self._client.on_socket_open = _send_at_once
         self._client.on_connect = self._on_connect
+        self._client.on_connect_fail = self._on_connect_fail
         self._client.on_disconnect = self._on_disconnect
         self._client.on_message = self._on_message
         self._client.connect_timeout = 2.0
@@ -99,6 +100,10 @@ class DeviceLink:
             return
         client.subscribe([(self._topic + kind, qos) for kind, qos in COMMANDS.items()])
         self._inbox.put(Connected())
+
+    def _on_connect_fail(self, _client: paho.Client, _data: object) -> None:
+        host, port = self._address
+        self._inbox.put(Disconnected(f"no MQTT broker answers at {host}:{port}; is the process `broker` running?"))
 
     def _on_disconnect(self, _client: paho.Client, _data: object, _flags: object, reason: object, _p: object) -> None:
         self._inbox.put(Disconnected(str(reason)))
