@@ -14,6 +14,7 @@ from services.arm.description import ROBOT_FILE, load_arm
 from services.arm.errors import DescriptionError
 from services.arm.findings import Finding, Severity, error
 from services.arm.robot_file import dotted, parse_toml, read_text, unknown_keys
+from services.arm.second_opinion import second_opinion
 from services.arm.srdf import read_srdf
 from services.arm.urdf import read_urdf
 
@@ -79,7 +80,7 @@ def _files(folder: Path, robot: RobotFile) -> list[Finding]:
 def _whole(folder: Path) -> list[Finding]:
     """What only shows when all of it is put together."""
     try:
-        load_arm(folder)
+        arm = load_arm(folder)
     except DescriptionError as problem:
         return [error(ROBOT_FILE, "robot", str(problem))]
-    return []
+    return second_opinion(arm)

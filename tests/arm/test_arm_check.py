@@ -117,3 +117,11 @@ def test_a_missing_or_broken_file_is_one_finding(copy: Path, name: str):
     assert any(finding.severity is Severity.ERROR for finding in check(copy))
     (copy / name).unlink()
     assert any("no such file" in finding.message for finding in check(copy))
+
+
+def test_a_mesh_that_cannot_be_opened_is_an_error(copy: Path):
+    (copy / "meshes" / "brazo_link.glb").write_bytes(b"no mesh")
+    (finding,) = check(copy)
+    assert finding.severity is Severity.ERROR
+    assert "yourdfpy cannot load it" in finding.message
+    assert "brazo_link.glb" in finding.remedy
