@@ -39,12 +39,7 @@ def until(is_true: Callable[[], object], timeout: float = 5.0) -> bool:
 
 def hear(node: Node, is_true: Callable[[], object], timeout: float = 5.0) -> bool:
     """Handles the node's inbox until something has come."""
-    end = time.monotonic() + timeout
-    while not is_true():
-        if time.monotonic() > end:
-            return False
-        node.wait(0.01)
-    return True
+    return node._loop.wait_for(lambda: bool(is_true()), timeout, on_tick=lambda: None)
 
 
 class RouterProcess:
