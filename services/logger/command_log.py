@@ -10,6 +10,7 @@ from schemas.device import CommandAck, CommandChunk
 
 ACK_TIMEOUT = 2_000_000_000  # [ns] after which an unanswered chunk counts as lost
 LOST, RESENT, UNANSWERED = "lost", "resent", "unanswered"
+MAX_EARLY = 64  # answers kept for a chunk that is still on its way here
 
 Row = tuple[str, ...]
 
@@ -36,6 +37,7 @@ class CommandLog:
         self.missing = 0  # chunks that never arrived here: gaps of the sequence number
         self.malformed = 0  # chunks whose tables do not fit together; they are in the MCAP only
         self._pending: dict[tuple[int, int], _Pending] = {}
+        self._early: dict[tuple[int, int], CommandAck] = {}
         self._newest: tuple[int, int] = (0, -1)  # stream, seq
         self._lines: list[Line] = []
 
@@ -54,13 +56,25 @@ class CommandLog:
         first = self._pending.pop(key, None)
         if first is not None:
             self._lines += _lines(first.chunk, None, RESENT)
-        self._pending[key] = _Pending(chunk, now)
+        early = self._early.pop(key, None)
+        if early is None or early.stamp < chunk.stamp:
+            self._pending[key] = _Pending(chunk, now)
+        else:
+            self._lines += _lines(chunk, early, str(early.code))
 
     def on_ack(self, ack: CommandAck) -> None:
-        """Complete the rows of the chunk that is answered; an answer to none of them is ignored."""
-        waiting = self._pending.pop((ack.stream, ack.seq), None)
+        """Complete the rows of the chunk that is answered.
+
+        Order is kept within a key only, so an answer may come before its chunk: it waits for it a while.
+        """
+        key = ack.stream, ack.seq
+        waiting = self._pending.pop(key, None)
         if waiting is not None:
             self._lines += _lines(waiting.chunk, ack, str(ack.code))
+            return
+        self._early[key] = ack
+        if len(self._early) > MAX_EARLY:
+            del self._early[next(iter(self._early))]
 
     def step(self, now: int) -> list[Line]:
         """The lines completed since the last call, those of lost chunks among them."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+import time
 
 from schemas.deployment import RouterSection
 from services.runtime.bus import Bus
 from services.runtime.stopping import StopRequest
 
 LOOK_EVERY = 0.1  # [s]
+PATIENCE = 1.0  # [s] of waiting that are not worth a word: all processes start at once
 
 
 def connect(router: RouterSection, robot: str, log: logging.Logger, stop: StopRequest) -> Bus:
@@ -16,6 +18,7 @@ def connect(router: RouterSection, robot: str, log: logging.Logger, stop: StopRe
     from services.runtime.zenoh_bus import BusNotOpen, ZenohBus, router_answers
 
     is_said = False
+    started = time.monotonic()
     while not stop.is_set:
         if router_answers(router.host, router.port):
             try:
@@ -28,7 +31,7 @@ def connect(router: RouterSection, robot: str, log: logging.Logger, stop: StopRe
                 return bus
         else:
             reason = ""
-        if not is_said:
+        if not is_said and time.monotonic() - started > PATIENCE:
             is_said = True
             log.warning("waiting for the router at %s:%d%s; `make up` starts it", router.host, router.port, reason)
         stop.wait(LOOK_EVERY)

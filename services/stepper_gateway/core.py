@@ -63,7 +63,8 @@ class GatewayCore:
         session = self.mover.session
         if connected != session.link_up:
             session.on_link(connected, reason)
-            self.mover.event("connected" if connected else "disconnected", reason, moment)
+            level = LogLevel.INFO if connected else LogLevel.WARNING
+            self.mover.event("connected" if connected else "disconnected", reason, moment, level)
         session.link_reason = reason
         return self._finish(moment)
 

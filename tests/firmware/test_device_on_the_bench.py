@@ -99,7 +99,7 @@ def test_a_stop_ends_the_stream_on_the_path_and_the_next_one_starts_there():
     assert ack.code == 0
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.binary(max_size=300), st.booleans())
 def test_no_bytes_at_all_move_a_device(data: bytes, retained: bool):
     device = vector_device()

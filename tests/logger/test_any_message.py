@@ -53,7 +53,7 @@ def test_the_logger_records_any_message_of_a_topic(topic, tmp_path_factory):
     folder = tmp_path_factory.mktemp("log")
     logger, recording = Logger(), Recording(folder, "any", START, {})
 
-    @settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=25, suppress_health_check=list(HealthCheck))
     @given(messages(topic.message))
     def record(message):
         received = decode(topic.message, encode(message))
@@ -82,7 +82,7 @@ HANDLERS = {
 
 @pytest.mark.parametrize("topic", [topic for topic in TOPICS if topic.key in HANDLERS], ids=lambda topic: topic.key)
 def test_the_visualizer_shows_any_message_of_a_topic(topic):
-    @settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=40, suppress_health_check=list(HealthCheck))
     @given(st.lists(messages(topic.message), max_size=3))
     def show(received):
         core = Visualizer(parse_urdf(URDF), "r", "b")

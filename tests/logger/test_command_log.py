@@ -124,3 +124,19 @@ def test_a_chunk_without_velocities_leaves_their_columns_empty(chunk, ack):
     row = table(log.step(START))[0]
     assert (row["brazo_joint_vel"], row["brazo_joint_acc"], row["brazo_joint_executed_steps"]) == ("", "0", "")
     assert len(bytes.fromhex(row["command_sent"])) == 12
+
+
+def test_an_acknowledgement_that_comes_before_its_chunk_waits_for_it(chunk, ack):
+    log = CommandLog()
+    log.on_ack(ack(0))
+    log.on_chunk(chunk(0), START)
+    assert {row["ack_code"] for row in table(log.step(START))} == {"0"}
+    assert log.pending == 0
+
+
+def test_an_old_acknowledgement_does_not_answer_a_chunk_sent_after_it(chunk, ack):
+    log = CommandLog()
+    log.on_ack(msgspec.structs.replace(ack(0, code=2), stamp=START - 1))
+    log.on_chunk(chunk(0), START)
+    log.on_ack(ack(0))
+    assert {row["ack_code"] for row in table(log.step(START))} == {"0"}

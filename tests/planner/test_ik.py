@@ -22,7 +22,7 @@ IK = InverseKinematics(ARM, KINEMATICS)
 POSTURES = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(POSTURES, POSTURES)
 def test_fk_of_ik_is_the_goal(goal: tuple[float, ...], near: tuple[float, ...]):
     target = Target(KINEMATICS.tool(goal).position)
@@ -63,7 +63,7 @@ def test_a_search_that_is_late_ends():
     assert list(IK.solutions(Target(np.array([0.6, 0.0, 0.1])), np.zeros(3), lambda: True)) == []
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(POSTURES, POSTURES)
 def test_orientations_are_met_where_the_arm_can(goal: tuple[float, ...], near: tuple[float, ...]):
     pose = KINEMATICS.tool(goal)

@@ -96,7 +96,7 @@ def test_a_start_rounded_to_whole_steps_beyond_a_limit_is_still_a_start(planner:
     assert response.trajectory.points[0].positions == (0.0, 2.95, 0.2)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(POSTURES, POSTURES)
 def test_whatever_comes_out_is_within_limits_and_free(start: tuple[float, ...], goal: tuple[float, ...]):
     point = tuple(PLANNER.kinematics.tool(goal).position.tolist())

@@ -108,7 +108,7 @@ def test_a_joint_that_holds_the_tool_back_is_named(planner: Planner, home: Joint
     assert "efector_joint at its upper limit of 0.2 m" in refused(response, PlanCode.NO_IK_SOLUTION).message
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(-0.3, 0.5)))
 def test_the_nearest_goal_of_a_refusal_is_planned_when_asked_for(goal: tuple[float, ...]):
     response = PLANNER.plan(PlanRequest(goal=PoseGoal(position=goal)), STANDING)
@@ -185,7 +185,7 @@ def test_a_search_without_time_is_timed_out(planner: Planner, home: JointState):
     assert refusal.subject == "allowed_time"
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.builds(
     PlanRequest,
     goal=st.one_of(

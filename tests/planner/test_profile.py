@@ -31,7 +31,7 @@ def dense(trajectory: JointTrajectory, parts: int = 10) -> tuple[np.ndarray, np.
     return (grid, *(np.array([row[i] for row in rows]) for i in range(3)))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(POSTURES, POSTURES, SCALINGS, SCALINGS)
 def test_a_trajectory_never_exceeds_joint_limits(
     start: tuple[float, ...], goal: tuple[float, ...], speed: float, acceleration: float
@@ -47,7 +47,7 @@ def test_a_trajectory_never_exceeds_joint_limits(
     require_within_limits(ARM, sample(trajectory), limits)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(POSTURES, POSTURES)
 def test_start_and_end_are_exact_and_at_rest(start: tuple[float, ...], goal: tuple[float, ...]):
     trajectory = straight_line(ARM.joint_names, start, goal, joint_limits(ARM))
@@ -57,7 +57,7 @@ def test_start_and_end_are_exact_and_at_rest(start: tuple[float, ...], goal: tup
     assert all(b - a > 0.5e-4 for a, b in itertools.pairwise(times))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(POSTURES, POSTURES)
 def test_the_joints_move_on_a_straight_line_and_never_back(start: tuple[float, ...], goal: tuple[float, ...]):
     _, p, _, _ = dense(straight_line(ARM.joint_names, start, goal, joint_limits(ARM)))
@@ -67,7 +67,7 @@ def test_the_joints_move_on_a_straight_line_and_never_back(start: tuple[float, .
     assert (np.diff(share) >= -1e-9).all()
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(POSTURES, POSTURES)
 def test_jerk_is_limited_and_the_acceleration_has_no_jump(start: tuple[float, ...], goal: tuple[float, ...]):
     limits = joint_limits(ARM)
@@ -76,7 +76,6 @@ def test_jerk_is_limited_and_the_acceleration_has_no_jump(start: tuple[float, ..
     assert (np.abs(np.diff(a, axis=0))[wide] / np.diff(t)[wide, None] <= 1.01 * limits.jerk + 1e-6).all()
 
 
-@settings(deadline=None)
 @given(st.floats(0.0, 1.0), st.integers(-14, -2))
 def test_the_shortest_ways_are_timed_too(share: float, exponent: int):
     start = (0.1, -0.2, 0.05)

@@ -266,7 +266,7 @@ junk = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(st.sampled_from([k for k in Kind if k != Kind.STATUS]), junk, st.booleans()), max_size=20))
 def test_junk_from_the_wire_is_counted_and_nothing_moves(items: list[tuple[Kind, bytes, bool]]) -> None:
     rig = Rig().ready()
@@ -284,7 +284,7 @@ def test_junk_from_the_wire_is_counted_and_nothing_moves(items: list[tuple[Kind,
     assert rig.core.bad_frames == wrong
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(st.sampled_from(list(Kind)), st.binary(max_size=80)), max_size=20))
 def test_random_bytes_while_moving_change_nothing(items: list[tuple[Kind, bytes]]) -> None:
     rig = Rig().ready()

@@ -61,7 +61,7 @@ def test_a_rounded_path_starts_from_the_arm_where_the_first_point_comes_later() 
 places = st.tuples(st.floats(-2.9, 2.9), st.floats(-2.9, 2.9), st.floats(0.0, 0.2))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(places, places, places, st.floats(0.0, 1.0))
 def test_a_bridge_is_continuous_and_keeps_the_limits(
     first: Vector, second: Vector, third: Vector, share: float
@@ -87,7 +87,7 @@ def test_a_bridge_is_continuous_and_keeps_the_limits(
             assert abs(knot.acceleration[joint]) <= LIMITS.acceleration[joint] * 1.05
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(0.0005, 30.0))
 def test_a_planned_motion_has_equal_steps_of_at_most_20_ms_and_ends_exactly(duration: float) -> None:
     points = tuple(

@@ -129,7 +129,7 @@ UPPER = (2.95, 2.95, 0.2)
 shares = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(shares, st.integers(1, 60), st.booleans()), min_size=1, max_size=6))
 def test_whatever_the_targets_the_tracker_keeps_every_limit(
     program: list[tuple[tuple[float, ...], int, bool]],

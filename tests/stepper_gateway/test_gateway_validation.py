@@ -211,7 +211,7 @@ goals = st.builds(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(goals)
 def test_any_goal_is_refused_or_its_path_keeps_the_limits(goal: FollowJointTrajectoryGoal) -> None:
     validator, parameters = Validator(rm1().joints, 50_000), GatewayParameters()
@@ -230,7 +230,7 @@ def test_any_goal_is_refused_or_its_path_keeps_the_limits(goal: FollowJointTraje
 places = st.tuples(st.floats(-2.9, 2.9), st.floats(-2.9, 2.9), st.floats(0.0, 0.2))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.lists(st.tuples(places, st.floats(0.02, 2.0)), min_size=1, max_size=4))
 def test_an_accepted_goal_never_leaves_the_limits_whenever_it_comes(program: list[tuple[Vector, float]]) -> None:
     rig = Rig().ready()

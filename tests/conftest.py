@@ -1,0 +1,29 @@
+"""The arm most tests are about, and property tests that run the same examples everywhere.
+
+HYPOTHESIS_PROFILE=explore looks for new examples.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+from services.arm.description import Arm, load_arm
+
+# No deadline: two cores, shared; time is measured by the bench.
+settings.register_profile("same", derandomize=True, deadline=None)
+settings.register_profile("explore", deadline=None)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
+
+
+@pytest.fixture(scope="session")
+def rm1_folder() -> Path:
+    return Path(__file__).parents[1] / "urdf" / "rm1"
+
+
+@pytest.fixture(scope="session")
+def rm1(rm1_folder: Path) -> Arm:
+    return load_arm(rm1_folder)
