@@ -1,8 +1,9 @@
 """From the acceptance of a goal to the first step pulse of the virtual ESP32 in real time.
 
 The device's `started` event bears the time of the first step, mapped to this machine's clock by the gateway's clock
-synchronisation. A trajectory that starts gently has its own first step some time after its start; that time is
-computed from the trajectory and taken off, because no controller could be earlier.
+synchronisation. Nothing is taken off: the trajectories start with nearly the full acceleration from a whole step, so
+that their own first step is due as soon as the arm's limits allow. The planner's moves start gently, within the jerk
+limit; they stand beside it with the time at which their own first step is due.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ import math
 
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceEvent
-from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory
+from schemas.message import Vector
+from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from schemas.planning import JointGoal, PlanRequest
-from schemas.topics import DEVICE_EVENTS, FOLLOW_JOINT_TRAJECTORY, PLAN
+from schemas.topics import DEVICE_EVENTS, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, PLAN
 from services.arm.description import Arm
 from services.arm.interpolation import TrajectorySampler
 from services.bench.figure import Figure, Goal, NotMeasured, of_samples, quantile, rounded
@@ -22,7 +24,9 @@ from services.bench.stacks import Running, Stacks
 UNIT = "ms"
 GOAL = Goal(median=25.0, p99=50.0)
 ROUNDS = 40
-SWING = 0.05  # [rad] or [m] to either side of zero
+SHARE = 0.95  # of the first joint's acceleration limit
+RAMP = 0.2  # [s] of speeding up, and of slowing down
+SWING = 0.05  # [rad] or [m] to either side of zero, for planned moves
 GRID = 0.0002  # [s] to which the trajectory's own first step is found
 
 
@@ -35,26 +39,58 @@ def measure(stacks: Stacks) -> Figure:
             started.append(event)
 
     running.node.subscribe(DEVICE_EVENTS, on_event)
-    raw, due = [], []
-    for number in range(ROUNDS):
-        joint = running.arm.joints[0].name
-        request = PlanRequest(goal=JointGoal(name=(joint,), position=(SWING * (-1.0) ** number,)))
-        plan = running.node.call(PLAN, request, timeout=3.0)
-        if plan.refusal is not None:
-            raise NotMeasured(f"the planner refused: {plan.refusal.message}")
+    states = running.node.latest(JOINT_STATES)
+
+    def took(trajectory: JointTrajectory) -> float:
         started.clear()
-        accepted = follow(running, plan.trajectory)
+        accepted = follow(running, trajectory)
         if not started:
             raise NotMeasured("the device reported no first step")
-        raw.append((started[0].stamp - accepted) * 1e-6)
-        due.append(first_step_due(running.arm, plan.trajectory) * 1e3)
-    samples = [took - physics for took, physics in zip(raw, due, strict=True)]
+        return (started[0].stamp - accepted) * 1e-6
+
+    sharp, sharp_due, gentle, gentle_due = [], [], [], []
+    for number in range(ROUNDS):
+        running.node.wait(0.1)
+        if states.message is None:
+            raise NotMeasured("no joint states")
+        trajectory = sharp_start(running.arm, states.message.position, (-1.0) ** number)
+        sharp.append(took(trajectory))
+        sharp_due.append(first_step_due(running.arm, trajectory) * 1e3)
+    for number in range(ROUNDS // 2):
+        trajectory = planned(running, SWING * (-1.0) ** number)
+        gentle.append(took(trajectory))
+        gentle_due.append(first_step_due(running.arm, trajectory) * 1e3)
+    reference = {
+        "planned (jerk-limited) move median": rounded(quantile(gentle, 0.5)),
+        "its own first step due": rounded(quantile(gentle_due, 0.5)),
+        "PAROL6's Python API median": 50.0,
+    }
     note = (
-        f"{ROUNDS} moves of one joint; the trajectory's own first step is due {rounded(quantile(due, 0.5)):g} ms after "
-        f"its start and is taken off; with it: median {rounded(quantile(raw, 0.5)):g}, "
-        f"p99 {rounded(quantile(raw, 0.99)):g} ms"
+        f"{ROUNDS} moves of one joint at {SHARE:.0%} of its acceleration from the start; their own first step is due "
+        f"{rounded(quantile(sharp_due, 0.5)):g} ms after it, which is part of the figure; PAROL6: published"
     )
-    return of_samples(samples, UNIT, GOAL, note=note)
+    return of_samples(sharp, UNIT, GOAL, reference=reference, note=note)
+
+
+def sharp_start(arm: Arm, here: Vector, direction: float) -> JointTrajectory:
+    """The first joint speeds up and slows down evenly, a parabola each."""
+    joint = arm.joints[0]
+    acceleration = SHARE * joint.acceleration * direction
+    points = []
+    for time, way, speed in ((0.0, 0.0, 0.0), (RAMP, 0.5, 1.0), (2 * RAMP, 1.0, 0.0)):
+        position = (here[0] + way * acceleration * RAMP**2, *here[1:])
+        velocity = (speed * acceleration * RAMP, *(0.0 for _ in here[1:]))
+        points.append(TrajectoryPoint(positions=position, velocities=velocity, time_from_start=time))
+    return JointTrajectory(joint_names=arm.joint_names, points=tuple(points))
+
+
+def planned(running: Running, position: float) -> JointTrajectory:
+    """The planner's way to `position` of the first joint."""
+    goal = JointGoal(name=(running.arm.joints[0].name,), position=(position,))
+    plan = running.node.call(PLAN, PlanRequest(goal=goal), timeout=3.0)
+    if plan.refusal is not None:
+        raise NotMeasured(f"the planner refused: {plan.refusal.message}")
+    return plan.trajectory
 
 
 def follow(running: Running, trajectory: JointTrajectory) -> int:
