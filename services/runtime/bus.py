@@ -64,6 +64,10 @@ class Bus(Protocol):
         """Whether messages can leave now; False while the router is away."""
         ...
 
+    def require_way_back(self) -> None:
+        """Call once a second; raises `BusError` where the router is there but this bus does not find back to it."""
+        ...
+
     def publish(self, key: str, schema: str, delivery: Delivery) -> Publication:
         """EVERY and LATCHED are kept for readers that miss them while the router is away."""
         ...

@@ -29,6 +29,9 @@ class MemoryBus:
     def is_connected(self) -> bool:
         return self.network.is_connected
 
+    def require_way_back(self) -> None:
+        pass
+
     def publish(self, key: str, schema: str, delivery: Delivery) -> MemoryPublication:
         publication = MemoryPublication(self, key, schema, delivery)
         with self.network.lock:

@@ -190,6 +190,8 @@ class Node:
         try:
             with stop_on_signals(self._stop) if self._signals else nullcontext():
                 self._loop.spin(step, rate)
+        except BrokenPipeError:
+            raise  # whoever reads this program's output has enough: no error of the node
         except Exception as error:
             self.log.exception("ended by an error")
             error.is_logged = True  # type: ignore[attr-defined]
@@ -239,6 +241,7 @@ class Node:
     def _beat(self) -> None:
         if self._readiness is not None:
             self._readiness.beat()
+        self._bus.require_way_back()
         self._declared.report_losses()
         report = self._statistics.report(self._loop.take_figures(), self._declared.statistics())
         if report is not None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import socket
 import threading
+import time
 from collections.abc import Callable
 
 import zenoh
@@ -32,6 +33,7 @@ from services.runtime.zenoh_parts import (
 CACHE = 1024  # messages of an EVERY key that survive while the router is away
 HEARTBEAT = 0.5  # [s] after which a reader notices that it misses the last message
 CLOSE_TIMEOUT = 1.0  # [s]
+ASTRAY_PATIENCE = 10.0  # [s] that a session may take to come back to a router that listens
 
 
 class BusNotOpen(BusError):
@@ -47,6 +49,8 @@ class ZenohBus:
             self._session = zenoh.open(client_config(host, port, robot))
         except zenoh.ZError as error:
             raise BusNotOpen(str(error)) from error
+        self._router = (host, port)
+        self._astray_since: float | None = None  # [s] monotonic
         self._tokens: list[ZenohDeclaration] = []
         self._presence: dict[str, Presence] = {}
         self._lock = threading.Lock()
@@ -55,6 +59,14 @@ class ZenohBus:
     @property
     def is_connected(self) -> bool:
         return bool(self._session.info.routers_zid())
+
+    def require_way_back(self) -> None:
+        if self.is_connected or not router_answers(*self._router, timeout=0.1):
+            self._astray_since = None
+            return
+        self._astray_since = self._astray_since or time.monotonic()
+        if time.monotonic() - self._astray_since > ASTRAY_PATIENCE:
+            raise BusError(f"the router is there, but did not take this session back within {ASTRAY_PATIENCE:g} s")
 
     def publish(self, key: str, schema: str, delivery: Delivery) -> ZenohPublication:
         encoding = encoding_of(schema)

@@ -7,7 +7,10 @@ import json
 import zenoh
 
 LEASE_MS = 1000  # a frozen or unplugged peer is seen after this
-LONGEST_BLOCK_US = 1_000_000  # a put of EVERY waits this long for a stalled reader, then the link is dropped
+OPEN_TIMEOUT_MS = 1000  # a router that takes a connection but does not answer (frozen) is tried anew after this
+# A put of EVERY waits this long for a stalled reader, then the link is dropped. Not as long as the lease: where both
+# end a link in the same instant, the session sometimes never comes back (seen with Zenoh 1.10.2).
+LONGEST_BLOCK_US = 500_000
 MAX_MESSAGE_BYTES = 16 * 1024 * 1024
 
 
@@ -35,6 +38,8 @@ def router_config(host: str, port: int) -> zenoh.Config:
 
 def _config(**settings: object) -> zenoh.Config:
     transport = {
+        "shared_memory": {"enabled": False},  # a process that is killed would leave its segments behind
+        "unicast": {"open_timeout": OPEN_TIMEOUT_MS, "accept_timeout": OPEN_TIMEOUT_MS},
         "link": {
             "tx": {
                 "lease": LEASE_MS,
@@ -42,7 +47,7 @@ def _config(**settings: object) -> zenoh.Config:
                 "queue": {"congestion_control": {"block": {"wait_before_close": LONGEST_BLOCK_US}}},
             },
             "rx": {"max_message_size": MAX_MESSAGE_BYTES},
-        }
+        },
     }
     common = {
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 import time
 from collections.abc import Iterator
@@ -15,7 +16,7 @@ from schemas.joints import JointState
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
 from schemas.system import LogRecord
 from schemas.topics import DESCRIPTION, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, LOG, PLAN
-from services.runtime.errors import NoAnswer, ServerLost
+from services.runtime.errors import BusError, NoAnswer, ServerLost
 from services.runtime.node import Node
 from tests.runtime.support import RouterProcess, hear, spinning, until
 from tests.runtime.test_actions import Arm, goal_of
@@ -132,9 +133,8 @@ def test_a_router_that_stays_away_ends_the_waiting(own_router: RouterProcess, mo
                 handle.wait(60.0)
 
 
-def test_a_frozen_router_blocks_a_publisher_for_a_bounded_time(own_router: RouterProcess) -> None:
-    import signal
-
+@pytest.mark.parametrize("frozen", [0.0, 1.5])
+def test_a_frozen_router_blocks_a_publisher_for_a_bounded_time(own_router: RouterProcess, frozen: float) -> None:
     with open_node(own_router, "gateway") as gateway, open_node(own_router, "reader") as reader:
         reader.subscribe(LOG, lambda record: None)
         publisher = gateway.publisher(LOG)
@@ -144,6 +144,16 @@ def test_a_frozen_router_blocks_a_publisher_for_a_bounded_time(own_router: Route
             begin = time.monotonic()
             publisher.put(LogRecord(text="x" * 8000))
             longest = max(longest, time.monotonic() - begin)
+        time.sleep(frozen)
         own_router.process.send_signal(signal.SIGCONT)
-        assert longest < 2.0
-        assert until(lambda: gateway.is_connected, RECOVERY)
+        assert longest < 1.0
+        assert until(lambda: gateway.is_connected and reader.is_connected, RECOVERY)
+
+
+def test_a_node_that_does_not_find_back_ends_so_that_it_is_started_anew(
+    own_router: RouterProcess, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("services.runtime.zenoh_bus.ASTRAY_PATIENCE", 0.5)
+    monkeypatch.setattr("services.runtime.zenoh_bus.ZenohBus.is_connected", False)
+    with open_node(own_router, "astray") as node, pytest.raises(BusError, match="did not take this session back"):
+        node.spin()
