@@ -83,6 +83,22 @@ def test_the_state_by_the_command_line(stack, operator):
         assert name in told.stdout
 
 
+def test_a_reader_that_has_enough_ends_a_listing_without_a_word(stack):
+    listing = subprocess.Popen(
+        [stack.root / ".venv/bin/gemelo", "topic", "hz", "joint_states"],
+        cwd=stack.root,
+        env=stack.environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert "average rate" in listing.stdout.readline()
+    listing.stdout.close()
+    assert listing.wait(5.0) == 0
+    assert listing.stderr.read() == ""
+    listing.stderr.close()
+
+
 def test_a_move_ends_with_every_commanded_step_executed(operator):
     outcome = operator.move()
     assert outcome.status is GoalStatusCode.SUCCEEDED, outcome
