@@ -5,9 +5,11 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from schemas.errors import ConfigurationError
 
-class DescriptionError(ValueError):
-    """A robot's folder is wrong; the text names the file, the thing, its value and, where known, the remedy."""
+
+class DescriptionError(ConfigurationError):
+    """A robot's folder is wrong."""
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str | None:

@@ -7,12 +7,11 @@ import msgspec
 from schemas.deployment import Deployment
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
 from schemas.topics import JOINT_STATES, PLAN, PLANNED_PATH
-from services.arm.description import Arm, load_arm
-from services.arm.errors import DescriptionError
+from services.arm.description import load_arm
 from services.planner.core import Planner
 from services.planner.start import STALE_AFTER
 from services.runtime.application import service
-from services.runtime.deployment import DeploymentError, project_root
+from services.runtime.deployment import project_root
 from services.runtime.node import Node
 
 NOT_READY = "no fresh joint_states: is the stepper_gateway running?"
@@ -20,7 +19,7 @@ NOT_READY = "no fresh joint_states: is the stepper_gateway running?"
 
 def run(node: Node, deployment: Deployment) -> None:
     """Serve until the node is stopped; ready while it knows where the arm is."""
-    planner = Planner(_arm(deployment))
+    planner = Planner(load_arm(project_root() / deployment.robot))
     states = node.latest(JOINT_STATES)
     path = node.publisher(PLANNED_PATH)
 
@@ -45,13 +44,6 @@ def run(node: Node, deployment: Deployment) -> None:
     # In the worker: a plan may take its whole allowed_time, and readiness keeps beating meanwhile.
     node.serve(PLAN, plan, worker=True)
     node.spin(step, rate=10.0)
-
-
-def _arm(deployment: Deployment) -> Arm:
-    try:
-        return load_arm(project_root() / deployment.robot)
-    except DescriptionError as error:
-        raise DeploymentError(str(error)) from error
 
 
 def main() -> None:

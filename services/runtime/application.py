@@ -8,14 +8,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from schemas.deployment import Deployment
-from services.runtime.deployment import DeploymentError, load_deployment
+from schemas.errors import ConfigurationError
+from services.runtime.deployment import load_deployment
 from services.runtime.errors import BusError, Refused
 from services.runtime.logs import LEVELS, line_logger
 from services.runtime.node import Node
 from services.runtime.stopping import StopRequest, end_soon, stop_on_signals
 
 Run = Callable[[Node, Deployment], None]
-EXPECTED = (DeploymentError, BusError, Refused)  # a sentence says all; anything else shows where it happened
+EXPECTED = (ConfigurationError, BusError, Refused)  # a sentence says all; anything else shows where it happened
 
 
 def service(name: str, run: Run, arguments: Sequence[str] | None = None) -> None:

@@ -12,12 +12,13 @@ from typing import Any
 import msgspec
 
 from schemas.deployment import Deployment
+from schemas.errors import ConfigurationError
 
 DEFAULT_FILE = "deploy/local.toml"
 PREFIX = "GEMELO_"
 
 
-class DeploymentError(ValueError):
+class DeploymentError(ConfigurationError):
     """A deployment that cannot be used; the text names the file, the key and what would do."""
 
 

@@ -11,9 +11,8 @@ from schemas.frames import RobotDescription
 from schemas.joints import JointState
 from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
 from services.arm.description import Arm, load_arm
-from services.arm.errors import DescriptionError
 from services.runtime.application import service
-from services.runtime.deployment import DeploymentError, project_root
+from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.state_publisher.core import StatePublisher
 
@@ -38,7 +37,7 @@ def describe(arm: Arm) -> RobotDescription:
 
 def run(node: Node, deployment: Deployment) -> None:
     """Publish until the node is stopped; ready while fresh joint states give frames."""
-    arm = _arm(deployment)
+    arm = load_arm(project_root() / deployment.robot)
     publisher = StatePublisher(arm)
     parameters = node.parameters(StatePublisherParameters)
     states = node.latest(JOINT_STATES)
@@ -60,13 +59,6 @@ def run(node: Node, deployment: Deployment) -> None:
 
     node.subscribe(JOINT_STATES, on_joint_state)
     node.spin(step, rate=10.0)
-
-
-def _arm(deployment: Deployment) -> Arm:
-    try:
-        return load_arm(project_root() / deployment.robot)
-    except DescriptionError as error:
-        raise DeploymentError(str(error)) from error
 
 
 def main() -> None:

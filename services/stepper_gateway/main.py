@@ -6,10 +6,9 @@ import secrets
 from contextlib import closing
 
 from schemas.deployment import Deployment
-from services.arm.description import Arm, load_arm
-from services.arm.errors import DescriptionError
+from services.arm.description import load_arm
 from services.runtime.application import service
-from services.runtime.deployment import DeploymentError, project_root
+from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.links.mqtt import MqttLink
@@ -21,7 +20,7 @@ RATE = 50.0  # [Hz]
 
 def run(node: Node, deployment: Deployment) -> None:
     """Serve until the node is stopped; ready while the device is online, synchronised and its state fresh."""
-    arm = _arm(deployment)
+    arm = load_arm(project_root() / deployment.robot)
     parameters = node.parameters(GatewayParameters)
     core = GatewayCore(arm, secrets.randbelow(2**31 - 1) + 1, parameters.value)
     shell = Shell(node, core, parameters)
@@ -29,13 +28,6 @@ def run(node: Node, deployment: Deployment) -> None:
     with closing(MqttLink(mqtt.host, mqtt.port, arm.device.name, shell.wake)) as link:
         shell.use(link)
         node.spin(shell.step, rate=RATE)
-
-
-def _arm(deployment: Deployment) -> Arm:
-    try:
-        return load_arm(project_root() / deployment.robot)
-    except DescriptionError as error:
-        raise DeploymentError(str(error)) from error
 
 
 def main() -> None:
