@@ -109,5 +109,37 @@ class EveryBox:
         self._handle(arrival)
 
 
+class BatchBox:
+    """Room for many arrivals that wait to be handled together: none of them wakes the thread of logic."""
+
+    def __init__(self, handle: Callable[[Arrival], None], capacity: int = EVERY_CAPACITY) -> None:
+        self._handle, self._capacity = handle, capacity
+        self._waiting: deque[Arrival] = deque()
+        self._lock = threading.Lock()
+        self._bytes = 0
+        self.dropped = 0
+
+    def on_arrival(self, arrival: Arrival) -> None:
+        with self._lock:
+            size = len(arrival.payload)
+            if len(self._waiting) >= self._capacity or self._bytes + size > EVERY_BYTES:
+                self.dropped += 1
+            else:
+                self._waiting.append(arrival)
+                self._bytes += size
+
+    def on_miss(self, count: int) -> None:
+        with self._lock:
+            self.dropped += count
+
+    def deliver(self) -> None:
+        """Handles all that wait, in order."""
+        with self._lock:
+            waiting, self._waiting = self._waiting, deque()
+            self._bytes = 0
+        for arrival in waiting:
+            self._handle(arrival)
+
+
 def _nothing() -> None:
     pass

@@ -100,9 +100,15 @@ class Node:
             publishers[topic.key] = Publisher(self._bus, topic)
         return publishers[topic.key]
 
-    def subscribe(self, topic: Topic[M], on_message: Callable[[M], object], own: bool = False) -> Subscription[M]:
-        """`on_message(message)` runs in the thread of logic; `own`: also for what this node publishes."""
-        subscription = Subscription(self._bus, self._loop.inbox, topic, on_message, self.log.warning, own)
+    def subscribe(
+        self, topic: Topic[M], on_message: Callable[[M], object], own: bool = False, batch: float | None = None
+    ) -> Subscription[M]:
+        """`on_message(message)` runs in the thread of logic; `own`: also for what this node publishes.
+
+        With `batch` all messages, of a LATEST topic too, wait and are handled together every so many seconds:
+        cheaper for a node that shows or keeps them.
+        """
+        subscription = Subscription(self._bus, self._loop, topic, on_message, self.log.warning, own, batch)
         self._declared.subscriptions.append(subscription)
         return subscription
 

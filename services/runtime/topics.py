@@ -10,7 +10,8 @@ from schemas.message import BadMessage, Message
 from schemas.system import TopicStatistics
 from schemas.topics import Delivery, Topic
 from services.runtime.bus import Arrival, Bus
-from services.runtime.inbox import EveryBox, Inbox, LatestBox
+from services.runtime.inbox import BatchBox, Box, EveryBox, LatestBox
+from services.runtime.loop import Loop
 from services.runtime.wire import from_arrival, schema_of, to_payload
 
 M = TypeVar("M", bound=Message)
@@ -43,14 +44,29 @@ class Subscription(Generic[M]):
     """Decodes what arrives on one topic and hands it to `handler` in the thread of logic."""
 
     def __init__(
-        self, bus: Bus, inbox: Inbox, topic: Topic[M], handler: Callable[[M], object], complain: Complain, own: bool
+        self,
+        bus: Bus,
+        loop: Loop,
+        topic: Topic[M],
+        handler: Callable[[M], object],
+        complain: Complain,
+        own: bool,
+        batch: float | None,
     ) -> None:
         self.topic = topic
         self._handler, self._complain = handler, complain
         self._received, self._bad, self._lost_said = 0, 0, False
-        latest = topic.delivery is Delivery.LATEST
-        self._box = LatestBox(inbox, self._handle) if latest else EveryBox(inbox, self._handle)
+        self._loop = loop
+        self._box = self._box_for(batch)
         self._declaration = bus.subscribe(topic.key, topic.delivery, self._box.on_arrival, self._box.on_miss, own)
+
+    def _box_for(self, batch: float | None) -> Box:
+        if batch is not None:
+            box = BatchBox(self._handle)
+            self._loop.every(batch, box.deliver)
+            return box
+        latest = self.topic.delivery is Delivery.LATEST
+        return (LatestBox if latest else EveryBox)(self._loop.inbox, self._handle)
 
     @property
     def statistics(self) -> TopicStatistics:
@@ -58,6 +74,8 @@ class Subscription(Generic[M]):
 
     def close(self) -> None:
         self._declaration.close()
+        if isinstance(self._box, BatchBox):
+            self._loop.forget(self._box.deliver)
 
     def report_losses(self) -> None:
         """Says once that an EVERY topic has lost messages."""

@@ -55,6 +55,32 @@ def test_latest_conflates_while_its_reader_is_busy_and_counts_it(buses: Buses) -
     assert heard == [500]
 
 
+def test_a_batch_keeps_every_message_of_a_latest_topic_and_hands_them_over_together(buses: Buses) -> None:
+    heard: list[int] = []
+    times: list[float] = []
+    reader, writer = buses.node("reader"), buses.node("writer")
+
+    def on_message(message: JointState) -> None:
+        heard.append(message.stamp)
+        times.append(time.monotonic())
+
+    reader.wait(0.01)
+    subscription = reader.subscribe(JOINT_STATES, on_message, batch=0.2)
+    buses.settle()
+    reader.wait(0.05)  # the first batch, which is empty
+    for stamp in range(1, 101):
+        writer.publisher(JOINT_STATES).put(JointState(stamp=stamp))
+        reader.wait(0.0005)
+    assert hear(reader, lambda: len(heard) == 100)
+    assert heard == list(range(1, 101))
+    assert len({round(at * 20) for at in times}) <= 4
+    assert subscription.statistics.dropped == 0
+    subscription.close()
+    writer.publisher(JOINT_STATES).put(JointState(stamp=101))
+    reader.wait(0.3)
+    assert len(heard) == 100
+
+
 def test_every_keeps_order_through_a_node(buses: Buses) -> None:
     heard: list[int] = []
     reader, writer = buses.node("reader"), buses.node("writer")
