@@ -10,9 +10,9 @@ from pathlib import Path
 
 from schemas.deployment import Broker, Deployment
 from services.broker import mosquitto
-from services.broker.ports import PortTaken, require_free
 from services.runtime.deployment import DeploymentError, load_deployment
 from services.runtime.logs import LEVELS, line_logger
+from services.runtime.ports import PortTaken, require_free
 from services.runtime.readiness import Readiness
 
 
@@ -30,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def run(deployment: Deployment, log: logging.Logger) -> int:
     """Serves; the readiness file is beaten once a second for as long as connections are accepted."""
     section = deployment.mqtt
-    require_free(section.host, section.port, "choose another with GEMELO_MQTT_PORT or [mqtt] port in deploy/local.toml")
+    require_free(section.host, section.port, "mqtt")
     folder = Path(deployment.paths.run)
     folder.mkdir(parents=True, exist_ok=True)
     readiness = Readiness(folder, "broker")

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import tomllib
 from collections.abc import Mapping
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +46,7 @@ def load_deployment(path: Path | None = None, environ: Mapping[str, str] | None 
         deployment = msgspec.convert(raw, Deployment, strict=not sources)
     except msgspec.ValidationError as error:
         said = f" (with {', '.join(sources)} from the environment)" if sources else ""
-        raise DeploymentError(f"{file}{said}: {error}") from error
+        raise DeploymentError(f"{file}{said}: {error}{_choices(str(error))}") from error
     return _with_absolute_paths(deployment, root)
 
 
@@ -79,6 +81,13 @@ def _require_known(raw: dict[str, Any], known: dict[str, Any], file: Path, path:
             raise DeploymentError(f'{file}: unknown key "{name}": {hint}')
         if key != "parameters" and isinstance(value, dict) and isinstance(known[key], dict):
             _require_known(value, known[key], file, (*path, key))
+
+
+def _choices(error: str) -> str:
+    """The values that the key named in `error` can have, where it has only a few."""
+    at = re.search(r"`\$\.(\w+)\.(\w+)`", error)
+    default = getattr(getattr(Deployment(), at[1], None), at[2], None) if at else None
+    return f"; known are {', '.join(type(default))}" if isinstance(default, StrEnum) else ""
 
 
 def _override(raw: dict[str, Any], environ: Mapping[str, str]) -> list[str]:

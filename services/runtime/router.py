@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import errno
-import socket
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import zenoh
 
-from schemas.deployment import RouterSection
 from services.runtime.deployment import DeploymentError, load_deployment
-from services.runtime.errors import BusError
 from services.runtime.logs import LEVELS, line_logger
+from services.runtime.ports import PortTaken, require_free
 from services.runtime.readiness import Readiness
 from services.runtime.stopping import StopRequest, stop_on_signals
 from services.runtime.zenoh_config import router_config
@@ -34,29 +31,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         deployment = load_deployment(options.config)
         section = deployment.router
         with stop_on_signals(stop):
-            require_free(section)
+            require_free(section.host, section.port, "router")
             with zenoh.open(router_config(section.host, section.port)):
                 log.info("listening on %s port %d", section.host, section.port)
                 _beat_until(stop, Readiness(Path(deployment.paths.run), "router"))
-    except (DeploymentError, BusError, zenoh.ZError) as error:
+    except (DeploymentError, PortTaken, zenoh.ZError) as error:
         log.error("%s", error)
         return 1
     return 0
-
-
-def require_free(section: RouterSection) -> None:
-    """Raises `BusError` where the router's address is another program's, or not of this machine."""
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((section.host, section.port))
-        except (OSError, OverflowError) as error:
-            is_taken = isinstance(error, OSError) and error.errno == errno.EADDRINUSE
-            what = "is taken by another program" if is_taken else f"cannot be listened on ({error})"
-            raise BusError(
-                f"port {section.port} on {section.host} {what}; "
-                "set GEMELO_ROUTER_PORT, or [router] in the deployment file, to another"
-            ) from error
 
 
 def _beat_until(stop: StopRequest, readiness: Readiness) -> None:

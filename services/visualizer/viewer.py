@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -19,6 +18,7 @@ from urllib.parse import quote
 
 from schemas.deployment import Deployment, ViewerMode, ViewerSection
 from services.runtime.deployment import load_deployment, project_root
+from services.runtime.ports import PortTaken, require_free
 from services.runtime.readiness import Readiness
 from services.visualizer.binary import rerun_binary
 from services.visualizer.child import start, stop
@@ -52,20 +52,6 @@ def address(viewer: ViewerSection, mode: ViewerMode) -> str:
     return f"a window on this display (data: {stream})"
 
 
-def taken_port(viewer: ViewerSection, mode: ViewerMode) -> str:
-    """A sentence about the first port that is in use by another program; empty where all are free."""
-    keys = ["port", "web_port"] if mode is ViewerMode.WEB else ["port"]
-    for key in keys:
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind((viewer.host, getattr(viewer, key)))
-            except OSError as error:
-                remedy = f"stop what uses it, or set viewer.{key} in the deployment file or GEMELO_VIEWER_{key.upper()}"
-                return f"viewer: cannot listen on {viewer.host}:{getattr(viewer, key)} ({error.strerror}); {remedy}"
-    return ""
-
-
 def run(deployment: Deployment, memory: str, stopping: threading.Event) -> int:
     """Keep the viewer and its readiness until asked to stop; returns the exit code."""
     run_folder = project_root() / deployment.paths.run
@@ -75,14 +61,16 @@ def run(deployment: Deployment, memory: str, stopping: threading.Event) -> int:
     try:
         if mode is ViewerMode.NONE:
             return _idle(readiness, stopping)
-        trouble = taken_port(deployment.viewer, mode)
-        if trouble:
-            return _say_error(trouble)
+        require_free(deployment.viewer.host, deployment.viewer.port, "viewer")
+        if mode is ViewerMode.WEB:
+            require_free(deployment.viewer.host, deployment.viewer.web_port, "viewer", "web_port")
         code = _keep(deployment.viewer, mode, memory, readiness, stopping)
         if code and mode is not deployment.viewer.mode and mode is ViewerMode.NATIVE and not stopping.is_set():
             print("viewer: no window could be opened; showing it in the browser instead", flush=True)
             return _keep(deployment.viewer, ViewerMode.WEB, memory, readiness, stopping)
         return code
+    except PortTaken as error:
+        return _say_error(f"viewer: {error}")
     finally:
         readiness.not_ready()
 

@@ -17,7 +17,6 @@ import pytest
 
 from schemas.deployment import MqttSection
 from services.broker import mosquitto
-from services.broker.ports import PortTaken, require_free
 from services.cli.stack import free_ports
 from services.runtime.deployment import project_root
 
@@ -142,11 +141,6 @@ def test_a_taken_port_is_named_with_its_holder_and_the_setting(tmp_path, name):
     assert f"(pid {os.getpid()})" in output
     assert "GEMELO_MQTT_PORT" in output
     assert "Traceback" not in output
-
-
-def test_a_host_of_somebody_else_is_refused_with_the_setting():
-    with pytest.raises(PortTaken, match=r"cannot listen on 192\.0\.2\.1 port 1883 .*: change it"):
-        require_free("192.0.2.1", 1883, "change it")
 
 
 def test_a_missing_mosquitto_is_said_with_the_remedy(monkeypatch):

@@ -1,33 +1,35 @@
-"""Whether a port is free, and who has it if not."""
+"""Whether the ports of a deployment are free, and who has one that is not."""
 
 from __future__ import annotations
 
 import errno
 import socket
 
-import psutil
-
 
 class PortTaken(Exception):
     """A port that something else listens on, or that may not be listened on; one sentence with the remedy."""
 
 
-def require_free(host: str, port: int, remedy: str) -> None:
-    """Returns if `host`:`port` can be listened on; else raises `PortTaken` ending with `remedy`."""
+def require_free(host: str, port: int, section: str, key: str = "port") -> None:
+    """Returns if `host`:`port` can be listened on; else raises `PortTaken` with the key of the deployment to change."""
+    variable = f"GEMELO_{section}_{key}".upper()
+    remedy = f"stop that, or set {variable} or [{section}] {key} in the deployment file to another"
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((host, port))
             probe.listen(1)
-        except OSError as error:
-            if error.errno == errno.EADDRINUSE:
+        except (OSError, OverflowError) as error:
+            if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
                 raise PortTaken(f"port {port} on {host} is taken{_holder(port)}: {remedy}") from None
-            raise PortTaken(f"cannot listen on {host} port {port} ({error.strerror}): {remedy}") from None
+            raise PortTaken(f"cannot listen on {host} port {port} ({error}): {remedy}") from None
 
 
 def _holder(port: int) -> str:
     """`" by mosquitto (pid 7)"`, or nothing where the system does not tell."""
+    import psutil  # 20 ms that only a taken port is worth
+
     try:
         for connection in psutil.net_connections("tcp"):
             if connection.status == psutil.CONN_LISTEN and connection.laddr.port == port and connection.pid:

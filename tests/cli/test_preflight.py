@@ -1,0 +1,48 @@
+"""What `make up` says before it starts anything."""
+
+from __future__ import annotations
+
+import socket
+
+import msgspec
+import pytest
+
+from schemas.deployment import Deployment, MqttSection, RouterSection, ViewerMode, ViewerSection
+from services.cli.preflight import main, troubles
+from services.cli.stack import free_ports
+
+
+@pytest.fixture
+def free() -> Deployment:
+    router, mqtt, grpc, web = free_ports(4)
+    return Deployment(
+        router=RouterSection(port=router), mqtt=MqttSection(port=mqtt), viewer=ViewerSection(port=grpc, web_port=web)
+    )
+
+
+def test_nothing_stands_in_the_way_of_free_ports_and_a_good_arm(free):
+    assert troubles(free) == []
+
+
+def test_every_taken_port_is_said_at_once(free):
+    with socket.create_server(("127.0.0.1", free.router.port)), socket.create_server(("127.0.0.1", free.viewer.port)):
+        router, viewer = troubles(free)
+    assert "GEMELO_ROUTER_PORT" in router
+    assert "GEMELO_VIEWER_PORT" in viewer
+
+
+def test_ports_of_a_viewer_that_is_not_wanted_do_not_matter(free):
+    viewer = msgspec.structs.replace(free.viewer, mode=ViewerMode.NONE)
+    with socket.create_server(("127.0.0.1", free.viewer.port)):
+        assert troubles(msgspec.structs.replace(free, viewer=viewer)) == []
+
+
+def test_an_arm_that_is_not_there_is_named(free):
+    (trouble,) = troubles(msgspec.structs.replace(free, robot="urdf/nobody"))
+    assert "urdf/nobody" in trouble
+
+
+def test_a_word_that_the_deployment_does_not_know_is_refused_with_those_it_does(monkeypatch, capsys):
+    monkeypatch.setenv("GEMELO_MQTT_BROKER", "mosquito")
+    assert main() == 1
+    assert "known are amqtt, mosquitto" in capsys.readouterr().err

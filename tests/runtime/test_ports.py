@@ -1,0 +1,31 @@
+"""Whether a port is free, and what is said where it is not."""
+
+from __future__ import annotations
+
+import os
+import socket
+
+import pytest
+
+from services.runtime.ports import PortTaken, require_free
+from tests.runtime.support import free_port
+
+
+def test_a_free_port_may_be_listened_on() -> None:
+    require_free("127.0.0.1", free_port(), "router")
+
+
+def test_a_taken_port_is_named_with_its_holder_and_the_key_to_change() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        with pytest.raises(PortTaken) as taken:
+            require_free("127.0.0.1", port, "viewer", "web_port")
+    assert f"port {port} on 127.0.0.1 is taken by " in str(taken.value)
+    assert f"(pid {os.getpid()})" in str(taken.value)
+    assert "GEMELO_VIEWER_WEB_PORT or [viewer] web_port" in str(taken.value)
+
+
+@pytest.mark.parametrize(("host", "port"), [("192.0.2.1", 1883), ("127.0.0.1", 70000)])
+def test_an_address_that_is_not_ours_or_none_at_all_is_refused_with_the_key(host: str, port: int) -> None:
+    with pytest.raises(PortTaken, match=f"cannot listen on {host} port {port}.*GEMELO_MQTT_PORT"):
+        require_free(host, port, "mqtt")
