@@ -80,7 +80,10 @@ class Bus(Protocol):
         on_miss: Callable[[int], None],
         own: bool = False,
     ) -> Declaration:
-        """`on_miss(n)`: n messages of an EVERY or LATCHED key are lost for good; `own`: hear this bus too."""
+        """`on_miss(n)`: n messages of an EVERY or LATCHED key are lost for good; `own`: hear this bus too.
+
+        Of an EVERY key comes what is written from now on by the writer's clock, of a LATCHED one also the last before.
+        """
         ...
 
     def serve(self, key: str, on_query: Callable[[Query], None]) -> Declaration:

@@ -101,10 +101,17 @@ class ZenohBus:
         if delivery is Delivery.LATEST:
             return ZenohDeclaration(self._session.declare_subscriber(key, on_sample, allowed_origin=origin))
         latched = delivery is Delivery.LATCHED
+        joined = self._session.new_timestamp()
+
+        def on_news(sample: zenoh.Sample) -> None:
+            # Recovery would hand a late joiner the writer's whole cache, which was never meant for it.
+            if sample.timestamp is None or sample.timestamp >= joined:
+                on_sample(sample)
+
         subscriber = zx.declare_advanced_subscriber(
             self._session,
             key,
-            on_sample,
+            on_sample if latched else on_news,
             allowed_origin=origin,
             history=zx.HistoryConfig(detect_late_publishers=True, max_samples=1) if latched else None,
             recovery=zx.RecoveryConfig(periodic_queries=None, heartbeat=True),
