@@ -1,7 +1,7 @@
 """One sample of every message, made from its annotations: what the golden bytes are bytes of.
 
-`python -m tests.schemas.samples` writes golden.json anew for messages and fields that are NEW. It refuses
-to change what is there: bytes that were once spoken must stay readable, see test_golden.py.
+`python -m tests.schemas.samples` adds messages that are NEW to golden.json and codes that are NEW to
+golden_codes.json. It changes nothing that is there: what was once spoken must keep its meaning, see test_golden.py.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ import json
 import pkgutil
 import sys
 from collections.abc import Iterator
-from enum import Enum
+from enum import Enum, IntEnum, StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 from msgspec import inspect
@@ -21,14 +21,22 @@ from msgspec import inspect
 import schemas
 from schemas.message import Message, encode
 
+T = TypeVar("T")
 GOLDEN = Path(__file__).with_name("golden.json")
+GOLDEN_CODES = Path(__file__).with_name("golden_codes.json")
 
 
 def messages() -> list[type[Message]]:
     """Every message class of `schemas`, by name."""
-    for module in pkgutil.iter_modules(schemas.__path__):
-        importlib.import_module(f"schemas.{module.name}")
+    _import_all()
     return sorted(_subclasses(Message), key=lambda kind: kind.__name__)
+
+
+def codes() -> dict[str, dict[str, int | str]]:
+    """Every enumeration of `schemas` that travels: its members' names and what is said for them."""
+    _import_all()
+    kinds = [kind for base in (IntEnum, StrEnum) for kind in _subclasses(base)]
+    return {kind.__name__: {each.name: each.value for each in kind} for kind in kinds}
 
 
 def sample(kind: type[Message]) -> Message:
@@ -42,12 +50,22 @@ def golden() -> dict[str, dict[str, Any]]:
     return json.loads(GOLDEN.read_text(encoding="utf-8")) if GOLDEN.exists() else {}
 
 
+def golden_codes() -> dict[str, dict[str, int | str]]:
+    """As `codes`, as they were when they were added."""
+    return json.loads(GOLDEN_CODES.read_text(encoding="utf-8")) if GOLDEN_CODES.exists() else {}
+
+
 def record(kind: type[Message]) -> dict[str, Any]:
     payload = encode(sample(kind))
     return {"hex": payload.hex(), "fields": msgspec.msgpack.decode(payload)}
 
 
-def _subclasses(kind: type[Message]) -> Iterator[type[Message]]:
+def _import_all() -> None:
+    for module in pkgutil.iter_modules(schemas.__path__):
+        importlib.import_module(f"schemas.{module.name}")
+
+
+def _subclasses(kind: type[T]) -> Iterator[type[T]]:
     for each in kind.__subclasses__():
         if each.__module__.startswith("schemas."):
             yield each
@@ -99,7 +117,10 @@ def main() -> int:
     for kind in messages():
         kept.setdefault(kind.__name__, record(kind))
     GOLDEN.write_text(json.dumps(kept, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    print(f"{len(kept)} messages in {GOLDEN.name}")
+    old = golden_codes()
+    merged = {name: now | old.get(name, {}) for name, now in codes().items()}
+    GOLDEN_CODES.write_text(json.dumps(old | merged, indent=1) + "\n", encoding="utf-8")
+    print(f"{len(kept)} messages in {GOLDEN.name}, {len(merged)} enumerations in {GOLDEN_CODES.name}")
     return 0
 
 

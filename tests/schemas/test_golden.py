@@ -13,7 +13,7 @@ import pytest
 
 from schemas.joints import JointState
 from schemas.message import Message, decode, encode
-from tests.schemas.samples import golden, messages, sample
+from tests.schemas.samples import codes, golden, golden_codes, messages, sample
 
 RECORDED = golden()
 
@@ -34,6 +34,13 @@ def test_what_is_said_now_has_every_recorded_field_under_its_name_and_type(kind:
 
 def test_no_recorded_message_is_gone() -> None:
     assert set(RECORDED) == {kind.__name__ for kind in messages()}
+
+
+@pytest.mark.parametrize("name", sorted(codes().keys() | golden_codes().keys()))
+def test_every_code_keeps_its_number(name: str) -> None:
+    """New codes may come; one that is renumbered, renamed or gone would be misread by who knows the old one."""
+    assert name in golden_codes(), "a new enumeration: run `python -m tests.schemas.samples`"
+    assert _contains(codes().get(name, {}), golden_codes()[name])
 
 
 def test_an_incompatible_change_would_be_noticed() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import struct
+from typing import Any
 
 import msgspec
 import pytest
@@ -13,8 +14,9 @@ from hypothesis import strategies as st
 
 from schemas.joints import JointState
 from schemas.message import BadMessage, Message, decode, encode
-from schemas.motion import JointTrajectory, TrajectoryPoint
-from schemas.planning import JointGoal, PlanRequest, PoseGoal
+from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from schemas.planning import JointGoal, NamedGoal, PlannedPath, PlanRequest, PoseGoal
+from schemas.system import Parameters, SetParameter
 from tests.schemas.samples import messages, sample
 
 KINDS = st.sampled_from(messages())
@@ -45,6 +47,49 @@ def test_it_is_frozen_documented_and_has_defaults(kind: type[Message]) -> None:
 def test_unknown_fields_are_ignored(kind: type[Message], unknown: dict[str, object]) -> None:
     known = msgspec.msgpack.decode(encode(sample(kind)))
     assert encode(decode(kind, msgspec.msgpack.encode(known | unknown))) == encode(sample(kind))
+
+
+@pytest.mark.parametrize("kind", messages(), ids=lambda kind: kind.__name__)
+def test_unknown_fields_are_ignored_at_any_depth(kind: type[Message]) -> None:
+    grown = _with_an_unknown_field(msgspec.msgpack.decode(encode(sample(kind))))
+    assert encode(decode(kind, msgspec.msgpack.encode(grown))) == encode(sample(kind))
+
+
+def test_missing_fields_take_their_defaults_at_any_depth() -> None:
+    goal, trajectory = {"type": "joints"}, {"points": [{"positions": [1.0]}]}
+    assert decode(PlanRequest, msgspec.msgpack.encode({"goal": goal, "start": {}})) == PlanRequest(
+        goal=JointGoal(), start=JointState()
+    )
+    assert decode(FollowJointTrajectoryGoal, msgspec.msgpack.encode({"trajectory": trajectory})).trajectory == (
+        JointTrajectory(points=(TrajectoryPoint(positions=(1.0,)),))
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields"),
+    [
+        (PlanRequest, {"goal": {"type": "pose", "position": [0.1, math.nan, 0.1]}}),
+        (PlanRequest, {"goal": {"type": "joints", "name": ["brazo_joint"], "position": [math.inf]}}),
+        (PlanRequest, {"start": {"name": ["brazo_joint"], "position": [math.nan]}}),
+        (FollowJointTrajectoryGoal, {"path_tolerance": [{"name": "brazo_joint", "position": -math.inf}]}),
+        (PlannedPath, {"points": [[0.0, 0.0, math.nan]]}),
+        (SetParameter, {"name": "rate", "value": math.nan}),
+        (Parameters, {"parameters": [{"name": "rate", "maximum": math.inf}]}),
+    ],
+)
+def test_what_is_not_finite_is_refused_in_nests_unions_and_optional_fields(
+    kind: type[Message], fields: dict[str, object]
+) -> None:
+    with pytest.raises(BadMessage, match="finite"):
+        decode(kind, msgspec.msgpack.encode(fields))
+
+
+def test_a_single_precision_nan_is_none_either() -> None:
+    payload = msgspec.msgpack.encode({"position": [1.5]}).replace(
+        b"\xcb" + struct.pack(">d", 1.5), b"\xca" + struct.pack(">f", math.nan)
+    )
+    with pytest.raises(BadMessage, match=r"position\[0\].* is nan"):
+        decode(JointState, payload)
 
 
 @given(st.data(), NOT_FINITE)
@@ -97,13 +142,24 @@ def test_a_refusal_names_the_message_the_field_and_the_value() -> None:
 
 
 def test_a_goal_travels_as_what_it_is() -> None:
-    for goal in (PoseGoal(position=(0.1, 0.2, 0.3)), JointGoal(name=("q",), position=(0.5,))):
+    for goal in (PoseGoal(position=(0.1, 0.2, 0.3)), JointGoal(name=("q",), position=(0.5,)), NamedGoal(name="home")):
         assert decode(PlanRequest, encode(PlanRequest(goal=goal))).goal == goal
 
 
 def _tagged(kind: type[Message], fields: dict[str, object]) -> dict[str, object]:
     tag, name = kind.__struct_config__.tag, kind.__struct_config__.tag_field
     return fields if tag is None else {name: tag, **fields}
+
+
+def _with_an_unknown_field(value: Any) -> Any:
+    """The same with one field more in every map; an empty one is a payload that is not ours to read."""
+    match value:
+        case dict() if value:
+            return {name: _with_an_unknown_field(inner) for name, inner in value.items()} | {"x_new": {"more": [1]}}
+        case list():
+            return [_with_an_unknown_field(inner) for inner in value]
+        case _:
+            return value
 
 
 def _floats(payload: bytes | bytearray) -> list[int]:
