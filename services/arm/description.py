@@ -66,10 +66,6 @@ class Arm:
         return tuple(joint.name for joint in self.joints)
 
     @property
-    def wire_names(self) -> tuple[str, ...]:
-        return tuple(joint.wire_name for joint in self.joints)
-
-    @property
     def reference_position(self) -> tuple[float, ...]:
         """[rad] or [m] of the pose that a person declares as the reference."""
         return tuple(joint.drive.reference_position for joint in self.joints)

@@ -137,7 +137,7 @@ class FrameBuffer:
                     f'asked for {seconds(stamp)}: there is no frame "{name}"{suggestion(name, self._frames)}; '
                     f"newest sample of any frame is at {self._newest()}"
                 )
-        up, down = self._to_root(source), self._to_root(target)
+        up, down = self._to_root(source, stamp), self._to_root(target, stamp)
         if (up[-1].parent if up else source) != (down[-1].parent if down else target):
             raise UnconnectedError(
                 f'asked for {seconds(stamp)}: "{source}" and "{target}" are in different trees; '
@@ -149,11 +149,15 @@ class FrameBuffer:
         way = self._ways[target, source] = (tuple(up), tuple(down))
         return way
 
-    def _to_root(self, frame: str) -> list[Edge]:
+    def _to_root(self, frame: str, stamp: int) -> list[Edge]:
         edges: list[Edge] = []
         while (edge := self._edges.get(frame)) is not None:
             if edge in edges:
-                raise UnconnectedError(f'"{frame}" is its own ancestor: {" in ".join(e.child for e in edges)}')
+                ring = " in ".join(each.child for each in edges)
+                raise UnconnectedError(
+                    f'asked for {seconds(stamp)}: "{frame}" is its own ancestor: {ring}; '
+                    f"newest sample of any frame is at {self._newest()}"
+                )
             edges.append(edge)
             frame = edge.parent
         return edges

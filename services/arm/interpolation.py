@@ -34,10 +34,6 @@ class TrajectorySampler:
         """[s] from the trajectory's zero to its last point."""
         return self._times[-1]
 
-    def index_at(self, t: float) -> int:
-        """The point that is being approached at time `t` [s]; the last one after the end."""
-        return min(bisect_right(self._times, t), len(self._times) - 1)
-
     def at(self, t: float) -> Sample:
         """Positions, velocities and accelerations at `t` [s] from the start; at rest outside the trajectory."""
         if t < self._times[0]:

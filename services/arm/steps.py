@@ -64,10 +64,6 @@ class StepScale:
         """Position [rad] or [m] of so many 1/256 steps."""
         return steps / self._q8 * self.travel_per_turn
 
-    def steps_of_degrees(self, degrees: Fraction | int) -> Fraction:
-        """Exact steps for exact degrees of the output shaft."""
-        return degrees * self.steps_per_turn / 360
-
 
 def step_scale(drive: StepperJoint) -> StepScale:
     """The scale of one joint of robot.toml; raises `DescriptionError` naming the joint."""

@@ -28,7 +28,7 @@ def edit(file: Path, old: str, new: str) -> None:
 def test_rm1_is_what_the_seed_says(rm1: Arm):
     assert rm1.name == "rm1"
     assert rm1.joint_names == ("brazo_joint", "antebrazo_joint", "efector_joint")
-    assert rm1.wire_names == ("q1", "q2", "q3")
+    assert [joint.wire_name for joint in rm1.joints] == ["q1", "q2", "q3"]
     assert [(j.lower, j.upper, j.unit) for j in rm1.joints] == [
         (-2.95, 2.95, "rad"),
         (-2.95, 2.95, "rad"),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -61,9 +64,23 @@ def test_a_start_fills_the_time_before_the_first_point():
     assert s.at(0.25)[0] == (0.25,)
 
 
-def test_the_point_that_is_approached_has_an_index():
-    s = sampler(point(0.0, 0.0), point(1.0, 1.0), point(2.0, 0.0))
-    assert [s.index_at(t) for t in (0.0, 0.5, 1.0, 1.5, 2.0, 9.0)] == [1, 1, 2, 2, 2, 2]
+LEGS = st.lists(st.tuples(st.floats(0.05, 5.0), VALUE, VALUE, VALUE), min_size=2, max_size=6)
+
+
+@given(LEGS, st.integers(0, 2))
+def test_it_is_as_continuous_as_its_fields_promise_and_passes_through_every_point(
+    legs: list[tuple[float, float, float, float]], derivatives: int
+):
+    """Positions never jump; velocities do not with velocities, nor accelerations with accelerations."""
+    times = list(itertools.accumulate((dt for dt, *_ in legs), initial=0.0))[:-1]
+    known = [values[: derivatives + 1] for _, *values in legs]
+    s = sampler(*(point(t, *values) for t, values in zip(times, known, strict=True)))
+    for t, values in zip(times, known, strict=True):
+        here = [value for (value,) in s.at(t)][: derivatives + 1]
+        assert here == pytest.approx(values, abs=1e-9)
+        if t > 0.0:
+            nearly = [value for (value,) in s.at(math.nextafter(t, 0.0))][: derivatives + 1]
+            assert nearly == pytest.approx(values, rel=1e-6, abs=1e-4)
 
 
 def test_no_points_is_an_error():

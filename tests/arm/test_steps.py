@@ -24,7 +24,7 @@ def test_a_step_of_q1_is_exactly_25_1296_of_a_degree(rm1: Arm):
     scale = rm1.joint("brazo_joint").steps
     assert scale.steps_per_turn == Fraction(93312, 5)
     assert scale.degrees_per_step == Fraction(25, 1296)
-    assert scale.steps_of_degrees(1800) == 93312
+    assert 1800 / scale.degrees_per_step == 93312
 
 
 def test_a_step_of_q2_is_exactly_nine_tenths_of_a_degree(rm1: Arm):
