@@ -31,7 +31,7 @@ def scaling_refused(which: str, value: float) -> NoPlan:
             value=value if value == value and abs(value) < 1e300 else None,
             limit=1.0,
             nearest=(1.0 if value > 1.0 else 0.1,),
-            message=f"{which} is {value:g}: it must be above 0 and at most 1",
+            message=f"{which} is {value}: it must be above 0 and at most 1",
             remedy=f"give {which} in (0, 1]; 1 is the arm's full speed",
         ),
     )
@@ -61,6 +61,7 @@ def beyond_limit(arm: Arm, joint: Joint, value: float, nearest: Vector) -> NoPla
     """A goal beyond a joint's limit."""
     limit = joint.clamp(value)
     side = "above its upper" if value > joint.upper else "below its lower"
+    off = f"{abs(value - limit):.4g} {joint.unit}"  # value and limit may look alike in few digits
     return NoPlan(
         PlanCode.INVALID_GOAL_CONSTRAINTS,
         Refusal(
@@ -69,7 +70,7 @@ def beyond_limit(arm: Arm, joint: Joint, value: float, nearest: Vector) -> NoPla
             value=value,
             limit=limit,
             nearest=nearest,
-            message=f'joint "{joint.name}": {value:.6g} {joint.unit} is {side} limit of {limit:g} {joint.unit}'
+            message=f'joint "{joint.name}": {value:.6g} {joint.unit} is {off} {side} limit of {limit:g} {joint.unit}'
             f" ({arm.urdf_path.name})",
             remedy=f"the nearest is {limit:g} {joint.unit}",
         ),

@@ -96,6 +96,19 @@ def test_a_start_rounded_to_whole_steps_beyond_a_limit_is_still_a_start(planner:
     assert response.trajectory.points[0].positions == (0.0, 2.95, 0.2)
 
 
+def test_from_limit_to_limit_of_every_joint_and_back(planner: Planner, rm1: Arm):
+    """Standing exactly at a limit is standing within it, and a goal may be there too."""
+    for first, last in (("lower", "upper"), ("upper", "lower")):
+        for joint in (rm1.joint("brazo_joint"), rm1.joint("efector_joint")):
+            ends = [tuple(getattr(joint, side) if j is joint else 0.0 for j in rm1.joints) for side in (first, last)]
+            goal = JointGoal(name=rm1.joint_names, position=ends[1])
+            response = planner.plan(PlanRequest(goal=goal), standing(ends[0]))
+            assert response.code is PlanCode.SUCCESS
+            points = response.trajectory.points
+            assert (points[0].positions, points[-1].positions) == (ends[0], ends[1])
+            require_within_limits(rm1, sample(response.trajectory), joint_limits(rm1))
+
+
 @settings(max_examples=150)
 @given(POSTURES, POSTURES)
 def test_whatever_comes_out_is_within_limits_and_free(start: tuple[float, ...], goal: tuple[float, ...]):

@@ -60,6 +60,14 @@ def test_an_unknown_frame_has_a_nearest_name(planner: Planner, home: JointState)
     assert refusal.remedy == 'use "base_link"'
 
 
+@pytest.mark.parametrize("beyond", [1e-6, 0.001, 3.0])
+def test_a_goal_just_beyond_a_limit_says_by_how_much(planner: Planner, home: JointState, beyond: float):
+    goal = JointGoal(name=("brazo_joint",), position=(2.95 + beyond,))
+    refusal = refused(planner.plan(PlanRequest(goal=goal), home), PlanCode.INVALID_GOAL_CONSTRAINTS)
+    assert f"rad is {beyond:.4g} rad above its upper limit of 2.95 rad" in refusal.message
+    assert refusal.nearest == (2.95,)
+
+
 def test_a_joint_beyond_its_limit_is_clamped_in_the_goals_own_form(planner: Planner, home: JointState):
     goal = JointGoal(name=("efector_joint", "brazo_joint"), position=(0.1, -3.5))
     refusal = refused(planner.plan(PlanRequest(goal=goal), home), PlanCode.INVALID_GOAL_CONSTRAINTS)

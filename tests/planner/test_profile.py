@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ruckig import InputParameter, Result, Ruckig, Trajectory
 
 from schemas.motion import JointTrajectory
 from services.arm.description import load_arm
 from services.arm.interpolation import TrajectorySampler
+from services.planner import profile
 from services.planner.profile import joint_limits, straight_line
 from services.planner.verify import require_ends, require_within_limits, sample
 
@@ -102,7 +104,23 @@ def test_points_are_at_most_50_ms_apart_but_few_on_a_long_way():
 def test_no_code_sends_a_trajectory_to_ruckigs_cloud():
     """`intermediate_positions` and the waypoint calculators of ruckig's community version ask a server."""
     root = Path(__file__).parents[2]
-    sources = [path for folder in ("services", "schemas", "firmware") for path in (root / folder).rglob("*.py")]
+    sources = [
+        path for folder in ("services", "schemas", "firmware", "examples") for path in (root / folder).rglob("*.py")
+    ]
     assert len(sources) > 20
-    forbidden = re.compile(r"intermediate_positions|per_section_|max_number_of_waypoints")
+    forbidden = re.compile(r"intermediate_positions|per_section_|max_number_of_waypoints|cloud_client")
     assert [path.name for path in sources if forbidden.search(path.read_text(encoding="utf-8"))] == []
+
+
+def test_what_ruckig_is_asked_has_no_waypoints(monkeypatch: pytest.MonkeyPatch):
+    """Seen from the call: one variable, from rest to rest, which ruckig computes on this machine."""
+    asked: list[InputParameter] = []
+
+    class Listening(Ruckig):
+        def calculate(self, demand: InputParameter, trajectory: Trajectory) -> Result:
+            asked.append(demand)
+            return super().calculate(demand, trajectory)
+
+    monkeypatch.setattr(profile, "Ruckig", Listening)
+    straight_line(ARM.joint_names, (0.0, 0.0, 0.0), (1.0, -0.5, 0.1), joint_limits(ARM))
+    assert [demand.intermediate_positions for demand in asked] == [[]]

@@ -1,0 +1,87 @@
+"""What a person finds at first sight: every view named with its unit, the ghost translucent, the band in the plot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rerun as rr
+import rerun.blueprint as rrb
+
+from services.visualizer import entities
+from services.visualizer.layout import blueprint
+from services.visualizer.sink import Sink
+
+
+class Listener:
+    """A recording stream that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.said: dict[str, list[Any]] = {}
+
+    def log(self, entity: str, *things: Any, static: bool = False) -> None:
+        self.said.setdefault(entity, []).extend(things)
+
+    def send_blueprint(self, layout: rrb.Blueprint) -> None:
+        self.layout = layout
+
+
+def views(node: Any) -> Iterator[Any]:
+    if isinstance(node, rrb.Container):
+        for inner in node.contents:
+            yield from views(inner)
+    else:
+        yield node
+
+
+@pytest.fixture
+def named(model) -> dict[str, str]:
+    """Origin of each view -> its name."""
+    return {view.origin: view.name for view in views(blueprint(model, window=20.0, trail=20.0).root_container)}
+
+
+@pytest.fixture
+def said(model, tmp_path: Path) -> dict[str, list[Any]]:
+    listener = Listener()
+    Sink(listener, model, tmp_path, window=20.0, trail=20.0)
+    return listener.said
+
+
+def test_arm_device_mode_and_log_have_their_views(named):
+    assert named[entities.WORLD] == "Twin: measured (solid), commanded (blue), planned way of the tool [m]"
+    assert (named[entities.PANEL], named[entities.MODE]) == ("Device", "Mode of the device")
+    assert named[entities.LOG] == "Log"
+    assert entities.PATH.startswith(entities.WORLD)
+
+
+def test_every_joint_has_a_plot_of_position_and_of_step_error_with_units(named, model):
+    for joint, unit in zip(model.moving, ("°", "°", "mm"), strict=True):
+        assert named[entities.position(joint.name)] == f"{joint.name} · position [{unit}]"
+        assert named[entities.error(joint.name)] == f"{joint.name} · step error [steps]"
+
+
+def test_series_say_what_they_are_and_the_band_is_half_a_step(said, model):
+    for joint in model.moving:
+        assert series(said[entities.executed(joint.name)]) == ["executed"]
+        assert series(said[entities.commanded(joint.name)]) == ["commanded"]
+        assert series(said[entities.error(joint.name)]) == ["commanded - executed", "+0.5 step", "-0.5 step"]
+
+
+def test_the_measured_arm_is_solid_and_the_commanded_one_a_translucent_ghost(said):
+    solid, ghost = alphas(said, entities.MEASURED), alphas(said, entities.COMMANDED)
+    assert len(solid) == len(ghost) > 3
+    assert set(solid) == {255}
+    assert max(ghost) < 128
+
+
+def series(things: list[Any]) -> list[str]:
+    (lines,) = [thing for thing in things if isinstance(thing, rr.SeriesLines)]
+    return lines.names.as_arrow_array().to_pylist()
+
+
+def alphas(said: dict[str, list[Any]], root: str) -> list[int]:
+    """The opacity, 0 to 255, of every mesh under `root`; a colour is 0xRRGGBBAA."""
+    things = [thing for entity, told in said.items() if entity.startswith(f"{root}/") for thing in told]
+    return [t.albedo_factor.as_arrow_array().to_pylist()[0] & 0xFF for t in things if isinstance(t, rr.Mesh3D)]
