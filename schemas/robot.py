@@ -1,14 +1,22 @@
 """`urdf/<robot>/robot.toml` as types: what turns steps into motion. Read by `services.arm`.
 
 Numbers that must be exact (gear ratios) are TOML strings holding a fraction or a decimal, for
-example "46.656" or "380/21"; everything else is SI unless the name says otherwise.
+example "46.656" or "380/21"; everything else is SI unless the name says otherwise. Bounds stand with the types;
+those that depend on another field or file are checked by `services.arm`.
 """
 
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import Annotated
 
 import msgspec
+from msgspec import Meta
+
+Natural = Annotated[int, Meta(ge=0)]
+NotNegative = Annotated[float, Meta(ge=0.0)]
+Positive = Annotated[float, Meta(gt=0.0)]
+AtLeastHalfAStep = Annotated[float, Meta(ge=0.5)]  # rounding to whole steps alone is off by as much
 
 
 class RobotRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -26,10 +34,10 @@ class Driver(RobotRecord, frozen=True, kw_only=True):
     """What a stepper driver demands of its inputs."""
 
     name: str
-    step_high_us: float
-    step_low_us: float
-    dir_setup_us: float
-    enable_lead_ms: float = 0.0
+    step_high_us: Positive
+    step_low_us: Positive
+    dir_setup_us: NotNegative
+    enable_lead_ms: NotNegative = 0.0
 
 
 class Motor(RobotRecord, frozen=True, kw_only=True):
@@ -38,8 +46,8 @@ class Motor(RobotRecord, frozen=True, kw_only=True):
     driver: str  # name of a [[driver]]
     pulses_per_turn: int  # [pulses/rev] of the motor shaft, microsteps included
     gear_ratio: str = "1"  # exact: motor turns per turn of the output shaft
-    step_pin: int | None = None
-    dir_pin: int | None = None
+    step_pin: Natural | None = None
+    dir_pin: Natural | None = None
     inverted: bool = False
 
 
@@ -57,16 +65,16 @@ class StepperJoint(RobotRecord, frozen=True, kw_only=True):
     mechanical_lower: float | None = None  # [rad] or [m] where the mechanics end; the URDF may not go beyond
     mechanical_upper: float | None = None  # [rad] or [m]
     reference_position: float = 0.0  # [rad] or [m] of the pose that `gemelo reference` declares
-    path_tolerance_steps: float = 4.0  # default of FollowJointTrajectory
-    goal_tolerance_steps: float = 0.75  # half a step is the physical limit
+    path_tolerance_steps: AtLeastHalfAStep = 4.0  # default of FollowJointTrajectory
+    goal_tolerance_steps: AtLeastHalfAStep = 0.75
 
 
 class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
     """The controller board."""
 
     name: str  # MQTT: gemelo/v1/<name>/...
-    tick_hz: int = 50_000
-    queue_capacity: int = 128  # [knots]
+    tick_hz: Annotated[int, Meta(ge=10_000, le=100_000, multiple_of=1000)] = 50_000  # the firmware's bounds
+    queue_capacity: Annotated[int, Meta(ge=2, le=128)] = 128  # [knots], and the firmware's again
 
 
 class RobotFile(RobotRecord, frozen=True, kw_only=True):

@@ -13,7 +13,7 @@ from services.arm.check_urdf import check_urdf
 from services.arm.description import ROBOT_FILE, load_arm
 from services.arm.errors import DescriptionError
 from services.arm.findings import Finding, Severity, error
-from services.arm.robot_file import dotted, parse_toml, read_text, unknown_keys
+from services.arm.robot_file import dotted, line_of, not_finite, parse_toml, read_text, unknown_keys, where_of
 from services.arm.second_opinion import second_opinion
 from services.arm.srdf import read_srdf
 from services.arm.urdf import read_urdf
@@ -29,11 +29,14 @@ def check(folder: Path) -> list[Finding]:
         data = parse_toml(folder / ROBOT_FILE, text)
     except DescriptionError as problem:
         return [error(ROBOT_FILE, "file", str(problem), f"a robot is a folder with a {ROBOT_FILE}")]
-    findings = _unknown_keys(data, text)
+    findings = [*_unknown_keys(data, text), *_not_finite(data, text)]
     try:
         robot = msgspec.convert(_known(data), RobotFile)
     except msgspec.ValidationError as problem:
-        return [*findings, error(ROBOT_FILE, "types", str(problem), "see schemas/robot.py")]
+        thing = where_of(problem, text).removeprefix(", ") or "types"
+        return [*findings, error(ROBOT_FILE, thing, str(problem), "see schemas/robot.py")]
+    if not_finite(data):
+        return findings
     findings += _files(folder, robot)
     if not any(finding.severity is Severity.ERROR for finding in findings):
         findings += _whole(folder)
@@ -44,6 +47,13 @@ def _unknown_keys(data: dict[str, object], text: str) -> list[Finding]:
     return [
         error(ROBOT_FILE, f"line {key.line}", f"unknown key `{dotted(key.path)}`{key.hint}", "correct or remove it")
         for key in unknown_keys(data, text)
+    ]
+
+
+def _not_finite(data: dict[str, object], text: str) -> list[Finding]:
+    return [
+        error(ROBOT_FILE, f"line {line_of(key, text)}", f"`{dotted(key)}` is {value}", "write a number that is finite")
+        for key, value in not_finite(data)
     ]
 
 

@@ -56,8 +56,6 @@ def _names(robot: RobotFile, model: UrdfModel) -> list[Finding]:
     for pin, count in pins.items():
         if count > 1:
             findings.append(error(ROBOT_FILE, f"pin {pin}", f"is used {count} times", "one signal a pin"))
-    if robot.device.tick_hz <= 0:
-        findings.append(error(ROBOT_FILE, "device", f"tick_hz is {robot.device.tick_hz}", "50000 is usual"))
     return findings
 
 
@@ -71,7 +69,7 @@ def _drive(drive: StepperJoint, joint: UrdfJoint, thing: str) -> list[Finding]:
     try:
         scale, speed = step_scale(drive), speed_limits(drive)
     except DescriptionError as problem:
-        return [error(ROBOT_FILE, thing, str(problem))]
+        return [error(ROBOT_FILE, thing, str(problem).removeprefix(f"{thing}: "))]
     findings = []
     if joint.limit is not None:
         findings += _against_limits(drive, joint, thing, scale.per_unit, speed.velocity)
@@ -128,8 +126,6 @@ def _against_mechanics(drive: StepperJoint, limit: Limit, thing: str, unit: str)
 
 def _pulses(drive: StepperJoint, driver: Driver, tick_hz: int, thing: str) -> list[Finding]:
     """Whether the device's tick and the driver's inputs can follow the joint's fastest pulses."""
-    if tick_hz <= 0:
-        return []
     try:
         rate = float(speed_limits(drive).step_rate)
     except DescriptionError:

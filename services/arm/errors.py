@@ -22,4 +22,6 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     """`"; did you mean "x"?"`, or the list of what there is."""
     names = sorted(known)
     near = nearest_name(name, names)
-    return f'; did you mean "{near}"?' if near else f"; known are {', '.join(names)}"
+    if near:
+        return f'; did you mean "{near}"?'
+    return f"; known are {', '.join(names)}" if names else "; none is known"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from dataclasses import dataclass
@@ -32,10 +33,12 @@ def read_robot_file(path: Path) -> RobotFile:
     data = parse_toml(path, text)
     for unknown in unknown_keys(data, text):
         raise DescriptionError(f"{path}, line {unknown.line}: unknown key `{dotted(unknown.path)}`{unknown.hint}")
+    for key, value in not_finite(data):
+        raise DescriptionError(f"{path}, line {line_of(key, text)}: `{dotted(key)}` is {value}: it must be finite")
     try:
         return msgspec.convert(data, RobotFile)
     except msgspec.ValidationError as error:
-        raise DescriptionError(f"{path}: {error}") from error
+        raise DescriptionError(f"{path}{where_of(error, text)}: {error}") from error
 
 
 def read_text(path: Path) -> str:
@@ -59,6 +62,27 @@ def parse_toml(path: Path, text: str) -> dict[str, object]:
 def unknown_keys(data: dict[str, object], text: str) -> list[UnknownKey]:
     """Every key of `data` that the types do not have."""
     return [UnknownKey(path, line_of(path, text), hint) for path, hint in _walk(data, RobotFile, ())]
+
+
+def not_finite(data: object, path: Keys = ()) -> list[tuple[Keys, float]]:
+    """Every NaN and infinity, which TOML allows, with where it stands."""
+    match data:
+        case dict():
+            return [found for key, value in data.items() for found in not_finite(value, (*path, key))]
+        case list():
+            return [found for index, value in enumerate(data) for found in not_finite(value, (*path, index))]
+        case float() if not math.isfinite(data):
+            return [(path, data)]
+        case _:
+            return []
+
+
+def where_of(error: msgspec.ValidationError, text: str) -> str:
+    """ ", line 14" of the key that a wrong type or a value out of bounds stands at; empty where it is not found."""
+    place = re.search(r"`\$\.(.+)`$", str(error))
+    words = re.findall(r"\w+", place[1]) if place else []
+    line = line_of(tuple(int(word) if word.isdecimal() else word for word in words), text) if words else 0
+    return f", line {line}" if line else ""
 
 
 def exact_ratio(text: str, where: str) -> Fraction:

@@ -79,7 +79,7 @@ def test_an_unknown_key_names_file_line_key_and_the_nearest_one(copy: Path):
 
 def test_a_wrong_type_names_the_key(copy: Path):
     edit(copy / "robot.toml", "tick_hz = 50_000", 'tick_hz = "fast"')
-    with pytest.raises(DescriptionError, match=r"robot.toml.*int.*device.tick_hz"):
+    with pytest.raises(DescriptionError, match=r"robot.toml, line 13: .*int.*device.tick_hz"):
         load_arm(copy)
 
 
@@ -93,6 +93,13 @@ def test_a_wrong_type_names_the_key(copy: Path):
             r'"braso_joint" is not in the URDF; did you',
         ),
         ("robot.toml", 'driver = "DM542T"', 'driver = "DM556"', r'no \[\[driver\]\] "DM556"'),
+        (
+            "robot.toml",
+            "ramp_time = 1.0",
+            "ramp_time = inf",
+            r"line 37: `joint\[0\].ramp_time` is inf: it must be finite",
+        ),
+        ("robot.toml", "step_low_us = 1.0", "step_low_us = 0.0", r"line 28: .*> 0.0 - at `\$.driver\[1\].step_low_us"),
         ("robot.toml", 'wire_name = "q2"', 'wire_name = "q1"', '"q1" is there 2 times'),
         ("robot.toml", 'tool_frame = "efector_link"', 'tool_frame = "tool"', 'tool_frame "tool" is no link'),
         ("robot.toml", 'transmission = "rack_and_pinion"', 'transmission = "rotary"', "must be .rack_and_pinion."),
