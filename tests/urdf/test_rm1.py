@@ -39,6 +39,25 @@ def test_forearm_and_effector_have_the_seeds_size(rm1: Arm):
     assert sizes["efector_link"] == "0.024 0.042 0.191"
 
 
+def test_the_motors_are_wired_as_the_seeds(rm1: Arm):
+    """Wire name, driver, STEP, DIR, inverted, and the pulse width that q1's driver gets [us]."""
+    wired = [
+        (j.wire_name, j.driver.name, j.drive.motor.step_pin, j.drive.motor.dir_pin, j.drive.motor.inverted)
+        for j in rm1.joints
+    ]
+    assert wired == [
+        ("q1", "DM542T", 25, 27, False), ("q2", "A4988", 18, 19, True), ("q3", "A4988", 22, 23, False)
+    ]  # fmt: skip
+    assert rm1.joint("brazo_joint").driver.step_high_us == 5.0
+
+
+def test_the_limits_are_the_seeds(rm1: Arm):
+    limits = [(joint.lower, joint.upper) for joint in rm1.joints]
+    assert limits == [(-2.95, 2.95), (-2.95, 2.95), (0.0, 0.2)]
+    assert [rm1.model.joint(joint.name).limit.velocity for joint in rm1.joints[:2]] == [1.57, 1.57]
+    assert rm1.model.joint("efector_joint").origin.rpy == pytest.approx((3.1416, 0.0, 0.0), abs=1e-5)
+
+
 def test_every_named_state_is_within_limits_and_free(rm1: Arm):
     kinematics = Kinematics(rm1)
     assert {"home", "ready"} <= set(rm1.named_states)
