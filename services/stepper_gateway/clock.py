@@ -6,6 +6,7 @@ from collections import deque
 from typing import NamedTuple
 
 WINDOW = 12  # exchanges, 6 s at 2 Hz: a drift of 50 ppm moves the offset by 0.3 ms
+DRIFT = 5_000.0  # [us] that two clocks may part within the window, generously
 ENOUGH = 3  # exchanges until the offset is trusted
 
 
@@ -32,7 +33,10 @@ class ClockSync:
         round_trip = (t3 - t0) - (t2 - t1)
         if round_trip < 0 or t2 < t1:
             return
-        self._exchanges.append(Exchange(((t1 - t0) + (t2 - t3)) / 2.0, round_trip))
+        exchange = Exchange(((t1 - t0) + (t2 - t3)) / 2.0, round_trip)
+        if self._exchanges and not _agree(exchange, min(self._exchanges, key=lambda one: one.round_trip)):
+            self._exchanges.clear()
+        self._exchanges.append(exchange)
         self._offset = min(self._exchanges, key=lambda exchange: exchange.round_trip).offset
 
     @property
@@ -55,3 +59,11 @@ class ClockSync:
     def monotonic(self, device_us: int) -> float:
         """[s] of our monotonic clock at an instant of the device's [us]."""
         return (device_us - self._offset) * 1e-6
+
+
+def _agree(first: Exchange, second: Exchange) -> bool:
+    """Whether one offset can explain both: each is wrong by half its round trip at most.
+
+    It cannot when this machine has slept meanwhile, as its monotonic clock stands still then.
+    """
+    return abs(first.offset - second.offset) <= (first.round_trip + second.round_trip) / 2.0 + DRIFT

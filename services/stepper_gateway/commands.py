@@ -45,6 +45,12 @@ class Commands:
     def is_pending(self, kind: DeviceCommandKind) -> bool:
         return any(command.kind == kind for command in self._pending)
 
+    def hindrance(self) -> str:
+        """Why nothing may be started now, empty if it may: what a person has asked for would hit it."""
+        kinds = (DeviceCommandKind.STOP, DeviceCommandKind.RESET, DeviceCommandKind.REFERENCE)
+        asked = [c.kind.name for c in self._pending if c.ticket != INTERNAL and c.kind in kinds]
+        return f"the device has not answered {asked[0]} yet: wait a moment" if asked else ""
+
     def due(self, moment: Moment, clock: ClockSync, boot_id: int) -> list[Command]:
         """The frames to send now."""
         frames = []

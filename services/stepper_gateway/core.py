@@ -117,7 +117,8 @@ class GatewayCore:
             self._lose(reason, moment)
         self.goals.step(moment, period)
         self.streaming.step(moment)
-        mover.stop_strangers(moment)
+        if mover.stop_strangers(moment):
+            self.goals.on_stranger(moment)
         self.desk.step(moment)
         mover.pump(moment)
         return self._finish(moment)
@@ -152,7 +153,9 @@ class GatewayCore:
             self.goals.use_tick(known.tick_hz)
 
     def _on_event(self, event: EventReport, moment: Moment) -> None:
-        level = LogLevel.WARNING if event.event in ("fault", "hold", "underrun") else LogLevel.INFO
+        is_asked_for = event.detail == "command"
+        is_trouble = event.event in ("fault", "hold", "underrun") and not is_asked_for
+        level = LogLevel.WARNING if is_trouble else LogLevel.INFO
         clock = self.mover.session.clock
         happened = clock.monotonic(event.t_us) if clock.is_synchronised and event.t_us else moment.monotonic
         happened = min(happened, moment.monotonic)
@@ -168,9 +171,9 @@ class GatewayCore:
         mover.on_state(state, arrival)
         point = mover.commanded(state)
         self._publish(state, point, moment)
-        if state.mode == DeviceMode.HOLD and not mover.is_held and self.streaming.is_active:
+        if state.mode == DeviceMode.HOLD and mover.is_followed(state) and not mover.is_held:
             self.streaming.interrupt()
-            mover.stop(moment)
+            self.goals.on_hold(moment)
         if state.mode in (DeviceMode.FAULT, DeviceMode.ESTOP, DeviceMode.UNREFERENCED):
             self._fail(mover.session.hindrance(), moment)
         self.goals.on_ack()
@@ -187,18 +190,15 @@ class GatewayCore:
 
     def _give_way(self, request: DeviceCommandRequest, moment: Moment) -> None:
         """A person's command comes before goals and targets."""
-        mover, who = self.mover, f"a device command ({request.command.name})"
-        match request.command:
-            case DeviceCommandKind.HOLD:
-                mover.is_held = mover.session.mode == DeviceMode.RUN
-            case DeviceCommandKind.RESUME:
-                pass
-            case _:
-                self.streaming.interrupt()
-                if self.goals.is_active:
-                    self.goals.stop(f"stopped by {who}", moment)
-                else:
-                    mover.transmission.abandon()
+        if request.command in (DeviceCommandKind.HOLD, DeviceCommandKind.RESUME):
+            return
+        self.streaming.interrupt()
+        if self.goals.is_active:
+            self.goals.stop(f"stopped by a device command ({request.command.name})", moment)
+        elif request.command == DeviceCommandKind.STOP:
+            self.mover.stop(moment)
+        else:
+            self.mover.transmission.abandon()
 
     def _reboot(self, moment: Moment) -> None:
         reason = "the device has restarted"
@@ -216,9 +216,8 @@ class GatewayCore:
     def _fail(self, reason: str, moment: Moment) -> None:
         if self.goals.is_active:
             self.goals.abort(reason, moment)
-        if self.streaming.is_active:
-            self.streaming.interrupt()
-            self.mover.transmission.abandon()
+        self.streaming.interrupt()
+        self.mover.transmission.abandon()
 
     def _finish(self, moment: Moment) -> list[Output]:
         """Tell of the device's status where it has changed, and hand the outputs out."""

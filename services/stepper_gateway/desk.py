@@ -65,6 +65,9 @@ class CommandDesk:
     def step(self, moment: Moment) -> None:
         """Give up what was not answered in time; a STOP of our own is asked for again."""
         for command in self._mover.commands.expired(moment):
+            state = self._mover.state
+            if command.kind == DeviceCommandKind.HOLD and state is not None:
+                self._mover.hold_answered(state.mode == DeviceMode.HOLD, state.t_us)
             if command.ticket != INTERNAL:
                 self._answer(command.ticket, False, f"the device has not answered {command.kind.name} in time")
             elif command.kind == DeviceCommandKind.STOP:
@@ -82,7 +85,7 @@ class CommandDesk:
             case DeviceCommandKind.STOP:
                 self._mover.stop_answered(reply.t_us)
             case DeviceCommandKind.HOLD:
-                self._mover.is_held = reply.mode == DeviceMode.HOLD
+                self._mover.hold_answered(reply.mode == DeviceMode.HOLD, reply.t_us)
             case DeviceCommandKind.REFERENCE:
                 self._mover.transmission.forget()
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceMode
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from schemas.system import LogLevel
 from services.stepper_gateway.execution import Ending, Execution
@@ -19,6 +18,7 @@ from services.stepper_gateway.paths import Path
 from services.stepper_gateway.refusals import GoalRejected, invalid
 from services.stepper_gateway.validation import Validator
 
+HEARTBEAT_LOST = "the device holds because it lost the gateway's heartbeat"
 FAILED = GoalStatusCode.ABORTED, FollowErrorCode.DEVICE_FAILED
 
 
@@ -72,12 +72,14 @@ class Goals:
         execution = next((e for e in (self._current, self._waiting) if e is not None and e.goal_id == goal_id), None)
         if execution is None:
             return f"goal {goal_id} is not being carried out"
-        ending = Ending(GoalStatusCode.CANCELED, FollowErrorCode.CANCELED, "canceled: the arm decelerated on its path")
+        ending = Ending(GoalStatusCode.CANCELED, FollowErrorCode.CANCELED, "the arm decelerated on its path")
         if execution is self._waiting:
             self._waiting = None
-            self._finish(execution, ending, moment)
-        else:
-            self._end(ending, moment)
+            if self._current is not None or self._mover.is_resting():
+                self._finish(execution, ending, moment)
+                return ""
+            self._current = execution  # what it waited behind has to stop
+        self._end(ending, moment)
         return ""
 
     def step(self, moment: Moment, period: float) -> None:
@@ -85,7 +87,7 @@ class Goals:
         self._start_waiting(moment)
         execution, mover = self._current, self._mover
         if execution is None:
-            return
+            return self._stop_what_failed(moment)
         if execution.ending is not None:
             if mover.has_stopped():
                 self._finish_current(execution.ending, moment)
@@ -94,8 +96,7 @@ class Goals:
         if stream is not None and stream.failure:
             return self._end(Ending(*FAILED, stream.failure), moment)
         if execution.deadline is not None:
-            if mover.is_held:
-                execution.deadline += period
+            execution.deadline += period * mover.excuse
             if moment.monotonic > execution.deadline and mover.state is not None:
                 self._end(execution.late(mover.state, moment.monotonic), moment)
 
@@ -119,16 +120,27 @@ class Goals:
     def abort(self, reason: str, moment: Moment) -> None:
         """The device can no longer be relied upon: end now, with the last steps known."""
         self._drop_waiting(moment, Ending(*FAILED, reason))
+        self._mover.transmission.abandon()
         if self._current is not None:
             ending = self._current.ending
-            self._mover.transmission.abandon()
             self._finish_current(Ending(*FAILED, f"{ending.reason}; then {reason}" if ending else reason), moment)
 
     def stop(self, reason: str, moment: Moment) -> None:
         """Decelerate and abort, for a reason outside the goal."""
         self._drop_waiting(moment, Ending(*FAILED, reason))
-        if self._current is not None and self._current.ending is None:
-            self._end(Ending(*FAILED, reason), moment)
+        if self._current is None:
+            self._mover.stop(moment)
+        self._end(Ending(*FAILED, reason), moment)
+
+    def on_hold(self, moment: Moment) -> None:
+        """The device holds by itself on a path of ours."""
+        if self._current is None:
+            self.stop(HEARTBEAT_LOST, moment)
+        self._end(Ending(*FAILED, HEARTBEAT_LOST), moment)
+
+    def on_stranger(self, moment: Moment) -> None:
+        """The device played another stream than the present goal's, and is being stopped."""
+        self._end(Ending(*FAILED, "the device moved along another stream"), moment)
 
     def _follow(self, execution: Execution, state: State, point: PathPoint, moment: Moment) -> None:
         strayed = execution.follow(point, state)
@@ -139,8 +151,6 @@ class Goals:
             return self._finish_current(done, moment)
         if strayed is not None and execution.ending is None:
             return self._end(strayed, moment)
-        if execution.ending is None and state.mode == DeviceMode.HOLD and not self._mover.is_held:
-            return self._end(Ending(*FAILED, "the device holds because it lost the gateway's heartbeat"), moment)
         self._report(execution, state, point, moment)
 
     def _report(self, execution: Execution, state: State, point: PathPoint, moment: Moment) -> None:
@@ -157,6 +167,8 @@ class Goals:
         """Begin the goal that waits if its time has come; `path` is known if it was accepted this very moment."""
         execution, mover = self._waiting, self._mover
         if execution is None or execution.goal.trajectory.stamp > moment.unix:
+            return
+        if self._current is not None and self._current.ending is not None:
             return
         if not (mover.transmission.is_open or mover.is_resting()):
             self._preempt(moment)
@@ -191,6 +203,12 @@ class Goals:
         end = moment.monotonic + ahead + motion.duration_us * 1e-6
         execution.begin(stream, start_us, motion.duration_us, None if late is None else end + late)
 
+    def _stop_what_failed(self, moment: Moment) -> None:
+        """The motion that a goal waits behind must come to an end."""
+        mover = self._mover
+        if self._waiting is not None and mover.transmission.owns_motion and mover.stream and mover.stream.failure:
+            mover.stop(moment)
+
     def _preempt(self, moment: Moment) -> None:
         if self._current is not None:
             reason = "a newer goal took over"
@@ -219,4 +237,9 @@ class Goals:
         result = execution.result(ending, self._mover.state, moment.monotonic)
         self._mover.out.put(GoalFinished(execution.goal_id, ending.status, result))
         level = LogLevel.INFO if ending.status == GoalStatusCode.SUCCEEDED else LogLevel.WARNING
-        self._mover.out.log(level, f"goal {execution.goal_id} {ending.status.name.lower()} {ending.reason}".rstrip())
+        self._mover.out.log(level, _epitaph(execution.goal_id, ending))
+
+
+def _epitaph(goal_id: str, ending: Ending) -> str:
+    end = f"goal {goal_id} {ending.status.name.lower()}"
+    return f"{end}: {ending.reason}" if ending.reason else end

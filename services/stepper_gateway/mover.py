@@ -41,8 +41,10 @@ class Mover:
         self.commands = Commands(session_id)
         self.transmission = Transmission(arm.joints, session_id)
         self.reporter = Reporter(arm.joints)
-        self.is_held = False  # by a person's command, who will resume
+        self.excuse = 0.0  # share of the time that a goal may end later: a person holds the arm, or it speeds up again
         self.lead = parameters.trajectory_lead  # [s]
+        self._holds = False  # by a person's command, who will resume
+        self._held_us = 0  # device time of its answer to HOLD
         self._history: deque[tuple[float, Vector]] = deque()
         self._stop_asked = -1.0e9  # [s] monotonic
         self._stopped_us = -1  # device time of its answer to the latest STOP
@@ -56,6 +58,15 @@ class Mover:
     def stream(self) -> Stream | None:
         return self.transmission.stream
 
+    @property
+    def is_held(self) -> bool:
+        """Whether a person has asked for a hold, and has not ended it."""
+        return self._holds or self.commands.is_pending(DeviceCommandKind.HOLD)
+
+    def is_followed(self, state: State) -> bool:
+        """Whether the device plays the stream that we want it to play."""
+        return self.transmission.owns_motion and self.stream is not None and state.stream == self.stream.id
+
     def is_resting(self) -> bool:
         """Whether the device stands idle with nothing under way to it."""
         if self.session.mode != DeviceMode.IDLE or (self._awaits_stop and not self.has_stopped()):
@@ -65,7 +76,8 @@ class Mover:
 
     def refusal(self, moment: Moment) -> str:
         """Why nothing may be started now, empty if it may."""
-        return self.session.absence(moment, self.parameters.state_timeout) or self.session.hindrance()
+        absence = self.session.absence(moment, self.parameters.state_timeout)
+        return absence or self.session.hindrance() or self.commands.hindrance()
 
     def begin(self, motion: Motion, position: Vector, moment: Moment) -> Stream:
         """A new stream from rest; its first chunk leaves at once."""
@@ -99,8 +111,10 @@ class Mover:
         self._history.append((arrival, self.reporter.positions(state.steps)))
         while self._history[0][0] < arrival - HISTORY:
             self._history.popleft()
-        if state.mode not in MOVING:
-            self.is_held = False
+        if state.mode not in MOVING or (state.mode == DeviceMode.RUN and state.t_us > self._held_us):
+            self._holds = False
+        slowness = 1.0 - state.time_scale / 32768.0
+        self.excuse = slowness if self.is_held or (self.excuse and state.mode == DeviceMode.RUN) else 0.0
 
     def commanded(self, state: State) -> PathPoint:
         """What the path asks for at the instant of `state`; where it is, if it follows no path of ours."""
@@ -129,12 +143,12 @@ class Mover:
         ahead = stream.log.knots_between(stream.played_us(moment.monotonic, self.session.clock), stream.end_us)
         rows = [position for _, position in self._history] + [knot.position for knot in ahead]
         columns = list(zip(*rows, strict=True))
-        return Presence(start, tuple(map(min, columns)), tuple(map(max, columns)))
+        return Presence(start, tuple(map(min, columns)), tuple(map(max, columns)), self.transmission.is_open)
 
     def stop(self, moment: Moment) -> None:
         """Decelerate along the path and forget the rest of it."""
         self.transmission.abandon()
-        self.is_held = False
+        self._holds = False
         self._stop_asked, self._stopped_us, self._awaits_stop = moment.monotonic, -1, True
         self.commands.ask(DeviceCommandKind.STOP, moment, self.parameters.command_timeout)
 
@@ -145,7 +159,7 @@ class Mover:
 
     def lost(self) -> None:
         """The device cannot be reached: no answer to a STOP will come, nor will a person's RESUME."""
-        self.is_held = self._awaits_stop = False
+        self._holds = self._awaits_stop = False
 
     def rebooted(self) -> None:
         """Another boot: neither the stream nor any STOP concerns it."""
@@ -156,19 +170,23 @@ class Mover:
     def stop_answered(self, t_us: int) -> None:
         self._stopped_us = t_us
 
-    def stop_strangers(self, moment: Moment) -> None:
-        """Stop a motion that is not ours: of a gateway before us, or one that was given up while the link was down."""
-        state, stream = self.state, self.stream
-        if state is None or state.mode not in MOVING or self.is_held:
-            return
-        if stream is not None and not stream.is_abandoned and state.stream == stream.id:
-            return
+    def hold_answered(self, holds: bool, t_us: int) -> None:
+        """The device has told, or shown, whether it holds because a person wants it."""
+        self._holds, self._held_us = holds, t_us
+
+    def stop_strangers(self, moment: Moment) -> bool:
+        """Stop a motion that is not ours, of a gateway before us or given up without a link; true if there is one."""
+        state = self.state
+        if state is None or state.mode not in MOVING or self.is_held or self.is_followed(state):
+            return False
         is_obeying = state.mode == DeviceMode.HOLD and self._stopped_us >= 0
         if is_obeying or self.session.absence(moment, self.parameters.state_timeout):
-            return
-        if moment.monotonic - self._stop_asked >= STOP_AGAIN:
-            self.event("stopping", f"the device moves along stream {state.stream}, which nobody follows", moment)
-            self.stop(moment)
+            return False
+        if moment.monotonic - self._stop_asked < STOP_AGAIN:
+            return False
+        self.event("stopping", f"the device moves along stream {state.stream}, which nobody follows", moment)
+        self.stop(moment)
+        return True
 
     def event(self, event: str, detail: str, moment: Moment, level: LogLevel = LogLevel.WARNING) -> None:
         """Say something once, on the bus and in the log."""

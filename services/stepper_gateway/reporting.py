@@ -12,6 +12,8 @@ from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.path_log import PathPoint
 from services.stepper_gateway.stream import SentChunk
 
+HALF_STEP = 0.5 + 1.0 / 256.0  # [steps] by which whole steps may lie beside the path, which has 1/256 itself
+
 
 class Reporter:
     """Converts for one arm; steps stay behind this edge."""
@@ -26,8 +28,8 @@ class Reporter:
         self._max_error = [0.0] * len(self._joints)
 
     def positions(self, steps: tuple[int, ...] | tuple[float, ...]) -> Vector:
-        """[rad] or [m] of motor steps."""
-        return tuple(joint.steps.to_position(count) for joint, count in zip(self._joints, steps, strict=True))
+        """[rad] or [m] of motor steps; a joint on its limit is there, not half a step beyond it."""
+        return tuple(_position(joint, count) for joint, count in zip(self._joints, steps, strict=True))
 
     def _rates(self, rates: tuple[float, ...], scale: float = 1.0) -> Vector:
         return tuple(rate * scale / joint.steps.per_unit for joint, rate in zip(self._joints, rates, strict=True))
@@ -113,6 +115,13 @@ class Reporter:
             round_trip=round_trip,
             steps=steps,
         )
+
+
+def _position(joint: Joint, count: float) -> float:
+    """The device stands on the whole step nearest to a limit: a plan from there must not begin outside."""
+    position = joint.steps.to_position(count)
+    nearest = min(max(position, joint.lower), joint.upper)
+    return nearest if abs(position - nearest) * joint.steps.per_unit <= HALF_STEP else position
 
 
 def code_name(code: int) -> str:

@@ -43,6 +43,7 @@ class Presence:
     start: Knot
     lowest: Vector
     highest: Vector
+    is_sent: bool = False  # the next knot follows one that was sent, perhaps between two whole steps
 
     @classmethod
     def at_rest(cls, position: Vector) -> Presence:
@@ -51,7 +52,7 @@ class Presence:
     def joined(self, other: Presence) -> Presence:
         """From here, having swept the other's range too."""
         lowest = tuple(map(min, self.lowest, other.lowest))
-        return Presence(self.start, lowest, tuple(map(max, self.highest, other.highest)))
+        return Presence(self.start, lowest, tuple(map(max, self.highest, other.highest)), self.is_sent)
 
 
 class Validator:
@@ -81,7 +82,7 @@ class Validator:
         path = _path(trajectory, start, offset, parameters.corner_time)
         require_path_within(path, self._joints, parameters, self._tick_hz)
         first = path.at(0.0)
-        if self._is_same(start, first):
+        if self._is_same(presence, first):
             return path
         self._require_near(first, presence, parameters)
         joined = bridge(start, path, self._limits, lambda knot: within(knot, self._joints))
@@ -107,10 +108,11 @@ class Validator:
             raise invalid("the way from the arm's present motion to the point leaves the joint limits")
         return path
 
-    def _is_same(self, start: Knot, first: Knot) -> bool:
-        """Whether the path begins where the arm is: on the same whole steps, or in motion to the wire's resolution."""
+    def _is_same(self, presence: Presence, first: Knot) -> bool:
+        """Whether the path begins where the arm is: on the same whole steps, or to the wire's resolution."""
+        start = presence.start
         rows = list(zip(self._joints, start.position, first.position, strict=True))
-        if start.is_at_rest and first.is_at_rest:
+        if start.is_at_rest and first.is_at_rest and not presence.is_sent:
             return all(whole_steps(j.steps.to_q8(a)) == whole_steps(j.steps.to_q8(b)) for j, a, b in rows)
         if any(abs(a - b) > SAME_VELOCITY for a, b in zip(start.velocity, first.velocity, strict=True)):
             return False
