@@ -19,6 +19,7 @@ PAUSE_AT_REST = 0.020  # [s] a state is due as often
 STALL = 0.1  # [s] a loop that was late by more was stopped by the operating system
 LONGEST_STOP = 5.0  # [s] when the process is asked to end while the arm moves
 BEAT = 1.0  # [s] of the readiness file
+PATIENCE = 3.0  # [s] that a broker which is started together with us may take
 
 
 class VirtualEsp32:
@@ -38,7 +39,7 @@ class VirtualEsp32:
         self._memory = memory
         self._readiness = readiness
         self._started = time.monotonic() - device.now_us / 1e6
-        self._looked = time.monotonic()
+        self._born = self._looked = time.monotonic()
         self._next_beat = 0.0
         self._connected = False
         self._was_refused = ""
@@ -125,9 +126,10 @@ class VirtualEsp32:
         if self._connected:
             log.warning("lost the broker (%s); trying again", reason)
             self._readiness.not_ready()
-        elif reason != self._was_refused:
+            self._connected = False
+        elif reason != self._was_refused and time.monotonic() - self._born > PATIENCE:
             log.warning("no connection: %s", reason)
-        self._connected, self._was_refused = False, reason
+            self._was_refused = reason
 
     def _device_time(self, monotonic: float) -> int:
         return max(0, int((monotonic - self._started) * 1e6))
@@ -164,4 +166,5 @@ def offline_status(device: Device) -> bytes:
 def _log_event(frame: OutFrame) -> None:
     event = json.loads(frame.payload)
     if event["event"] in ("fault", "hold", "underrun"):
-        log.warning("%s %s at %.3f s", event["event"], event["detail"], event["t_us"] / 1e6)
+        level = logging.INFO if event["detail"] == "command" else logging.WARNING
+        log.log(level, "%s %s at %.3f s", event["event"], event["detail"], event["t_us"] / 1e6)
