@@ -21,5 +21,9 @@ with Node("custom_planner") as node:
         node.wait(0.1)
     goal = FollowJointTrajectoryGoal(trajectory=there_and_back(joints.message))
     handle = node.action(FOLLOW_JOINT_TRAJECTORY).send(goal)
-    outcome = handle.wait(timeout=60.0)
+    try:
+        outcome = handle.wait(timeout=60.0)
+    except KeyboardInterrupt:  # the arm would go on by itself
+        handle.cancel()
+        outcome = handle.wait(timeout=10.0)
     print(outcome.status.name, outcome.result.error_string, outcome.result.executed_steps, flush=True)

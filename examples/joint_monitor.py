@@ -13,4 +13,5 @@ with Node("joint_monitor") as node:
         state = joints.message
         print("  ".join(f"{name} {at:+.4f}" for name, at in zip(state.name, state.position, strict=True)), flush=True)
 
+    node.wait(0.3)  # for the first of them
     node.spin(show, rate=2.0)

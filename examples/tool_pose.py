@@ -19,4 +19,5 @@ with Node("tool_pose") as node:
         else:
             print(f"x {x:+.4f}  y {y:+.4f}  z {z:+.4f} m", flush=True)
 
+    node.wait(0.3)  # for the first of them
     node.spin(show, rate=2.0)

@@ -150,6 +150,35 @@ def test_custom_planner_moves_the_arm_and_feedback_monitor_sees_it(
     assert [point.positions for point in points] == [(0.5, -0.25), (0.52, -0.23), (0.5, -0.25)]
 
 
+def test_ctrl_c_in_custom_planner_cancels_its_move(start: Start, robot: Node) -> None:
+    running: list[str] = []
+    cancelled: list[str] = []
+    states = robot.publisher(JOINT_STATES)
+
+    def on_goal(goal_id: str, goal: FollowJointTrajectoryGoal) -> GoalDecision:
+        running.append(goal_id)
+        return accept()
+
+    def on_cancel(goal_id: str) -> str:
+        cancelled.append(goal_id)
+        return ""
+
+    server = robot.serve_action(FOLLOW_JOINT_TRAJECTORY, on_goal, on_cancel)
+
+    def step(now: int) -> None:
+        states.put(JointState(stamp=now, name=("q1",), position=(0.5,)))
+        while cancelled:
+            server.finish(cancelled.pop(), GoalStatusCode.CANCELED, FollowJointTrajectoryResult(executed_steps=(3,)))
+
+    with spinning(robot, step):
+        planner = start("custom_planner.py")
+        assert until(lambda: running, 10.0)
+        time.sleep(0.3)
+        planner.send_signal(signal.SIGINT)
+        output, errors = planner.communicate(timeout=5.0)
+    assert (planner.returncode, errors, output) == (0, "", "CANCELED  (3,)\n")
+
+
 def test_demo_sine_streams_targets_about_where_the_arm_stands(start: Start, robot: Node) -> None:
     heard: list[JointTargets] = []
     robot.subscribe(JOINT_TARGETS, heard.append)
