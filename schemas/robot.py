@@ -13,6 +13,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+Word = Annotated[str, Meta(pattern="^[A-Za-z0-9_-]+$")]  # part of a key on the bus or of an MQTT topic
 Natural = Annotated[int, Meta(ge=0)]
 NotNegative = Annotated[float, Meta(ge=0.0)]
 Positive = Annotated[float, Meta(gt=0.0)]
@@ -44,7 +45,7 @@ class Motor(RobotRecord, frozen=True, kw_only=True):
     """A stepper behind its driver and gearbox."""
 
     driver: str  # name of a [[driver]]
-    pulses_per_turn: int  # [pulses/rev] of the motor shaft, microsteps included
+    pulses_per_turn: Annotated[int, Meta(le=10_000_000)]  # [pulses/rev] of the motor shaft, microsteps included
     gear_ratio: str = "1"  # exact: motor turns per turn of the output shaft
     step_pin: Natural | None = None
     dir_pin: Natural | None = None
@@ -72,7 +73,7 @@ class StepperJoint(RobotRecord, frozen=True, kw_only=True):
 class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
     """The controller board."""
 
-    name: str  # MQTT: gemelo/v1/<name>/...
+    name: Word  # MQTT: gemelo/v1/<name>/...
     tick_hz: Annotated[int, Meta(ge=10_000, le=100_000, multiple_of=1000)] = 50_000  # the firmware's bounds
     queue_capacity: Annotated[int, Meta(ge=2, le=128)] = 128  # [knots], and the firmware's again
 
@@ -80,7 +81,7 @@ class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
 class RobotFile(RobotRecord, frozen=True, kw_only=True):
     """The whole robot.toml."""
 
-    name: str
+    name: Word
     urdf: str = "robot.urdf"
     srdf: str = "robot.srdf"
     group: str = "arm"

@@ -17,6 +17,9 @@ from services.arm.errors import DescriptionError, suggestion
 
 Keys = tuple[str | int, ...]
 
+MOST_RATIO = Fraction(10**9)
+LEAST_RATIO = 1 / MOST_RATIO
+
 
 @dataclass(frozen=True)
 class UnknownKey:
@@ -88,11 +91,15 @@ def where_of(error: msgspec.ValidationError, text: str) -> str:
 def exact_ratio(text: str, where: str) -> Fraction:
     """ "46.656" or "380/21" as a positive fraction; raises `DescriptionError` naming `where`."""
     try:
+        if "e" in text.lower():
+            raise ValueError("an exponent may be longer than any memory")
         ratio = Fraction(text.replace(" ", ""))
     except (ValueError, ZeroDivisionError) as error:
         raise DescriptionError(f'{where}: "{text}" is neither a decimal nor a fraction like "380/21"') from error
     if ratio <= 0:
         raise DescriptionError(f"{where}: a ratio of {text} is not positive; turn the direction with `inverted`")
+    if not LEAST_RATIO <= ratio <= MOST_RATIO:
+        raise DescriptionError(f"{where}: a ratio of {text} is not within 1/1000000000 to 1000000000")
     return ratio
 
 

@@ -9,6 +9,12 @@ from schemas.robot import StepperJoint
 from services.arm.errors import DescriptionError
 from services.arm.steps import StepScale, step_scale
 
+RANGES = {  # of what a builder can mean
+    "max_speed_rpm": (1e-3, 1e6),  # [rev/min]
+    "ramp_time": (1e-3, 1e3),  # [s]
+    "jerk_time": (1e-3, 1e3),  # [s]
+}
+
 
 @dataclass(frozen=True)
 class SpeedLimits:
@@ -28,9 +34,10 @@ def step_rate(rpm: float, scale: StepScale) -> Fraction:
 
 def speed_limits(drive: StepperJoint) -> SpeedLimits:
     """The limits of one joint of robot.toml; raises `DescriptionError` naming the joint and the key."""
-    for key in ("max_speed_rpm", "ramp_time", "jerk_time"):
-        if not getattr(drive, key) > 0.0:
-            raise DescriptionError(f'joint "{drive.name}": {key} is {getattr(drive, key)}, it must be above 0')
+    for key, (least, most) in RANGES.items():
+        value = getattr(drive, key)
+        if not least <= value <= most:
+            raise DescriptionError(f'joint "{drive.name}": {key} is {value}, it must be {least:g} to {most:g}')
     scale = step_scale(drive)
     rate = step_rate(drive.max_speed_rpm, scale)
     velocity = drive.max_speed_rpm / 60.0 * scale.travel_per_turn

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,9 +72,11 @@ def _state(element: ET.Element) -> NamedState:
     for joint in element.findall("joint"):
         text = _need(joint, "value")
         try:
-            values[_need(joint, "name")] = float(text)
+            value = values[_need(joint, "name")] = float(text)
         except ValueError as error:
             raise DescriptionError(f'state "{name}": "{text}" is not a number') from error
+        if not math.isfinite(value):
+            raise DescriptionError(f'state "{name}": {text} is not finite')
     return NamedState(name, _need(element, "group"), values)
 
 

@@ -83,8 +83,9 @@ def travel_per_turn(drive: StepperJoint) -> float:
                 )
             return TAU
         case Transmission.RACK_AND_PINION:
-            if drive.pinion_radius is None or not drive.pinion_radius > 0.0:
+            if drive.pinion_radius is None or not 1e-4 <= drive.pinion_radius <= 10.0:
                 raise DescriptionError(
-                    f'joint "{drive.name}": rack_and_pinion needs pinion_radius > 0 in m, it is {drive.pinion_radius}'
+                    f'joint "{drive.name}": rack_and_pinion needs pinion_radius of 0.0001 to 10 m, '
+                    f"it is {drive.pinion_radius}"
                 )
             return TAU * drive.pinion_radius

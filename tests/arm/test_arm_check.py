@@ -49,6 +49,9 @@ FAULTS = [
     ("robot.toml", "tick_hz = 50_000", "tick_hz = 0", "line 13: Expected `int` >= 10000", "schemas/robot.py"),
     ("robot.toml", "queue_capacity = 128", "queue_capacity = 129", "<= 128 - at `$.device.queue_capacity`", ""),
     ("robot.toml", "ramp_time = 1.0", "ramp_time = 1.0\ngoal_tolerance_steps = 0.1", ">= 0.5", "schemas/robot.py"),
+    ("robot.toml", 'name = "rm1"', 'name = "rm/1"', "line 4: Expected `str` matching regex", "schemas/robot.py"),
+    ("robot.toml", "pinion_radius = 0.0225", "pinion_radius = 1e-300", "0.0001 to 10 m", ""),
+    ("robot.srdf", 'value="2.4"', 'value="nan"', 'state "folded": nan is not finite', ""),
     ("robot.toml", "step_pin = 18", "step_pin = 25", "is used 2 times", "one signal a pin"),
     ("robot.toml", 'wire_name = "q1"', 'wire_name = "q1"\nreference_position = 9.0', "outside -2.95 to 2.95", ""),
     (

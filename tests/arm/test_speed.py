@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from fractions import Fraction
 
 import msgspec
@@ -40,7 +41,9 @@ def test_the_tighter_limit_wins(rm1: Arm):
     assert rm1.joint("efector_joint").velocity == pytest.approx(0.0353429, abs=1e-7)
 
 
-def test_a_speed_of_zero_is_refused_by_name(rm1: Arm):
-    drive = msgspec.structs.replace(rm1.joints[0].drive, max_speed_rpm=0.0)
-    with pytest.raises(DescriptionError, match=r'joint "brazo_joint": max_speed_rpm is 0'):
+@pytest.mark.parametrize("key", ["max_speed_rpm", "ramp_time", "jerk_time"])
+@pytest.mark.parametrize("value", [0.0, -1.0, 1e-320, 1e308])
+def test_a_speed_or_time_that_cannot_be_meant_is_refused_by_name(rm1: Arm, key: str, value: float):
+    drive = msgspec.structs.replace(rm1.joints[0].drive, **{key: value})
+    with pytest.raises(DescriptionError, match=re.escape(f'joint "brazo_joint": {key} is {value}, it must be')):
         speed_limits(drive)
