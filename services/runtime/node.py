@@ -252,8 +252,3 @@ class Node:
         report = self._statistics.report(self._loop.take_figures(), self._declared.statistics())
         if report is not None:
             self.publisher(STATISTICS).put(report)
-
-
-def node_names(bus: Bus) -> set[str]:
-    """The names of all living nodes on a bus."""
-    return identity.alive(bus)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any, Generic, TypeVar, cast
 
@@ -40,9 +41,12 @@ class ParameterSet(Generic[P]):
             raise Refused(f'{self._node}: parameter "{name}" is a {declared.type}: {value!r} is not')
         values = {each: getattr(self.value, each) for each in self._declared} | {name: value}
         try:
-            self.value = msgspec.convert(values, self._kind, strict=strict)
+            changed = msgspec.convert(values, self._kind, strict=strict)
         except (msgspec.ValidationError, ValueError) as error:
-            raise Refused(f'{self._node}: parameter "{name}" cannot be {value!r}: {error}') from error
+            raise Refused(f'{self._node}: parameter "{name}" cannot be {value!r}: {_reason(error)}') from error
+        if declared.type == "float" and not math.isfinite(getattr(changed, name)):
+            raise Refused(f'{self._node}: parameter "{name}" cannot be {value!r}: it must be finite')
+        self.value = changed
         return self._with_value(name)
 
     def set_all(self, values: Mapping[str, ParameterValue], origin: str, strict: bool) -> None:
@@ -59,6 +63,11 @@ class ParameterSet(Generic[P]):
 
     def _with_value(self, name: str) -> Parameter:
         return msgspec.structs.replace(self._declared[name], value=getattr(self.value, name))
+
+
+def _reason(error: Exception) -> str:
+    """Without the path that msgspec adds: the parameter is named already."""
+    return str(error).partition(" - at `$")[0]
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -30,6 +30,7 @@ class GatewayParameters(msgspec.Struct, frozen=True, kw_only=True):
     chunk: Annotated[int, Meta(ge=1)] = 10
     is_strict: bool = True
     device: str = "rm1"
+    rate: float = 50.0  # no bounds
 
 
 def test_messages_reach_the_handler_in_the_thread_of_logic(buses: Buses) -> None:
@@ -273,6 +274,9 @@ def test_parameters_from_the_deployment_and_the_command_line_are_checked(buses: 
         buses.node("second").parameters(GatewayParameters)
     with pytest.raises(Refused, match="--set: third"):
         buses.node("third", overrides={"chunk": "0"}).parameters(GatewayParameters)
+    for name, number in (("fourth", "inf"), ("fifth", "-inf"), ("sixth", "nan")):
+        with pytest.raises(Refused, match='"rate" cannot be .* must be finite'):
+            buses.node(name, overrides={"rate": number}).parameters(GatewayParameters)
 
 
 def test_nodes_know_one_another(buses: Buses) -> None:

@@ -14,7 +14,6 @@ import msgspec
 
 MAGIC = 0x67
 VERSION = 1
-MAX_KNOTS = 128
 NO_JOINT = 255
 
 Row = tuple[int, ...]
