@@ -66,7 +66,9 @@ def demonstrate(out: Path, broker: str, with_picture: bool) -> int:
     found += missing_files(folder, recording)
     if with_picture:
         found += take_picture(recording, out / "demo.png")
-    print(f"\n{text_of(report, performance.moves)}\n\nresults: {out / 'demo.json'}, {recording}, {folder}")
+    picture = f" and {out / 'demo.png'}" if (out / "demo.png").exists() else ""
+    print(f"\n{text_of(report, performance.moves)}\n\nresults: {out / 'demo.json'}, {folder}")
+    print(f"to look at: {recording} (.venv/bin/rerun {recording}){picture}")
     for complaint in found:
         print(f"demo failed: {complaint}", file=sys.stderr)
     return 1 if found else 0

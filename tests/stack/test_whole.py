@@ -12,7 +12,7 @@ import psutil
 import pytest
 
 from schemas.actions import GoalStatusCode
-from schemas.motion import FollowErrorCode
+from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from services.cli.stack import Stack
 from tests.stack.person import jumps
 
@@ -106,6 +106,36 @@ def test_a_move_ends_with_every_commanded_step_executed(operator):
     assert outcome.result.executed_steps == outcome.result.commanded_steps
     assert max(abs(error) for error in outcome.result.final_error) <= 0.5
     assert not jumps(operator.arm, operator.seen)
+
+
+def test_a_parameter_of_the_gateway_counts_from_the_moment_it_is_set(stack, operator):
+    counts = {}
+    for rate in ("2.0", "20.0"):
+        told = gemelo(stack, "param", "set", "stepper_gateway", "feedback_rate", rate)
+        assert told.returncode == 0, told.stderr
+        heard = []
+        plan = operator.plan()
+        goal = FollowJointTrajectoryGoal(trajectory=plan.trajectory)
+        outcome = operator.follow.send(goal, on_feedback=heard.append).wait(plan.duration + 10.0)
+        assert outcome.status is GoalStatusCode.SUCCEEDED
+        counts[rate] = len(heard) / plan.duration
+    assert counts["2.0"] < 5.0 < counts["20.0"]
+
+
+def test_the_logger_writes_a_new_file_only_while_it_is_told_to_record(stack):
+    def recordings():
+        return {path: path.stat().st_size for path in (stack.out / "recordings").glob("*.mcap")}
+
+    assert gemelo(stack, "param", "set", "logger", "enable_logging", "false").returncode == 0
+    time.sleep(1.0)
+    before = recordings()
+    time.sleep(1.5)
+    assert recordings() == before
+    assert gemelo(stack, "param", "set", "logger", "enable_logging", "true").returncode == 0
+    deadline = time.monotonic() + 8.0
+    while sum(recordings().values()) <= sum(before.values()) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert sum(recordings().values()) > sum(before.values())
 
 
 def test_a_cancelled_move_decelerates_on_its_path(operator):
