@@ -3,9 +3,14 @@
 
 #include <stdint.h>
 
+// A board with less memory is built for fewer.
+#ifndef GEMELO_MAX_JOINTS
+#define GEMELO_MAX_JOINTS 8
+#endif
+
 namespace gemelo {
 
-constexpr uint8_t kMaxJoints = 8;
+constexpr uint8_t kMaxJoints = GEMELO_MAX_JOINTS;
 constexpr uint16_t kMaxKnots = 128;
 constexpr uint32_t kSlotUs = 1000;
 constexpr uint32_t kSlotHz = 1000;
