@@ -1,0 +1,33 @@
+// A move of up to six joints from rest to rest as TRAJ frames: integers only, so every processor makes the same bytes.
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "protocol.h"
+
+constexpr uint8_t kMostJoints = 6;
+constexpr uint32_t kBoot = 0x12345678;
+constexpr uint16_t kLastKnot = 150;  // of 20 ms: 3 s
+constexpr uint32_t kDtUs = 20000;
+constexpr uint16_t kChunkKnots = 10;
+constexpr size_t kFrameSize = 32 + kChunkKnots * 8 * kMostJoints + 4;
+
+// One frame's bytes.
+struct Wire {
+    uint8_t bytes[kFrameSize];
+    size_t size;
+};
+
+struct Move {
+    uint32_t stream;
+    uint8_t joints;
+    const int32_t* from;      // steps
+    const int32_t* distance;  // steps
+
+    // Knots from `first`, at most kChunkKnots, as the seq-th chunk.
+    Wire chunk(uint16_t first, uint32_t seq) const;
+};
+
+Wire command(gemelo::Command command, uint32_t id);
+Wire heartbeat(uint32_t counter);
