@@ -24,8 +24,9 @@ from services.runtime.deployment import project_root
 ALONE = ("frame_lookup_us", "plan_ms", "lost_of_45000_at_25hz", "cli_start_ms")  # before any stack disturbs them
 ON_A_STACK = ("stack_idle_cpu_percent", "stack_rss_mb", "state_to_frame_ms", "move_accept_to_first_step_ms")
 BROKERS = {"chunk_ack_ms": "mosquitto", "chunk_ack_ms_amqtt": "amqtt"}
+CHIP = ("tick_instructions", "slot_instructions", "core_text_bytes", "core_ram_bytes")
 LAST = ("ready_s",)
-NAMES = (*ALONE, *ON_A_STACK, *BROKERS, *LAST)
+NAMES = (*ALONE, *CHIP, *ON_A_STACK, *BROKERS, *LAST)
 
 
 def main() -> None:
@@ -58,7 +59,7 @@ def measured(name: str, stacks: Stacks) -> Figure:
     measure: Callable[..., Figure] = module.measure
     if name in BROKERS:
         return guarded(partial(measure, stacks, BROKERS[name]), module.UNIT)
-    return guarded(partial(measure, *(() if name in ALONE else (stacks,))), module.UNIT)
+    return guarded(partial(measure, *(() if name in (*ALONE, *CHIP) else (stacks,))), module.UNIT)
 
 
 def module_of(name: str) -> ModuleType:
