@@ -275,7 +275,7 @@ def test_parameters_from_the_deployment_and_the_command_line_are_checked(buses: 
     with pytest.raises(Refused, match="--set: third"):
         buses.node("third", overrides={"chunk": "0"}).parameters(GatewayParameters)
     for name, number in (("fourth", "inf"), ("fifth", "-inf"), ("sixth", "nan")):
-        with pytest.raises(Refused, match='"rate" cannot be .* must be finite'):
+        with pytest.raises(Refused, match=r'"rate" cannot be .* must be finite'):
             buses.node(name, overrides={"rate": number}).parameters(GatewayParameters)
 
 
