@@ -149,6 +149,8 @@ class Goals:
         if is_finished and strayed is None and execution.is_reached(state):
             done = Ending(GoalStatusCode.SUCCEEDED, FollowErrorCode.SUCCESSFUL, "")
             return self._finish_current(done, moment)
+        if is_finished and execution.deadline is None:  # no time would bring more steps
+            return self._finish_current(strayed or execution.late(state, moment.monotonic), moment)
         if strayed is not None and execution.ending is None:
             return self._end(strayed, moment)
         self._report(execution, state, point, moment)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceMode
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
 from schemas.topics import JOINT_STATES
 from services.stepper_gateway.clock import ENOUGH, ClockSync
 from tests.stepper_gateway.harness import Rig, assert_within_limits, move, rm1
@@ -214,6 +214,20 @@ def test_an_arm_on_its_limit_is_within_its_limits() -> None:
     assert here(rig)[1] == joint.upper
     rig.new_gateway()
     rig.ready()
+    assert_next_goal_succeeds(rig)
+
+
+def test_a_goal_without_a_bound_in_time_does_not_wait_for_steps_that_will_not_come() -> None:
+    rig = Rig().ready()
+    goal = FollowJointTrajectoryGoal(
+        trajectory=move(HOME, (0.6001, -1.203, 0.0801)),
+        goal_tolerance=(JointTolerance(name="antebrazo_joint", position=1e-6),),
+        goal_time_tolerance=-1.0,
+    )
+    assert rig.goal(goal).accepted
+    status, result = rig.finish(seconds=10.0)
+    assert (status, result.error_code) == (GoalStatusCode.ABORTED, FollowErrorCode.GOAL_TOLERANCE_VIOLATED)
+    assert "antebrazo_joint" in result.error_string
     assert_next_goal_succeeds(rig)
 
 
