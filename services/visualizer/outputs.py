@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import rerun as rr
@@ -42,7 +43,8 @@ class Outputs:
         if self._recording is not None:
             self._recording.close(timeout=5.0)
         if self._viewer is not None and self._watch is not None and self._watch.is_alive:
-            self._viewer.close(timeout=1.0)
+            with suppress(RuntimeError):  # it may end while we hand over
+                self._viewer.close(timeout=1.0)
 
     def _open_recording(self, core: Visualizer) -> None:
         if self._recording_path is None or self._recording is not None or self._trouble:
