@@ -101,7 +101,7 @@ def _value_of(info: inspect.Type, annotation: Any, name: str) -> Any:
         case inspect.RawType():
             return msgspec.Raw(b"\x80")
         case _:
-            raise NotImplementedError(f"a sample for field {name} of {info}")
+            raise TypeError(f"no sample is known for field {name} of {info}")
 
 
 def _last(kind: type[Enum]) -> Enum:
