@@ -155,7 +155,8 @@ def test_every_log_is_kept_and_no_process_has_complained(stack):
 
 
 def test_ctrl_c_ends_everything_with_zero_and_leaves_nothing_behind(tmp_path):
-    with Stack(broker="amqtt", out=tmp_path) as stack:
+    # As a user starts it: `Stack` alone leaves dependencies out, and with them the order of stopping.
+    with Stack(broker="amqtt", out=tmp_path, viewer="web", command=("deploy/up",)) as stack:
         pids = [psutil.Process(pid) for pid in stack.pids().values()]
         family = [each for pid in pids for each in [pid, *pid.children(recursive=True)]]
         started = time.monotonic()
@@ -166,7 +167,7 @@ def test_ctrl_c_ends_everything_with_zero_and_leaves_nothing_behind(tmp_path):
         assert not alive
         console = stack.console()
         assert "Traceback" not in console, console[-3000:]
-        assert "lost the broker" not in console, console[-3000:]
+        assert "WARNING" not in console, console[-3000:]
 
 
 def test_make_up_welcomes_the_user_and_a_sigterm_ends_it(tmp_path):
