@@ -20,6 +20,13 @@ class Broker(StrEnum):
     MOSQUITTO = "mosquitto"  # real arms and tests
 
 
+class Wire(StrEnum):
+    """How the gateway reaches the device."""
+
+    MQTT = "mqtt"
+    SERIAL = "serial"
+
+
 class ViewerMode(StrEnum):
     """How the Rerun viewer shows itself."""
 
@@ -40,6 +47,11 @@ class MqttSection(DeploymentRecord, frozen=True, kw_only=True):
     port: int = 1883
 
 
+class SerialSection(DeploymentRecord, frozen=True, kw_only=True):
+    device: str = "/dev/ttyUSB0"
+    baud: int = 921_600
+
+
 class ViewerSection(DeploymentRecord, frozen=True, kw_only=True):
     mode: ViewerMode = ViewerMode.AUTO
     host: str = "127.0.0.1"
@@ -57,7 +69,9 @@ class Deployment(DeploymentRecord, frozen=True, kw_only=True):
 
     robot: str = "urdf/rm1"
     router: RouterSection = RouterSection()
+    wire: Wire = Wire.MQTT  # how the gateway reaches the device
     mqtt: MqttSection = MqttSection()
+    serial: SerialSection = SerialSection()
     viewer: ViewerSection = ViewerSection()
     paths: PathsSection = PathsSection()
     parameters: dict[str, dict[str, ParameterValue]] = {}  # by node, then by name

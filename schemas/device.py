@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 
 from schemas.message import Message, Vector
 
@@ -20,6 +20,19 @@ class DeviceMode(IntEnum):
     ESTOP = 7
 
 
+class DeviceFault(IntEnum):
+    """Why the device is in FAULT or ESTOP, with the numbers of the wire."""
+
+    NONE = 0
+    TICK_OVERRUN = 1
+    INTERNAL = 2
+    LIMIT_SWITCH = 3
+    HOMING_TIMEOUT = 4
+    SWITCH_NOT_FOUND = 5
+    SWITCH_STUCK = 6
+    EMERGENCY_STOP = 7
+
+
 class DeviceStatus(Message, frozen=True, kw_only=True):
     """Who the device is and whether it can be reached; latched."""
 
@@ -33,6 +46,9 @@ class DeviceStatus(Message, frozen=True, kw_only=True):
     joints: int = 0
     tick_hz: int = 0
     queue_capacity: int = 0  # [knots]
+    config_crc32: int = 0  # of the configuration that the device works with; 0: none yet
+    wanted_crc32: int = 0  # of the one that robot.toml asks for
+    virtual: bool = False  # its switches can be pressed by a request
 
 
 class DeviceState(Message, frozen=True, kw_only=True):
@@ -42,7 +58,13 @@ class DeviceState(Message, frozen=True, kw_only=True):
     device_time: int = 0  # [us] since the device's boot
     boot_id: int = 0
     mode: DeviceMode = DeviceMode.BOOT
-    fault: int = 0
+    fault: int = 0  # a DeviceFault, or a number that a newer firmware has
+    fault_joint: str = ""
+    armed: bool = False  # the drivers are energised
+    referenced: tuple[bool, ...] = ()  # whether the joint's position is known
+    inputs: tuple[str, ...] = ()  # names of the switches that are active
+    outputs: tuple[str, ...] = ()  # names of the outputs that are on
+    speed: float = 1.0  # the time scale that a person has asked for
     name: tuple[str, ...] = ()
     steps: tuple[int, ...] = ()  # executed
     velocity: Vector = ()  # [steps/s]
@@ -74,14 +96,21 @@ class DeviceCommandKind(IntEnum):
     STOP = 3
     RESET = 4
     REFERENCE = 5
+    ARM = 6
+    DISARM = 7
+    HOME = 8
+    OUTPUT = 9
+    SPEED = 10
 
 
 class DeviceCommandRequest(Message, frozen=True, kw_only=True):
-    """A command; REFERENCE declares where the joints stand, at the zero of every joint if empty."""
+    """A command; REFERENCE and HOME are for the joints named, for all if none is."""
 
     command: DeviceCommandKind = DeviceCommandKind.HOLD
     name: tuple[str, ...] = ()
-    position: Vector = ()  # [rad] or [m], for REFERENCE
+    position: Vector = ()  # [rad] or [m], for REFERENCE; empty: the reference pose of robot.toml
+    output: str = ""  # name, for OUTPUT
+    value: float = 0.0  # OUTPUT: 0 off, 1 on; SPEED: the time scale, 0 to 1
 
 
 class DeviceCommandResponse(Message, frozen=True, kw_only=True):
@@ -90,6 +119,77 @@ class DeviceCommandResponse(Message, frozen=True, kw_only=True):
     accepted: bool = False
     reason: str = ""
     mode: DeviceMode = DeviceMode.BOOT
+
+
+class DeviceConfiguration(Message, frozen=True, kw_only=True):
+    """The configuration that robot.toml asks for, and whether the device works with it; latched."""
+
+    stamp: int = 0  # [ns] UNIX time
+    text: str = ""  # the JSON of firmware/PROTOCOL.md
+    crc32: int = 0  # of `text`
+    device_crc32: int = 0  # of what the device works with; 0: none, or not known
+    accepted: bool = False  # the device works with `text`
+    reason: str = ""  # why not, with the remedy
+
+
+class ConfigureRequest(Message, frozen=True, kw_only=True):
+    """Have the device take the configuration of robot.toml; it must be disarmed."""
+
+
+class ConfigureResponse(Message, frozen=True, kw_only=True):
+    """What the device has said to it."""
+
+    accepted: bool = False
+    reason: str = ""
+    crc32: int = 0
+
+
+class SensorReadings(Message, frozen=True, kw_only=True):
+    """The readings of the controller board, as long as they are fresh."""
+
+    stamp: int = 0  # [ns] UNIX time of the device's measurement
+    name: tuple[str, ...] = ()
+    value: Vector = ()  # in the units of robot.toml
+    unit: tuple[str, ...] = ()
+
+
+class ShaftPositions(Message, frozen=True, kw_only=True):
+    """What the step counter believes and where the shaft truly is; a virtual device knows both."""
+
+    stamp: int = 0  # [ns] UNIX time
+    name: tuple[str, ...] = ()
+    steps: tuple[int, ...] = ()  # executed
+    shaft: tuple[int, ...] = ()  # steps that the shaft has made
+    position: Vector = ()  # [rad] or [m] of the shaft
+
+
+class PressKind(StrEnum):
+    """What a person can do to a virtual device, or its world."""
+
+    ESTOP = "estop"  # value 1 pressed, 0 released
+    SWITCH = "switch"  # target: an input; value 1 held, 0 held open, -1 left to the arm
+    BLOCK = "block"  # target: a joint whose shaft is held fast (value 1) or let go (0)
+    SLIP = "slip"  # target: a joint; value: steps that its shaft is pushed
+    SENSOR = "sensor"  # target: a sensor; value: its reading
+    REBOOT = "reboot"
+    OFFLINE = "offline"  # value [s] without network
+    FREEZE = "freeze"  # value [s] in which the slot task hangs
+    DRIFT = "drift"  # value [ppm] by which its clock is fast
+
+
+class PressRequest(Message, frozen=True, kw_only=True):
+    """A press; only a virtual device takes it."""
+
+    press: PressKind = PressKind.ESTOP
+    target: str = ""
+    value: float = 1.0
+
+
+class PressResponse(Message, frozen=True, kw_only=True):
+    """Whether the virtual device has done it."""
+
+    accepted: bool = False
+    reason: str = ""
 
 
 class CommandChunk(Message, frozen=True, kw_only=True):

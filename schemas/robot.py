@@ -13,8 +13,10 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from schemas.device_config import InputRole, Pull, SensorKind
+
 Word = Annotated[str, Meta(pattern="^[A-Za-z0-9_-]+$")]  # part of a key on the bus or of an MQTT topic
-Natural = Annotated[int, Meta(ge=0)]
+Pin = Annotated[int, Meta(ge=0, le=63)]  # GPIO
 NotNegative = Annotated[float, Meta(ge=0.0)]
 Positive = Annotated[float, Meta(gt=0.0)]
 AtLeastHalfAStep = Annotated[float, Meta(ge=0.5)]  # rounding to whole steps alone is off by as much
@@ -41,15 +43,46 @@ class Driver(RobotRecord, frozen=True, kw_only=True):
     enable_lead_ms: NotNegative = 0.0
 
 
+class PullOut(RobotRecord, frozen=True, kw_only=True):
+    """The torque that a stepper can give before it loses steps, and what it has to move."""
+
+    speed: tuple[NotNegative, ...]  # [steps/s] rising
+    torque: tuple[NotNegative, ...]  # [N m] of the motor shaft at these speeds; 0 beyond the last
+    inertia: Positive  # [kg m^2] rotor and load, at the motor shaft
+    friction: NotNegative = 0.0  # [N m] at the motor shaft
+
+
 class Motor(RobotRecord, frozen=True, kw_only=True):
     """A stepper behind its driver and gearbox."""
 
     driver: str  # name of a [[driver]]
     pulses_per_turn: Annotated[int, Meta(le=10_000_000)]  # [pulses/rev] of the motor shaft, microsteps included
     gear_ratio: str = "1"  # exact: motor turns per turn of the output shaft
-    step_pin: Natural | None = None
-    dir_pin: Natural | None = None
+    step_pin: Pin | None = None
+    dir_pin: Pin | None = None
     inverted: bool = False
+    pull_out: PullOut | None = None  # None: a motor that never loses a step
+
+
+class HomingDirection(StrEnum):
+    """The limit at which the home switch is."""
+
+    LOWER = "lower"
+    UPPER = "upper"
+
+
+class Homing(RobotRecord, frozen=True, kw_only=True):
+    """How a joint finds its place on the device: fast to its switch, off it, slowly to it again."""
+
+    switch: str  # name of an [[input]]
+    direction: HomingDirection
+    position: float  # [rad] or [m] where the joint is when the switch closes
+    fast: Positive  # [rad/s] or [m/s]
+    slow: Positive  # [rad/s] or [m/s]
+    back_off: Positive  # [rad] or [m] away from the switch, before the slow approach and at the end
+    group: Annotated[int, Meta(ge=0, le=15)] = 0  # joints of one group home together, lower groups first
+    max_travel: Positive | None = None  # [rad] or [m] on the way to the switch; None: the joint's travel and a tenth
+    timeout: Positive = 60.0  # [s] of the joint's whole homing
 
 
 class StepperJoint(RobotRecord, frozen=True, kw_only=True):
@@ -66,8 +99,49 @@ class StepperJoint(RobotRecord, frozen=True, kw_only=True):
     mechanical_lower: float | None = None  # [rad] or [m] where the mechanics end; the URDF may not go beyond
     mechanical_upper: float | None = None  # [rad] or [m]
     reference_position: float = 0.0  # [rad] or [m] of the pose that `gemelo reference` declares
+    homing: Homing | None = None
     path_tolerance_steps: AtLeastHalfAStep = 4.0  # default of FollowJointTrajectory
     goal_tolerance_steps: AtLeastHalfAStep = 0.75
+
+
+class Level(StrEnum):
+    """Of a pin."""
+
+    HIGH = "high"
+    LOW = "low"
+
+
+class Input(RobotRecord, frozen=True, kw_only=True):
+    """A switch or button on the controller board. A contact that opens when pressed also tells of a torn wire."""
+
+    name: Word
+    pin: Pin
+    role: InputRole
+    joint: str = ""  # name of the URDF joint; empty for the e-stop
+    active: Level = Level.HIGH  # of the pressed switch
+    pull: Pull = Pull.NONE
+
+
+class Output(RobotRecord, frozen=True, kw_only=True):
+    """A digital output of the controller board."""
+
+    name: Word
+    pin: Pin
+    active: Level = Level.HIGH
+    at_boot: bool = False
+    off_at_estop: bool = False
+
+
+class Sensor(RobotRecord, frozen=True, kw_only=True):
+    """A reading of the controller board: value = raw * scale + offset, raw in mV or in us of the echo."""
+
+    name: Word
+    kind: SensorKind
+    pin: Pin
+    trigger_pin: Pin | None = None  # ultrasonic
+    unit: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
 
 
 class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
@@ -76,6 +150,10 @@ class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
     name: Word  # MQTT: gemelo/v1/<name>/...
     tick_hz: Annotated[int, Meta(ge=10_000, le=100_000, multiple_of=1000)] = 50_000  # the firmware's bounds
     queue_capacity: Annotated[int, Meta(ge=2, le=128)] = 128  # [knots], and the firmware's again
+    sensor_hz: Annotated[int, Meta(ge=1, le=50)] = 10  # a divisor of 1000
+    armed_at_boot: bool = True  # as it is where no enable pin is wired
+    enable_pin: Pin | None = None  # of all drivers
+    enable_active: Level = Level.LOW
 
 
 class RobotFile(RobotRecord, frozen=True, kw_only=True):
@@ -90,3 +168,6 @@ class RobotFile(RobotRecord, frozen=True, kw_only=True):
     device: DeviceRecord
     driver: tuple[Driver, ...]
     joint: tuple[StepperJoint, ...]
+    input: tuple[Input, ...] = ()
+    output: tuple[Output, ...] = ()
+    sensor: tuple[Sensor, ...] = ()

@@ -12,11 +12,18 @@ from typing import Generic, TypeVar
 from schemas.device import (
     CommandAck,
     CommandChunk,
+    ConfigureRequest,
+    ConfigureResponse,
     DeviceCommandRequest,
     DeviceCommandResponse,
+    DeviceConfiguration,
     DeviceEvent,
     DeviceState,
     DeviceStatus,
+    PressRequest,
+    PressResponse,
+    SensorReadings,
+    ShaftPositions,
 )
 from schemas.frames import FrameTransforms, RobotDescription
 from schemas.joints import JointState, JointTargets, StepErrors
@@ -106,6 +113,13 @@ DEVICE_STATE = Topic(
     "device/state", DeviceState, LATEST, 50.0, True, GATEWAY, "mode, steps, queue and time scale of the device"
 )
 DEVICE_EVENTS = Topic("device/events", DeviceEvent, EVERY, None, True, GATEWAY, "faults, under-runs, reconnections")
+DEVICE_CONFIGURATION = Topic(
+    "device/configuration", DeviceConfiguration, LATCHED, None, True, GATEWAY, "what robot.toml asks of the device"
+)
+SENSORS = Topic("sensors", SensorReadings, LATEST, 10.0, True, GATEWAY, "readings of the device, while they are fresh")
+DEVICE_SHAFT = Topic(
+    "device/shaft", ShaftPositions, LATEST, 10.0, True, GATEWAY, "a virtual device's true shafts beside its counters"
+)
 COMMANDS = Topic("commands", CommandChunk, EVERY, None, True, GATEWAY, "every chunk of knots sent to the device")
 COMMAND_ACKS = Topic("command_acks", CommandAck, EVERY, None, True, GATEWAY, "the device's answer to every chunk")
 LOG = Topic("log", LogRecord, EVERY, None, True, ANY, "the log of every node")
@@ -115,15 +129,23 @@ STATISTICS = Topic(
 
 TOPICS: tuple[Topic[Message], ...] = (
     DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, JOINT_TARGETS, FRAMES, STATIC_FRAMES, PLANNED_PATH,
-    DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, COMMANDS, COMMAND_ACKS, LOG, STATISTICS,
+    DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, DEVICE_CONFIGURATION, SENSORS, DEVICE_SHAFT,
+    COMMANDS, COMMAND_ACKS, LOG, STATISTICS,
 )  # fmt: skip
 
 PLAN = Request("plan", PlanRequest, PlanResponse, "planner", "a goal in, a verified trajectory or a refusal out")
 DEVICE_COMMAND = Request(
-    "device/command", DeviceCommandRequest, DeviceCommandResponse, GATEWAY, "hold, resume, stop, reset, reference"
+    "device/command", DeviceCommandRequest, DeviceCommandResponse, GATEWAY,
+    "hold, resume, stop, reset, reference, arm, disarm, home, output, speed",
+)  # fmt: skip
+DEVICE_CONFIGURE = Request(
+    "device/configure", ConfigureRequest, ConfigureResponse, GATEWAY, "give the device its configuration anew"
+)
+DEVICE_PRESS = Request(
+    "device/press", PressRequest, PressResponse, GATEWAY, "press a virtual device's buttons, block its joints"
 )
 
-REQUESTS: tuple[Request[Message, Message], ...] = (PLAN, DEVICE_COMMAND)
+REQUESTS: tuple[Request[Message, Message], ...] = (PLAN, DEVICE_COMMAND, DEVICE_CONFIGURE, DEVICE_PRESS)
 
 FOLLOW_JOINT_TRAJECTORY = Action(
     "follow_joint_trajectory", FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult,

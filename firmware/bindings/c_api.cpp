@@ -6,6 +6,42 @@
 using gemelo::DeviceConfig;
 using gemelo::VirtualDevice;
 
+struct FlatJoint {
+    char name[gemelo::kNameSize];
+    int32_t lower_q8, upper_q8, max_velocity_q8, max_acceleration_q8;
+    uint32_t dir_setup_us, inverted;
+};
+
+struct FlatConfig {
+    char name[gemelo::kNameSize];
+    uint32_t tick_hz, queue_capacity, state_hz, hold_timeout_ms, joints;
+    FlatJoint joint[gemelo::kMaxJoints];
+};
+
+static DeviceConfig unfold(const FlatConfig& flat) {
+    DeviceConfig config{};
+    memcpy(config.name, flat.name, sizeof config.name);
+    config.tick_hz = flat.tick_hz;
+    config.queue_capacity = flat.queue_capacity;
+    config.state_hz = flat.state_hz;
+    config.sensor_hz = 10;
+    config.hold_timeout_ms = flat.hold_timeout_ms;
+    config.is_armed_at_boot = 1;
+    config.joints = static_cast<uint8_t>(flat.joints);
+    for (uint8_t j = 0; j < gemelo::kMaxJoints; ++j) {
+        const FlatJoint& from = flat.joint[j];
+        gemelo::JointConfig& to = config.joint[j];
+        memcpy(to.name, from.name, sizeof to.name);
+        to.lower_q8 = from.lower_q8;
+        to.upper_q8 = from.upper_q8;
+        to.max_velocity_q8 = from.max_velocity_q8;
+        to.max_acceleration_q8 = from.max_acceleration_q8;
+        to.dir_setup_us = from.dir_setup_us;
+        to.is_inverted = from.inverted != 0;
+    }
+    return config;
+}
+
 extern "C" {
 
 // What a test or the virtual ESP32 reads of a device at once.
@@ -23,13 +59,20 @@ struct GemeloSnapshot {
 };
 
 // A sentence, or nullptr; `joint` becomes the joint at fault, or 8.
-const char* gemelo_find_fault(const DeviceConfig* config, uint8_t* joint) { return gemelo::find_fault(*config, joint); }
+const char* gemelo_find_fault(const FlatConfig* flat, uint8_t* joint) {
+    const DeviceConfig config = unfold(*flat);
+    const gemelo::ConfigFault fault = gemelo::find_fault(config);
+    *joint = gemelo::kMaxJoints;
+    for (uint8_t j = 0; j < config.joints && j < gemelo::kMaxJoints; ++j)
+        if (fault.part == config.joint[j].name) *joint = j;
+    return fault.sentence;
+}
 
-VirtualDevice* gemelo_create(const DeviceConfig* config, uint32_t boot_id, const char* reset_cause, uint64_t now_us,
+VirtualDevice* gemelo_create(const FlatConfig* flat, uint32_t boot_id, const char* reset_cause, uint64_t now_us,
                              const int32_t* steps, int referenced) {
-    uint8_t joint = 0;
-    if (gemelo::find_fault(*config, &joint) != nullptr) return nullptr;
-    VirtualDevice* device = new VirtualDevice(*config, boot_id, reset_cause, now_us);
+    const DeviceConfig config = unfold(*flat);
+    if (gemelo::find_fault(config).sentence != nullptr) return nullptr;
+    VirtualDevice* device = new VirtualDevice(config, boot_id, reset_cause, now_us);
     device->start(steps, referenced != 0);
     return device;
 }

@@ -52,8 +52,9 @@ Code Machine::carry_out(const Frame& frame) {
             return reset();
         case Command::Reference:
             return reference(frame);
+        default:
+            return Code::UnknownCommand;
     }
-    return Code::UnknownCommand;
 }
 
 Code Machine::resume() {

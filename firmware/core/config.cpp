@@ -27,23 +27,20 @@ const char* find_joint_fault(const JointConfig& joint) {
 
 }  // namespace
 
-const char* find_fault(const DeviceConfig& config, uint8_t* joint) {
-    *joint = kMaxJoints;
-    if (!is_name(config.name)) return "the device's name is not 1 to 31 letters, digits, '_' or '-'";
+ConfigFault find_fault(const DeviceConfig& config) {
+    if (!is_name(config.name)) return {"its name is not 1 to 31 letters, digits, '_' or '-'"};
     if (config.tick_hz < 10 * kSlotHz || config.tick_hz > kMaxTickHz || config.tick_hz % kSlotHz != 0)
-        return "tick_hz is not a multiple of 1000 between 10000 and 100000";
-    if (config.queue_capacity < 2 || config.queue_capacity > kMaxKnots) return "queue_capacity is not 2 to 128 knots";
+        return {"tick_hz is not a multiple of 1000 between 10000 and 100000"};
+    if (config.queue_capacity < 2 || config.queue_capacity > kMaxKnots) return {"queue_capacity is not 2 to 128 knots"};
     if (config.state_hz < 1 || config.state_hz > kSlotHz || kSlotHz % config.state_hz != 0)
-        return "state_hz does not divide 1000";
-    if (config.hold_timeout_ms < 1 || config.hold_timeout_ms > 60000) return "hold_timeout_ms is not 1 to 60000";
-    if (config.joints < 1 || config.joints > kMaxJoints) return "there are not 1 to 8 joints";
+        return {"state_hz does not divide 1000"};
+    if (config.hold_timeout_ms < 1 || config.hold_timeout_ms > 60000) return {"hold_timeout_ms is not 1 to 60000"};
+    if (config.joints < 1 || config.joints > kMaxJoints) return {"there are not 1 to 8 joints"};
     for (uint8_t j = 0; j < config.joints; ++j) {
-        const char* fault = find_joint_fault(config.joint[j]);
-        if (fault == nullptr) continue;
-        *joint = j;
-        return fault;
+        const char* sentence = find_joint_fault(config.joint[j]);
+        if (sentence != nullptr) return {sentence, config.joint[j].name};
     }
-    return nullptr;
+    return {};
 }
 
 int32_t velocity_limit_q8(const DeviceConfig& config, uint8_t joint) {

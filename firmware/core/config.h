@@ -1,4 +1,4 @@
-// What a device is told before it starts: its clock rates and, per joint, its limits and its driver's demands.
+// What a device is told before it moves: its clock rates, its pins and, per joint, its limits and its driver's demands.
 #pragma once
 
 #include <stdint.h>
@@ -16,6 +16,24 @@ constexpr uint32_t kSlotUs = 1000;
 constexpr uint32_t kSlotHz = 1000;
 constexpr uint32_t kMaxTickHz = 100000;
 constexpr uint8_t kNameSize = 32;
+constexpr uint8_t kMaxInputs = 16;
+constexpr uint8_t kMaxOutputs = 8;
+constexpr uint8_t kMaxSensors = 8;
+constexpr uint8_t kMaxPin = 63;
+constexpr uint8_t kNone = 255;  // no pin, no joint, no input
+
+// How a joint finds its place: fast to its switch, off it, slowly to it again. Travels in Q24.8 steps.
+struct HomingConfig {
+    uint8_t input = kNone;  // the switch, or kNone for a joint that cannot home
+    uint8_t group;          // joints of one group home together, lower groups first
+    int8_t direction;       // of travel towards the switch: 1 or -1
+    int32_t fast_q8;        // steps/s
+    int32_t slow_q8;        // steps/s
+    int32_t back_off_q8;
+    int32_t position_q8;    // where the joint is when the switch closes
+    int32_t max_travel_q8;  // on the way to the switch
+    uint32_t timeout_ms;    // of the joint's whole homing
+};
 
 // Positions are absolute motor steps in Q24.8, velocities Q24.8 steps/s, accelerations Q24.8 steps/s^2.
 struct JointConfig {
@@ -25,7 +43,43 @@ struct JointConfig {
     int32_t max_velocity_q8;
     int32_t max_acceleration_q8;
     uint32_t dir_setup_us;  // DIR stands still for so long before STEP rises
-    uint32_t inverted;      // 1: DIR is high for negative travel
+    uint8_t is_inverted;    // DIR is high for negative travel
+    uint8_t step_pin = kNone;
+    uint8_t dir_pin = kNone;
+    uint64_t text_scale_q32;  // 1/256 steps per 1e-7 rad or m, for text mode; 0: the joint has none
+    HomingConfig homing;
+};
+
+enum class InputRole : uint8_t { EStop, LimitLower, LimitUpper, Home };
+enum class Pull : uint8_t { None, Up, Down };
+
+struct InputConfig {
+    char name[kNameSize];
+    uint8_t pin = kNone;
+    InputRole role;
+    uint8_t joint = kNone;  // that the switch belongs to; kNone for the e-stop
+    uint8_t is_inverted;    // active at low level
+    Pull pull;
+};
+
+struct OutputConfig {
+    char name[kNameSize];
+    uint8_t pin = kNone;
+    uint8_t is_inverted;
+    uint8_t at_boot;          // the logical level after a start
+    uint8_t is_off_at_estop;  // an e-stop switches it off
+};
+
+enum class SensorKind : uint8_t { Analog, Ultrasonic };  // raw value in mV, or the echo's length in us
+
+// value [1/1000] = raw * scale_q16 / 65536 + offset_milli
+struct SensorConfig {
+    char name[kNameSize];
+    SensorKind kind;
+    uint8_t pin = kNone;
+    uint8_t trigger_pin = kNone;  // Ultrasonic
+    int32_t scale_q16;
+    int32_t offset_milli;
 };
 
 struct DeviceConfig {
@@ -33,13 +87,29 @@ struct DeviceConfig {
     uint32_t tick_hz;         // a multiple of 1000
     uint32_t queue_capacity;  // knots
     uint32_t state_hz;        // a divisor of 1000
+    uint32_t sensor_hz;       // a divisor of 1000
     uint32_t hold_timeout_ms;
-    uint32_t joints;
+    uint32_t enable_lead_ms;  // from enabling the drivers to the first step
+    uint8_t is_armed_at_boot;
+    uint8_t enable_pin = kNone;
+    uint8_t is_enable_inverted;  // the drivers are enabled at low level
+    uint8_t joints;
+    uint8_t inputs;
+    uint8_t outputs;
+    uint8_t sensors;
     JointConfig joint[kMaxJoints];
+    InputConfig input[kMaxInputs];
+    OutputConfig output[kMaxOutputs];
+    SensorConfig sensor[kMaxSensors];
 };
 
-// A sentence saying what is wrong, or nullptr; `joint` is set to the joint at fault, or kMaxJoints.
-const char* find_fault(const DeviceConfig& config, uint8_t* joint);
+// What is wrong with a configuration: a sentence, and the part it is about.
+struct ConfigFault {
+    const char* sentence = nullptr;  // nullptr: nothing is wrong
+    const char* part = "";           // name of the joint, input, output or sensor; empty for the device
+};
+
+ConfigFault find_fault(const DeviceConfig& config);
 
 inline uint32_t ticks_per_slot(const DeviceConfig& config) { return config.tick_hz / kSlotHz; }
 

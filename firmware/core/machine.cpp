@@ -164,6 +164,10 @@ void Machine::report_state(const Point& point) {
     report.underruns = underruns_;
     report.refused = refused_;
     report.bad_frames = bad_frames_;
+    report.flags = kFlagArmed;
+    report.fault_joint = kNoJoint;
+    report.referenced = static_cast<uint16_t>(is_referenced_ ? (1u << rules_.joints) - 1 : 0);
+    report.speed_permil = 1000;
     for (uint8_t j = 0; j < rules_.joints; ++j) {
         report.steps[j] = stepper_.latched(j);
         report.velocity_q8[j] = as_q8((point.position_q20[j] - before.position_q20[j]) * kSlotHz);

@@ -8,7 +8,26 @@ namespace gemelo {
 constexpr uint8_t kMagic = 0x67;
 constexpr uint8_t kProtocolVersion = 1;
 
-enum class FrameType : uint8_t { Traj = 1, Ack, Cmd, CmdAck, Heartbeat, Sync, SyncReply, State };
+enum class FrameType : uint8_t {
+    Traj = 1,
+    Ack,
+    Cmd,
+    CmdAck,
+    Heartbeat,
+    Sync,
+    SyncReply,
+    State,
+    // JSON in a frame: only on a serial line, for what has a topic of its own on MQTT.
+    Config,
+    ConfigAck,
+    Sensors,
+    Status,
+    Event,
+    Provision,
+    ProvisionAck,
+    Press,  // virtual devices only
+    Shaft,  // virtual devices only
+};
 
 enum class Code : uint8_t {
     Ok,
@@ -28,14 +47,26 @@ enum class Code : uint8_t {
     NotAtRest,
     UnknownCommand,
     BadCount,
+    NotArmed,
+    EstopPressed,
+    NoHoming,
+    BadArgument,
 };
 
-// 2 (Homing) and 7 (EStop) are kept for devices that can do them.
-enum class Mode : uint8_t { Boot = 0, Unreferenced = 1, Idle = 3, Run = 4, Hold = 5, Fault = 6 };
+enum class Mode : uint8_t { Boot, Unreferenced, Homing, Idle, Run, Hold, Fault, EStop };
 
-enum class FaultCode : uint8_t { None, TickOverrun, Internal };
+enum class FaultCode : uint8_t {
+    None,
+    TickOverrun,
+    Internal,
+    LimitSwitch,
+    HomingTimeout,
+    SwitchNotFound,
+    SwitchStuck,
+    EmergencyStop,
+};
 
-enum class Command : uint8_t { Hold = 1, Resume, Stop, Reset, Reference };
+enum class Command : uint8_t { Hold = 1, Resume, Stop, Reset, Reference, Arm, Disarm, Home, Output, Speed };
 
 constexpr uint16_t kFlagFirst = 1;
 constexpr uint16_t kFlagLast = 2;

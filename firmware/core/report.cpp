@@ -5,6 +5,11 @@
 #include "json.h"
 
 namespace gemelo {
+namespace {
+
+constexpr size_t kStateHeadSize = 60;
+
+}  // namespace
 
 void Reporter::send(Output output, uint8_t* bytes, size_t size) const {
     sink_.put(sink_.context, output, bytes, seal_frame(bytes, size));
@@ -49,12 +54,12 @@ void Reporter::answer_sync(uint64_t t0, uint64_t t1, uint64_t t2) const {
 }
 
 void Reporter::state(const StateReport& report) const {
-    uint8_t bytes[52 + 8 * kMaxJoints + kCrcSize];
+    uint8_t bytes[kStateHeadSize + 8 * kMaxJoints + kCrcSize];
     write_header(bytes, FrameType::State, joints_, boot_id_);
     store_u64(bytes + 8, report.t_us);
     bytes[16] = static_cast<uint8_t>(report.mode);
     bytes[17] = static_cast<uint8_t>(report.fault);
-    store_u16(bytes + 18, 0);
+    store_u16(bytes + 18, report.inputs);
     store_u16(bytes + 20, static_cast<uint16_t>(report.scale_q30 >> 15));
     store_u16(bytes + 22, report.buffered_ms);
     store_u32(bytes + 24, report.stream);
@@ -63,11 +68,16 @@ void Reporter::state(const StateReport& report) const {
     store_u32(bytes + 40, report.underruns);
     store_u32(bytes + 44, report.refused);
     store_u32(bytes + 48, report.bad_frames);
+    bytes[52] = report.flags;
+    bytes[53] = report.fault_joint;
+    store_u16(bytes + 54, report.outputs);
+    store_u16(bytes + 56, report.referenced);
+    store_u16(bytes + 58, report.speed_permil);
     for (uint8_t j = 0; j < joints_; ++j) {
-        store_i32(bytes + 52 + 4 * j, report.steps[j]);
-        store_i32(bytes + 52 + 4 * (joints_ + j), report.velocity_q8[j]);
+        store_i32(bytes + kStateHeadSize + 4 * j, report.steps[j]);
+        store_i32(bytes + kStateHeadSize + 4 * (joints_ + j), report.velocity_q8[j]);
     }
-    send(Output::State, bytes, 52 + 8 * static_cast<size_t>(joints_));
+    send(Output::State, bytes, kStateHeadSize + 8 * static_cast<size_t>(joints_));
 }
 
 void Reporter::event(const char* name, uint64_t t_us, uint32_t stream, const char* detail) const {

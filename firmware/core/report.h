@@ -12,7 +12,9 @@ namespace gemelo {
 constexpr const char* kFirmwareVersion = "1.0.0";
 
 // Where an output goes; in the order of the topics in PROTOCOL.md.
-enum class Output : uint8_t { TrajAck, CmdAck, SyncReply, State, Event, Status };
+enum class Output : uint8_t { TrajAck, CmdAck, SyncReply, State, Event, Status, ConfigAck, Sensors };
+
+constexpr uint8_t kFlagArmed = 1;
 
 // Takes every output at once; the bytes are valid during the call only.
 struct Sink {
@@ -36,6 +38,12 @@ struct StateReport {
     uint32_t stream, next_seq;
     uint64_t play_us;
     uint32_t underruns, refused, bad_frames;
+    uint16_t inputs;        // bit i: input i is active
+    uint8_t flags;          // kArmed, ...
+    uint8_t fault_joint;    // or kNoJoint
+    uint16_t outputs;       // bit i: output i is on
+    uint16_t referenced;    // bit j: the place of joint j is known
+    uint16_t speed_permil;  // the time scale that was asked for
     int32_t steps[kMaxJoints];
     int32_t velocity_q8[kMaxJoints];
 };

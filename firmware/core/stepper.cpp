@@ -27,7 +27,7 @@ void Stepper::begin(const DeviceConfig& config) {
         Axis& axis = axis_[j];
         axis = Axis{};
         axis.setup = setup_ticks(config, j);
-        axis.is_inverted = config.joint[j].inverted != 0;
+        axis.is_inverted = config.joint[j].is_inverted != 0;
         turn(axis, 1u << j, 1, 0);
         offered_[j] = 0;
     }

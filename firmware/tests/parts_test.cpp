@@ -77,15 +77,14 @@ TEST(Root, RoundsDown) {
 }
 
 TEST(Config, NamesTheJointThatIsWrong) {
-    uint8_t joint = 0;
     DeviceConfig config = rig::two_joints();
-    EXPECT_EQ(find_fault(config, &joint), nullptr);
+    EXPECT_EQ(find_fault(config).sentence, nullptr);
     config.joint[1].max_acceleration_q8 = 0;
-    EXPECT_STREQ(find_fault(config, &joint), "its acceleration limit is not positive");
-    EXPECT_EQ(joint, 1);
+    EXPECT_STREQ(find_fault(config).sentence, "its acceleration limit is not positive");
+    EXPECT_STREQ(find_fault(config).part, "q2");
     config = rig::two_joints();
     config.tick_hz = 44100;
-    EXPECT_NE(find_fault(config, &joint), nullptr);
+    EXPECT_NE(find_fault(config).sentence, nullptr);
     std::memset(config.name, 'x', sizeof config.name);
-    EXPECT_NE(find_fault(config, &joint), nullptr);
+    EXPECT_NE(find_fault(config).sentence, nullptr);
 }

@@ -39,7 +39,7 @@ gemelo::JointConfig joint(const char* name, bool inverted) {
     config.max_velocity_q8 = 4000 * 256;
     config.max_acceleration_q8 = 4000 * 256;
     config.dir_setup_us = 5;
-    config.inverted = inverted;
+    config.is_inverted = inverted;
     return config;
 }
 
@@ -51,6 +51,8 @@ gemelo::DeviceConfig two_joints() {
     config.tick_hz = 50000;
     config.queue_capacity = 128;
     config.state_hz = 50;
+    config.sensor_hz = 10;
+    config.is_armed_at_boot = 1;
     config.hold_timeout_ms = 500;
     config.joints = 2;
     config.joint[0] = joint("q1", false);
@@ -185,8 +187,8 @@ void Rig::read(const gemelo::OutFrame& frame) {
                            {},
                            {}};
             for (uint32_t j = 0; j < joints_; ++j) {
-                state_.steps.push_back(load_i32(at + 52 + 4 * j));
-                state_.velocity_q8.push_back(load_i32(at + 52 + 4 * (joints_ + j)));
+                state_.steps.push_back(load_i32(at + 60 + 4 * j));
+                state_.velocity_q8.push_back(load_i32(at + 60 + 4 * (joints_ + j)));
             }
             break;
         default:

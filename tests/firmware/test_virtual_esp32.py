@@ -211,7 +211,7 @@ def test_a_device_that_loses_its_broker_holds_by_itself_and_comes_back(bed: Bed)
         if struct.unpack("<Q", state[8:16])[0] > 3_000_000:
             break
     assert state[16] == 5  # Hold
-    assert 0 < struct.unpack("<i", state[52:56])[0] < 4000
+    assert 0 < struct.unpack("<i", state[60:64])[0] < 4000
 
 
 def test_retained_wrong_and_oversized_messages_move_nothing(bed: Bed):

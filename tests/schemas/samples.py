@@ -40,8 +40,15 @@ def codes() -> dict[str, dict[str, int | str]]:
 
 
 def sample(kind: type[Message]) -> Message:
-    """A message in which no field has its default where its type allows another value."""
-    values = {field.name: _value(field.type, field.name) for field in msgspec.structs.fields(kind)}
+    """A message in which no field has its default where its type allows another value.
+
+    An enumeration that has grown keeps the member that was recorded.
+    """
+    recorded = golden().get(kind.__name__, {}).get("fields", {})
+    values = {}
+    for field in msgspec.structs.fields(kind):
+        is_recorded_code = isinstance(field.type, type) and issubclass(field.type, Enum) and field.name in recorded
+        values[field.name] = field.type(recorded[field.name]) if is_recorded_code else _value(field.type, field.name)
     return kind(**values)
 
 

@@ -14,6 +14,8 @@ DeviceConfig device(uint8_t joints) {
     config.tick_hz = 50000;
     config.queue_capacity = kMaxKnots;
     config.state_hz = 50;
+    config.sensor_hz = 10;
+    config.is_armed_at_boot = 1;
     config.hold_timeout_ms = 500;
     config.joints = joints;
     for (uint8_t j = 0; j < joints; ++j) {
@@ -24,7 +26,7 @@ DeviceConfig device(uint8_t joints) {
         joint.upper_q8 = 100000 * 256;
         joint.max_velocity_q8 = joint.max_acceleration_q8 = 4000 * 256;
         joint.dir_setup_us = 5;
-        joint.inverted = j % 2;
+        joint.is_inverted = j % 2;
     }
     return config;
 }

@@ -27,7 +27,7 @@ _CMD_ACK = struct.Struct("<IBBBBQ")
 _HB = struct.Struct("<II")
 _SYNC = struct.Struct("<Q")
 _SYNC_R = struct.Struct("<QQQ")
-_STATE = struct.Struct("<QBBHHHIIQIII")
+_STATE = struct.Struct("<QBBHHHIIQIIIBBHHH")
 
 
 class BadFrame(ValueError):
@@ -67,6 +67,16 @@ class Code(IntEnum):
     NOT_AT_REST = 14
     UNKNOWN_CMD = 15
     BAD_COUNT = 16
+    NOT_ARMED = 17
+    ESTOP_PRESSED = 18
+    NO_HOMING = 19
+    BAD_ARGUMENT = 20
+
+
+class StateFlag(IntFlag):
+    """What is true of the device besides its mode."""
+
+    ARMED = 1  # the drivers are energised
 
 
 class ChunkFlag(IntFlag):
@@ -111,11 +121,13 @@ class Ack(Frame, frozen=True, kw_only=True, gc=False):
 
 
 class Command(Frame, frozen=True, kw_only=True, gc=False):
-    """CMD: `positions` only for REFERENCE."""
+    """CMD: `positions` only for REFERENCE; `index` and `argument` as PROTOCOL.md has them for each command."""
 
     cmd_id: int
     expires_us: int
     cmd: int
+    index: int = 0
+    argument: int = 0
     positions: Row = ()
 
 
@@ -165,6 +177,11 @@ class State(Frame, frozen=True, kw_only=True, gc=False):
     underruns: int = 0
     refused: int = 0
     bad_frames: int = 0
+    flags: int = 1
+    fault_joint: int = NO_JOINT
+    outputs: int = 0  # bit i: output i is on
+    referenced: int = 0xFFFF  # bit j: the place of joint j is known
+    speed: int = 1000  # [1/1000] the time scale that was asked for
     steps: Row = ()
     velocity: Row = ()
 
@@ -189,7 +206,9 @@ def encode(frame: AnyFrame) -> bytes:
             )  # fmt: skip
         case Command():
             kind, joints = FrameType.CMD, len(frame.positions)
-            body = _CMD.pack(frame.cmd_id, frame.expires_us, frame.cmd, 0, 0) + _rows(frame.positions)
+            body = _CMD.pack(frame.cmd_id, frame.expires_us, frame.cmd, frame.index, frame.argument) + _rows(
+                frame.positions
+            )
         case CommandReply():
             kind, joints = FrameType.CMD_ACK, 0
             body = _CMD_ACK.pack(frame.cmd_id, frame.cmd, frame.code, frame.mode, 0, frame.t_us)
@@ -204,6 +223,7 @@ def encode(frame: AnyFrame) -> bytes:
             body = _STATE.pack(
                 frame.t_us, frame.mode, frame.fault, frame.inputs, frame.time_scale, frame.buffered_ms,
                 frame.stream, frame.next_seq, frame.play_us, frame.underruns, frame.refused, frame.bad_frames,
+                frame.flags, frame.fault_joint, frame.outputs, frame.referenced, frame.speed,
             )  # fmt: skip
             body += _rows((*frame.steps, *frame.velocity))
     head = _HEADER.pack(MAGIC, VERSION, kind, joints, frame.boot_id) + body
@@ -257,9 +277,12 @@ def _read_ack(boot_id: int, _joints: int, body: bytes) -> Ack:
 
 
 def _read_command(boot_id: int, joints: int, body: bytes) -> Command:
-    cmd_id, expires_us, cmd, _, _ = _CMD.unpack_from(body)
+    cmd_id, expires_us, cmd, index, argument = _CMD.unpack_from(body)
     (positions,) = _read_rows(body, _CMD.size, joints, 1)
-    return Command(boot_id=boot_id, cmd_id=cmd_id, expires_us=expires_us, cmd=cmd, positions=positions)
+    return Command(
+        boot_id=boot_id, cmd_id=cmd_id, expires_us=expires_us, cmd=cmd, index=index, argument=argument,
+        positions=positions,
+    )  # fmt: skip
 
 
 def _read_reply(boot_id: int, _joints: int, body: bytes) -> CommandReply:
@@ -287,7 +310,8 @@ def _read_state(boot_id: int, joints: int, body: bytes) -> State:
     return State(
         boot_id=boot_id, t_us=t_us, mode=mode, fault=fault, inputs=inputs, time_scale=scale, buffered_ms=buffered,
         stream=stream, next_seq=next_seq, play_us=play_us, underruns=counts[0], refused=counts[1],
-        bad_frames=counts[2], steps=steps, velocity=velocity,
+        bad_frames=counts[2], flags=counts[3], fault_joint=counts[4], outputs=counts[5], referenced=counts[6],
+        speed=counts[7], steps=steps, velocity=velocity,
     )  # fmt: skip
 
 
