@@ -12,7 +12,7 @@ namespace gemelo {
 constexpr const char* kFirmwareVersion = "1.0.0";
 
 // Where an output goes; in the order of the topics in PROTOCOL.md.
-enum class Output : uint8_t { TrajAck, CmdAck, SyncReply, State, Event, Status, ConfigAck, Sensors };
+enum class Output : uint8_t { TrajAck, CmdAck, SyncReply, State, Event, Status, ConfigAck, Sensors, Text };
 
 constexpr uint8_t kFlagArmed = 1;
 

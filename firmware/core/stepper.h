@@ -10,6 +10,12 @@
 
 namespace gemelo {
 
+// Levels of GPIO 0 to 31 and 32 to 63, as the pins have them.
+struct Levels {
+    uint32_t low = 0;
+    uint32_t high = 0;
+};
+
 // Levels after a tick: bit j is joint j.
 struct Pins {
     uint32_t step = 0;
