@@ -13,7 +13,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
+from services.arm.description import Arm, Joint
 from services.arm.kinematics import Kinematics
 from services.planner.targets import Target
 
@@ -42,8 +42,7 @@ class InverseKinematics:
 
     def __init__(self, arm: Arm, kinematics: Kinematics) -> None:
         self._kinematics = kinematics
-        self._lower = np.array([max(joint.lower, -math.pi) for joint in arm.joints])
-        self._upper = np.array([min(joint.upper, math.pi) for joint in arm.joints])
+        self._lower, self._upper = np.array([_one_turn(joint) for joint in arm.joints]).T
         self._bounds = np.array([[j.lower for j in arm.joints], [j.upper for j in arm.joints]])
         self._speed = np.array([joint.velocity for joint in arm.joints])
         self._identity = np.eye(len(arm.joints))
@@ -127,6 +126,14 @@ class InverseKinematics:
         share = np.array([_radical_inverse(index, _PRIMES[i % len(_PRIMES)]) for i in range(len(self._lower))])
         point: Array = self._lower + share * (self._upper - self._lower)
         return point
+
+
+def _one_turn(joint: Joint) -> tuple[float, float]:
+    """Where starts are spread [rad] or [m]: the limits, or the turn nearest to zero within wider ones."""
+    if joint.upper - joint.lower <= math.tau:
+        return joint.lower, joint.upper
+    middle = min(max(0.0, joint.lower + math.pi), joint.upper - math.pi)
+    return middle - math.pi, middle + math.pi
 
 
 def _radical_inverse(index: int, base: int) -> float:
