@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from schemas.robot import DeviceRecord, Driver, RobotFile, StepperJoint, Transmission
+from schemas.robot import DeviceRecord, Driver, Input, Output, RobotFile, Sensor, StepperJoint, Transmission
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.robot_file import read_robot_file
 from services.arm.speed import speed_limits
@@ -57,6 +57,9 @@ class Arm:
     device: DeviceRecord
     drivers: tuple[Driver, ...]
     joints: tuple[Joint, ...]
+    inputs: tuple[Input, ...]
+    outputs: tuple[Output, ...]
+    sensors: tuple[Sensor, ...]
     named_states: dict[str, tuple[float, ...]]  # [rad] or [m]
     disabled_collisions: frozenset[frozenset[str]]  # pairs of links
     model: UrdfModel
@@ -103,6 +106,9 @@ def load_arm(folder: Path) -> Arm:
         device=robot.device,
         drivers=robot.driver,
         joints=joints,
+        inputs=robot.input,
+        outputs=robot.output,
+        sensors=robot.sensor,
         named_states=_named_states(srdf, robot.group, joints, srdf_path),
         disabled_collisions=frozenset(frozenset(pair) for pair in srdf.disabled),
         model=model,

@@ -1,0 +1,37 @@
+"""Single values as a device's configuration holds them: whole numbers of 32 bits, short names, pins."""
+
+from __future__ import annotations
+
+import math
+import re
+from fractions import Fraction
+
+from schemas.device_config import NOTHING
+from services.arm.errors import DescriptionError
+
+LONGEST_NAME = 31  # bytes, the firmware's
+NAME = re.compile(rf"[A-Za-z0-9_-]{{1,{LONGEST_NAME}}}")
+
+
+def nearest(value: Fraction) -> int:
+    """The nearest whole number, halves upwards."""
+    return math.floor(value + Fraction(1, 2))
+
+
+def int32(value: int, where: str) -> int:
+    """`value`, if the wire's integers hold it; raises `DescriptionError`."""
+    if not -(2**31) <= value < 2**31:
+        raise DescriptionError(f"{where} is {value} on the wire, which does not fit its 32 bits: make it smaller")
+    return value
+
+
+def device_name(text: str, where: str) -> str:
+    """`text`, if the firmware takes it as a name; raises `DescriptionError`."""
+    if not NAME.fullmatch(text):
+        raise DescriptionError(f'{where} "{text}" is not 1 to {LONGEST_NAME} letters, digits, "_" or "-"')
+    return text
+
+
+def pin_or_nothing(pin: int | None) -> int:
+    """The GPIO, or the number that stands for none."""
+    return NOTHING if pin is None else pin
