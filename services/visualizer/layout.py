@@ -33,7 +33,7 @@ def blueprint(model: Model, window: float, trail: float) -> rrb.Blueprint:
 
 
 def _scene(model: Model, trail: float) -> rrb.Spatial3DView:
-    reach = model.reach
+    size, waist = max(model.reach, 2.1 * model.height), 0.6 * model.height  # an arm that stands needs a step back
     return rrb.Spatial3DView(
         origin=entities.WORLD,
         name="Twin: measured (solid), commanded (blue), planned way of the tool [m]",
@@ -41,8 +41,8 @@ def _scene(model: Model, trail: float) -> rrb.Spatial3DView:
         background=rrb.Background(kind="SolidColor", color=palette.BACKGROUND),
         eye_controls=rrb.EyeControls3D(
             kind="Orbital",
-            position=(0.86 * reach, -0.72 * reach, 0.6 * reach),
-            look_target=(0.24 * reach, 0.0, 0.13 * reach),
+            position=(0.86 * size, -0.72 * size, waist + 0.47 * size),
+            look_target=(0.24 * size, 0.0, waist),
             eye_up=(0.0, 0.0, 1.0),
         ),
         overrides={entities.TRAIL: rrb.VisibleTimeRanges([_last(trail)])},

@@ -45,6 +45,7 @@ class Joint:
     axis: Array  # (3,) unit
     mimic: tuple[str, float, float] | None = None  # joint, multiplier, offset
     travel: float = 0.0  # [m] of a prismatic joint, upper - lower
+    middle: float = 0.0  # [rad] or [m] half way between its limits
 
     @property
     def is_moving(self) -> bool:
@@ -84,6 +85,13 @@ class Model:
     def reach(self) -> float:
         """[m] an upper bound of the distance from the base to the tip."""
         return sum(float(np.linalg.norm(joint.translation)) + joint.travel for joint in self.joints) or 0.5
+
+    @property
+    def height(self) -> float:
+        """[m] how high the highest frame is above the root with every joint in its middle."""
+        names = [joint.name for joint in self.moving]
+        middles = np.array([[joint.middle for joint in self.moving]])
+        return max((float(self.tips(joint.child, middles, names)[0, 2]) for joint in self.joints), default=0.0)
 
     def positions(self, joint: Joint, rows: Array, names: list[str]) -> Array:
         """The column of `joint` in rows (n, len(names)), by its mimic where it has one."""

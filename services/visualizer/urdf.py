@@ -59,11 +59,12 @@ def _joint(element: ElementTree.Element) -> Joint:
     axis = np.array(_numbers(element.find("axis"), "xyz", (1.0, 0.0, 0.0)))
     mimic, limit = element.find("mimic"), element.find("limit")
     kind = element.get("type", "fixed")
-    travel = float(limit.get("upper", "0")) - float(limit.get("lower", "0")) if limit is not None else 0.0
+    lower, upper = (0.0, 0.0) if limit is None else (float(limit.get(key, "0")) for key in ("lower", "upper"))
     return Joint(
         name=element.get("name", ""), kind=kind, parent=_link(element, "parent"), child=_link(element, "child"),
         translation=translation, rotation=rotation, axis=axis / (np.linalg.norm(axis) or 1.0),
-        mimic=None if mimic is None else _mimic(mimic), travel=travel if kind == "prismatic" else 0.0,
+        mimic=None if mimic is None else _mimic(mimic), travel=upper - lower if kind == "prismatic" else 0.0,
+        middle=(lower + upper) / 2.0,
     )  # fmt: skip
 
 

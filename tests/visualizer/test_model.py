@@ -1,6 +1,7 @@
 """The drawn arm is where the URDF says, and every mesh is closed and faces outwards."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -134,3 +135,12 @@ def test_two_roots_are_refused_by_name():
 def test_the_tool_frame_is_the_robots_own_or_the_last_link(model):
     assert tool_link(model, 'tool_frame = "antebrazo_link"') == "antebrazo_link"
     assert tool_link(model, 'tool_frame = "nowhere"') == "efector_link"
+
+
+def test_the_height_is_that_of_the_arm_with_every_joint_in_its_middle():
+    """parol6's wrist, by the lengths of its links [mm]; lean and lift are its middles' distance from home."""
+    model = parse_urdf((Path(__file__).parents[2] / "urdf/parol6/robot.urdf").read_text())
+    lean, lift = np.radians(90.0 - 148.3838 / 2), np.radians((107.866 + 287.8675) / 2 - 180.0)
+    pitch = lift - lean
+    wrist = 110.5 + 180.0 * np.cos(lean) + 43.5 * np.cos(pitch) + 176.35 * np.sin(pitch)
+    assert model.height == pytest.approx(wrist / 1000.0, abs=1e-6)
