@@ -7,10 +7,14 @@ from pathlib import Path
 import msgspec
 
 from schemas.robot import RobotFile
+from services.arm.check_device import check_device
+from services.arm.check_homing import check_homing
 from services.arm.check_motors import check_motors
+from services.arm.check_pull_out import check_pull_out
 from services.arm.check_srdf import check_srdf
 from services.arm.check_urdf import check_urdf
 from services.arm.description import ROBOT_FILE, load_arm
+from services.arm.device_config import device_config
 from services.arm.errors import DescriptionError
 from services.arm.findings import Finding, Severity, error
 from services.arm.robot_file import dotted, line_of, not_finite, parse_toml, read_text, unknown_keys, where_of
@@ -80,6 +84,9 @@ def _files(folder: Path, robot: RobotFile) -> list[Finding]:
         return [error(robot.urdf, "file", str(problem))]
     findings += check_urdf(model, folder / robot.urdf)
     findings += check_motors(robot, model)
+    findings += check_device(robot)
+    findings += check_homing(robot, model)
+    findings += check_pull_out(robot)
     try:
         findings += check_srdf(read_srdf(folder / robot.srdf), robot, model)
     except DescriptionError as problem:
@@ -91,6 +98,7 @@ def _whole(folder: Path) -> list[Finding]:
     """What only shows when all of it is put together."""
     try:
         arm = load_arm(folder)
+        device_config(arm)
     except DescriptionError as problem:
         return [error(ROBOT_FILE, "robot", str(problem))]
     return second_opinion(arm)

@@ -52,10 +52,6 @@ def _names(robot: RobotFile, model: UrdfModel) -> list[Finding]:
         if joint.kind is not JointKind.FIXED and joint.mimic is None and joint.name not in driven:
             remedy = 'add a [[joint]], or make it type="fixed" in the URDF'
             findings.append(error(ROBOT_FILE, f'joint "{joint.name}"', "moves in the URDF but has no motor", remedy))
-    pins = Counter(p for j in robot.joint for p in (j.motor.step_pin, j.motor.dir_pin) if p is not None)
-    for pin, count in pins.items():
-        if count > 1:
-            findings.append(error(ROBOT_FILE, f"pin {pin}", f"is used {count} times", "one signal a pin"))
     return findings
 
 

@@ -149,7 +149,7 @@ def test_a_sensor_is_scaled_to_half_a_unit_of_the_wire(scale: float, offset: flo
         ("scale = 0.01715", "scale = 40.0", ('sensor "ultra"', "scale", "32 bits")),
         ('wire_name = "q1"', 'wire_name = "q 1"', ('joint "brazo_joint"', '"q 1"', "letters")),
         ("step_high_us = 5.0", "step_high_us = 25.0", ('joint "brazo_joint"', "20 us", "DM542T", "tick_hz")),
-        ("queue_capacity = 128", "queue_capacity = 128\nsensor_hz = 30", ("sensor_hz is 30", "write 25")),
+        ("sensor_hz = 10", "sensor_hz = 30", ("sensor_hz is 30", "write 25")),
     ],
 )  # fmt: skip
 def test_what_a_device_cannot_be_told_is_said_with_its_remedy(
