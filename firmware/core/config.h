@@ -84,6 +84,7 @@ struct SensorConfig {
 
 struct DeviceConfig {
     char name[kNameSize];
+    uint32_t crc32;           // of the text that this was read from; 0: not from a text
     uint32_t tick_hz;         // a multiple of 1000
     uint32_t queue_capacity;  // knots
     uint32_t state_hz;        // a divisor of 1000

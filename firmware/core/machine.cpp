@@ -1,5 +1,7 @@
 #include "machine.h"
 
+#include "sentence.h"
+
 namespace gemelo {
 namespace {
 
@@ -7,7 +9,7 @@ int32_t as_q8(int64_t q20) { return static_cast<int32_t>((q20 + 2048) >> 12); }
 
 }  // namespace
 
-void Machine::begin(const DeviceConfig& config, const Identity& identity, const Sink& sink) {
+void Machine::begin(DeviceConfig& config, const Identity& identity, const Sink& sink) {
     config_ = &config;
     identity_ = identity;
     mode_ = Mode::Boot;
@@ -28,10 +30,37 @@ void Machine::start(uint64_t now_us, const int32_t* steps, bool referenced) {
     int64_t position_q20[kMaxJoints] = {};
     for (uint8_t j = 0; j < rules_.joints; ++j) position_q20[j] = static_cast<int64_t>(steps[j]) * kFineStep;
     place(position_q20);
-    is_referenced_ = referenced;
-    mode_ = referenced ? Mode::Idle : Mode::Unreferenced;
+    is_armed_ = config_->is_armed_at_boot != 0;
+    is_referenced_ = referenced && is_armed_;
+    mode_ = is_referenced_ ? Mode::Idle : Mode::Unreferenced;
     report_status();
     event("boot", identity_.reset_cause);
+}
+
+void Machine::restart() {
+    begin(*config_, identity_, reporter_.sink());
+    mode_ = Mode::Unreferenced;
+    is_armed_ = is_referenced_ = false;
+    event("configured");
+    report_status();
+}
+
+bool Machine::takes_config() const {
+    if (mode_ == Mode::Boot) return true;
+    return !is_armed_ && (mode_ == Mode::Unreferenced || mode_ == Mode::Fault || mode_ == Mode::EStop);
+}
+
+Code Machine::follow(const int32_t*, uint64_t now_us) {
+    now_us_ = now_us;
+    return Code::NotReady;
+}
+
+void Machine::set_sensor(uint8_t, int32_t) {}
+
+void Machine::report_text_lost(uint32_t lines) {
+    Sentence text;
+    text.add(lines);
+    event("text_lost", text.text());
 }
 
 void Machine::place(const int64_t* position_q20) {

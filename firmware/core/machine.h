@@ -17,9 +17,12 @@
 
 namespace gemelo {
 
+// The texts are kept, not copied.
 struct Identity {
     uint32_t boot_id;
-    const char* reset_cause;  // kept, not copied
+    const char* reset_cause;
+    bool is_virtual = false;
+    const char* device = "";  // what it is called until a configuration says it
 };
 
 // A frame as it came off the wire.
@@ -32,18 +35,41 @@ struct Arrival {
 
 class Machine {
   public:
-    // The device is in Boot until start(). `config` is kept and must have no fault.
-    void begin(const DeviceConfig& config, const Identity& identity, const Sink& sink);
-    // The joints stand at these whole steps; whether that can be trusted is `referenced`.
+    // The device is in Boot until start(). `config` is kept; it has no fault, or no joints if there is none yet.
+    void begin(DeviceConfig& config, const Identity& identity, const Sink& sink);
+    // The joints stand at these whole steps; `referenced` is believed if the device arms itself at boot.
     void start(uint64_t now_us, const int32_t* steps, bool referenced);
+    // Begins anew with what `config` says now: unreferenced, disarmed, the same boot; says so. Only if takes_config().
+    void restart();
 
     void receive(const Arrival& arrival, uint64_t now_us);
+    // The text of a configuration.
+    void receive_config(const Arrival& arrival, uint64_t now_us);
+    bool takes_config() const;
+    // Text mode: every joint to its target, Q24.8 steps, within its own limits. Counts as a heartbeat.
+    Code follow(const int32_t* target_q8, uint64_t now_us);
+    // At any time, from the slot's task: mV, or us of echo.
+    void set_sensor(uint8_t index, int32_t raw);
     void slot(uint64_t slot_start_us);
     void report_status() const;
     // The platform is about to stop: slow down along the path.
     void halt() {
         if (mode_ == Mode::Run) hold("shutdown");
     }
+
+    // For what stands before the machine on a line: what it could not read, and what it says itself.
+    void count_bad_frame() { ++bad_frames_; }
+    void report_text_lost(uint32_t lines);
+    void say(Output output, const uint8_t* bytes, size_t size) const { reporter_.say(output, bytes, size); }
+
+    const DeviceConfig& config() const { return *config_; }
+    // Changes when a configuration was taken: the platform sets its pins up anew.
+    uint32_t config_crc32() const { return config_->crc32; }
+    // Logical: the platform applies `is_inverted` and drives its pins after each slot.
+    bool is_enabled() const { return is_armed_; }
+    uint16_t outputs() const { return outputs_; }
+    // Nothing moves and no pulse is due: a platform may write its flash.
+    bool keeps_still() const { return !is_moving(); }
 
     Stepper& stepper() { return stepper_; }
     const Stepper& stepper() const { return stepper_; }
@@ -91,7 +117,7 @@ class Machine {
 
     static constexpr uint8_t kPoints = 4;  // before, finished, running, prepared
 
-    const DeviceConfig* config_ = nullptr;
+    DeviceConfig* config_ = nullptr;
     Identity identity_{};
     Reporter reporter_;
     KnotRules rules_{};
@@ -107,6 +133,8 @@ class Machine {
     Mode mode_ = Mode::Boot;
     FaultCode fault_ = FaultCode::None;
     bool is_referenced_ = false;
+    bool is_armed_ = false;
+    uint16_t outputs_ = 0;
     bool is_stopping_ = false;
     bool is_dry_ = false;
     bool awaits_first_pulse_ = false;

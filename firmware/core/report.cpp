@@ -107,4 +107,14 @@ void Reporter::status(const StatusReport& report) const {
     sink_.put(sink_.context, Output::Status, json.bytes(), size);
 }
 
+void Reporter::acknowledge_config(uint32_t crc32, bool accepted, const char* part, const char* reason) const {
+    JsonWriter json;
+    json.field("crc32", static_cast<uint64_t>(crc32));
+    json.field("accepted", accepted);
+    json.field("part", part);
+    json.field("reason", reason);
+    const size_t size = json.close();
+    say(Output::ConfigAck, json.bytes(), size);
+}
+
 }  // namespace gemelo

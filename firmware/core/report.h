@@ -20,6 +20,8 @@ constexpr uint8_t kFlagArmed = 1;
 struct Sink {
     void* context = nullptr;
     void (*put)(void* context, Output output, const uint8_t* bytes, size_t size) = nullptr;
+    // The text of a configuration that was taken, to be kept over a restart; may be null.
+    void (*keep)(void* context, const uint8_t* text, size_t size) = nullptr;
 };
 
 struct Acknowledgement {
@@ -68,6 +70,10 @@ class Reporter {
     void state(const StateReport& report) const;
     void event(const char* name, uint64_t t_us, uint32_t stream, const char* detail) const;
     void status(const StatusReport& report) const;
+    void acknowledge_config(uint32_t crc32, bool accepted, const char* part, const char* reason) const;
+    // Bytes as they are.
+    void say(Output output, const uint8_t* bytes, size_t size) const { sink_.put(sink_.context, output, bytes, size); }
+    const Sink& sink() const { return sink_; }
 
   private:
     void send(Output output, uint8_t* bytes, size_t size) const;

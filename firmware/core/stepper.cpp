@@ -56,7 +56,7 @@ void Stepper::silence() {
     }
 }
 
-void Stepper::tick() {
+void Stepper::tick(const Levels&) {
     if (tick_in_slot_ == 0) take();
     for (uint8_t j = 0; j < joints_; ++j) step(axis_[j], 1u << j);
     ++tick_;

@@ -36,7 +36,8 @@ class Stepper {
     void silence();
 
     // The interrupt's side.
-    void tick();
+    // Reads the e-stop and the switches, then steps.
+    void tick(const Levels& levels = Levels{});
     // `count` ticks within a slot in which nothing happens; only allowed while is_quiet().
     void skip(uint32_t count);
 

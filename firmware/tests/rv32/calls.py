@@ -8,7 +8,7 @@ from pathlib import Path
 
 from firmware.tests.rv32.toolchain import PREFIX, run
 
-TICK = "_ZN6gemelo7Stepper4tickEv"
+TICK = "_ZN6gemelo7Stepper4tickERKNS_6LevelsE"
 STEPPER = "_ZN6gemelo7Stepper"
 DIVISION = re.compile(r"^(div|rem)u?$")
 
