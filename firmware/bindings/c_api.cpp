@@ -1,46 +1,11 @@
 // The virtual device as plain C functions, for ctypes.
 #include <string.h>
 
+#include "../core/config_text.h"
 #include "../platform/host/virtual_device.h"
 
 using gemelo::DeviceConfig;
 using gemelo::VirtualDevice;
-
-struct FlatJoint {
-    char name[gemelo::kNameSize];
-    int32_t lower_q8, upper_q8, max_velocity_q8, max_acceleration_q8;
-    uint32_t dir_setup_us, inverted;
-};
-
-struct FlatConfig {
-    char name[gemelo::kNameSize];
-    uint32_t tick_hz, queue_capacity, state_hz, hold_timeout_ms, joints;
-    FlatJoint joint[gemelo::kMaxJoints];
-};
-
-static DeviceConfig unfold(const FlatConfig& flat) {
-    DeviceConfig config{};
-    memcpy(config.name, flat.name, sizeof config.name);
-    config.tick_hz = flat.tick_hz;
-    config.queue_capacity = flat.queue_capacity;
-    config.state_hz = flat.state_hz;
-    config.sensor_hz = 10;
-    config.hold_timeout_ms = flat.hold_timeout_ms;
-    config.is_armed_at_boot = 1;
-    config.joints = static_cast<uint8_t>(flat.joints);
-    for (uint8_t j = 0; j < gemelo::kMaxJoints; ++j) {
-        const FlatJoint& from = flat.joint[j];
-        gemelo::JointConfig& to = config.joint[j];
-        memcpy(to.name, from.name, sizeof to.name);
-        to.lower_q8 = from.lower_q8;
-        to.upper_q8 = from.upper_q8;
-        to.max_velocity_q8 = from.max_velocity_q8;
-        to.max_acceleration_q8 = from.max_acceleration_q8;
-        to.dir_setup_us = from.dir_setup_us;
-        to.is_inverted = from.inverted != 0;
-    }
-    return config;
-}
 
 extern "C" {
 
@@ -58,20 +23,15 @@ struct GemeloSnapshot {
     uint32_t scale_q30;
 };
 
-// A sentence, or nullptr; `joint` becomes the joint at fault, or 8.
-const char* gemelo_find_fault(const FlatConfig* flat, uint8_t* joint) {
-    const DeviceConfig config = unfold(*flat);
-    const gemelo::ConfigFault fault = gemelo::find_fault(config);
-    *joint = gemelo::kMaxJoints;
-    for (uint8_t j = 0; j < config.joints && j < gemelo::kMaxJoints; ++j)
-        if (fault.part == config.joint[j].name) *joint = j;
-    return fault.sentence;
-}
-
-VirtualDevice* gemelo_create(const FlatConfig* flat, uint32_t boot_id, const char* reset_cause, uint64_t now_us,
-                             const int32_t* steps, int referenced) {
-    const DeviceConfig config = unfold(*flat);
-    if (gemelo::find_fault(config).sentence != nullptr) return nullptr;
+// The device of a configuration, or nullptr and why not; `part` has room for 32 bytes, `reason` for 128.
+VirtualDevice* gemelo_create(const char* text, size_t size, char* part, char* reason, uint32_t boot_id,
+                             const char* reset_cause, uint64_t now_us, const int32_t* steps, int referenced) {
+    DeviceConfig config;
+    gemelo::Refusal refusal;
+    const bool is_taken = gemelo::parse_config(text, size, &config, &refusal);
+    memcpy(part, refusal.part, sizeof refusal.part);
+    memcpy(reason, refusal.reason, sizeof refusal.reason);
+    if (!is_taken) return nullptr;
     VirtualDevice* device = new VirtualDevice(config, boot_id, reset_cause, now_us);
     device->start(steps, referenced != 0);
     return device;

@@ -3,50 +3,18 @@
 from __future__ import annotations
 
 import ctypes as c
-from dataclasses import dataclass
 from typing import NamedTuple
 
-from firmware.bindings.library import (
-    MAX_JOINTS,
-    NAME_SIZE,
-    ConfigRecord,
-    JointRecord,
-    SnapshotRecord,
-    load_library,
-)
+from firmware.bindings.library import MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
 from schemas.device import DeviceMode
+from schemas.device_config import DeviceConfig, config_text
 
 OUTPUTS = ("traj/ack", "cmd/ack", "sync/r", "state", "event", "status")
 LARGEST_OUTPUT = 1024
 
 
 class ConfigError(ValueError):
-    """The core refuses this configuration; the message names the joint and the reason."""
-
-
-@dataclass(frozen=True)
-class JointConfig:
-    """One joint's limits [1/256 step, per s, per s^2] and its driver's demands."""
-
-    name: str
-    lower_q8: int
-    upper_q8: int
-    max_velocity_q8: int
-    max_acceleration_q8: int
-    inverted: bool = False
-    dir_setup_us: int = 0
-
-
-@dataclass(frozen=True)
-class DeviceConfig:
-    """What a device is told before it starts."""
-
-    name: str
-    joints: tuple[JointConfig, ...]
-    tick_hz: int = 50_000
-    queue_capacity: int = 128  # [knots]
-    state_hz: int = 50
-    hold_timeout_ms: int = 500
+    """The core refuses this configuration; the message names the part and the reason."""
 
 
 class OutFrame(NamedTuple):
@@ -84,27 +52,20 @@ class Device:
         start = steps if steps is not None else (0,) * count
         if len(start) != count:
             raise ConfigError(f"{len(start)} start positions for {count} joints of {config.name!r}")
-        record = _record(config)
-        self._check(record)
-        positions = (c.c_int32 * MAX_JOINTS)(*start)
+        positions = (c.c_int32 * max(count, MAX_JOINTS))(*start)
+        text, part, reason = config_text(config), c.create_string_buffer(PART_SIZE), c.create_string_buffer(REASON_SIZE)
         self._handle = self._library.gemelo_create(
-            c.byref(record), boot_id, reset_cause.encode(), now_us, positions, referenced
+            text, len(text), part, reason, boot_id, reset_cause.encode(), now_us, positions, referenced
         )
+        if self._handle is None:
+            subject = f"{part.value.decode()!r} of device" if part.value else "device"
+            raise ConfigError(f"{subject} {config.name!r}: {reason.value.decode()}")
         self._buffer = (c.c_uint8 * LARGEST_OUTPUT)()
         self._output = c.c_uint8()
 
     def __del__(self) -> None:
         if getattr(self, "_handle", None) is not None:
             self._library.gemelo_destroy(self._handle)
-
-    def _check(self, record: ConfigRecord) -> None:
-        joint = c.c_uint8()
-        fault = self._library.gemelo_find_fault(c.byref(record), c.byref(joint))
-        if fault is None:
-            return
-        name = self.config.joints[joint.value].name if joint.value < len(self.config.joints) else ""
-        subject = f"joint {name!r} of device" if name else "device"
-        raise ConfigError(f"{subject} {self.config.name!r}: {fault.decode()}")
 
     def receive(self, payload: bytes, retained: bool = False, received_us: int | None = None) -> None:
         """Hand one frame over, at the device's present time; it may have arrived a little earlier [us]."""
@@ -200,33 +161,3 @@ class Device:
     def max_slot_error(self) -> int:
         """The largest |commanded - executed| at any slot end so far [1/256 step], rounded up."""
         return int(self._snapshot().max_slot_error_q8)
-
-
-def _record(config: DeviceConfig) -> ConfigRecord:
-    if not 1 <= len(config.joints) <= MAX_JOINTS:
-        raise ConfigError(f"device {config.name!r} has {len(config.joints)} joints, not 1 to {MAX_JOINTS}")
-    record = ConfigRecord(
-        name=_name(config.name),
-        tick_hz=config.tick_hz,
-        queue_capacity=config.queue_capacity,
-        state_hz=config.state_hz,
-        hold_timeout_ms=config.hold_timeout_ms,
-        joints=len(config.joints),
-    )
-    for slot, joint in zip(record.joint, config.joints, strict=False):
-        _fill(slot, joint)
-    return record
-
-
-def _fill(record: JointRecord, joint: JointConfig) -> None:
-    record.name = _name(joint.name)
-    record.lower_q8, record.upper_q8 = joint.lower_q8, joint.upper_q8
-    record.max_velocity_q8, record.max_acceleration_q8 = joint.max_velocity_q8, joint.max_acceleration_q8
-    record.dir_setup_us, record.inverted = joint.dir_setup_us, joint.inverted
-
-
-def _name(text: str) -> bytes:
-    encoded = text.encode()
-    if len(encoded) >= NAME_SIZE:
-        raise ConfigError(f"the name {text!r} is longer than {NAME_SIZE - 1} bytes")
-    return encoded

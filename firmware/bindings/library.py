@@ -7,40 +7,12 @@ import functools
 from pathlib import Path
 
 MAX_JOINTS = 8
-NAME_SIZE = 32
+PART_SIZE, REASON_SIZE = 32, 128  # of `Refusal` in core/refusal.h
 LIBRARY = Path(__file__).resolve().parents[1] / "build" / "libgemelo_core.so"
 
 
 class CoreMissing(RuntimeError):
     """The core has not been built."""
-
-
-class JointRecord(c.Structure):
-    """`JointConfig` of core/config.h."""
-
-    _fields_ = (
-        ("name", c.c_char * NAME_SIZE),
-        ("lower_q8", c.c_int32),
-        ("upper_q8", c.c_int32),
-        ("max_velocity_q8", c.c_int32),
-        ("max_acceleration_q8", c.c_int32),
-        ("dir_setup_us", c.c_uint32),
-        ("inverted", c.c_uint32),
-    )
-
-
-class ConfigRecord(c.Structure):
-    """`DeviceConfig` of core/config.h."""
-
-    _fields_ = (
-        ("name", c.c_char * NAME_SIZE),
-        ("tick_hz", c.c_uint32),
-        ("queue_capacity", c.c_uint32),
-        ("state_hz", c.c_uint32),
-        ("hold_timeout_ms", c.c_uint32),
-        ("joints", c.c_uint32),
-        ("joint", JointRecord * MAX_JOINTS),
-    )
 
 
 class SnapshotRecord(c.Structure):
@@ -70,11 +42,11 @@ def load_library(path: Path = LIBRARY) -> c.CDLL:
             f"the firmware core cannot be loaded ({error}): run `make setup`, or firmware/bindings/build.sh"
         ) from error
     u8, u32, u64, size, device = c.POINTER(c.c_uint8), c.c_uint32, c.c_uint64, c.c_size_t, c.c_void_p
-    i32s, config = c.POINTER(c.c_int32), c.POINTER(ConfigRecord)
+    text = c.c_char_p
+    i32s = c.POINTER(c.c_int32)
     u32s, u64s = c.POINTER(c.c_uint32), c.POINTER(c.c_uint64)
     signatures: dict[str, tuple[object, list[object]]] = {
-        "find_fault": (c.c_char_p, [config, u8]),
-        "create": (device, [config, u32, c.c_char_p, u64, i32s, c.c_int]),
+        "create": (device, [text, size, text, text, u32, text, u64, i32s, c.c_int]),
         "destroy": (None, [device]),
         "receive": (None, [device, c.c_char_p, size, c.c_int, u64]),
         "advance": (None, [device, u64]),

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "bytes.h"
+#include "config_text.h"
 #include "vectors.h"
 #include "virtual_device.h"
 
@@ -37,13 +38,20 @@ void expect_answer(const Vector& vector, const OutFrame& answer) {
     EXPECT_EQ(load_i32(at + 28), vector.limit);
 }
 
+DeviceConfig vector_device() {
+    DeviceConfig config;
+    Refusal refusal;
+    EXPECT_TRUE(parse_config(kVectorConfig.data(), kVectorConfig.size(), &config, &refusal)) << refusal.reason;
+    return config;
+}
+
 }  // namespace
 
 TEST(Vectors, AFreshDeviceAnswersEachAsExpected) {
     ASSERT_GT(kVectors.size(), 30u);
     for (const Vector& vector : kVectors) {
         SCOPED_TRACE(vector.name);
-        VirtualDevice device(kVectorDevice, kVectorBoot, "power_on", 0);
+        VirtualDevice device(vector_device(), kVectorBoot, "power_on", 0);
         const int32_t steps[kMaxJoints] = {};
         device.start(steps, true);
         device.outputs().clear();

@@ -10,7 +10,7 @@ from typing import Any
 
 def main(out: str, *files: str) -> None:
     """Write `out` from the vector files; device.json becomes the configuration they are played against."""
-    lines = ["#pragma once", "#include <cstring>", '#include "vector.h"', ""]
+    lines = ["#pragma once", "#include <string>", '#include "vector.h"', ""]
     vectors: list[dict[str, Any]] = []
     for file in sorted(files):
         content = json.loads(Path(file).read_text(encoding="utf-8"))
@@ -23,28 +23,10 @@ def main(out: str, *files: str) -> None:
 
 
 def device_lines(device: dict[str, Any]) -> list[str]:
-    names = {"inverted": "is_inverted"}
-    fields = [
-        f"    config.joint[{index}].{names.get(key, key)} = {int(value)};"
-        for index, joint in enumerate(device["joints"])
-        for key, value in joint.items()
-        if key != "name"
-    ]
-    texts = [f'    std::strcpy(config.joint[{i}].name, "{j["name"]}");' for i, j in enumerate(device["joints"])]
-    numbers = ("tick_hz", "queue_capacity", "state_hz", "hold_timeout_ms")
+    text = json.dumps(device["config"], separators=(",", ":"))
     return [
         f"inline constexpr uint32_t kVectorBoot = {device['boot_id']}u;",
-        "inline const gemelo::DeviceConfig kVectorDevice = [] {",
-        "    gemelo::DeviceConfig config{};",
-        f'    std::strcpy(config.name, "{device["name"]}");',
-        *(f"    config.{key} = {device[key]};" for key in numbers),
-        "    config.sensor_hz = 10;",
-        "    config.is_armed_at_boot = 1;",
-        f"    config.joints = {len(device['joints'])};",
-        *texts,
-        *fields,
-        "    return config;",
-        "}();",
+        f'inline const std::string kVectorConfig = R"({text})";',
         "",
     ]
 

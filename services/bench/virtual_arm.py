@@ -8,9 +8,9 @@ from collections.abc import Callable
 from itertools import count
 
 from firmware.bindings.device import Device
-from firmware.platform.host.configure import device_config
 from schemas.message import Message
 from services.arm.description import Arm
+from services.arm.device_config import device_config
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.moment import Moment

@@ -8,7 +8,8 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from firmware.bindings.device import Device, DeviceConfig, JointConfig
+from firmware.bindings.device import Device
+from schemas.device_config import DeviceConfig, JointConfig
 
 BOOT = 0x12345678
 NEVER = (1 << 64) - 1
@@ -106,6 +107,14 @@ def rm1_config() -> DeviceConfig:
 
     def joint(name: str, speed: float, inverted: bool = False) -> JointConfig:
         limit = round(speed * 256 * 1.02)
-        return JointConfig(name, -10_000_000, 10_000_000, limit, limit, inverted, 5)
+        return JointConfig(
+            name=name,
+            lower_q8=-10_000_000,
+            upper_q8=10_000_000,
+            max_velocity_q8=limit,
+            max_acceleration_q8=limit,
+            inverted=inverted,
+            dir_setup_us=5,
+        )
 
-    return DeviceConfig("rm1", (joint("q1", 4665.6), joint("q2", 100.0, True), joint("q3", 100.0)))
+    return DeviceConfig(name="rm1", joints=(joint("q1", 4665.6), joint("q2", 100.0, True), joint("q3", 100.0)))

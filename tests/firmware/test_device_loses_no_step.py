@@ -7,17 +7,21 @@ import random
 
 from bench_firmware import FIRST, LAST, Bench, Row, rm1_config, smooth, traj
 
-from firmware.bindings.device import DeviceConfig, JointConfig
 from schemas.device import DeviceMode
+from schemas.device_config import DeviceConfig, JointConfig
 
 OK, DUPLICATE, GAP, NO_SPACE = 0, 1, 2, 3
 HALF_A_STEP = 128  # [1/256 step]
 
 
 def fast_config() -> DeviceConfig:
-    limit = 20_000 * 256
-    joint = (-(1 << 30), 1 << 30, limit, limit * 4)
-    return DeviceConfig("bench", (JointConfig("q1", *joint), JointConfig("q2", *joint)))
+    def joint(name: str) -> JointConfig:
+        limit = 20_000 * 256
+        return JointConfig(
+            name=name, lower_q8=-(1 << 30), upper_q8=1 << 30, max_velocity_q8=limit, max_acceleration_q8=limit * 4
+        )
+
+    return DeviceConfig(name="bench", joints=(joint("q1"), joint("q2")))
 
 
 class BadLink:

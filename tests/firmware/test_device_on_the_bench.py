@@ -6,13 +6,15 @@ import json
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from bench_firmware import FIRST, LAST, Bench, Row, command, rm1_config, smooth, traj
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware.bindings.device import ConfigError, Device, DeviceConfig, JointConfig
+from firmware.bindings.device import ConfigError, Device
 from schemas.device import DeviceMode
+from schemas.device_config import DeviceConfig, JointConfig
 
 VECTORS = Path(__file__).resolve().parents[2] / "firmware/tests/vectors"
 HOLD, RESUME, STOP = 1, 2, 3
@@ -26,10 +28,7 @@ def vectors() -> list[Any]:
 
 def vector_device() -> Device:
     described = json.loads((VECTORS / "device.json").read_text())
-    described.pop("about")
-    boot = described.pop("boot_id")
-    joints = tuple(JointConfig(**joint) for joint in described.pop("joints"))
-    return Device(DeviceConfig(joints=joints, **described), boot_id=boot)
+    return Device(msgspec.convert(described["config"], DeviceConfig), boot_id=described["boot_id"])
 
 
 @pytest.mark.parametrize("case", vectors())
@@ -109,8 +108,13 @@ def test_no_bytes_at_all_move_a_device(data: bytes, retained: bool):
     assert device.mode == DeviceMode.IDLE
 
 
+def one_joint(lower_q8: int, upper_q8: int) -> DeviceConfig:
+    joint = JointConfig(name="q1", lower_q8=lower_q8, upper_q8=upper_q8, max_velocity_q8=1, max_acceleration_q8=1)
+    return DeviceConfig(name="x", joints=(joint,))
+
+
 def test_a_configuration_that_cannot_be_is_refused_with_the_joint_and_the_reason():
-    with pytest.raises(ConfigError, match="joint 'q1' of device 'x': its lower limit is not below its upper limit"):
-        Device(DeviceConfig("x", (JointConfig("q1", 5, 5, 1, 1),)))
+    with pytest.raises(ConfigError, match="'q1' of device 'x': its lower limit is not below its upper limit"):
+        Device(one_joint(5, 5))
     with pytest.raises(ConfigError, match="2 start positions for 1 joints"):
-        Device(DeviceConfig("x", (JointConfig("q1", 0, 5, 1, 1),)), steps=(1, 2))
+        Device(one_joint(0, 5), steps=(1, 2))

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 from firmware.bindings.device import Device
-from firmware.platform.host.configure import device_config, reference_steps
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse
 from schemas.joints import JointTargets
@@ -29,6 +28,7 @@ from schemas.motion import (
 )
 from schemas.topics import Topic
 from services.arm.description import Arm, load_arm
+from services.arm.device_config import device_config, reference_steps
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.goals import GoalVerdict
 from services.stepper_gateway.knots import Knot

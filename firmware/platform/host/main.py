@@ -11,14 +11,15 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from firmware.bindings.device import ConfigError, Device, DeviceConfig
+from firmware.bindings.device import ConfigError, Device
 from firmware.bindings.library import CoreMissing
-from firmware.platform.host.configure import device_config, reference_steps
 from firmware.platform.host.link import DeviceLink, Item, Stop
 from firmware.platform.host.memory import PoseMemory
 from firmware.platform.host.virtual_esp32 import VirtualEsp32, offline_status
 from schemas.deployment import Deployment
+from schemas.device_config import DeviceConfig
 from services.arm.description import Arm, load_arm
+from services.arm.device_config import device_config, reference_steps
 from services.arm.errors import DescriptionError
 from services.runtime.deployment import DeploymentError, load_deployment, project_root
 from services.runtime.logs import LEVELS, line_logger
