@@ -3,33 +3,9 @@
 #include <cstring>
 
 #include "bytes.h"
-#include "frame.h"
 
 namespace rig {
 namespace {
-
-void add_u8(Bytes& bytes, uint8_t value) { bytes.push_back(value); }
-
-void add_u16(Bytes& bytes, uint16_t value) {
-    bytes.resize(bytes.size() + 2);
-    gemelo::store_u16(&bytes[bytes.size() - 2], value);
-}
-
-void add_u32(Bytes& bytes, uint32_t value) {
-    bytes.resize(bytes.size() + 4);
-    gemelo::store_u32(&bytes[bytes.size() - 4], value);
-}
-
-void add_u64(Bytes& bytes, uint64_t value) {
-    bytes.resize(bytes.size() + 8);
-    gemelo::store_u64(&bytes[bytes.size() - 8], value);
-}
-
-Bytes header(gemelo::FrameType type, size_t joints, uint32_t boot_id) {
-    Bytes bytes(gemelo::kHeaderSize);
-    gemelo::write_header(bytes.data(), type, static_cast<uint8_t>(joints), boot_id);
-    return bytes;
-}
 
 gemelo::JointConfig joint(const char* name, bool inverted) {
     gemelo::JointConfig config{};
@@ -58,54 +34,6 @@ gemelo::DeviceConfig two_joints() {
     config.joint[0] = joint("q1", false);
     config.joint[1] = joint("q2", true);
     return config;
-}
-
-Bytes seal(Bytes bytes) {
-    const size_t size = bytes.size();
-    bytes.resize(size + gemelo::kCrcSize);
-    gemelo::seal_frame(bytes.data(), size);
-    return bytes;
-}
-
-Bytes build(const ChunkSpec& chunk) {
-    Bytes bytes =
-        header(gemelo::FrameType::Traj, chunk.rows.empty() ? 2 : chunk.rows[0].position.size(), chunk.boot_id);
-    add_u32(bytes, chunk.stream);
-    add_u32(bytes, chunk.seq);
-    add_u64(bytes, chunk.expires_us);
-    add_u32(bytes, chunk.dt_us);
-    add_u16(bytes, static_cast<uint16_t>(chunk.rows.size()));
-    add_u16(bytes, static_cast<uint16_t>((chunk.first ? 1 : 0) | (chunk.last ? 2 : 0)));
-    for (const Row& row : chunk.rows) {
-        for (int32_t value : row.position) add_u32(bytes, static_cast<uint32_t>(value));
-        for (int32_t value : row.velocity) add_u32(bytes, static_cast<uint32_t>(value));
-    }
-    return seal(bytes);
-}
-
-Bytes build_command(gemelo::Command command, uint32_t id, const std::vector<int32_t>& position, uint64_t expires_us,
-                    uint32_t boot_id) {
-    Bytes bytes = header(gemelo::FrameType::Cmd, position.size(), boot_id);
-    add_u32(bytes, id);
-    add_u64(bytes, expires_us);
-    add_u8(bytes, static_cast<uint8_t>(command));
-    add_u8(bytes, 0);
-    add_u16(bytes, 0);
-    for (int32_t value : position) add_u32(bytes, static_cast<uint32_t>(value));
-    return seal(bytes);
-}
-
-Bytes build_heartbeat(uint32_t session, uint32_t counter, uint32_t boot_id) {
-    Bytes bytes = header(gemelo::FrameType::Heartbeat, 0, boot_id);
-    add_u32(bytes, session);
-    add_u32(bytes, counter);
-    return seal(bytes);
-}
-
-Bytes build_sync(uint64_t t0) {
-    Bytes bytes = header(gemelo::FrameType::Sync, 0, 0);
-    add_u64(bytes, t0);
-    return seal(bytes);
 }
 
 Rig::Rig(const gemelo::DeviceConfig& config, bool referenced, uint64_t now_us, uint32_t boot_id)

@@ -5,41 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "frames.h"
 #include "virtual_device.h"
 
 namespace rig {
 
-constexpr uint32_t kBoot = 0x12345678;
-constexpr uint64_t kNever = UINT64_MAX;
-
-using Bytes = std::vector<uint8_t>;
-
 // Two joints that do 4000 steps/s after a second, within +-100,000 steps.
 gemelo::DeviceConfig two_joints();
-
-struct Row {
-    std::vector<int32_t> position;
-    std::vector<int32_t> velocity;
-};
-
-struct ChunkSpec {
-    uint32_t stream = 7;
-    uint32_t seq = 0;
-    std::vector<Row> rows;
-    bool first = false;
-    bool last = false;
-    uint32_t dt_us = 20000;
-    uint64_t expires_us = kNever;
-    uint32_t boot_id = kBoot;
-};
-
-Bytes build(const ChunkSpec& chunk);
-Bytes build_command(gemelo::Command command, uint32_t id, const std::vector<int32_t>& position = {},
-                    uint64_t expires_us = kNever, uint32_t boot_id = kBoot);
-Bytes build_heartbeat(uint32_t session, uint32_t counter, uint32_t boot_id = 0);
-Bytes build_sync(uint64_t t0);
-// Appends the CRC.
-Bytes seal(Bytes bytes);
 
 struct Ack {
     uint32_t stream, seq, next_seq;
