@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 
+from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.message import Message, Vector
 from schemas.motion import JointTrajectory
 
 
 class PoseGoal(Message, frozen=True, kw_only=True, tag="pose"):
-    """Tool position and, for arms that can, orientation, in `frame` (empty: the base)."""
+    """A tool pose in `frame` (empty: the base): a position, and as much of an orientation as is asked for."""
 
     position: Vector = ()  # (3,) [m]
     orientation: Vector = ()  # (x, y, z, w); empty: any
     frame: str = ""
+    free_axis: Vector = ()  # (3,) in the tool frame: with an orientation, turning about it is free
+    tool_axis: Vector = ()  # (3,) in the tool frame: this axis is to point along `direction`; then no orientation
+    direction: Vector = ()  # (3,) in `frame`
+    position_tolerance: float = 0.0  # [m] 0: exact
+    orientation_tolerance: float = 0.0  # [rad] 0: exact
 
 
 class JointGoal(Message, frozen=True, kw_only=True, tag="joints"):
@@ -30,14 +36,74 @@ class NamedGoal(Message, frozen=True, kw_only=True, tag="named"):
     name: str = ""
 
 
+class WaypointGoal(Message, frozen=True, kw_only=True, tag="waypoints"):
+    """Goals to be passed in order; the arm stops at the last one only, where `blend` allows it."""
+
+    points: tuple[PoseGoal | JointGoal | NamedGoal, ...] = ()
+    blend: float = 0.0  # [m] of the tool around a point within which it may be cut
+
+
+Goal = PoseGoal | JointGoal | NamedGoal | WaypointGoal
+
+
+class FreeMotion(Message, frozen=True, kw_only=True, tag="free"):
+    """Any way that touches nothing."""
+
+    planner_id: str = ""  # "": the default; "RRTConnect", "RRTstar", "BITstar", "PRM", "native"
+    seed: int = 0  # the same seed, the same plan
+
+
+class PointToPoint(Message, frozen=True, kw_only=True, tag="ptp"):
+    """The straight line of the joints, or a refusal."""
+
+
+class LinearMotion(Message, frozen=True, kw_only=True, tag="lin"):
+    """The tool on a straight line, its orientation turning evenly."""
+
+    speed: float = 0.0  # [m/s] of the tool; 0: as fast as the joints can
+    acceleration: float = 0.0  # [m/s^2] of the tool; 0: as the joints can
+    max_step: float = 0.0  # [m] between checked points; 0: the planner's own
+    jump_threshold: float = 0.0  # [rad] or [m] a joint may move between them; 0: the planner's own
+    least_fraction: float = 1.0  # of the way that must be possible; less is refused
+
+
+class CircularMotion(Message, frozen=True, kw_only=True, tag="circ"):
+    """The tool on an arc to the goal."""
+
+    interim: Vector = ()  # (3,) [m] a point on the arc, in the goal's frame
+    center: Vector = ()  # (3,) [m] or its centre: then the shorter arc
+    speed: float = 0.0  # [m/s] of the tool; 0: as fast as the joints can
+    acceleration: float = 0.0  # [m/s^2] of the tool; 0: as the joints can
+
+
+Motion = FreeMotion | PointToPoint | LinearMotion | CircularMotion
+
+
+class Timing(StrEnum):
+    """How a path gets its time."""
+
+    JERK_LIMITED = "jerk_limited"  # ruckig
+    TIME_OPTIMAL = "time_optimal"  # toppra, without a jerk limit
+
+
+class StepPolicy(StrEnum):
+    """What becomes of a trajectory that asks more of the steppers than they have."""
+
+    SLOW_DOWN = "slow_down"
+    REFUSE = "refuse"
+
+
 class PlanRequest(Message, frozen=True, kw_only=True):
     """What to plan; scaling is in (0, 1], and 0 is refused."""
 
-    goal: PoseGoal | JointGoal | NamedGoal = NamedGoal()
+    goal: Goal = NamedGoal()
     start: JointState | None = None  # absent: where the arm is now
     velocity_scaling: float = 1.0
     acceleration_scaling: float = 1.0
     allowed_time: float = 1.0  # [s]
+    motion: Motion = FreeMotion()
+    timing: Timing = Timing.JERK_LIMITED
+    step_policy: StepPolicy = StepPolicy.SLOW_DOWN
 
 
 class PlanCode(IntEnum):
@@ -69,6 +135,26 @@ class Refusal(Message, frozen=True, kw_only=True):
     remedy: str = ""
 
 
+class StepMargin(Message, frozen=True, kw_only=True):
+    """How near a trajectory comes to what one stepper can do."""
+
+    name: str = ""
+    peak_rate: float = 0.0  # [steps/s]
+    rate_limit: float = 0.0  # [steps/s] of driver, tick and configuration
+    share: float = 0.0  # of the limit that binds, pull-out torque included: 1 is all
+    limited_by: str = ""  # "step rate", "pulse width" or "pull-out torque"
+
+
+class PlanningTimes(Message, frozen=True, kw_only=True):
+    """Where the time went [s]."""
+
+    ik: float = 0.0
+    search: float = 0.0
+    smoothing: float = 0.0
+    timing: float = 0.0
+    verification: float = 0.0
+
+
 class PlanResponse(Message, frozen=True, kw_only=True):
     """A verified, timed trajectory, or a refusal."""
 
@@ -78,6 +164,13 @@ class PlanResponse(Message, frozen=True, kw_only=True):
     planning_time: float = 0.0  # [s]
     duration: float = 0.0  # [s] of the trajectory
     tool_goal: Vector = ()  # (3,) [m] where the tool will be
+    fraction: float = 1.0  # of a Cartesian way that the trajectory goes
+    stopped_by: Refusal | None = None  # why it goes no further
+    margins: tuple[StepMargin, ...] = ()
+    slowed: float = 1.0  # the time scale that step_policy SLOW_DOWN has used; 1: none
+    times: PlanningTimes = PlanningTimes()
+    planner_id: str = ""  # that found the way
+    scene_version: int = 0  # that it is free of
 
 
 class PlannedPath(Message, frozen=True, kw_only=True):
@@ -86,3 +179,66 @@ class PlannedPath(Message, frozen=True, kw_only=True):
     stamp: int = 0  # [ns] UNIX time
     frame: str = ""
     points: tuple[tuple[float, float, float], ...] = ()  # [m]
+
+
+class IkRequest(Message, frozen=True, kw_only=True):
+    """Joint values for a tool pose."""
+
+    goal: PoseGoal = PoseGoal()
+    near: JointState | None = None  # absent: where the arm is now
+    solutions: int = 1  # at most so many distinct ones, the nearest first
+    avoid_collisions: bool = True
+
+
+class IkSolution(Message, frozen=True, kw_only=True):
+    """One posture."""
+
+    position: Vector = ()  # [rad] or [m]
+    distance: float = 0.0  # [s] that the slowest joint takes from `near`
+
+
+class IkResponse(Message, frozen=True, kw_only=True):
+    """The postures, or why there is none."""
+
+    code: PlanCode = PlanCode.FAILURE
+    name: tuple[str, ...] = ()
+    solutions: tuple[IkSolution, ...] = ()
+    refusal: Refusal | None = None
+
+
+class FkRequest(Message, frozen=True, kw_only=True):
+    """Poses of links for joint values; joints that are not named stand as they do now."""
+
+    name: tuple[str, ...] = ()
+    position: Vector = ()  # [rad] or [m]
+    links: tuple[str, ...] = ()  # empty: the tool
+
+
+class FkResponse(Message, frozen=True, kw_only=True):
+    """The poses in the base frame, or why there is none."""
+
+    code: PlanCode = PlanCode.FAILURE
+    links: tuple[str, ...] = ()
+    poses: tuple[Transform, ...] = ()
+    refusal: Refusal | None = None
+
+
+class JogCommand(Message, frozen=True, kw_only=True):
+    """How to move now; to be said again within 0.1 s, or the arm stops. Joint speeds, or a twist of the tool."""
+
+    stamp: int = 0  # [ns] UNIX time
+    name: tuple[str, ...] = ()  # joints
+    velocity: Vector = ()  # [rad/s] or [m/s]
+    linear: Vector = ()  # (3,) [m/s] of the tool in `frame`
+    angular: Vector = ()  # (3,) [rad/s]
+    frame: str = ""  # empty: the base; the tool's own name: the tool
+
+
+class JogStatus(Message, frozen=True, kw_only=True):
+    """What becomes of the jog commands, 10 times a second while there are some."""
+
+    stamp: int = 0  # [ns] UNIX time
+    active: bool = False
+    scale: float = 1.0  # of the commanded speed that is left
+    limited_by: str = ""  # "singularity", "joint limit of ...", "collision of ... and ..."; empty: nothing
+    manipulability: float = 0.0

@@ -33,7 +33,18 @@ from schemas.motion import (
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
 )
-from schemas.planning import PlannedPath, PlanRequest, PlanResponse
+from schemas.planning import (
+    FkRequest,
+    FkResponse,
+    IkRequest,
+    IkResponse,
+    JogCommand,
+    JogStatus,
+    PlannedPath,
+    PlanRequest,
+    PlanResponse,
+)
+from schemas.scene import Contacts, PlanningScene, SceneRequest, SceneResponse
 from schemas.system import LogRecord, NodeStatistics
 
 M_co = TypeVar("M_co", bound=Message, covariant=True)
@@ -106,6 +117,10 @@ STATIC_FRAMES = Topic(
     "static_frames", FrameTransforms, LATCHED, None, True, "state_publisher", "poses of the fixed links"
 )
 PLANNED_PATH = Topic("planned_path", PlannedPath, LATCHED, None, True, "planner", "the tool's planned way")
+SCENE = Topic("scene", PlanningScene, LATCHED, None, True, "planner", "what stands around the arm and what it carries")
+CONTACTS = Topic("contacts", Contacts, LATCHED, None, True, "planner", "what touches where a plan was refused")
+JOG = Topic("jog", JogCommand, LATEST, 50.0, True, ANY, "how to move now, by hand")
+JOG_STATUS = Topic("jog_status", JogStatus, LATEST, None, True, "planner", "what slows the jogging")
 DEVICE_STATUS = Topic(
     "device/status", DeviceStatus, LATCHED, None, True, GATEWAY, "who the device is, and whether it is online"
 )
@@ -129,11 +144,15 @@ STATISTICS = Topic(
 
 TOPICS: tuple[Topic[Message], ...] = (
     DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, JOINT_TARGETS, FRAMES, STATIC_FRAMES, PLANNED_PATH,
-    DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, DEVICE_CONFIGURATION, SENSORS, DEVICE_SHAFT,
+    SCENE, CONTACTS, JOG, JOG_STATUS, DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, DEVICE_CONFIGURATION,
+    SENSORS, DEVICE_SHAFT,
     COMMANDS, COMMAND_ACKS, LOG, STATISTICS,
 )  # fmt: skip
 
 PLAN = Request("plan", PlanRequest, PlanResponse, "planner", "a goal in, a verified trajectory or a refusal out")
+IK = Request("ik", IkRequest, IkResponse, "planner", "joint values for a tool pose")
+FK = Request("fk", FkRequest, FkResponse, "planner", "link poses for joint values")
+SCENE_EDIT = Request("scene/edit", SceneRequest, SceneResponse, "planner", "add, remove, move, attach, allow ...")
 DEVICE_COMMAND = Request(
     "device/command", DeviceCommandRequest, DeviceCommandResponse, GATEWAY,
     "hold, resume, stop, reset, reference, arm, disarm, home, output, speed",
@@ -145,7 +164,15 @@ DEVICE_PRESS = Request(
     "device/press", PressRequest, PressResponse, GATEWAY, "press a virtual device's buttons, block its joints"
 )
 
-REQUESTS: tuple[Request[Message, Message], ...] = (PLAN, DEVICE_COMMAND, DEVICE_CONFIGURE, DEVICE_PRESS)
+REQUESTS: tuple[Request[Message, Message], ...] = (
+    PLAN,
+    IK,
+    FK,
+    SCENE_EDIT,
+    DEVICE_COMMAND,
+    DEVICE_CONFIGURE,
+    DEVICE_PRESS,
+)
 
 FOLLOW_JOINT_TRAJECTORY = Action(
     "follow_joint_trajectory", FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult,

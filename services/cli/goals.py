@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from schemas.planning import JointGoal, NamedGoal, PlanRequest, PoseGoal, Refusal
+from schemas.planning import Goal, JointGoal, NamedGoal, PlanRequest, PoseGoal, Refusal
 from services.cli.exits import usage
 from services.cli.names import unknown
 from services.cli.units import SHOWN, parse_joints
 
 if TYPE_CHECKING:
     from services.arm.description import Arm
-
-Goal = PoseGoal | JointGoal | NamedGoal
 
 
 def goal_of(arm: Arm, to: Sequence[float] | None, joints: Sequence[str], named: str | None) -> Goal:

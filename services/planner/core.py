@@ -9,13 +9,27 @@ from numpy.typing import NDArray
 
 from schemas.joints import JointState
 from schemas.motion import JointTrajectory
-from schemas.planning import JointGoal, NamedGoal, PlanCode, PlannedPath, PlanRequest, PlanResponse, PoseGoal, Refusal
+from schemas.planning import (
+    FreeMotion,
+    Goal,
+    JointGoal,
+    NamedGoal,
+    PlanCode,
+    PlannedPath,
+    PlanRequest,
+    PlanResponse,
+    PointToPoint,
+    PoseGoal,
+    Refusal,
+    Timing,
+    WaypointGoal,
+)
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.clearance import CLEARANCE, first_collision, last_free
 from services.planner.goals import Goals, timed_out
 from services.planner.profile import JointLimits, NoProfile, joint_limits, straight_line
-from services.planner.refusals import NoPlan, in_collision, scaling_refused
+from services.planner.refusals import NoPlan, in_collision, malformed, scaling_refused
 from services.planner.start import resolve_start
 from services.planner.verify import (
     BadTrajectory,
@@ -26,7 +40,6 @@ from services.planner.verify import (
 
 Array = NDArray[np.float64]
 Start = tuple[float, ...]
-Goal = PoseGoal | JointGoal | NamedGoal
 
 PATH_POINTS = 100
 
@@ -71,6 +84,7 @@ class Planner:
     def _plan(
         self, request: PlanRequest, present: JointState | None, age: float, is_late: Callable[[], bool]
     ) -> PlanResponse:
+        _require_known(request)
         limits = self._limits(request)
         start = resolve_start(self.arm, request.start, present, age)
         margin = self._start_margin(start)
@@ -148,7 +162,7 @@ class Planner:
                 nearest = self._goals.shown_point(asked, start, last, is_late)
             case JointGoal():
                 nearest = tuple(values[name] for name in asked.name)
-            case NamedGoal():
+            case NamedGoal() | WaypointGoal():
                 nearest = tuple(values.values())
         remedy = f"the farthest it can go on the straight way there: {named}"
         return in_collision(PlanCode.GOAL_IN_COLLISION, "at the goal", pairs, CLEARANCE, nearest, remedy)
@@ -158,3 +172,16 @@ class Planner:
         named = ", ".join(self.arm.named_states)
         remedy = f"go by way of another posture, for example a named one ({named})"
         return in_collision(PlanCode.PLANNING_FAILED, "on the straight way to the goal", pairs, margin, (), remedy)
+
+
+def _require_known(request: PlanRequest) -> None:
+    """Raises `NoPlan` for what this planner cannot do."""
+    is_known_way = isinstance(request.motion, PointToPoint) or request.motion == FreeMotion()
+    if is_known_way and request.timing is Timing.JERK_LIMITED:
+        return
+    raise malformed(
+        PlanCode.INVALID_GOAL_CONSTRAINTS,
+        "motion",
+        "this planner makes straight joint lines, jerk-limited",
+        "leave motion and timing at their defaults",
+    )

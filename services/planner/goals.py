@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from schemas.message import Vector
-from schemas.planning import JointGoal, NamedGoal, PlanCode, PoseGoal
+from schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.arm.transforms import IDENTITY, Point, Rigid, compose, from_message, inverse
@@ -38,7 +38,7 @@ class Goals:
         self._kinematics = kinematics
         self._ik = InverseKinematics(arm, kinematics)
 
-    def candidates(self, goal: PoseGoal | JointGoal | NamedGoal, start: Start, is_late: Clock) -> Iterator[Start]:
+    def candidates(self, goal: Goal, start: Start, is_late: Clock) -> Iterator[Start]:
         """Postures that fulfil the goal, lazily; raises `NoPlan` where there is none."""
         match goal:
             case NamedGoal():
@@ -47,6 +47,10 @@ class Goals:
                 return iter([self._joints(goal, start)])
             case PoseGoal():
                 return self._poses(goal, start, is_late)
+            case WaypointGoal():
+                raise malformed(
+                    INVALID, "goal", "this planner takes one goal at a time", "ask for the first point alone"
+                )
 
     def _named(self, goal: NamedGoal) -> Start:
         values = self._arm.named_states.get(goal.name)

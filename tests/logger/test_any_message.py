@@ -35,6 +35,7 @@ def values(kind):
         return st.sampled_from(kind)
     plain = {
         bool: st.booleans(), int: st.integers(-(2**63), 2**64 - 1), str: texts, types.NoneType: st.none(),
+        bytes: st.binary(max_size=8),
         float: st.floats(allow_nan=False, allow_infinity=False),
     }  # fmt: skip
     return plain[kind]

@@ -64,7 +64,7 @@ def golden_codes() -> dict[str, dict[str, int | str]]:
 
 def record(kind: type[Message]) -> dict[str, Any]:
     payload = encode(sample(kind))
-    return {"hex": payload.hex(), "fields": msgspec.msgpack.decode(payload)}
+    return {"hex": payload.hex(), "fields": json.loads(msgspec.json.encode(msgspec.msgpack.decode(payload)))}
 
 
 def _import_all() -> None:
@@ -95,6 +95,8 @@ def _value_of(info: inspect.Type, annotation: Any, name: str) -> Any:
             return 0.5 + len(name)
         case inspect.StrType():
             return name
+        case inspect.BytesType():
+            return name.encode()
         case inspect.EnumType():
             return _last(info.cls)
         case inspect.StructType():
