@@ -20,7 +20,7 @@ complete -F _gemelo gemelo
 
 
 def script(commands: Iterable[Command]) -> str:
-    """Completes commands, groups and options; topics and actions by their table."""
+    """Completes commands, groups and options; topics and actions by their table, the arm's parts by robot.toml."""
     commands = list(commands)
     following: dict[str, list[str]] = {"": []}
     for command in commands:
@@ -29,7 +29,10 @@ def script(commands: Iterable[Command]) -> str:
             known = following.setdefault(before, [])
             if word not in known:
                 known.append(word)
-        following[" ".join(command.words)] = [*arguments_of(command), *options_of(command)]
+        own = " ".join(command.words)
+        following[own] = [*arguments_of(command), *options_of(command)]
+        for given, words in command.words_after().items():
+            following.setdefault(f"{own} {given}".strip(), []).extend(words)
     # The longest first: `topic list` must not be taken for `topic` and a word that follows.
     cases = [f'        "{before}") words="{" ".join(words)}" ;;' for before, words in following.items()]
     more = [f'        "{" ".join(c.words)} "*) words="{" ".join(options_of(c))}" ;;' for c in commands if options_of(c)]

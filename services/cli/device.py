@@ -1,13 +1,14 @@
-"""`gemelo hold | resume | stop | reset | reference`: what a person may ask of the device besides motion."""
+"""What a person may ask of the device besides a motion: from `gemelo hold` to `gemelo speed`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from schemas.device import DeviceCommandKind, DeviceCommandRequest
+from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse
 from schemas.topics import DEVICE_COMMAND
-from services.cli.exits import CommandError, ExitCode
+from services.cli.device_names import require_name
+from services.cli.exits import CommandError, ExitCode, usage
 from services.cli.units import parse_joints, show
 
 if TYPE_CHECKING:
@@ -15,11 +16,18 @@ if TYPE_CHECKING:
     from services.cli.session import Session
 
 TIMEOUT = 3.0  # [s]
+AFTERWARDS = {
+    DeviceCommandKind.ARM: "the motors hold; `gemelo home` or `gemelo reference` if a joint is unreferenced",
+    DeviceCommandKind.DISARM: "the motors are without current, and every joint is unreferenced",
+}
 
 
 def command(session: Session, kind: DeviceCommandKind) -> ExitCode:
     """Sends a command and says what the device answered."""
-    return _send(session, DeviceCommandRequest(command=kind))
+    code = _send(session, DeviceCommandRequest(command=kind))
+    if kind in AFTERWARDS:
+        print(f"  {AFTERWARDS[kind]}")
+    return code
 
 
 def reference(session: Session, assignments: Sequence[str]) -> ExitCode:
@@ -40,10 +48,39 @@ def reference_request(arm: Arm, assignments: Sequence[str]) -> DeviceCommandRequ
     )
 
 
-def _send(session: Session, request: DeviceCommandRequest) -> ExitCode:
+def output(session: Session, name: str, is_on: bool) -> ExitCode:
+    """Switches an output of robot.toml."""
+    require_name("output", name, session.arm.outputs)
+    return _send(
+        session,
+        DeviceCommandRequest(command=DeviceCommandKind.OUTPUT, output=name, value=float(is_on)),
+        f"output {name} {'on' if is_on else 'off'}",
+    )
+
+
+def speed(session: Session, percent: float) -> ExitCode:
+    """How fast the device plays every path from now on [%]."""
+    request = DeviceCommandRequest(command=DeviceCommandKind.SPEED, value=share_of(percent))
+    return _send(session, request, f"speed {percent:g} %")
+
+
+def share_of(percent: float) -> float:
+    """The time scale, 0 to 1."""
+    if not 0.0 <= percent <= 100.0:
+        raise usage(f"a speed of {percent:g} % is not in 0 to 100: the planner's own speed is 100")
+    return percent / 100.0
+
+
+def ask(session: Session, request: DeviceCommandRequest, what: str = "") -> DeviceCommandResponse:
+    """The device's answer; a no is raised with its reason."""
     answer = session.node.call(DEVICE_COMMAND, request, timeout=TIMEOUT)
-    what = request.command.name.lower()
     if not answer.accepted:
+        what = what or request.command.name.lower()
         raise CommandError(f"{what} refused: {answer.reason} (device mode {answer.mode.name})")
-    print(f"{what} done: device mode {answer.mode.name}")
+    return answer
+
+
+def _send(session: Session, request: DeviceCommandRequest, what: str = "") -> ExitCode:
+    what = what or request.command.name.lower()
+    print(f"{what} done: device mode {ask(session, request, what).mode.name}")
     return ExitCode.OK

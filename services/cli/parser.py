@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -16,8 +16,16 @@ Options = argparse.Namespace
 _NEGATIVE_NUMBER = re.compile(r"^-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?$")
 
 
+Words = Mapping[str, Iterable[str]]  # what may follow, by the arguments given so far, joined by a blank
+
+
 def no_options(parser: Parser) -> None:
     """For a command that takes none."""
+
+
+def no_words() -> Words:
+    """For a command whose arguments no table knows."""
+    return {}
 
 
 @dataclass(frozen=True)
@@ -28,6 +36,8 @@ class Command:
     about: str
     run: Callable[[Options], ExitCode]
     add_options: Callable[[Parser], None] = no_options
+    example: str = ""
+    words_after: Callable[[], Words] = no_words  # for completion
 
 
 class Parser(argparse.ArgumentParser):
@@ -60,6 +70,7 @@ def build(commands: Iterable[Command], groups: dict[str, str], about: str, epilo
             parents[group[0]] = parent.add_subparsers(metavar="COMMAND", title="commands", required=True)
         where = parents[group[0]] if group else top
         leaf = where.add_parser(word, help=command.about, description=command.about, allow_abbrev=False)
+        leaf.epilog = f"example:\n  {command.example}" if command.example else None
         command.add_options(leaf)
         leaf.set_defaults(command=command)
     return root

@@ -14,9 +14,11 @@ LARGEST = 8232  # [bytes] of a frame
 LARGEST_PACKET = LARGEST + LARGEST // 254 + 1  # [bytes] of it as COBS
 END = b"\x00"
 MAGIC, VERSION = 0x67, 1
+SYNC = 6
 
 _HEADER = struct.Struct("<BBBBI")
 _CRC = struct.Struct("<I")
+_SYNC = struct.Struct("<Q")
 
 
 class JsonFrame(IntEnum):
@@ -120,8 +122,17 @@ class Packets:
 
 def json_frame(kind: JsonFrame, text: bytes, boot_id: int = 0) -> bytes:
     """The frame that carries `text`."""
-    body = _HEADER.pack(MAGIC, VERSION, kind, 0, boot_id) + text
-    return body + _CRC.pack(zlib.crc32(body))
+    return _frame(kind, text, boot_id)
+
+
+def sync_frame(t0: int) -> bytes:
+    """A SYNC: any device answers it and does nothing, so it is a knock at the door."""
+    return _frame(SYNC, _SYNC.pack(t0), 0)
+
+
+def _frame(kind: int, body: bytes, boot_id: int) -> bytes:
+    frame = _HEADER.pack(MAGIC, VERSION, kind, 0, boot_id) + body
+    return frame + _CRC.pack(zlib.crc32(frame))
 
 
 def parse_json_frame(frame: bytes) -> JsonText | None:

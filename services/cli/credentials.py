@@ -1,0 +1,79 @@
+"""What a board is told over its serial line, once: networks, broker, passwords. No password is ever an argument."""
+
+from __future__ import annotations
+
+import getpass
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import msgspec
+
+from services.cli.exits import usage
+
+WIFI_PASSWORD, MQTT_PASSWORD = "GEMELO_WIFI_PASSWORD", "GEMELO_MQTT_PASSWORD"
+LONGEST_SSID = 32  # [bytes] IEEE 802.11
+WPA = (8, 63)  # [characters] of a passphrase
+
+
+class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The JSON of `provision` in firmware/PROTOCOL.md; what is None stays as the device has it."""
+
+    device: str | None = None
+    wifi_ssid: str | None = None
+    wifi_password: str | None = None
+    mqtt_uri: str | None = None
+    mqtt_user: str | None = None
+    mqtt_password: str | None = None
+    mqtt_ca: str | None = None  # PEM
+    factory_reset: bool = False
+
+    def text(self) -> bytes:
+        """As it is sent."""
+        return msgspec.json.encode(self)
+
+    def summary(self) -> str:
+        """What is given, without a password."""
+        said = [f"{name} {value}" for name in ("device", "wifi_ssid", "mqtt_uri", "mqtt_user")
+                if (value := getattr(self, name)) is not None]  # fmt: skip
+        hidden = [name for name in ("wifi_password", "mqtt_password", "mqtt_ca") if getattr(self, name) is not None]
+        return ", ".join([*said, *(f"{name} given" for name in hidden)])
+
+
+def require_sound(credentials: Credentials) -> Credentials:
+    """Raises on what no board could use, before it is sent."""
+    ssid, uri = credentials.wifi_ssid, credentials.mqtt_uri
+    if ssid is not None and len(ssid.encode()) > LONGEST_SSID:
+        raise usage(f"--wifi-ssid has {len(ssid.encode())} bytes: a network's name has at most {LONGEST_SSID}")
+    if credentials.wifi_password and not WPA[0] <= len(credentials.wifi_password) <= WPA[1]:
+        raise usage(f"the Wi-Fi password has {len(credentials.wifi_password)} characters, not {WPA[0]} to {WPA[1]}")
+    if uri is not None and not uri.startswith(("mqtt://", "mqtts://")):
+        raise usage(f'--mqtt-uri "{uri}" is written as mqtt://host:1883, or mqtts://host:8883 with TLS')
+    if credentials == Credentials():
+        raise usage("nothing to tell the device: give --device, --wifi-ssid, --mqtt-uri, ... or --factory-reset")
+    return credentials
+
+
+def password(what: str, variable: str, environ: Mapping[str, str]) -> str:
+    """From the environment, else asked on a terminal without showing it, else a line of standard input."""
+    if variable in environ:
+        return environ[variable]
+    if sys.stdin.isatty():
+        return getpass.getpass(f"{what} (empty: none): ")
+    line = sys.stdin.readline()
+    if not line:
+        raise usage(f"no {what}: set ${variable}, or write it to standard input as a line")
+    return line.rstrip("\r\n")
+
+
+def certificate(path: Path | None) -> str | None:
+    """The text of a PEM file."""
+    if path is None:
+        return None
+    try:
+        text = path.read_text(encoding="ascii")
+    except (OSError, UnicodeDecodeError) as error:
+        raise usage(f"--mqtt-ca: cannot read {path}: {error}") from error
+    if "-----BEGIN CERTIFICATE-----" not in text:
+        raise usage(f"--mqtt-ca: {path} holds no certificate in PEM")
+    return text

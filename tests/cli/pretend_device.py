@@ -1,0 +1,135 @@
+"""A gateway whose device has switches, outputs, sensors and a homing, on a bus in memory."""
+
+from __future__ import annotations
+
+import msgspec
+
+from schemas.device import (
+    ConfigureRequest,
+    ConfigureResponse,
+    DeviceCommandKind,
+    DeviceCommandRequest,
+    DeviceCommandResponse,
+    DeviceConfiguration,
+    DeviceEvent,
+    DeviceFault,
+    DeviceMode,
+    DeviceState,
+    DeviceStatus,
+    PressRequest,
+    PressResponse,
+    SensorReadings,
+)
+from schemas.topics import (
+    DEVICE_COMMAND,
+    DEVICE_CONFIGURATION,
+    DEVICE_CONFIGURE,
+    DEVICE_EVENTS,
+    DEVICE_PRESS,
+    DEVICE_STATE,
+    DEVICE_STATUS,
+    SENSORS,
+)
+from services.arm.description import Arm
+from services.runtime.node import Node
+
+TO_HOME = 0.15  # [s] for every joint
+
+Command = DeviceCommandKind
+
+
+class PretendDevice:
+    """Does at once what it is asked; homes one joint after another, or comes to `homing_fault` at the second."""
+
+    def __init__(self, node: Node, arm: Arm) -> None:
+        self.arm, self._node = arm, node
+        self.asked: list[DeviceCommandRequest] = []
+        self.pressed: list[PressRequest] = []
+        self.steps_off: dict[str, int] = {}
+        self.homing_fault = DeviceFault.NONE
+        self.state = DeviceState(
+            mode=DeviceMode.UNREFERENCED, armed=True, name=arm.joint_names, referenced=(False,) * 3,
+            steps=(933, -50, 113), velocity=(0.0,) * 3, time_scale=1.0, round_trip=0.002,
+        )  # fmt: skip
+        self._homing: list[str] = []
+        self._all: list[str] = []
+        self._since = 0.0
+        node.serve(DEVICE_COMMAND, self._on_command)
+        node.serve(DEVICE_CONFIGURE, self._on_configure)
+        node.serve(DEVICE_PRESS, self._on_press)
+        self._states, self._events = node.publisher(DEVICE_STATE), node.publisher(DEVICE_EVENTS)
+        self._statuses, self._sensors = node.publisher(DEVICE_STATUS), node.publisher(SENSORS)
+        self._configurations = node.publisher(DEVICE_CONFIGURATION)
+        self.status = DeviceStatus(
+            online=True, device="rm1", firmware="1.0.0", boot_id=0xABC, reset_cause="power_on", joints=3,
+            tick_hz=50_000, config_crc32=0x1234, wanted_crc32=0x1234, virtual=True,
+        )  # fmt: skip
+        self.configuration = DeviceConfiguration(text='{"name":"rm1"}', crc32=0x1234, accepted=True)
+        self.readings: SensorReadings | None = SensorReadings(
+            name=("ultra", "bateria"), value=(12.5, 7.4), unit=("cm", "V")
+        )
+        self.tell()
+
+    def tell(self) -> None:
+        """Says who it is again."""
+        self._statuses.put(self.status)
+        self._configurations.put(self.configuration)
+
+    def set(self, **fields) -> None:
+        self.state = msgspec.structs.replace(self.state, **fields)
+
+    def step(self, now: int) -> None:
+        if self._homing:
+            self._home()
+        self._states.put(msgspec.structs.replace(self.state, stamp=now))
+        if self.readings is not None:
+            self._sensors.put(msgspec.structs.replace(self.readings, stamp=now))
+
+    def _home(self) -> None:
+        if self._node.monotonic() - self._since < TO_HOME:
+            velocity = tuple(-80.0 if name == self._homing[0] else 0.0 for name in self.arm.joint_names)
+            self.set(velocity=velocity)
+            return
+        if self.homing_fault and len(self._homing) < len(self._all):
+            self.set(mode=DeviceMode.FAULT, fault=int(self.homing_fault), fault_joint=self._homing[0])
+            self._homing.clear()
+            return
+        self._since = self._node.monotonic()
+        name = self._homing.pop(0)
+        wire_name = self.arm.joint(name).wire_name
+        off = f": {self.steps_off[name]} steps off" if name in self.steps_off else ""
+        self._events.put(DeviceEvent(event="homed", detail=wire_name + off))
+        known = zip(self.state.referenced, self.arm.joint_names, strict=True)
+        self.set(referenced=tuple(before or each == name for before, each in known), velocity=(0.0,) * 3)
+        if not self._homing:
+            self.set(mode=DeviceMode.IDLE if all(self.state.referenced) else DeviceMode.UNREFERENCED)
+
+    def _on_command(self, request: DeviceCommandRequest) -> DeviceCommandResponse:
+        self.asked.append(request)
+        match request.command:
+            case Command.HOME:
+                self._all = list(request.name)
+                self._homing, self._since = list(request.name), self._node.monotonic()
+                self.set(mode=DeviceMode.HOMING)
+            case Command.STOP if self._homing:
+                self._homing.clear()
+                self._events.put(DeviceEvent(event="homing_stopped", detail="command"))
+                self.set(mode=DeviceMode.UNREFERENCED)
+            case Command.ARM | Command.DISARM:
+                self.set(armed=request.command is Command.ARM, referenced=(False,) * 3)
+            case Command.OUTPUT:
+                self.set(outputs=(request.output,) if request.value else ())
+            case Command.SPEED:
+                self.set(speed=request.value)
+        return DeviceCommandResponse(accepted=True, mode=self.state.mode)
+
+    def _on_configure(self, request: ConfigureRequest) -> ConfigureResponse:
+        if self.state.armed:
+            return ConfigureResponse(accepted=False, reason="the device is armed")
+        self.configuration = msgspec.structs.replace(self.configuration, accepted=True)
+        self.tell()
+        return ConfigureResponse(accepted=True, crc32=self.configuration.crc32)
+
+    def _on_press(self, request: PressRequest) -> PressResponse:
+        self.pressed.append(request)
+        return PressResponse(accepted=request.target != "efector_joint", reason="it does not slip")
