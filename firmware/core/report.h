@@ -22,6 +22,8 @@ struct Sink {
     void (*put)(void* context, Output output, const uint8_t* bytes, size_t size) = nullptr;
     // The text of a configuration that was taken, to be kept over a restart; may be null.
     void (*keep)(void* context, const uint8_t* text, size_t size) = nullptr;
+    // What keeps this board from serving a configuration that is without a fault; may be null.
+    ConfigFault (*check)(void* context, const DeviceConfig& config) = nullptr;
 };
 
 struct Acknowledgement {
