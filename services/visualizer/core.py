@@ -11,19 +11,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from schemas.device import DeviceEvent, DeviceState, DeviceStatus
+from schemas.device import DeviceEvent, DeviceState, DeviceStatus, SensorReadings, ShaftPositions
 from schemas.joints import JointState, StepErrors
 from schemas.planning import PlannedPath
 from schemas.system import LogRecord
 from services.visualizer import entities
 from services.visualizer.model import Joint, Model
-from services.visualizer.panel import Facts, mode_name, panel
+from services.visualizer.panel import LOST, Facts, panel, shaft_errors
 from services.visualizer.rotations import Array
 from services.visualizer.thinning import LAST_STAMP, Thinned
-from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip, Times, Update
+from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip, Times, Tint, Update
 
 PANEL_PERIOD = 500_000_000  # [ns]
 BAND = 0.5  # [steps] rounding to whole steps alone gives as much
+EVENT_LEVELS = {"fault": "ERROR", "estop": "ERROR", "homing_stopped": "WARNING", "press_refused": "WARNING"}
 
 
 class Visualizer:
@@ -35,6 +36,7 @@ class Visualizer:
         self._names = [joint.name for joint in model.moving]
         width = len(self._names)
         self._executed, self._commanded, self._errors = Thinned(width), Thinned(width), Thinned(width)
+        self._shaft = Thinned(width)
         self._logs: list[tuple[int, str, str]] = []
         self._path: PlannedPath | None = None
         self._path_is_new = False
@@ -66,6 +68,20 @@ class Visualizer:
         """Whether the device is there."""
         self._facts = replace(self._facts, status=message)
 
+    def on_sensors(self, message: SensorReadings) -> None:
+        """What the board reads."""
+        self._facts = replace(self._facts, sensors=message)
+
+    def on_shaft(self, message: ShaftPositions) -> None:
+        """Where a virtual device's shafts truly are; a joint that leaves its counter, or comes back, is a line."""
+        before, after = shaft_errors(self._facts.shaft), shaft_errors(message)
+        self._facts = replace(self._facts, shaft=message)
+        self._shaft.add(message.stamp, self._row(message.name, [float(each) for each in after.values()], self._shaft))
+        for name, error in after.items():
+            if is_lost(error) is not is_lost(before.get(name, 0)):
+                text = f"{name}: its shaft is {error:+d} steps from its counter"
+                self._logs.append((_bounded(message.stamp), text, "ERROR" if is_lost(error) else "INFO"))
+
     def on_planned_path(self, message: PlannedPath) -> None:
         """The way the tool will take."""
         self._path, self._path_is_new = message, True
@@ -77,12 +93,12 @@ class Visualizer:
     def on_event(self, message: DeviceEvent) -> None:
         """Something that the device reports once."""
         text = f"{message.device}: {message.event}" + (f" ({message.detail})" if message.detail else "")
-        self._logs.append((_bounded(message.stamp), text, "ERROR" if message.event == "fault" else "INFO"))
+        self._logs.append((_bounded(message.stamp), text, EVENT_LEVELS.get(message.event, "INFO")))
 
     def step(self, now: int) -> list[Update]:
         """Everything new; `now` in ns UNIX."""
-        return [*self._measured(), *self._ghost(), *self._step_errors(), *self._planned(), *self._device(now),
-                *self._log_lines()]  # fmt: skip
+        return [*self._measured(), *self._ghost(), *self._step_errors(), *self._shafts(), *self._planned(),
+                *self._device(now), *self._log_lines()]  # fmt: skip
 
     def restart(self) -> None:
         """Say the lasting things again: the viewer is a new one."""
@@ -141,6 +157,12 @@ class Visualizer:
             for column, name in enumerate(self._names)
         ]
 
+    def _shafts(self) -> list[Update]:
+        times, rows = self._shaft.take()
+        if not len(times):
+            return []
+        return [Scalars(entities.shaft(name), times, rows[:, [column]]) for column, name in enumerate(self._names)]
+
     def _planned(self) -> list[Update]:
         if self._path is None or not self._path_is_new:
             return []
@@ -156,14 +178,14 @@ class Visualizer:
         mode, text = self._mode(), panel(self._facts, now)
         shown, self._shown = self._shown, (mode, text)
         updates: list[Update] = []
-        updates += [State(entities.MODE, now, mode)] if mode != shown[0] else []
+        updates += [State(entities.MODE, now, mode), Tint(entities.MEASURED, now, mode)] if mode != shown[0] else []
         updates += [Panel(entities.PANEL, now, text)] if text != shown[1] else []
         return updates
 
     def _mode(self) -> str:
         if self._facts.status is not None and not self._facts.status.online:
             return "OFFLINE"
-        return "WAITING" if self._facts.state is None else mode_name(self._facts.state)
+        return "WAITING" if self._facts.state is None else self._facts.state.mode.name
 
     def _log_lines(self) -> list[Update]:
         logs, self._logs = self._logs, []
@@ -172,6 +194,11 @@ class Visualizer:
         stamps, lines, levels = zip(*logs, strict=True)
         texts = tuple(f"{time_of_day(stamp)} {line}" for stamp, line in zip(stamps, lines, strict=True))
         return [LogLines(entities.LOG, np.array(stamps, dtype=np.int64), texts, levels)]
+
+
+def is_lost(error: int) -> bool:
+    """Whether a shaft is farther from its counter [steps] than a motor that holds its load may be."""
+    return abs(error) > LOST
 
 
 def on_screen(joint: Joint) -> float:

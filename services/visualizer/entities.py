@@ -28,3 +28,8 @@ def executed(joint: str) -> str:
 def error(joint: str) -> str:
     """Three series: the step error and both edges of its band."""
     return f"joints/{joint}/step_error"
+
+
+def shaft(joint: str) -> str:
+    """One series, in the same plot: how far the true shaft of a virtual device is from its counter."""
+    return f"{error(joint)}/shaft"

@@ -7,12 +7,14 @@ from schemas.frames import RobotDescription
 from schemas.topics import (
     DESCRIPTION,
     DEVICE_EVENTS,
+    DEVICE_SHAFT,
     DEVICE_STATE,
     DEVICE_STATUS,
     JOINT_COMMANDS,
     JOINT_STATES,
     LOG,
     PLANNED_PATH,
+    SENSORS,
     STEP_ERRORS,
 )
 from services.runtime.application import service
@@ -67,6 +69,8 @@ def _visualizer(node: Node, message: RobotDescription) -> Visualizer:
     node.subscribe(DEVICE_STATE, core.on_device_state, batch=1 / BATCH_RATE)
     node.subscribe(DEVICE_STATUS, core.on_device_status)
     node.subscribe(DEVICE_EVENTS, core.on_event)
+    node.subscribe(SENSORS, core.on_sensors)
+    node.subscribe(DEVICE_SHAFT, core.on_shaft, batch=1 / BATCH_RATE)
     node.subscribe(PLANNED_PATH, core.on_planned_path)
     node.subscribe(LOG, core.on_log, own=True)
     return core

@@ -12,6 +12,7 @@ ERROR = (255, 122, 48)
 BAND = (240, 190, 60)
 PATH = (122, 180, 255)
 TRAIL = (255, 122, 48)
+SHAFT = (186, 130, 250)
 GRID = (140, 148, 160, 50)
 BACKGROUND = (22, 25, 30)
 
@@ -20,3 +21,6 @@ MODES = {
     "HOMING": (170, 130, 230), "IDLE": (84, 160, 110), "RUN": (86, 156, 255), "HOLD": (240, 190, 60),
     "FAULT": (230, 70, 70), "ESTOP": (230, 70, 70),
 }  # fmt: skip
+
+# The arm itself in these modes: seen from across the room.
+TINTS: dict[str, Color] = {"FAULT": (214, 48, 48), "ESTOP": (214, 48, 48), "OFFLINE": (96, 98, 102)}

@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from schemas.device import DeviceMode, DeviceState, DeviceStatus
+from schemas.device import DeviceMode, DeviceState, DeviceStatus, SensorReadings, ShaftPositions
+from schemas.device_faults import explain
 from schemas.joints import JointState, StepErrors
 
 STALE = 1_000_000_000  # [ns] after which a state is no longer called present
+
+
+LOST = 1  # [steps] between counter and shaft that a motor under load may be off
 
 
 @dataclass(frozen=True)
@@ -20,12 +24,22 @@ class Facts:
     state: DeviceState | None = None
     errors: StepErrors | None = None
     joints: JointState | None = None
+    sensors: SensorReadings | None = None
+    shaft: ShaftPositions | None = None
     prismatic: frozenset[str] = frozenset()
 
 
 def panel(facts: Facts, now: int) -> str:
     """Markdown; `now` in ns UNIX."""
-    return "\n\n".join(part for part in (_heading(facts, now), _table(facts), _numbers(facts)) if part) + "\n"
+    parts = (_heading(facts, now), _lost(facts), _device(facts, now), _table(facts), _numbers(facts))
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def shaft_errors(shaft: ShaftPositions | None) -> dict[str, int]:
+    """[steps] that each true shaft is ahead of its counter, by joint."""
+    if shaft is None:
+        return {}
+    return {name: true - counted for name, counted, true in zip(shaft.name, shaft.steps, shaft.shaft, strict=False)}
 
 
 def _heading(facts: Facts, now: int) -> str:
@@ -36,14 +50,56 @@ def _heading(facts: Facts, now: int) -> str:
         return f"## {facts.robot} · waiting for the device"
     age = now - state.stamp
     if age > STALE:
-        return f"## {facts.robot} · SILENT for {age / 1e9:.0f} s\n\nlast mode {mode_name(state)}"
-    return f"## {facts.robot} · {mode_name(state)}"
+        return f"## {facts.robot} · SILENT for {age / 1e9:.0f} s\n\nlast mode {state.mode.name}"
+    return _fault(facts.robot, state) or f"## {facts.robot} · {state.mode.name}"
 
 
-def mode_name(state: DeviceState) -> str:
-    """The mode, and the fault where there is one."""
-    fault = f" (fault {state.fault})" if state.mode is DeviceMode.FAULT else ""
-    return state.mode.name + fault
+def _fault(robot: str, state: DeviceState) -> str:
+    """In capitals, with joint and remedy; empty while all is well."""
+    about = explain(state.fault)
+    if about is None and state.mode not in (DeviceMode.FAULT, DeviceMode.ESTOP):
+        return ""
+    if about is None:
+        return f"# {robot} · {state.mode.name}"
+    where = f" AT {state.fault_joint.upper()}" if state.fault_joint else ""
+    return f"# {robot} · {about.name}{where}\n\n**{about.meaning}**\n\n{about.remedy}"
+
+
+def _lost(facts: Facts) -> str:
+    """The shafts that are not where their counters say."""
+    off = {name: error for name, error in shaft_errors(facts.shaft).items() if abs(error) > LOST}
+    if not off:
+        return ""
+    said = ", ".join(f"{name} {error:+d}" for name, error in off.items())
+    return f"**STEPS LOST: true shaft minus counter {said}** · `gemelo home {' '.join(off)}`"
+
+
+def _device(facts: Facts, now: int) -> str:
+    """Drivers, references, switches, outputs, sensors, in one line."""
+    state = facts.state
+    if state is None or (facts.status is not None and not facts.status.online):
+        return ""
+    known = dict(zip(state.name, state.referenced, strict=False))
+    parts = ["armed" if state.armed else "**DISARMED**"]
+    parts += [_references(known)] if known else []
+    parts += [f"**speed {state.speed:.0%}**"] if state.speed != 1.0 else []
+    parts += [f"**pressed: {', '.join(state.inputs)}**"] if state.inputs else []
+    parts += [f"on: {', '.join(state.outputs)}"] if state.outputs else []
+    return " · ".join([*parts, *_sensors(facts.sensors, now)])
+
+
+def _references(known: dict[str, bool]) -> str:
+    missing = [name for name, is_known in known.items() if not is_known]
+    if not missing:
+        return "all joints referenced"
+    return f"**UNREFERENCED{'' if len(missing) == len(known) else ' ' + ', '.join(missing)}**"
+
+
+def _sensors(sensors: SensorReadings | None, now: int) -> list[str]:
+    if sensors is None or now - sensors.stamp > STALE:
+        return []
+    rows = zip(sensors.name, sensors.value, sensors.unit, strict=False)
+    return [f"{name} {value:.3g} {unit}".rstrip() for name, value, unit in rows]
 
 
 def _table(facts: Facts) -> str:
@@ -58,8 +114,8 @@ def _table(facts: Facts) -> str:
             errors.name, errors.commanded, errors.executed, errors.error, errors.max_error, strict=False
         )
     ]
-    head = "| joint | position | commanded | executed | error | worst |\n|---|---|---|---|---|---|"
-    return "\n".join([head, *rows]) + "\n\ncommanded, executed, error and worst error of this motion in motor steps"
+    head = "| joint | position | steps commanded | executed | error | worst |\n|---|---|---|---|---|---|"
+    return "\n".join([head, *rows])
 
 
 def _position(facts: Facts, name: str, value: float | None) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from services.visualizer.layout import TIMELINE, blueprint
 from services.visualizer.meshes import mesh_path
 from services.visualizer.model import Joint, Model, Visual
 from services.visualizer.shapes import mesh_of
-from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip, Times, Update
+from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip, Times, Tint, Update
 
 APPLICATION = "gemelo"
 GHOST_MARGIN = 0.0015  # [m] the ghost is a skin around the arm, or the two would flicker
@@ -54,8 +55,18 @@ class Sink:
                 self._send(entity, _once(time), rr.TextDocument.columns(text=[markdown], media_type=["text/markdown"]))
             case State(entity, time, state):
                 self._send(entity, _once(time), rr.StateChange.columns(state=[state]))
+            case Tint(root, time, mode):
+                self._tint(root, time, palette.TINTS.get(mode))
             case LogLines(entity, times, texts, levels):
                 self._send(entity, times, rr.TextLog.columns(text=list(texts), level=[_level(name) for name in levels]))
+
+    def _tint(self, root: str, time: int, tint: palette.Color | None) -> None:
+        """Colours an arm, or gives it back its own colours."""
+        for entity, visual in self._visuals(root):
+            kind = rr.Asset3D if visual.shape.kind == "mesh" else rr.Mesh3D
+            color = tint or _own_color(visual)
+            columns = kind.columns(albedo_factor=[color] if color else []).partition([1 if color else 0])
+            self._send(entity, _once(time), columns)
 
     def _send(self, entity: str, times: Times, columns: rr.ComponentColumnList) -> None:
         index = rr.TimeColumn(TIMELINE, timestamp=times.astype("datetime64[ns]"))
@@ -78,22 +89,27 @@ class Sink:
         for joint in self._model.joints:
             pose = rr.Transform3D(translation=joint.translation, quaternion=joint.rotation)
             self._stream.log(f"{root}/{self._model.paths[joint.child]}", pose, static=not joint.is_moving)
+        for entity, visual in self._visuals(root):
+            pose = rr.Transform3D(translation=visual.translation, quaternion=visual.rotation)
+            drawn = self._drawn(visual, is_ghost)
+            if drawn is not None:
+                self._stream.log(entity, pose, drawn, static=True)
+
+    def _visuals(self, root: str) -> Iterator[tuple[str, Visual]]:
+        """Every visual with the entity that it has under `root`."""
         for link, visuals in self._model.visuals.items():
             for index, visual in enumerate(visuals):
-                entity = f"{root}/{self._model.paths[link]}/visual_{index}"
-                pose = rr.Transform3D(translation=visual.translation, quaternion=visual.rotation)
-                drawn = self._drawn(visual, is_ghost)
-                if drawn is not None:
-                    self._stream.log(entity, pose, drawn, static=True)
+                yield f"{root}/{self._model.paths[link]}/visual_{index}", visual
 
     def _drawn(self, visual: Visual, is_ghost: bool) -> rr.Mesh3D | rr.Asset3D | None:
-        """The visual in its colour; None where its file is missing, which is not worth the whole view."""
-        color = palette.GHOST if is_ghost else (visual.color or palette.ARM)
+        """The visual; None where its file is missing, which is not worth the whole view.
+
+        The measured arm has its colours from `Tint`, since what is static cannot change.
+        """
+        color = palette.GHOST if is_ghost else None
         if visual.shape.kind == "mesh":
             path = mesh_path(self._folder, visual.shape.file)
-            # A mesh file brings its own colours, and a URDF's colour stands over them.
-            tint = palette.GHOST if is_ghost else visual.color
-            return rr.Asset3D(path=path, albedo_factor=tint) if path.is_file() else None
+            return rr.Asset3D(path=path, albedo_factor=color) if path.is_file() else None
         mesh = mesh_of(visual.shape, GHOST_MARGIN if is_ghost else 0.0)
         return rr.Mesh3D(
             vertex_positions=mesh.vertices, vertex_normals=mesh.normals, triangle_indices=mesh.triangles,
@@ -105,10 +121,16 @@ class Sink:
         self._style(entities.executed(joint.name), [("executed", palette.EXECUTED, 1.5)])
         band = [("+0.5 step", palette.BAND, 1.5), ("-0.5 step", palette.BAND, 1.5)]
         self._style(entities.error(joint.name), [("commanded - executed", palette.ERROR, 1.5), *band])
+        self._style(entities.shaft(joint.name), [("true shaft - counter", palette.SHAFT, 1.5)])
 
     def _style(self, entity: str, series: list[tuple[str, palette.Color, float]]) -> None:
         names, colors, widths = zip(*series, strict=True)
         self._stream.log(entity, rr.SeriesLines(colors=colors, widths=widths, names=names), static=True)
+
+
+def _own_color(visual: Visual) -> palette.Color | None:
+    """The URDF's colour; None leaves a mesh file those that it brings itself."""
+    return visual.color or (None if visual.shape.kind == "mesh" else palette.ARM)
 
 
 def _once(time: int) -> Times:

@@ -69,4 +69,13 @@ class State:
     state: str
 
 
-Update: TypeAlias = Scalars | Poses | Strip | Panel | LogLines | State
+@dataclass(frozen=True)
+class Tint:
+    """The arm under `entity` as it looks in a mode of the device."""
+
+    entity: str
+    time: int
+    mode: str
+
+
+Update: TypeAlias = Scalars | Poses | Strip | Panel | LogLines | State | Tint

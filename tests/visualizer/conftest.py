@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from schemas.device import DeviceEvent, DeviceMode, DeviceState, DeviceStatus
+from schemas.device import DeviceEvent, DeviceMode, DeviceState, DeviceStatus, ShaftPositions
 from schemas.joints import JointState, StepErrors
 from schemas.planning import PlannedPath
 from schemas.system import LogLevel, LogRecord
@@ -79,6 +79,7 @@ def feed(core: Visualizer, index: int) -> int:
         DeviceState(stamp=stamp, mode=DeviceMode.RUN if is_moving else DeviceMode.IDLE, name=NAMES, steps=steps,
                     time_scale=1.0 if is_moving else 0.0, buffered=0.4 if is_moving else 0.0, round_trip=0.0011)
     )  # fmt: skip
+    core.on_shaft(ShaftPositions(stamp=stamp, name=NAMES, steps=steps, shaft=steps))
     return stamp
 
 

@@ -6,13 +6,21 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from schemas.device import DeviceEvent, DeviceMode, DeviceState, DeviceStatus
+from schemas.device import (
+    DeviceEvent,
+    DeviceFault,
+    DeviceMode,
+    DeviceState,
+    DeviceStatus,
+    SensorReadings,
+    ShaftPositions,
+)
 from schemas.joints import JointState, StepErrors
 from schemas.planning import PlannedPath
 from schemas.system import LogLevel, LogRecord
 from services.visualizer import entities
 from services.visualizer.thinning import KEEP_ALIVE, Thinned
-from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip
+from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip, Tint
 
 START = 1_795_000_000_000_000_000
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")
@@ -150,11 +158,80 @@ def test_the_panel_lists_steps_and_position_per_joint(core):
                    max_error=(0.5, 0.1, 0.1))
     )  # fmt: skip
     mode, text = device_panel(core)
-    assert mode == "FAULT (fault 1)"
+    assert mode == "FAULT"
+    assert text.startswith("# rm1 · TICK_OVERRUN\n\n**the step pulses waited")
     assert "| brazo_joint | 45.00° | 1.25 | 1 | **+0.25** | 0.50 |" in text
     assert "12.30 mm" in text
     assert "300 ms queued" in text
     assert "firmware 1.2.3" in text
+
+
+def test_a_fault_stands_in_capitals_with_joint_and_remedy(core):
+    fault = int(DeviceFault.LIMIT_SWITCH)
+    core.on_device_state(DeviceState(stamp=START, mode=DeviceMode.FAULT, fault=fault, fault_joint="brazo_joint"))
+    text = device_panel(core)[1]
+    assert text.startswith("# rm1 · LIMIT_SWITCH AT BRAZO_JOINT\n\n**its limit switch was pressed**")
+    assert "`gemelo reset`, `gemelo home`" in text
+
+
+def test_the_panel_says_what_is_not_as_usual_in_bold(core):
+    core.on_device_state(
+        DeviceState(stamp=START, mode=DeviceMode.UNREFERENCED, name=NAMES, referenced=(True, False, True), speed=0.5,
+                    inputs=("estop",), outputs=("avanzar",))
+    )  # fmt: skip
+    core.on_sensors(SensorReadings(stamp=START, name=("ultra", "bateria"), value=(12.5, 7.41), unit=("cm", "")))
+    line = device_panel(core)[1].split("\n\n")[1].strip()
+    assert line == (
+        "**DISARMED** · **UNREFERENCED antebrazo_joint** · **speed 50%** · **pressed: estop** · on: avanzar · "
+        "ultra 12.5 cm · bateria 7.41"
+    )
+
+
+def test_the_panel_is_short_where_all_is_well(core):
+    core.on_device_state(DeviceState(stamp=START, mode=DeviceMode.IDLE, name=NAMES, referenced=(True,) * 3, armed=True))
+    assert "\n\narmed · all joints referenced\n" in device_panel(core)[1]
+
+
+def test_readings_that_are_no_longer_fresh_are_left_out(core):
+    core.on_device_state(DeviceState(stamp=START + 3_000_000_000, mode=DeviceMode.IDLE))
+    core.on_sensors(SensorReadings(stamp=START, name=("ultra",), value=(12.5,), unit=("cm",)))
+    assert "ultra" not in device_panel(core, START + 3_000_000_000)[1]
+
+
+def shaft(stamp, *shafts):
+    return ShaftPositions(stamp=stamp, name=NAMES, steps=(100, 200, 300), shaft=shafts)
+
+
+def test_a_shaft_that_leaves_its_counter_is_a_series_a_line_and_a_warning_in_the_panel(core):
+    core.on_device_state(DeviceState(stamp=START, mode=DeviceMode.IDLE))
+    core.on_shaft(shaft(START, 100, 201, 300))
+    updates = by_entity(core.step(START))
+    assert updates[entities.shaft("antebrazo_joint")].values.tolist() == [[1.0]]
+    assert entities.LOG not in updates
+    assert "STEPS LOST" not in updates[entities.PANEL].markdown
+    later = START + 1_000_000_000
+    core.on_shaft(shaft(later, 63, 201, 300))
+    core.on_shaft(shaft(later + 1, 60, 201, 300))
+    updates = by_entity(core.step(later))
+    assert updates[entities.shaft("brazo_joint")].values.tolist() == [[-37.0], [-40.0]]
+    assert updates[entities.LOG].texts == ("11:06:41 brazo_joint: its shaft is -37 steps from its counter",)
+    assert updates[entities.LOG].levels == ("ERROR",)
+    assert "**STEPS LOST: true shaft minus counter brazo_joint -40** · `gemelo home brazo_joint`" in (
+        updates[entities.PANEL].markdown
+    )
+
+
+def test_the_arm_changes_its_colour_with_the_mode_and_a_new_viewer_is_told(core):
+    def tints(now):
+        return [update.mode for update in core.step(now) if isinstance(update, Tint)]
+
+    core.on_device_state(DeviceState(stamp=START, mode=DeviceMode.IDLE))
+    assert tints(START) == ["IDLE"]
+    assert tints(START + 1_000_000_000) == []
+    core.on_device_state(DeviceState(stamp=START, mode=DeviceMode.ESTOP))
+    assert tints(START + 2_000_000_000) == ["ESTOP"]
+    core.restart()
+    assert tints(START + 3_000_000_000) == ["ESTOP"]
 
 
 def test_every_update_is_finite_and_ordered(core):

@@ -13,6 +13,8 @@ import rerun.blueprint as rrb
 from services.visualizer import entities
 from services.visualizer.layout import blueprint
 from services.visualizer.sink import Sink
+from services.visualizer.updates import Tint
+from services.visualizer.urdf import parse_urdf
 
 
 class Listener:
@@ -20,9 +22,14 @@ class Listener:
 
     def __init__(self) -> None:
         self.said: dict[str, list[Any]] = {}
+        self.sent: list[tuple[str, list[int]]] = []
 
     def log(self, entity: str, *things: Any, static: bool = False) -> None:
         self.said.setdefault(entity, []).extend(things)
+
+    def send_columns(self, entity: str, index: list[Any], columns: Any) -> None:
+        (column,) = columns
+        self.sent.append((entity, column.as_arrow_array().values.to_pylist()))
 
     def send_blueprint(self, layout: rrb.Blueprint) -> None:
         self.layout = layout
@@ -67,13 +74,38 @@ def test_series_say_what_they_are_and_the_band_is_half_a_step(said, model):
         assert series(said[entities.executed(joint.name)]) == ["executed"]
         assert series(said[entities.commanded(joint.name)]) == ["commanded"]
         assert series(said[entities.error(joint.name)]) == ["commanded - executed", "+0.5 step", "-0.5 step"]
+        assert series(said[entities.shaft(joint.name)]) == ["true shaft - counter"]
 
 
-def test_the_measured_arm_is_solid_and_the_commanded_one_a_translucent_ghost(said):
-    solid, ghost = alphas(said, entities.MEASURED), alphas(said, entities.COMMANDED)
-    assert len(solid) == len(ghost) > 3
-    assert set(solid) == {255}
+def test_the_measured_arm_is_solid_and_the_commanded_one_a_translucent_ghost(said, model, tmp_path):
+    ghost = alphas(said, entities.COMMANDED)
+    assert len(ghost) > 3
     assert max(ghost) < 128
+    assert len(colors_in(model, tmp_path, "IDLE")) == len(ghost)
+    assert {color & 0xFF for color in colors_in(model, tmp_path, "IDLE")} == {255}
+
+
+def test_the_measured_arm_is_red_in_fault_and_its_own_colours_otherwise(model, tmp_path):
+    red = 0xD63030FF
+    assert set(colors_in(model, tmp_path, "ESTOP")) == set(colors_in(model, tmp_path, "FAULT")) == {red}
+    own = colors_in(model, tmp_path, "IDLE")
+    assert red not in own
+    assert len(set(own)) > 1
+
+
+def test_meshes_keep_the_colours_of_their_files_but_in_fault(rm1_folder):
+    rm1 = parse_urdf((rm1_folder / "robot.urdf").read_text())
+    assert colors_in(rm1, rm1_folder, "IDLE") == []
+    assert len(colors_in(rm1, rm1_folder, "FAULT")) >= len(rm1.visuals)
+
+
+def colors_in(model, folder: Path, mode: str) -> list[int]:
+    """0xRRGGBBAA of every visual of the measured arm in a mode of the device."""
+    listener = Listener()
+    Sink(listener, model, folder, window=20.0, trail=20.0).write([Tint(entities.MEASURED, 0, mode)])
+    return [
+        color for entity, columns in listener.sent if entity.startswith(f"{entities.MEASURED}/") for color in columns
+    ]
 
 
 def series(things: list[Any]) -> list[str]:

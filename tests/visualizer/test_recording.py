@@ -23,6 +23,7 @@ def printed(recording):
     [
         entities.MODE, entities.PANEL, entities.LOG, entities.PATH, entities.TRAIL,
         entities.commanded("brazo_joint"), entities.executed("efector_joint"), entities.error("antebrazo_joint"),
+        entities.shaft("antebrazo_joint"),
         f"{entities.MEASURED}/base_link/brazo_link/antebrazo_link/efector_link",
         f"{entities.COMMANDED}/base_link/brazo_link/visual_0",
     ],
