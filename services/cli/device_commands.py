@@ -1,4 +1,4 @@
-"""Commands about the device: home, output, sensors, speed, and `gemelo device ...`."""
+"""Commands about the controller board: `gemelo device ...`."""
 
 from __future__ import annotations
 
@@ -6,68 +6,9 @@ import os
 from pathlib import Path
 
 from services.cli.exits import ExitCode, usage
-from services.cli.parser import Command, Options, Parser, Words, finite_number, positive_integer, positive_number
+from services.cli.parser import Command, Options, Parser, Words, json_option, positive_integer, positive_number
 
 GROUPS = {"device": "the controller board: how it is, what it is told, and its drivers"}
-
-
-def json_option(parser: Parser) -> None:
-    parser.add_argument("--json", action="store_true", help="JSON instead of text")
-
-
-def home_options(parser: Parser) -> None:
-    parser.add_argument("joints", metavar="JOINT", nargs="*", help="all that have a home switch, if none is named")
-    json_option(parser)
-
-
-def home(options: Options) -> ExitCode:
-    from services.cli.device_names import homing_joints
-    from services.cli.home import home
-    from services.cli.session import connect, load
-
-    homing_joints(load()[1], options.joints)
-    with connect() as session:
-        return home(session, options.joints, options.json)
-
-
-def output_options(parser: Parser) -> None:
-    parser.add_argument("output", metavar="OUTPUT", help="a name of robot.toml's [[output]]")
-    parser.add_argument("state", choices=("on", "off"), help="on or off")
-
-
-def output(options: Options) -> ExitCode:
-    from services.cli.device import output
-    from services.cli.device_names import require_name
-    from services.cli.session import connect, load
-
-    require_name("output", options.output, load()[1].outputs)
-    with connect() as session:
-        return output(session, options.output, options.state == "on")
-
-
-def sensors(options: Options) -> ExitCode:
-    from services.cli.device_status import sensors
-    from services.cli.session import connect
-
-    with connect() as session:
-        return sensors(session, options.json)
-
-
-def percent(text: str) -> float:
-    return finite_number(text.removesuffix("%"))
-
-
-def speed_options(parser: Parser) -> None:
-    parser.add_argument("percent", metavar="PERCENT", type=percent, help="of the planned speed, 0 to 100")
-
-
-def speed(options: Options) -> ExitCode:
-    from services.cli.device import share_of, speed
-    from services.cli.session import connect
-
-    share_of(options.percent)
-    with connect() as session:
-        return speed(session, options.percent)
 
 
 def device_status(options: Options) -> ExitCode:
@@ -175,18 +116,6 @@ def device_provision(options: Options) -> ExitCode:
     return provision(options.serial, options.baud, told.require_sound(credentials))
 
 
-def joint_words() -> Words:
-    from services.cli.device_words import joints
-
-    return joints()
-
-
-def output_words() -> Words:
-    from services.cli.device_words import outputs
-
-    return outputs()
-
-
 def press_words() -> Words:
     from services.cli.device_words import presses
 
@@ -194,13 +123,6 @@ def press_words() -> Words:
 
 
 COMMANDS = (
-    Command(("home",), "let the joints find their switches; Ctrl-C stops them", home, home_options,
-            "gemelo home brazo_joint", joint_words),
-    Command(("output",), "switch an output of the device", output, output_options, "gemelo output avanzar on",
-            output_words),
-    Command(("sensors",), "what the device's sensors read", sensors, json_option, "gemelo sensors --json"),
-    Command(("speed",), "how fast the device plays every path from now on; 0 lets it stand on it", speed, speed_options,
-            "gemelo speed 50"),
     Command(("device", "status"), "who the device is, its mode, faults, switches, outputs and sensors", device_status,
             json_option, "gemelo device status"),
     Command(("device", "monitor"), "a line for everything that changes, until Ctrl-C", device_monitor, monitor_options,

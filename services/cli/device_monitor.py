@@ -10,8 +10,8 @@ import msgspec
 from schemas.device import DeviceConfiguration, DeviceState, DeviceStatus
 from schemas.topics import DEVICE_CONFIGURATION, DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
 from services.cli.device_changes import configuration_changes, event_text, state_changes, status_changes
-from services.cli.device_snapshot import text_of
 from services.cli.device_status import snapshot_of
+from services.cli.device_text import text_of
 from services.cli.device_view import DeviceView
 from services.cli.exits import ExitCode
 from services.cli.live import LiveBlock

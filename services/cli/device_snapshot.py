@@ -1,4 +1,4 @@
-"""What `gemelo device status` says, put together from the newest messages. Pure."""
+"""What is known of the device, put together from the newest messages. Pure."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from schemas.device import DeviceConfiguration, DeviceMode, DeviceState, DeviceStatus, SensorReadings
+from schemas.device import DeviceConfiguration, DeviceState, DeviceStatus, SensorReadings
 from schemas.device_faults import Explanation, explain
-from services.cli.columns import table
 from services.cli.device_names import joint_name
 
 if TYPE_CHECKING:
@@ -109,83 +108,4 @@ def _joint(arm: Arm, name: str, state: DeviceState | None, active: frozenset[str
         steps=state.steps[index] if index < len(state.steps) else None,
         velocity=state.velocity[index] if index < len(state.velocity) else None,
         switches=switches,
-    )
-
-
-def text_of(view: DeviceSnapshot) -> str:
-    """One screen."""
-    lines = [f"device   {_who(view.status)}", f"config   {view.configuration}"]
-    if view.state is None:
-        return "\n".join(lines)
-    lines += [f"mode     {_mode(view, view.state)}", *_fault(view), f"drivers  {_drivers(view.state)}"]
-    lines += [f"speed    {view.state.speed:.0%} asked for, the path runs at {view.state.time_scale:.0%}"]
-    lines += _named("inputs", view.inputs, "PRESSED", "released") + _named("outputs", view.outputs, "on", "off")
-    lines += [f"sensors  {', '.join(map(reading_text, view.sensors))}"] if view.sensors else []
-    return "\n".join([*lines, f"link     {_link(view.state)}", "", _joints(view)])
-
-
-def reading_text(reading: Reading) -> str:
-    """`ultra 12.5 cm`."""
-    value = "-" if reading.value is None else f"{reading.value:.6g}"
-    return f"{reading.name} {value} {reading.unit}".rstrip()
-
-
-def _who(status: DeviceStatus) -> str:
-    name = status.device or "unknown"
-    if not status.online:
-        return f"{name}: OFFLINE: {status.reason or 'no reason is known'}"
-    kind = "virtual, " if status.virtual else ""
-    reason = f"; {status.reason}" if status.reason else ""
-    return (
-        f"{name}: online, {kind}firmware {status.firmware}, boot {status.boot_id:08x} ({status.reset_cause}), "
-        f"{status.joints} joints, tick {status.tick_hz / 1000:g} kHz{reason}"
-    )
-
-
-def _mode(view: DeviceSnapshot, state: DeviceState) -> str:
-    hints = {
-        DeviceMode.BOOT: "it has no configuration yet: `gemelo device config --push`",
-        DeviceMode.UNREFERENCED: "it does not know where its joints are: `gemelo home` or `gemelo reference`",
-        DeviceMode.HOLD: "it stands on its path: `gemelo resume` or `gemelo stop`",
-    }
-    hint = hints.get(state.mode, "")
-    return f"{state.mode.name}: {hint}" if hint else state.mode.name
-
-
-def _fault(view: DeviceSnapshot) -> list[str]:
-    if not view.fault:
-        return []
-    where = f' at joint "{view.fault_joint}"' if view.fault_joint else ""
-    return [f"fault    {view.fault}{where}: {view.meaning}", f"remedy   {view.remedy}"]
-
-
-def _drivers(state: DeviceState) -> str:
-    return "armed: the motors hold" if state.armed else "disarmed: the motors are without current, `gemelo device arm`"
-
-
-def _named(heading: str, parts: dict[str, bool], yes: str, no: str) -> list[str]:
-    said = ", ".join(f"{name} {yes if is_on else no}" for name, is_on in parts.items())
-    return [f"{heading:<8} {said}"] if said else []
-
-
-def _link(state: DeviceState) -> str:
-    return (
-        f"round trip {state.round_trip * 1e3:.1f} ms, {state.buffered:.2f} s of path queued; since boot "
-        f"{state.underruns} under-runs, {state.refused} refused, {state.bad_frames} bad frames"
-    )
-
-
-def _joints(view: DeviceSnapshot) -> str:
-    return table(("joint", "referenced", "steps", "velocity [steps/s]", "switches"), [_row(j) for j in view.joints])
-
-
-def _row(joint: DeviceJoint) -> tuple[str, ...]:
-    words = {None: "-", True: "yes", False: "NO"}
-    switches = ", ".join(f"{name} {'PRESSED' if on else 'released'}" for name, on in joint.switches.items())
-    return (
-        joint.name,
-        words[joint.referenced],
-        "-" if joint.steps is None else str(joint.steps),
-        "-" if joint.velocity is None else f"{joint.velocity:.1f}",
-        switches or "none",
     )

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from services.cli.columns import table
-from services.cli.device_snapshot import DeviceSnapshot, device_snapshot, readings, text_of
+from services.cli.device_snapshot import DeviceSnapshot, device_snapshot, readings
+from services.cli.device_text import text_of
 from services.cli.device_view import DeviceView
 from services.cli.exits import CommandError, ExitCode
 

@@ -76,6 +76,10 @@ def build(commands: Iterable[Command], groups: dict[str, str], about: str, epilo
     return root
 
 
+def json_option(parser: Parser) -> None:
+    parser.add_argument("--json", action="store_true", help="JSON instead of text")
+
+
 def positive_integer(text: str) -> int:
     value = int(text)
     if value < 1:

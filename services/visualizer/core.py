@@ -11,20 +11,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from schemas.device import DeviceEvent, DeviceState, DeviceStatus, SensorReadings, ShaftPositions
+from schemas.device import DeviceState, DeviceStatus, SensorReadings, ShaftPositions
 from schemas.joints import JointState, StepErrors
 from schemas.planning import PlannedPath
-from schemas.system import LogRecord
 from services.visualizer import entities
+from services.visualizer.journal import Journal, bounded
 from services.visualizer.model import Joint, Model
 from services.visualizer.panel import LOST, Facts, panel, shaft_errors
 from services.visualizer.rotations import Array
-from services.visualizer.thinning import LAST_STAMP, Thinned
-from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip, Times, Tint, Update
+from services.visualizer.thinning import Thinned
+from services.visualizer.updates import Panel, Poses, Scalars, State, Strip, Times, Tint, Update
 
 PANEL_PERIOD = 500_000_000  # [ns]
 BAND = 0.5  # [steps] rounding to whole steps alone gives as much
-EVENT_LEVELS = {"fault": "ERROR", "estop": "ERROR", "homing_stopped": "WARNING", "press_refused": "WARNING"}
 
 
 class Visualizer:
@@ -37,7 +36,7 @@ class Visualizer:
         width = len(self._names)
         self._executed, self._commanded, self._errors = Thinned(width), Thinned(width), Thinned(width)
         self._shaft = Thinned(width)
-        self._logs: list[tuple[int, str, str]] = []
+        self.journal = Journal()
         self._path: PlannedPath | None = None
         self._path_is_new = False
         self._tip: Array | None = None  # where the trail ends
@@ -80,25 +79,16 @@ class Visualizer:
         for name, error in after.items():
             if is_lost(error) is not is_lost(before.get(name, 0)):
                 text = f"{name}: its shaft is {error:+d} steps from its counter"
-                self._logs.append((_bounded(message.stamp), text, "ERROR" if is_lost(error) else "INFO"))
+                self.journal.add(message.stamp, text, "ERROR" if is_lost(error) else "INFO")
 
     def on_planned_path(self, message: PlannedPath) -> None:
         """The way the tool will take."""
         self._path, self._path_is_new = message, True
 
-    def on_log(self, message: LogRecord) -> None:
-        """A line of a node."""
-        self._logs.append((_bounded(message.stamp), f"{message.node}: {message.text}", message.level.name))
-
-    def on_event(self, message: DeviceEvent) -> None:
-        """Something that the device reports once."""
-        text = f"{message.device}: {message.event}" + (f" ({message.detail})" if message.detail else "")
-        self._logs.append((_bounded(message.stamp), text, EVENT_LEVELS.get(message.event, "INFO")))
-
     def step(self, now: int) -> list[Update]:
         """Everything new; `now` in ns UNIX."""
         return [*self._measured(), *self._ghost(), *self._step_errors(), *self._shafts(), *self._planned(),
-                *self._device(now), *self._log_lines()]  # fmt: skip
+                *self._device(now), *self.journal.take()]  # fmt: skip
 
     def restart(self) -> None:
         """Say the lasting things again: the viewer is a new one."""
@@ -168,7 +158,7 @@ class Visualizer:
             return []
         self._path_is_new = False
         return [
-            Strip(entities.PATH, _bounded(self._path.stamp), np.array(self._path.points, dtype=float).reshape(-1, 3))
+            Strip(entities.PATH, bounded(self._path.stamp), np.array(self._path.points, dtype=float).reshape(-1, 3))
         ]
 
     def _device(self, now: int) -> list[Update]:
@@ -187,14 +177,6 @@ class Visualizer:
             return "OFFLINE"
         return "WAITING" if self._facts.state is None else self._facts.state.mode.name
 
-    def _log_lines(self) -> list[Update]:
-        logs, self._logs = self._logs, []
-        if not logs:
-            return []
-        stamps, lines, levels = zip(*logs, strict=True)
-        texts = tuple(f"{time_of_day(stamp)} {line}" for stamp, line in zip(stamps, lines, strict=True))
-        return [LogLines(entities.LOG, np.array(stamps, dtype=np.int64), texts, levels)]
-
 
 def is_lost(error: int) -> bool:
     """Whether a shaft is farther from its counter [steps] than a motor that holds its load may be."""
@@ -204,16 +186,6 @@ def is_lost(error: int) -> bool:
 def on_screen(joint: Joint) -> float:
     """Screen units per SI unit: mm for a prismatic joint, degrees for the others."""
     return 1e3 if joint.is_prismatic else math.degrees(1.0)
-
-
-def time_of_day(stamp: int) -> str:
-    """UTC to the second, of ns UNIX."""
-    minutes, seconds = divmod(stamp // 1_000_000_000 % 86_400, 60)
-    return f"{minutes // 60:02d}:{minutes % 60:02d}:{seconds:02d}"
-
-
-def _bounded(stamp: int) -> int:
-    return min(max(stamp, 0), LAST_STAMP)
 
 
 def unit(joint: Joint) -> str:

@@ -68,11 +68,11 @@ def _visualizer(node: Node, message: RobotDescription) -> Visualizer:
     node.subscribe(STEP_ERRORS, core.on_step_errors, batch=1 / BATCH_RATE)
     node.subscribe(DEVICE_STATE, core.on_device_state, batch=1 / BATCH_RATE)
     node.subscribe(DEVICE_STATUS, core.on_device_status)
-    node.subscribe(DEVICE_EVENTS, core.on_event)
+    node.subscribe(DEVICE_EVENTS, core.journal.on_event)
     node.subscribe(SENSORS, core.on_sensors)
     node.subscribe(DEVICE_SHAFT, core.on_shaft, batch=1 / BATCH_RATE)
     node.subscribe(PLANNED_PATH, core.on_planned_path)
-    node.subscribe(LOG, core.on_log, own=True)
+    node.subscribe(LOG, core.journal.on_log, own=True)
     return core
 
 

@@ -119,8 +119,8 @@ def test_the_planned_path_is_told_once_and_again_to_a_new_viewer(core):
 
 
 def test_logs_and_events_are_lines_with_a_level(core):
-    core.on_log(LogRecord(stamp=START, node="planner", level=LogLevel.WARNING, text="slow"))
-    core.on_event(DeviceEvent(stamp=START, device="rm1", event="fault", detail="TICK_OVERRUN"))
+    core.journal.on_log(LogRecord(stamp=START, node="planner", level=LogLevel.WARNING, text="slow"))
+    core.journal.on_event(DeviceEvent(stamp=START, device="rm1", event="fault", detail="TICK_OVERRUN"))
     (lines,) = [update for update in core.step(START) if isinstance(update, LogLines)]
     assert lines.texts == ("11:06:40 planner: slow", "11:06:40 rm1: fault (TICK_OVERRUN)")
     assert lines.levels == ("WARNING", "ERROR")
