@@ -12,6 +12,26 @@ from services.stepper_gateway.moment import Moment
 RETRY = 0.1  # [s]
 TIME_TO_LIVE = 500_000  # [us]
 INTERNAL = 0  # ticket of the gateway's own commands
+EXCLUSIVE = (  # what a person has asked for would hit whatever is started before the answer
+    DeviceCommandKind.STOP,
+    DeviceCommandKind.RESET,
+    DeviceCommandKind.REFERENCE,
+    DeviceCommandKind.ARM,
+    DeviceCommandKind.DISARM,
+    DeviceCommandKind.HOME,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """What a command says besides its kind, as the frame has it."""
+
+    positions: tuple[int, ...] = ()  # [1/256 step] of REFERENCE
+    index: int = 0
+    argument: int = 0
+
+
+NO_ARGUMENTS = Arguments()
 
 
 @dataclass
@@ -20,7 +40,7 @@ class PendingCommand:
 
     cmd_id: int
     kind: DeviceCommandKind
-    positions: tuple[int, ...]  # [1/256 step] of REFERENCE
+    arguments: Arguments
     ticket: int
     deadline: float  # [s] monotonic
     sent: float = -1.0e9  # [s] monotonic, the last time
@@ -35,20 +55,19 @@ class Commands:
 
     def ask(
         self, kind: DeviceCommandKind, moment: Moment, timeout: float, ticket: int = INTERNAL,
-        positions: tuple[int, ...] = (),
+        arguments: Arguments = NO_ARGUMENTS,
     ) -> None:  # fmt: skip
         """Have `kind` sent with the next frames."""
         self._next_id = self._next_id % 0xFFFFFFFF + 1
         deadline = moment.monotonic + timeout
-        self._pending.append(PendingCommand(self._next_id, kind, positions, ticket, deadline))
+        self._pending.append(PendingCommand(self._next_id, kind, arguments, ticket, deadline))
 
     def is_pending(self, kind: DeviceCommandKind) -> bool:
         return any(command.kind == kind for command in self._pending)
 
     def hindrance(self) -> str:
-        """Why nothing may be started now, empty if it may: what a person has asked for would hit it."""
-        kinds = (DeviceCommandKind.STOP, DeviceCommandKind.RESET, DeviceCommandKind.REFERENCE)
-        asked = [c.kind.name for c in self._pending if c.ticket != INTERNAL and c.kind in kinds]
+        """Why nothing may be started now, empty if it may."""
+        asked = [c.kind.name for c in self._pending if c.ticket != INTERNAL and c.kind in EXCLUSIVE]
         return f"the device has not answered {asked[0]} yet: wait a moment" if asked else ""
 
     def due(self, moment: Moment, clock: ClockSync, boot_id: int) -> list[Command]:
@@ -64,7 +83,9 @@ class Commands:
                         cmd_id=command.cmd_id,
                         expires_us=expires,
                         cmd=command.kind,
-                        positions=command.positions,
+                        index=command.arguments.index,
+                        argument=command.arguments.argument,
+                        positions=command.arguments.positions,
                     )
                 )
         return frames

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceMode, DeviceStatus
+from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceMode, DeviceStatus, PressRequest
 from schemas.joints import JointTargets
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.system import LogLevel
-from schemas.topics import DEVICE_STATE, DEVICE_STATUS, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS
+from schemas.topics import DEVICE_SHAFT, DEVICE_STATE, DEVICE_STATUS, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS
 from services.arm.description import Arm
 from services.stepper_gateway.desk import CommandDesk
+from services.stepper_gateway.event_desk import pass_on
 from services.stepper_gateway.goals import Goals, GoalVerdict
 from services.stepper_gateway.links.frames import (
     Ack,
@@ -26,15 +27,33 @@ from services.stepper_gateway.links.frames import (
     encode,
 )
 from services.stepper_gateway.links.link import Kind, Received
-from services.stepper_gateway.links.reports import EventReport, StatusReport, decode_event, decode_status
+from services.stepper_gateway.links.reports import (
+    ConfigAckReport,
+    EventReport,
+    ShaftReport,
+    StatusReport,
+    decode_report,
+    decode_sensors,
+)
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.mover import Mover
 from services.stepper_gateway.outputs import Outbox, Output
 from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.path_log import PathPoint
+from services.stepper_gateway.presses import PressDesk
+from services.stepper_gateway.sensors import SensorWatch
+from services.stepper_gateway.status import status_of
 from services.stepper_gateway.streaming import Streaming
 
 BAD_FRAME_REPORT = 1.0  # [s] between two
+PAUSES = (  # commands that leave goals and targets as they are
+    DeviceCommandKind.HOLD,
+    DeviceCommandKind.RESUME,
+    DeviceCommandKind.OUTPUT,
+    DeviceCommandKind.SPEED,
+    DeviceCommandKind.ARM,
+)
+LOST = (DeviceMode.FAULT, DeviceMode.ESTOP, DeviceMode.UNREFERENCED, DeviceMode.HOMING, DeviceMode.BOOT)
 
 
 class GatewayCore:
@@ -46,6 +65,8 @@ class GatewayCore:
         self.goals = Goals(self.mover)
         self.streaming = Streaming(self.mover)
         self.desk = CommandDesk(self.mover)
+        self.sensors = SensorWatch(self.mover)
+        self.presses = PressDesk(self.mover)
         self.bad_frames = 0
         self._bad_reported = -1.0e9  # [s] monotonic
         self._told: DeviceStatus | None = None
@@ -56,7 +77,8 @@ class GatewayCore:
 
     def not_ready(self, moment: Moment) -> str:
         """Why the gateway's state is not valid, empty if it is."""
-        return self.mover.session.absence(moment, self.mover.parameters.state_timeout)
+        mover = self.mover
+        return mover.absence(moment) or ("" if mover.state is not None else mover.hindrance())
 
     def on_link(self, connected: bool, reason: str, moment: Moment) -> list[Output]:
         """The wire has come or gone."""
@@ -101,9 +123,20 @@ class GatewayCore:
 
     def on_command(self, request: DeviceCommandRequest, ticket: int, moment: Moment) -> list[Output]:
         """A person's command; its answer comes as a `CommandAnswer` with this ticket."""
-        if self.desk.ask(request, ticket, moment):
+        if self.desk.ask(request, ticket, self.goals.is_active, moment):
             self._give_way(request, moment)
         self.desk.send_due(moment)
+        return self._finish(moment)
+
+    def on_configure(self, ticket: int, moment: Moment) -> list[Output]:
+        """A person wants the device configured; the answer comes as a `ConfigureAnswer` with this ticket."""
+        mover = self.mover
+        mover.configuration.ask(ticket, mover.absence(moment), moment)
+        return self._finish(moment)
+
+    def on_press(self, request: PressRequest, ticket: int, moment: Moment) -> list[Output]:
+        """A press of a virtual device; its answer comes as a `PressAnswer` with this ticket."""
+        self.presses.ask(request, ticket, moment)
         return self._finish(moment)
 
     def step(self, moment: Moment) -> list[Output]:
@@ -113,24 +146,39 @@ class GatewayCore:
         self._stepped = moment.monotonic
         for frame in mover.session.due(moment):
             self._out.send(Kind.HB if isinstance(frame, Heartbeat) else Kind.SYNC, encode(frame))
-        if reason := self.not_ready(moment):
-            self._lose(reason, moment)
+        absence = mover.absence(moment)
+        if absence:
+            self._lose(absence, moment)
         self.goals.step(moment, period)
         self.streaming.step(moment)
         if mover.stop_strangers(moment):
             self.goals.on_stranger(moment)
         self.desk.step(moment)
+        mover.configuration.step(absence, moment)
+        self.presses.step(moment)
+        self.sensors.step(absence, moment)
         mover.pump(moment)
         return self._finish(moment)
 
     def _dispatch(self, received: Received, moment: Moment) -> None:
-        arrival = received.arrival * 1e-9
-        if received.kind == Kind.STATUS:
-            return self._on_status(decode_status(received.payload))
-        if received.retained:
+        payload, arrival = received.payload, received.arrival * 1e-9
+        if received.retained and received.kind != Kind.STATUS:
             raise BadFrame("it is retained, and only a status may be")
-        if received.kind == Kind.EVENT:
-            return self._on_event(decode_event(received.payload), moment)
+        match received.kind:
+            case Kind.STATUS:
+                self._on_status(decode_report(StatusReport, payload), moment)
+            case Kind.EVENT:
+                self._on_event(decode_report(EventReport, payload), moment)
+            case Kind.CONFIG_ACK:
+                self.mover.configuration.on_ack(decode_report(ConfigAckReport, payload))
+            case Kind.SENSORS:
+                self.sensors.on_readings(decode_sensors(payload), arrival, moment)
+            case Kind.SHAFT:
+                self._on_shaft(decode_report(ShaftReport, payload), arrival, moment)
+            case _:
+                self._on_frame(received, arrival, moment)
+
+    def _on_frame(self, received: Received, arrival: float, moment: Moment) -> None:
         frame = decode(received.payload)
         match received.kind, frame:
             case Kind.STATE, State():
@@ -146,20 +194,26 @@ class GatewayCore:
             case _:
                 raise BadFrame(f"a {type(frame).__name__} frame does not belong there")
 
-    def _on_status(self, status: StatusReport) -> None:
-        self.mover.session.on_status(status)
-        known = self.mover.session.status
+    def _on_status(self, status: StatusReport, moment: Moment) -> None:
+        mover = self.mover
+        before = mover.configuration.device_crc32
+        mover.session.on_status(status)
+        mover.configuration.on_status()
+        if before and mover.configuration.device_crc32 != before:
+            self._fail("the device has another configuration", moment)
+            mover.begin_anew()
+        known = mover.session.status
         if known is not None and known.tick_hz:
             self.goals.use_tick(known.tick_hz)
 
     def _on_event(self, event: EventReport, moment: Moment) -> None:
-        is_asked_for = event.detail == "command"
-        is_trouble = event.event in ("fault", "hold", "underrun") and not is_asked_for
-        level = LogLevel.WARNING if is_trouble else LogLevel.INFO
+        pass_on(event, self.mover, moment)
+        self.presses.on_event(event)
+
+    def _on_shaft(self, report: ShaftReport, arrival: float, moment: Moment) -> None:
         clock = self.mover.session.clock
-        happened = clock.monotonic(event.t_us) if clock.is_synchronised and event.t_us else moment.monotonic
-        happened = min(happened, moment.monotonic)
-        self.mover.event(event.event, event.detail, Moment(moment.unix_at(happened), happened), level)
+        measured = min(clock.monotonic(report.t_us), arrival) if clock.is_synchronised else arrival
+        self._out.publish(DEVICE_SHAFT, self.mover.reporter.shaft(report, moment.unix_at(measured)))
 
     def _on_state(self, state: State, arrival: float, moment: Moment) -> None:
         mover = self.mover
@@ -168,29 +222,39 @@ class GatewayCore:
             self._reboot(moment)
         if not is_news:
             return
+        if not mover.session.fits(state):
+            self._fail(mover.hindrance(), moment)
+            self._publish_device(state, moment)
+            return
         mover.on_state(state, arrival)
         point = mover.commanded(state)
         self._publish(state, point, moment)
         if state.mode == DeviceMode.HOLD and mover.is_followed(state) and not mover.is_held:
             self.streaming.interrupt()
             self.goals.on_hold(moment)
-        if state.mode in (DeviceMode.FAULT, DeviceMode.ESTOP, DeviceMode.UNREFERENCED):
-            self._fail(mover.session.hindrance(), moment)
+        if state.mode in LOST:
+            self._fail(mover.hindrance(), moment)
         self.goals.on_ack()
         self.goals.on_state(state, point, moment)
 
     def _publish(self, state: State, point: PathPoint, moment: Moment) -> None:
-        mover, clock = self.mover, self.mover.session.clock
-        measured = clock.monotonic(state.t_us) if clock.is_synchronised else mover.session.state_arrival
+        reporter = self.mover.reporter
+        stamp = self._publish_device(state, moment)
+        self._out.publish(JOINT_STATES, reporter.joint_state(state, stamp))
+        self._out.publish(JOINT_COMMANDS, reporter.joint_command(point, state, stamp))
+        self._out.publish(STEP_ERRORS, reporter.step_errors(point, state, stamp))
+
+    def _publish_device(self, state: State, moment: Moment) -> int:
+        """The state's stamp [ns]."""
+        session = self.mover.session
+        measured = session.clock.monotonic(state.t_us) if session.clock.is_synchronised else session.state_arrival
         stamp = moment.unix_at(min(measured, moment.monotonic))
-        self._out.publish(JOINT_STATES, mover.reporter.joint_state(state, stamp))
-        self._out.publish(JOINT_COMMANDS, mover.reporter.joint_command(point, state, stamp))
-        self._out.publish(STEP_ERRORS, mover.reporter.step_errors(point, state, stamp))
-        self._out.publish(DEVICE_STATE, mover.reporter.device_state(state, stamp, clock))
+        self._out.publish(DEVICE_STATE, self.mover.reporter.device_state(state, stamp, session.clock))
+        return stamp
 
     def _give_way(self, request: DeviceCommandRequest, moment: Moment) -> None:
         """A person's command comes before goals and targets."""
-        if request.command in (DeviceCommandKind.HOLD, DeviceCommandKind.RESUME):
+        if request.command in PAUSES:
             return
         self.streaming.interrupt()
         if self.goals.is_active:
@@ -205,7 +269,7 @@ class GatewayCore:
         self.mover.event("rebooted", f"{reason}: its position and boot id are read anew", moment)
         self._fail(reason, moment)
         self.desk.give_up(reason)
-        self.mover.rebooted()
+        self.mover.begin_anew()
 
     def _lose(self, reason: str, moment: Moment) -> None:
         """The device cannot be reached: whatever it does now it does by itself, and nothing of it is continued."""
@@ -221,7 +285,7 @@ class GatewayCore:
 
     def _finish(self, moment: Moment) -> list[Output]:
         """Tell of the device's status where it has changed, and hand the outputs out."""
-        status = self.mover.session.status_message(moment, self.mover.parameters.state_timeout)
+        status = status_of(self.mover, moment)
         if self._told is None or replace(status, stamp=0) != self._told:
             self._told = replace(status, stamp=0)
             self._out.publish(DEVICE_STATUS, status)

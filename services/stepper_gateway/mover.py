@@ -10,6 +10,8 @@ from schemas.system import LogLevel
 from schemas.topics import COMMAND_ACKS, COMMANDS, DEVICE_EVENTS
 from services.arm.description import Arm
 from services.stepper_gateway.commands import Commands
+from services.stepper_gateway.configuration import Configuration
+from services.stepper_gateway.hindrance import hindrance
 from services.stepper_gateway.knots import Knot, whole_steps
 from services.stepper_gateway.links.frames import Ack, Chunk, State, encode
 from services.stepper_gateway.links.link import Kind
@@ -20,6 +22,7 @@ from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.path_log import PathPoint
 from services.stepper_gateway.reporting import Reporter
 from services.stepper_gateway.session import DeviceSession
+from services.stepper_gateway.slowness import Slowness
 from services.stepper_gateway.stream import SentChunk, Stream
 from services.stepper_gateway.transmission import Transmission
 from services.stepper_gateway.validation import Presence
@@ -38,10 +41,11 @@ class Mover:
         self.parameters = parameters
         self.out = out
         self.session = DeviceSession(arm.device.name, len(arm.joints), session_id)
+        self.configuration = Configuration(arm, self.session, out)
         self.commands = Commands(session_id)
         self.transmission = Transmission(arm.joints, session_id)
-        self.reporter = Reporter(arm.joints)
-        self.excuse = 0.0  # share of the time that a goal may end later: a person holds the arm, or it speeds up again
+        self.reporter = Reporter(arm)
+        self._slowness = Slowness()
         self.lead = parameters.trajectory_lead  # [s]
         self._holds = False  # by a person's command, who will resume
         self._held_us = 0  # device time of its answer to HOLD
@@ -74,10 +78,22 @@ class Mover:
         stream = self.stream
         return stream is None or stream.is_abandoned or stream.is_finished
 
+    @property
+    def excuse(self) -> float:
+        """Share of the time that a goal may end later, because a person wants the arm slow."""
+        return self._slowness.share
+
+    def absence(self, moment: Moment) -> str:
+        """Why the device cannot be reached, empty if it can."""
+        return self.session.absence(moment, self.parameters.state_timeout)
+
+    def hindrance(self) -> str:
+        """Why the device, though there, cannot start a motion; empty if it can."""
+        return self.configuration.objection() or hindrance(self.arm, self.state)
+
     def refusal(self, moment: Moment) -> str:
         """Why nothing may be started now, empty if it may."""
-        absence = self.session.absence(moment, self.parameters.state_timeout)
-        return absence or self.session.hindrance() or self.commands.hindrance()
+        return self.absence(moment) or self.hindrance() or self.commands.hindrance()
 
     def begin(self, motion: Motion, position: Vector, moment: Moment) -> Stream:
         """A new stream from rest; its first chunk leaves at once."""
@@ -113,8 +129,7 @@ class Mover:
             self._history.popleft()
         if state.mode not in MOVING or (state.mode == DeviceMode.RUN and state.t_us > self._held_us):
             self._holds = False
-        slowness = 1.0 - state.time_scale / 32768.0
-        self.excuse = slowness if self.is_held or (self.excuse and state.mode == DeviceMode.RUN) else 0.0
+        self._slowness.on_state(state, self.is_held)
 
     def commanded(self, state: State) -> PathPoint:
         """What the path asks for at the instant of `state`; where it is, if it follows no path of ours."""
@@ -154,15 +169,15 @@ class Mover:
 
     def has_stopped(self) -> bool:
         """Whether the device has answered the latest STOP and has said since that it stands."""
-        state = self.state
+        state = self.session.latest
         return state is not None and 0 <= self._stopped_us < state.t_us and state.mode not in MOVING
 
     def lost(self) -> None:
         """The device cannot be reached: no answer to a STOP will come, nor will a person's RESUME."""
         self._holds = self._awaits_stop = False
 
-    def rebooted(self) -> None:
-        """Another boot: neither the stream nor any STOP concerns it."""
+    def begin_anew(self) -> None:
+        """Another boot, or the same one with another configuration: neither the stream nor any STOP concerns it."""
         self.transmission.forget()
         self._history.clear()
         self._stopped_us, self._stop_asked, self._awaits_stop = -1, -1.0e9, False
@@ -176,11 +191,11 @@ class Mover:
 
     def stop_strangers(self, moment: Moment) -> bool:
         """Stop a motion that is not ours, of a gateway before us or given up without a link; true if there is one."""
-        state = self.state
+        state = self.session.latest
         if state is None or state.mode not in MOVING or self.is_held or self.is_followed(state):
             return False
         is_obeying = state.mode == DeviceMode.HOLD and self._stopped_us >= 0
-        if is_obeying or self.session.absence(moment, self.parameters.state_timeout):
+        if is_obeying or self.absence(moment):
             return False
         if moment.monotonic - self._stop_asked < STOP_AGAIN:
             return False

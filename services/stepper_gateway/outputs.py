@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandResponse
+from schemas.device import ConfigureResponse, DeviceCommandResponse, PressResponse
 from schemas.message import Message
 from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryResult
 from schemas.system import LogLevel
@@ -63,6 +63,22 @@ class CommandAnswer:
 
 
 @dataclass(frozen=True, slots=True)
+class ConfigureAnswer:
+    """The answer to the request for a configuration under `ticket`."""
+
+    ticket: int
+    response: ConfigureResponse
+
+
+@dataclass(frozen=True, slots=True)
+class PressAnswer:
+    """The answer to the press that was asked for under `ticket`."""
+
+    ticket: int
+    response: PressResponse
+
+
+@dataclass(frozen=True, slots=True)
 class LogLine:
     """A line for people."""
 
@@ -70,7 +86,8 @@ class LogLine:
     text: str
 
 
-Output = SendFrame | Publish | GoalExecuting | GoalProgress | GoalFinished | CommandAnswer | LogLine
+Answer = CommandAnswer | ConfigureAnswer | PressAnswer
+Output = SendFrame | Publish | GoalExecuting | GoalProgress | GoalFinished | Answer | LogLine
 
 
 class Outbox:

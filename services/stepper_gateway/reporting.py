@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState
+from schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState, ShaftPositions
 from schemas.joints import JointState, StepErrors
 from schemas.message import Vector
-from services.arm.description import Joint
+from services.arm.description import Arm, Joint
 from services.stepper_gateway.clock import ClockSync
-from services.stepper_gateway.links.frames import Ack, Chunk, Code, State
+from services.stepper_gateway.hindrance import input_names, joint_name
+from services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, State, StateFlag
+from services.stepper_gateway.links.reports import ShaftReport
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.path_log import PathPoint
 from services.stepper_gateway.stream import SentChunk
@@ -18,7 +20,9 @@ HALF_STEP = 0.5 + 1.0 / 256.0  # [steps] by which whole steps may lie beside the
 class Reporter:
     """Converts for one arm; steps stay behind this edge."""
 
-    def __init__(self, joints: tuple[Joint, ...]) -> None:
+    def __init__(self, arm: Arm) -> None:
+        joints = arm.joints
+        self._arm = arm
         self._joints = joints
         self._names = tuple(joint.name for joint in joints)
         self._max_error = [0.0] * len(joints)
@@ -71,7 +75,13 @@ class Reporter:
             boot_id=state.boot_id,
             mode=DeviceMode(state.mode),
             fault=state.fault,
-            name=self._names,
+            fault_joint=joint_name(self._arm, state.fault_joint),
+            armed=bool(state.flags & StateFlag.ARMED),
+            referenced=tuple(bool(state.referenced >> index & 1) for index in range(len(state.steps))),
+            inputs=input_names(self._arm, state),
+            outputs=tuple(one.name for index, one in enumerate(self._arm.outputs) if state.outputs >> index & 1),
+            speed=state.speed / 1000.0,
+            name=self._names if len(state.steps) == len(self._names) else (),
             steps=state.steps,
             velocity=tuple(rate / 256.0 for rate in state.velocity),
             time_scale=state.time_scale / 32768.0,
@@ -83,6 +93,18 @@ class Reporter:
             refused=state.refused,
             bad_frames=state.bad_frames,
             round_trip=clock.round_trip,
+        )
+
+    def shaft(self, report: ShaftReport, stamp: int) -> ShaftPositions:
+        """A virtual device's true shafts; raises `BadFrame` for one of another arm."""
+        if len(report.steps) != len(self._joints) or len(report.shaft) != len(self._joints):
+            raise BadFrame(f"shafts of {len(report.shaft)} joints, this arm has {len(self._joints)}")
+        return ShaftPositions(
+            stamp=stamp,
+            name=self._names,
+            steps=report.steps,
+            shaft=report.shaft,
+            position=self.positions(report.shaft),
         )
 
     def chunk(self, frame: Chunk, sent: SentChunk, moment: Moment) -> CommandChunk:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 
-from schemas.device import DeviceMode, DeviceStatus
+from schemas.device import DeviceMode
 from services.stepper_gateway.clock import ClockSync
-from services.stepper_gateway.links.frames import BadFrame, Heartbeat, State, Sync, SyncReply
+from services.stepper_gateway.links.frames import BadFrame, Heartbeat, State, StateFlag, Sync, SyncReply
 from services.stepper_gateway.links.reports import StatusReport
 from services.stepper_gateway.moment import Moment
 
@@ -35,7 +35,7 @@ class DeviceSession:
         self._questions: deque[int] = deque(maxlen=QUESTIONS)  # [us] SYNCs that may be answered
         self.link_up = False
         self.link_reason = "no connection yet"
-        self.state: State | None = None
+        self.latest: State | None = None  # of any number of joints
         self.state_arrival = -1.0e9  # [s] monotonic
         self.boot_id = 0
         self.clock = ClockSync()
@@ -44,6 +44,25 @@ class DeviceSession:
     def status(self) -> StatusReport | None:
         """What the present boot has said about itself."""
         return self._reports.get(self.boot_id)
+
+    @property
+    def state(self) -> State | None:
+        """The latest state, if it is one of this arm."""
+        return self.latest if self.latest is not None and self.fits(self.latest) else None
+
+    @property
+    def is_armed(self) -> bool:
+        """Whether the drivers are energised."""
+        return self.latest is not None and bool(self.latest.flags & StateFlag.ARMED)
+
+    @property
+    def newest_report(self) -> StatusReport | None:
+        """What was said last by any boot, perhaps one that is over."""
+        return next(reversed(self._reports.values()), None)
+
+    def fits(self, state: State) -> bool:
+        """Whether the state has this arm's joints; a device with another configuration has others."""
+        return len(state.steps) == self._joints
 
     def on_link(self, connected: bool, reason: str) -> None:
         self.link_up, self.link_reason = connected, reason
@@ -59,23 +78,22 @@ class DeviceSession:
             return
         if status.boot_id == self._offline_boot:
             self._offline_boot = 0
+        self._reports.pop(status.boot_id, None)
         self._reports[status.boot_id] = status
         if len(self._reports) > OLD_BOOTS:
             del self._reports[next(boot for boot in self._reports if boot != self.boot_id)]
 
     def on_state(self, state: State, arrival: float, timeout: float) -> tuple[bool, bool]:
-        """(is it news, does it tell of a new boot); raises `BadFrame` for one that is not of this arm."""
-        if len(state.steps) != self._joints:
-            raise BadFrame(f"a state of {len(state.steps)} joints, this arm has {self._joints}")
+        """(is it news, does it tell of a new boot); raises `BadFrame` for one that no device says."""
         if state.mode not in DeviceMode._value2member_map_:
             raise BadFrame(f"a state with the unknown mode {state.mode}")
         is_fresh = arrival - self.state_arrival <= timeout
         if state.boot_id in self._old_boots and is_fresh:
             return False, False
         is_new_boot = self._meet(state.boot_id)
-        if self.state is not None and state.t_us <= self.state.t_us and is_fresh:
+        if self.latest is not None and state.t_us <= self.latest.t_us and is_fresh:
             return False, is_new_boot
-        self.state, self.state_arrival = state, arrival
+        self.latest, self.state_arrival = state, arrival
         return True, is_new_boot
 
     def on_sync_reply(self, reply: SyncReply, arrival_us: int) -> None:
@@ -106,7 +124,7 @@ class DeviceSession:
 
     @property
     def mode(self) -> DeviceMode:
-        return DeviceMode(self.state.mode) if self.state is not None else DeviceMode.BOOT
+        return DeviceMode(self.latest.mode) if self.latest is not None else DeviceMode.BOOT
 
     def absence(self, moment: Moment, timeout: float) -> str:
         """Why the device cannot be reached, empty if it can."""
@@ -114,59 +132,16 @@ class DeviceSession:
         if not self.link_up:
             return f'no link to device "{name}": {self.link_reason}'
         if not self.is_fresh(moment, timeout):
-            if self.state is None and not self._reports:
+            if self.latest is None and not self._reports:
                 return f'device "{name}" has not been heard: is it switched on and does it use the same broker?'
             if self._offline_boot == self.boot_id:
                 return f'device "{name}" is offline: switch it on, or check its network'
             return f'device "{name}" is silent for more than {timeout:g} s: check its power and network'
         if self.status is None:
             return f'device "{name}" has not said yet who it is: wait a second, or restart it'
-        if self.status.joints != self._joints:
-            return (
-                f'device "{name}" has {self.status.joints} joints, this arm has {self._joints}: the wrong robot.toml '
-                "or the wrong device"
-            )
         if not self.clock.is_synchronised:
             return f'the clock of device "{name}" is not known yet: try again in a second'
         return ""
-
-    def hindrance(self) -> str:
-        """Why the device, though there, cannot start a motion; empty if it can."""
-        name = self._device
-        match self.mode:
-            case DeviceMode.IDLE | DeviceMode.RUN:
-                return ""
-            case DeviceMode.UNREFERENCED:
-                return (
-                    f'device "{name}" does not know where its joints stand: put the arm into its reference pose and '
-                    "run `gemelo reference`"
-                )
-            case DeviceMode.HOLD:
-                return f'device "{name}" holds: run `gemelo resume` or `gemelo stop` first'
-            case DeviceMode.FAULT:
-                fault = self.state.fault if self.state is not None else 0
-                return f'device "{name}" has fault {fault}: find its cause, then run `gemelo reset`'
-            case DeviceMode.ESTOP:
-                return f'the emergency stop of device "{name}" is pressed: release it, then run `gemelo reset`'
-            case mode:
-                return f'device "{name}" is in mode {mode.name}: wait until it is IDLE'
-
-    def status_message(self, moment: Moment, timeout: float) -> DeviceStatus:
-        """What the bus is told."""
-        reason = self.absence(moment, timeout)
-        status = self.status or StatusReport(online=False)
-        return DeviceStatus(
-            stamp=moment.unix,
-            online=not reason,
-            reason=reason or self.hindrance(),
-            device=self._device,
-            firmware=status.firmware,
-            boot_id=self.boot_id,
-            reset_cause=status.reset_cause,
-            joints=status.joints,
-            tick_hz=status.tick_hz,
-            queue_capacity=status.queue_capacity,
-        )
 
     def _meet(self, boot_id: int) -> bool:
         """Adopt a boot id; true if it replaces another one."""
@@ -177,7 +152,7 @@ class DeviceSession:
             self._old_boots = [*self._old_boots[1 - OLD_BOOTS :], self.boot_id]
         self._old_boots = [boot for boot in self._old_boots if boot != boot_id]
         self.boot_id = boot_id
-        self.state = None
+        self.latest = None
         self.clock.reset()
         self._sync_due = 0.0
         return is_reboot

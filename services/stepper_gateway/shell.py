@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import itertools
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeVar
 
-from schemas.device import DeviceCommandRequest, DeviceCommandResponse
+from schemas.device import (
+    ConfigureRequest,
+    ConfigureResponse,
+    DeviceCommandRequest,
+    DeviceCommandResponse,
+    PressRequest,
+    PressResponse,
+)
 from schemas.joints import JointTargets
 from schemas.motion import (
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
 )
-from schemas.topics import DEVICE_COMMAND, FOLLOW_JOINT_TRAJECTORY, JOINT_TARGETS
+from schemas.topics import DEVICE_COMMAND, DEVICE_CONFIGURE, DEVICE_PRESS, FOLLOW_JOINT_TRAJECTORY, JOINT_TARGETS
 from services.runtime.action_server import ActionServer, GoalDecision, accept, refuse
 from services.runtime.errors import Refused
 from services.runtime.node import Node
@@ -23,19 +32,23 @@ from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import (
     CommandAnswer,
+    ConfigureAnswer,
     GoalExecuting,
     GoalFinished,
     GoalProgress,
     LogLine,
     Output,
+    PressAnswer,
     Publish,
     SendFrame,
 )
 from services.stepper_gateway.parameters import GatewayParameters
 
 AT_ONCE = 64  # payloads handled before the loop may look at its deadline
-PATIENCE = 5.0  # [s] a command's caller waits; the core answers sooner
+PATIENCE = 12.0  # [s] a caller waits; the core answers sooner
 
+Response = DeviceCommandResponse | ConfigureResponse | PressResponse
+R = TypeVar("R", DeviceCommandResponse, ConfigureResponse, PressResponse)
 Server = ActionServer[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
 
 
@@ -43,12 +56,12 @@ Server = ActionServer[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, 
 class Ticket:
     """A caller in the node's worker thread who waits for the device's answer."""
 
-    response: DeviceCommandResponse | None = None
+    response: Response | None = None
     answered: threading.Event = field(default_factory=threading.Event)
 
 
 class Shell:
-    """Everything here but `on_command` and `wake` runs in the thread of logic."""
+    """Everything here runs in the thread of logic, but `wake` and the waiting of callers for their answers."""
 
     def __init__(self, node: Node, core: GatewayCore, parameters: ParameterSet[GatewayParameters]) -> None:
         self._node, self._core, self._parameters = node, core, parameters
@@ -59,6 +72,8 @@ class Shell:
         self._server: Server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self._on_goal, self._on_cancel)
         node.subscribe(JOINT_TARGETS, self._on_targets)
         node.serve(DEVICE_COMMAND, self._on_command, worker=True)
+        node.serve(DEVICE_CONFIGURE, self._on_configure, worker=True)
+        node.serve(DEVICE_PRESS, self._on_press, worker=True)
 
     def use(self, link: Link) -> None:
         self._link = link
@@ -106,13 +121,22 @@ class Shell:
         self._carry_out(self._core.on_targets(targets, self._moment()))
 
     def _on_command(self, request: DeviceCommandRequest) -> DeviceCommandResponse:
-        """In the worker thread: hands the command over and waits for the device's answer."""
+        return self._wait(DeviceCommandResponse, lambda number, now: self._core.on_command(request, number, now))
+
+    def _on_configure(self, _request: ConfigureRequest) -> ConfigureResponse:
+        return self._wait(ConfigureResponse, lambda number, now: self._core.on_configure(number, now))
+
+    def _on_press(self, request: PressRequest) -> PressResponse:
+        return self._wait(PressResponse, lambda number, now: self._core.on_press(request, number, now))
+
+    def _wait(self, kind: type[R], ask: Callable[[int, Moment], list[Output]]) -> R:
+        """In the worker thread: hands the request over and waits for the device's answer."""
         number, ticket = next(self._numbers), Ticket()
         self._tickets[number] = ticket
-        self._node.post(lambda: self._carry_out(self._core.on_command(request, number, self._moment())))
+        self._node.post(lambda: self._carry_out(ask(number, self._moment())))
         ticket.answered.wait(PATIENCE)
         self._tickets.pop(number, None)
-        if ticket.response is None:
+        if not isinstance(ticket.response, kind):
             raise Refused("the gateway's control loop has not answered in time")
         return ticket.response
 
@@ -130,12 +154,14 @@ class Shell:
                     self._server.feedback(goal_id, feedback)
                 case GoalFinished(goal_id, status, result):
                     self._server.finish(goal_id, status, result)
-                case CommandAnswer(number, response):
+                case (
+                    CommandAnswer(number, response) | ConfigureAnswer(number, response) | PressAnswer(number, response)
+                ):
                     self._answer(number, response)
                 case LogLine(level, text):
                     self._node.log.log(level, "%s", text)
 
-    def _answer(self, number: int, response: DeviceCommandResponse) -> None:
+    def _answer(self, number: int, response: Response) -> None:
         ticket = self._tickets.get(number)
         if ticket is not None:
             ticket.response = response

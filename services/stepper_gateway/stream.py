@@ -16,7 +16,7 @@ from services.stepper_gateway.path_log import PathLog, PathPoint
 TIME_TO_LIVE = 1_000_000  # [us] after which the device is to refuse a chunk
 RETRY_MIN, RETRY_MAX = 0.06, 0.3  # [s] until an unacknowledged chunk is sent again
 GAP_RETRY = 0.02  # [s] until a gap that the device still reports is filled once more
-TRANSIENT = (Code.GAP, Code.NO_SPACE, Code.EXPIRED)
+TRANSIENT = (Code.GAP, Code.NO_SPACE, Code.EXPIRED, Code.NOT_ARMED)  # NOT_ARMED: the drivers are only just on
 
 
 @dataclass

@@ -208,7 +208,7 @@ def test_a_refused_command_says_why() -> None:
     rig = Rig().ready()
     rig.command(DeviceCommandKind.RESUME, 1)
     rig.command(DeviceCommandKind.REFERENCE, 2, brazo_joint=9.0, antebrazo_joint=0.0, efector_joint=0.0)
-    rig.command(DeviceCommandKind.REFERENCE, 3, brazo_joint=0.0)
+    rig.command(DeviceCommandKind.REFERENCE, 3, antebraso_joint=0.0)
     rig.run(0.2)
     assert "NOT_READY" in rig.answers[1].reason
     assert "brazo_joint" in rig.answers[2].reason

@@ -25,7 +25,14 @@ from services.stepper_gateway.links.frames import (
     decode,
     encode,
 )
-from services.stepper_gateway.links.reports import decode_event, decode_status
+from services.stepper_gateway.links.reports import (
+    ConfigAckReport,
+    EventReport,
+    ShaftReport,
+    StatusReport,
+    decode_report,
+    decode_sensors,
+)
 
 VECTORS = Path(__file__).resolve().parents[2] / "firmware" / "tests" / "vectors"
 KINDS = {
@@ -121,11 +128,22 @@ def test_a_valid_checksum_over_a_wrong_length_is_refused(frame: Any, cut: int, m
 
 @given(st.binary(max_size=200))
 def test_random_bytes_are_no_report(payload: bytes) -> None:
-    for decoder in (decode_status, decode_event):
-        try:
-            decoder(payload)
-        except BadFrame:
-            continue
+    for kind in (StatusReport, EventReport, ConfigAckReport, ShaftReport):
+        with contextlib.suppress(BadFrame):
+            decode_report(kind, payload)
+    with contextlib.suppress(BadFrame):
+        decode_sensors(payload)
+
+
+@pytest.mark.parametrize("text", ["{}", '{"t_us": 1e400}', '{"t_us": -1, "ultra": "far"}', "[1]", '{"ultra": null}'])
+def test_odd_sensor_readings_are_read_or_refused_never_a_crash(text: str) -> None:
+    with contextlib.suppress(BadFrame):
+        assert all(isinstance(value, float) for value in decode_sensors(text.encode()).values.values())
+
+
+def test_sensor_readings_are_those_beside_the_time_and_the_boot() -> None:
+    report = decode_sensors(b'{"t_us": 123, "boot_id": 305419896, "ultra": 12.500, "bateria": 7}')
+    assert (report.t_us, report.values) == (123, {"ultra": 12.5, "bateria": 7.0})
 
 
 @pytest.mark.parametrize("vector", vectors())

@@ -19,9 +19,15 @@ class Kind(StrEnum):
     SYNC_R = "sync/r"
     STATE = "state"
     EVENT = "event"
+    CONFIG = "config"
+    CONFIG_ACK = "config/ack"
+    SENSORS = "sensors"
+    PRESS = "press"
+    SHAFT = "shaft"
 
 
-FROM_DEVICE = (Kind.STATUS, Kind.TRAJ_ACK, Kind.CMD_ACK, Kind.SYNC_R, Kind.STATE, Kind.EVENT)
+TO_DEVICE = (Kind.TRAJ, Kind.CMD, Kind.HB, Kind.SYNC, Kind.CONFIG, Kind.PRESS)
+FROM_DEVICE = tuple(kind for kind in Kind if kind not in TO_DEVICE)
 
 
 class Received(NamedTuple):

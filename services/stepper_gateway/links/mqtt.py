@@ -20,7 +20,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 from services.stepper_gateway.links.link import FROM_DEVICE, Kind, Received
 
 PREFIX = "gemelo/v1"
-ACKNOWLEDGED = (Kind.TRAJ, Kind.CMD, Kind.STATUS, Kind.CMD_ACK, Kind.EVENT)  # QoS 1
+UNACKNOWLEDGED = (Kind.HB, Kind.SYNC, Kind.SYNC_R, Kind.TRAJ_ACK, Kind.STATE, Kind.SENSORS, Kind.SHAFT)  # QoS 0
 MAX_PAYLOAD = 65_536  # [bytes] no frame of the device comes near
 INBOX = 4096  # [messages] 80 s of state
 CONNECT_TIMEOUT = 2.0  # [s]
@@ -55,8 +55,9 @@ class MqttLink:
         client = self._client
         if client is None:
             return False
-        qos = 1 if kind in ACKNOWLEDGED else 0
-        return client.publish(self._prefix + kind, payload, qos).rc == paho.MQTT_ERR_SUCCESS
+        # The newest configuration replaces what any gateway before us has left at the broker.
+        retain = kind is Kind.CONFIG
+        return client.publish(self._prefix + kind, payload, _qos(kind), retain).rc == paho.MQTT_ERR_SUCCESS
 
     def take(self, most: int) -> list[Received]:
         taken: list[Received] = []
@@ -116,7 +117,7 @@ class MqttLink:
         if getattr(reason, "is_failure", False):
             self._lose(f"the MQTT broker at {self._address[0]}:{self._address[1]} refuses us: {reason}")
             return
-        client.subscribe([(self._prefix + kind, 1 if kind in ACKNOWLEDGED else 0) for kind in FROM_DEVICE])
+        client.subscribe([(self._prefix + kind, _qos(kind)) for kind in FROM_DEVICE])
         self._client = client
         self._wake()
 
@@ -140,6 +141,10 @@ class MqttLink:
             return
         self._inbox.append(Received(kind, payload, message.retain, arrival))
         self._wake()
+
+
+def _qos(kind: Kind) -> int:
+    return 0 if kind in UNACKNOWLEDGED else 1
 
 
 def _send_at_once(_client: paho.Client, _data: object, sock: object) -> None:

@@ -1,13 +1,22 @@
-"""The device's JSON: its retained `status` and its `event`s, as firmware/PROTOCOL.md has them."""
+"""The device's JSON, as firmware/PROTOCOL.md has it."""
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import msgspec
 
-from services.stepper_gateway.links.frames import BadFrame
+from services.stepper_gateway.links.frames import BadFrame, Row
 
 
-class StatusReport(msgspec.Struct, frozen=True, kw_only=True):
+class Report(msgspec.Struct, frozen=True, kw_only=True):
+    """A JSON object of the device; keys that only a newer one knows are passed over."""
+
+
+R = TypeVar("R", bound=Report)
+
+
+class StatusReport(Report, frozen=True, kw_only=True):
     """Who the device is; the last will carries only the first fields."""
 
     online: bool
@@ -20,9 +29,12 @@ class StatusReport(msgspec.Struct, frozen=True, kw_only=True):
     tick_hz: int = 0
     queue_capacity: int = 0  # [knots]
     referenced: bool = False
+    armed: bool = False
+    config_crc32: int | None = None  # of the configuration it works with; 0: none yet; None: it does not say
+    virtual: bool = False
 
 
-class EventReport(msgspec.Struct, frozen=True, kw_only=True):
+class EventReport(Report, frozen=True, kw_only=True):
     """Something that happened once, at `t_us` of the device's clock."""
 
     event: str
@@ -31,21 +43,51 @@ class EventReport(msgspec.Struct, frozen=True, kw_only=True):
     detail: str = ""
 
 
-_status = msgspec.json.Decoder(StatusReport)
-_event = msgspec.json.Decoder(EventReport)
+class ConfigAckReport(Report, frozen=True, kw_only=True):
+    """The device's answer to the configuration whose text has this `crc32`."""
+
+    crc32: int
+    accepted: bool
+    part: str = ""  # that is wrong; empty for the device
+    reason: str = ""
 
 
-def decode_status(payload: bytes) -> StatusReport:
-    """The status in `payload`; raises `BadFrame`."""
+class ShaftReport(Report, frozen=True, kw_only=True):
+    """What the counters of a virtual device believe, and where its shafts are [steps]."""
+
+    t_us: int = 0
+    steps: Row = ()
+    shaft: Row = ()
+
+
+class SensorReport(Report, frozen=True, kw_only=True):
+    """The readings that there are, by the sensors' names."""
+
+    t_us: int
+    values: dict[str, float]
+
+
+_decoders: dict[type[Report], msgspec.json.Decoder[Report]] = {}
+_readings = msgspec.json.Decoder(dict[str, float])
+
+
+def decode_report(kind: type[R], payload: bytes) -> R:
+    """The report in `payload`; raises `BadFrame`."""
+    decoder = _decoders.get(kind)
+    if decoder is None:
+        decoder = _decoders[kind] = msgspec.json.Decoder(kind)
     try:
-        return _status.decode(payload)
+        return decoder.decode(payload)  # type: ignore[return-value]
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadFrame(f"not a status report ({len(payload)} bytes): {error}") from error
+        raise BadFrame(f"not a {kind.__name__} ({len(payload)} bytes): {error}") from error
 
 
-def decode_event(payload: bytes) -> EventReport:
-    """The event in `payload`; raises `BadFrame`."""
+def decode_sensors(payload: bytes) -> SensorReport:
+    """The readings in `payload`, whose object holds them beside the device's time; raises `BadFrame`."""
     try:
-        return _event.decode(payload)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise BadFrame(f"not an event report ({len(payload)} bytes): {error}") from error
+        values = _readings.decode(payload)
+        t_us = int(values.pop("t_us", 0))
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError, ValueError) as error:
+        raise BadFrame(f"no sensor readings ({len(payload)} bytes): {error}") from error
+    values.pop("boot_id", None)
+    return SensorReport(t_us=t_us, values=values)

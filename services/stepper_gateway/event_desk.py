@@ -1,0 +1,21 @@
+"""The device's events as the bus has them: when they happened, and how grave they are."""
+
+from __future__ import annotations
+
+from schemas.system import LogLevel
+from services.stepper_gateway.links.reports import EventReport
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.mover import Mover
+
+TROUBLE = ("fault", "hold", "underrun", "estop", "homing_stopped", "text_lost", "press_refused")
+BY_A_PERSON = "command"  # the detail of what somebody has asked for
+
+
+def pass_on(event: EventReport, mover: Mover, moment: Moment) -> None:
+    """Say it on the bus and in the log."""
+    is_trouble = event.event in TROUBLE and event.detail != BY_A_PERSON
+    level = LogLevel.WARNING if is_trouble else LogLevel.INFO
+    clock = mover.session.clock
+    happened = clock.monotonic(event.t_us) if clock.is_synchronised and event.t_us else moment.monotonic
+    happened = min(happened, moment.monotonic)
+    mover.event(event.event, event.detail, Moment(moment.unix_at(happened), happened), level)
