@@ -1,11 +1,9 @@
-// Commands: hold, resume, stop, reset, reference.
+// Commands: each once, in its time, for this boot; those that steer what moves, and the outputs.
 #include "bytes.h"
 #include "machine.h"
 
 namespace gemelo {
 namespace {
-
-constexpr size_t kCommandSize = 24;
 
 uint32_t id_of(const Frame& frame) { return load_u32(frame.bytes + 8); }
 uint8_t word_of(const Frame& frame) { return frame.bytes[20]; }
@@ -39,11 +37,11 @@ Code Machine::judge_command(const Frame& frame, const Arrival& arrival) const {
 
 Code Machine::carry_out(const Frame& frame) {
     const Command command = static_cast<Command>(word_of(frame));
+    const uint16_t argument = load_u16(frame.bytes + 22);
     if (command != Command::Reference && frame.joints() != 0) return Code::BadJoints;
     switch (command) {
         case Command::Hold:
-            if (mode_ == Mode::Run) hold("command");
-            return Code::Ok;
+            return carry_out_hold();
         case Command::Resume:
             return resume();
         case Command::Stop:
@@ -51,10 +49,26 @@ Code Machine::carry_out(const Frame& frame) {
         case Command::Reset:
             return reset();
         case Command::Reference:
-            return reference(frame);
+            return reference(frame, argument);
+        case Command::Arm:
+            return arm();
+        case Command::Disarm:
+            return disarm();
+        case Command::Home:
+            return home(argument);
+        case Command::Output:
+            return switch_output(frame.bytes[21], argument);
+        case Command::Speed:
+            return change_speed(argument);
         default:
             return Code::UnknownCommand;
     }
+}
+
+Code Machine::carry_out_hold() {
+    if (mode_ == Mode::Run) hold("command");
+    if (mode_ == Mode::Homing) stop_homing("command");
+    return Code::Ok;
 }
 
 Code Machine::resume() {
@@ -67,36 +81,28 @@ Code Machine::resume() {
 
 // Slows down as a hold does; finish_slot() ends the stream once the arm stands.
 Code Machine::stop() {
+    if (mode_ == Mode::Homing) stop_homing("command");
     if (mode_ != Mode::Run && mode_ != Mode::Hold) return Code::Ok;
     if (mode_ == Mode::Run) hold("command");
     is_stopping_ = true;
     return Code::Ok;
 }
 
-Code Machine::reset() {
-    if (mode_ == Mode::Run || mode_ == Mode::Hold || !is_at_rest()) return Code::NotReady;
-    if (mode_ != Mode::Fault) return Code::Ok;
-    fault_ = FaultCode::None;
-    mode_ = is_referenced_ ? Mode::Idle : Mode::Unreferenced;
-    event("reset");
+// What an e-stop switches off stays off until that is reset.
+Code Machine::switch_output(uint8_t index, uint16_t level) {
+    if (mode_ == Mode::Boot) return Code::NotReady;
+    if (index >= config_->outputs || level > 1) return Code::BadArgument;
+    const uint16_t bit = static_cast<uint16_t>(1u << index);
+    if (level == 1 && mode_ == Mode::EStop && config_->output[index].is_off_at_estop != 0) return Code::EstopPressed;
+    outputs_ = static_cast<uint16_t>(level == 1 ? outputs_ | bit : outputs_ & ~bit);
     return Code::Ok;
 }
 
-Code Machine::reference(const Frame& frame) {
-    if ((mode_ != Mode::Idle && mode_ != Mode::Unreferenced) || !is_at_rest()) return Code::NotReady;
-    if (frame.joints() != rules_.joints) return Code::BadJoints;
-    int64_t position_q20[kMaxJoints] = {};
-    for (uint8_t j = 0; j < rules_.joints; ++j) {
-        const int32_t position_q8 = load_i32(frame.bytes + kCommandSize + 4 * j);
-        const JointLimits& limits = rules_.limits[j];
-        if (position_q8 < limits.lower_q8 || position_q8 > limits.upper_q8) return Code::PositionLimit;
-        position_q20[j] = static_cast<int64_t>(position_q8) * 4096;
-    }
-    place(position_q20);
-    is_referenced_ = true;
-    mode_ = Mode::Idle;
-    event("referenced");
-    report_status();
+Code Machine::change_speed(uint16_t permil) {
+    if (mode_ == Mode::Boot) return Code::NotReady;
+    if (permil > 1000) return Code::BadArgument;
+    speed_permil_ = permil;
+    if (is_following_) bound_ramps();
     return Code::Ok;
 }
 

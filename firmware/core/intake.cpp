@@ -81,7 +81,10 @@ Verdict Machine::judge_place(const Chunk& chunk) const {
         return chunk.seq() == streams_.next_seq() ? Verdict{} : gap(streams_.next_seq());
     }
     if (chunk.stream() == streams_.stream()) return wrong_stream;
-    if (chunk.is_first() && chunk.seq() == 0) return mode_ == Mode::Idle ? Verdict{} : not_ready;
+    if (chunk.is_first() && chunk.seq() == 0) {
+        if (mode_ != Mode::Idle) return not_ready;
+        return takes_motion() ? Verdict{} : Verdict{Code::NotArmed, kNoJoint, 0, 0, 0};
+    }
     return mode_ == Mode::Idle && chunk.seq() != 0 && !chunk.is_first() ? gap(0) : wrong_stream;
 }
 
@@ -99,7 +102,7 @@ void Machine::take_chunk(const Chunk& chunk) {
 void Machine::open_stream(const Chunk& chunk) {
     Knot knot{};
     chunk.read_knot(0, &knot);
-    path_.start(knot);
+    path_.start(knot, speed_q30());
     // The slots that are under way still belong to the stream before.
     for (Point& point : points_) {
         point.play_us = 0;

@@ -10,6 +10,12 @@ void JsonWriter::put(const char* text) {
     for (; *text != 0; ++text) put(*text);
 }
 
+// A control character becomes a question mark: none belongs into what is said.
+void JsonWriter::put_escaped(char c) {
+    if (c == '"' || c == '\\') put('\\');
+    put(static_cast<uint8_t>(c) < 0x20 ? '?' : c);
+}
+
 void JsonWriter::put_number(uint64_t number) {
     char digits[20];
     int count = 0;
@@ -29,7 +35,7 @@ void JsonWriter::key(const char* name) {
 void JsonWriter::field(const char* name, const char* text) {
     key(name);
     put('"');
-    put(text);
+    for (; *text != 0; ++text) put_escaped(*text);
     put('"');
 }
 
@@ -41,6 +47,17 @@ void JsonWriter::field(const char* name, uint64_t number) {
 void JsonWriter::field(const char* name, bool truth) {
     key(name);
     put(truth ? "true" : "false");
+}
+
+void JsonWriter::field_milli(const char* name, int32_t milli) {
+    key(name);
+    if (milli < 0) put('-');
+    const uint32_t size = milli < 0 ? 0 - static_cast<uint32_t>(milli) : static_cast<uint32_t>(milli);
+    put_number(size / 1000);
+    put('.');
+    put(static_cast<char>('0' + size / 100 % 10));
+    put(static_cast<char>('0' + size / 10 % 10));
+    put(static_cast<char>('0' + size % 10));
 }
 
 void JsonWriter::field(const char* name, uint32_t first, uint32_t second) {

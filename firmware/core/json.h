@@ -1,4 +1,4 @@
-// Writes one flat JSON object into a buffer of fixed size; keys and strings need no escaping.
+// Writes one flat JSON object into a buffer of fixed size; keys need no escaping.
 #pragma once
 
 #include <stddef.h>
@@ -12,6 +12,8 @@ class JsonWriter {
     void field(const char* key, const char* text);
     void field(const char* key, uint64_t number);
     void field(const char* key, bool truth);
+    // A decimal: `milli` / 1000.
+    void field_milli(const char* key, int32_t milli);
     // A pair of numbers as an array.
     void field(const char* key, uint32_t first, uint32_t second);
     // Closes the object; nothing may be added after.
@@ -22,6 +24,7 @@ class JsonWriter {
     void key(const char* name);
     void put(char c);
     void put(const char* text);
+    void put_escaped(char c);
     void put_number(uint64_t number);
 
     static constexpr size_t kSize = 512;

@@ -1,11 +1,10 @@
 #include "machine.h"
 
-#include "sentence.h"
-
 namespace gemelo {
 namespace {
 
-int32_t as_q8(int64_t q20) { return static_cast<int32_t>((q20 + 2048) >> 12); }
+// A device without a configuration says how it is, too.
+constexpr uint32_t kStateHzInBoot = 50;
 
 }  // namespace
 
@@ -13,34 +12,64 @@ void Machine::begin(DeviceConfig& config, const Identity& identity, const Sink& 
     config_ = &config;
     identity_ = identity;
     mode_ = Mode::Boot;
-    reporter_.begin(sink, identity.boot_id, static_cast<uint8_t>(config.joints));
-    rules_.joints = static_cast<uint8_t>(config.joints);
+    fault_ = FaultCode::None;
+    fault_joint_ = kNoJoint;
+    referenced_ = was_referenced_ = 0;
+    speed_permil_ = 1000;
+    is_armed_ = is_following_ = is_stopping_ = is_dry_ = awaits_first_pulse_ = false;
+    is_still_ = true;
+    heard_ = 0;
+    slots_to_state_ = slots_to_sensors_ = 0;
+    reporter_.begin(sink, identity.boot_id, config.joints);
+    rules_.joints = config.joints;
     for (uint8_t j = 0; j < rules_.joints; ++j) {
         const JointConfig& joint = config.joint[j];
         rules_.limits[j] = JointLimits{joint.lower_q8, joint.upper_q8, velocity_limit_q8(config, j)};
     }
+    begin_inputs();
+    begin_outputs();
     path_.begin(config);
-    stepper_.begin(config);
+    homing_.begin(config, stepper_, ramp_);
     prepared_number_ = 1;  // the stepper starts with one empty offer
     for (Point& point : points_) point = Point{};
+    stepper_.begin(config);
+}
+
+void Machine::begin_inputs() {
+    limits_ = 0;
+    for (uint8_t i = 0; i < config_->inputs; ++i) {
+        const InputRole role = config_->input[i].role;
+        if (role == InputRole::LimitLower || role == InputRole::LimitUpper) limits_ |= 1u << i;
+    }
+}
+
+void Machine::begin_outputs() {
+    outputs_ = 0;
+    for (uint8_t i = 0; i < config_->outputs; ++i)
+        if (config_->output[i].at_boot != 0) outputs_ = static_cast<uint16_t>(outputs_ | 1u << i);
 }
 
 void Machine::start(uint64_t now_us, const int32_t* steps, bool referenced) {
     now_us_ = alive_us_ = now_us;
-    int64_t position_q20[kMaxJoints] = {};
-    for (uint8_t j = 0; j < rules_.joints; ++j) position_q20[j] = static_cast<int64_t>(steps[j]) * kFineStep;
-    place(position_q20);
-    is_armed_ = config_->is_armed_at_boot != 0;
-    is_referenced_ = referenced && is_armed_;
-    mode_ = is_referenced_ ? Mode::Idle : Mode::Unreferenced;
+    if (config_->joints != 0) {
+        int64_t position_q20[kMaxJoints] = {};
+        for (uint8_t j = 0; j < rules_.joints; ++j) position_q20[j] = static_cast<int64_t>(steps[j]) * kFineStep;
+        place(position_q20);
+        is_armed_ = config_->is_armed_at_boot != 0;
+        armed_us_ = now_us;
+        if (is_armed_ && referenced) referenced_ = all_joints();
+        mode_ = is_referenced() ? Mode::Idle : Mode::Unreferenced;
+    }
     report_status();
     event("boot", identity_.reset_cause);
+    if (is_armed_) event("armed", "boot");
 }
 
+// The streams and commands of this boot stay known.
 void Machine::restart() {
+    if (is_armed_) set_armed(false, "configuration");
     begin(*config_, identity_, reporter_.sink());
-    mode_ = Mode::Unreferenced;
-    is_armed_ = is_referenced_ = false;
+    if (config_->joints != 0) mode_ = Mode::Unreferenced;
     event("configured");
     report_status();
 }
@@ -50,42 +79,57 @@ bool Machine::takes_config() const {
     return !is_armed_ && (mode_ == Mode::Unreferenced || mode_ == Mode::Fault || mode_ == Mode::EStop);
 }
 
-Code Machine::follow(const int32_t*, uint64_t now_us) {
-    now_us_ = now_us;
-    return Code::NotReady;
-}
-
-void Machine::set_sensor(uint8_t, int32_t) {}
-
-void Machine::report_text_lost(uint32_t lines) {
-    Sentence text;
-    text.add(lines);
-    event("text_lost", text.text());
-}
-
 void Machine::place(const int64_t* position_q20) {
     stepper_.place(position_q20);
     for (Point& point : points_)
         for (uint8_t j = 0; j < rules_.joints; ++j) point.position_q20[j] = position_q20[j];
 }
 
+// A joint that stands gets another count.
+void Machine::shift(uint8_t joint, int32_t steps) {
+    const int64_t by_q20 = steps * kFineStep;
+    stepper_.shift(joint, steps);
+    ramp_[joint].shift(by_q20);
+    for (Point& point : points_) point.position_q20[joint] += by_q20;
+}
+
 void Machine::slot(uint64_t slot_start_us) {
+    if (mode_ == Mode::Boot) {
+        now_us_ = slot_start_us;
+        return report_due();
+    }
     if (!stepper_.wants_offer()) return;
     now_us_ = slot_start_us;
-    if (stepper_.has_overrun() && path_.is_active()) fail(FaultCode::TickOverrun, "no new slot for 3 ms");
+    watch_trips();
     finish_slot();
     watch_heartbeat();
     plan_slot();
-    if (slots_++ % (kSlotHz / config_->state_hz) == 0) report_state(present());
+    guard_switches();
+    report_due();
 }
 
 void Machine::finish_slot() {
     const Point& point = present();
-    if (mode_ != Mode::Fault) measure(point);
-    if (mode_ != Mode::Run && mode_ != Mode::Hold) return;
+    switch (mode_) {
+        case Mode::Fault:
+        case Mode::EStop:
+            return;
+        case Mode::Run:
+        case Mode::Hold:
+            measure(point);
+            return is_following_ ? watch_following() : finish_stream_slot(point);
+        case Mode::Homing:
+            measure(point);
+            return watch_homing();
+        default:
+            return measure(point);
+    }
+}
+
+void Machine::finish_stream_slot(const Point& point) {
     announce_start();
-    if (point.is_end) return end_stream("finished");
-    if (is_stopping_ && is_at_rest()) return end_stream("stopped");
+    if (point.is_end) return end_motion("finished");
+    if (is_stopping_ && is_at_rest()) return end_motion("stopped");
     watch_supply(point);
 }
 
@@ -106,11 +150,12 @@ void Machine::announce_start() {
     reporter_.event("started", t_us, streams_.stream(), "");
 }
 
-void Machine::end_stream(const char* name) {
+// Of a stream or of text mode; `name` may be null for nothing to say.
+void Machine::end_motion(const char* name) {
     path_.flush();
     mode_ = Mode::Idle;
-    is_stopping_ = is_dry_ = awaits_first_pulse_ = false;
-    event(name);
+    is_following_ = is_stopping_ = is_dry_ = awaits_first_pulse_ = false;
+    if (name != nullptr) event(name);
 }
 
 // An under-run is counted once the arm stands for want of knots, not while it slows for it.
@@ -125,29 +170,30 @@ void Machine::watch_supply(const Point& point) {
     }
 }
 
-void Machine::watch_heartbeat() {
-    const uint64_t timeout_us = static_cast<uint64_t>(config_->hold_timeout_ms) * 1000;
-    if (mode_ == Mode::Run && now_us_ > alive_us_ + timeout_us) hold("heartbeat");
-}
-
 void Machine::plan_slot() {
     const Point& before = points_[prepared_number_ % kPoints];
     Point& next = points_[(prepared_number_ + 1) % kPoints];
     next = before;
-    path_.advance(mode_ == Mode::Hold, &next);
+    path_.advance(mode_ == Mode::Hold ? 0 : speed_q30(), &next);
     next.stream = streams_.stream();
+    if (is_following_ || mode_ == Mode::Homing) advance_ramps(&next);
+    if (!offer(before, next)) fail(FaultCode::Internal, "more than a step in a tick");
+}
+
+bool Machine::offer(const Point& before, const Point& next) {
     int32_t increment_q20[kMaxJoints] = {};
     const int64_t fastest_q20 = static_cast<int64_t>(ticks_per_slot(*config_)) << kFineBits;
-    is_still_ = true;
+    bool is_still = true;
     for (uint8_t j = 0; j < rules_.joints; ++j) {
         const int64_t increment = next.position_q20[j] - before.position_q20[j];
-        if (increment > fastest_q20 || increment < -fastest_q20)
-            return fail(FaultCode::Internal, "more than a step in a tick");
+        if (increment > fastest_q20 || increment < -fastest_q20) return false;
         increment_q20[j] = static_cast<int32_t>(increment);
-        is_still_ = is_still_ && increment == 0;
+        is_still = is_still && increment == 0;
     }
+    is_still_ = is_still;
     ++prepared_number_;
     stepper_.offer(increment_q20);
+    return true;
 }
 
 void Machine::hold(const char* cause) {
@@ -155,22 +201,13 @@ void Machine::hold(const char* cause) {
     event("hold", cause);
 }
 
-// Pulses stop dead, so where a moving joint ends up is not known.
-void Machine::fail(FaultCode fault, const char* detail) {
-    const bool was_moving = !is_at_rest();
-    path_.flush();
-    stepper_.silence();
-    fault_ = fault;
-    mode_ = Mode::Fault;
-    is_stopping_ = is_dry_ = awaits_first_pulse_ = false;
-    is_still_ = true;
-    if (was_moving) is_referenced_ = false;
-    int64_t position_q20[kMaxJoints] = {};
-    for (uint8_t j = 0; j < rules_.joints; ++j)
-        position_q20[j] = static_cast<int64_t>(stepper_.executed(j)) * kFineStep;
-    place(position_q20);
-    event("fault", detail);
-    report_status();
+void Machine::halt() {
+    if (mode_ == Mode::Run) hold("shutdown");
+    if (mode_ == Mode::Homing) stop_homing("shutdown");
+}
+
+uint32_t Machine::speed_q30() const {
+    return speed_permil_ * (kFullScale / 1000) + speed_permil_ * (kFullScale % 1000) / 1000;
 }
 
 uint16_t Machine::buffered_ms() const {
@@ -178,36 +215,18 @@ uint16_t Machine::buffered_ms() const {
     return ms > UINT16_MAX ? UINT16_MAX : static_cast<uint16_t>(ms);
 }
 
-void Machine::report_state(const Point& point) {
-    const Point& before = points_[(stepper_.latched_number() + kPoints - 1) % kPoints];
-    StateReport report{};
-    report.t_us = now_us_;
-    report.mode = mode_;
-    report.fault = fault_;
-    report.scale_q30 = mode_ == Mode::Run || mode_ == Mode::Hold ? point.scale_q30 : 0;
-    report.buffered_ms = buffered_ms();
-    report.stream = streams_.stream();
-    report.next_seq = streams_.next_seq();
-    // Until the first slot of a new stream has been made, the arm stands where that stream begins.
-    report.play_us = point.stream == streams_.stream() ? point.play_us : 0;
-    report.underruns = underruns_;
-    report.refused = refused_;
-    report.bad_frames = bad_frames_;
-    report.flags = kFlagArmed;
-    report.fault_joint = kNoJoint;
-    report.referenced = static_cast<uint16_t>(is_referenced_ ? (1u << rules_.joints) - 1 : 0);
-    report.speed_permil = 1000;
-    for (uint8_t j = 0; j < rules_.joints; ++j) {
-        report.steps[j] = stepper_.latched(j);
-        report.velocity_q8[j] = as_q8((point.position_q20[j] - before.position_q20[j]) * kSlotHz);
+void Machine::report_due() {
+    if (slots_to_state_ == 0) {
+        slots_to_state_ = kSlotHz / (mode_ == Mode::Boot ? kStateHzInBoot : config_->state_hz);
+        report_state(present());
     }
-    reporter_.state(report);
+    --slots_to_state_;
+    if (mode_ == Mode::Boot || heard_ == 0) return;
+    if (slots_to_sensors_ == 0) {
+        slots_to_sensors_ = kSlotHz / config_->sensor_hz;
+        report_sensors();
+    }
+    --slots_to_sensors_;
 }
-
-void Machine::report_status() const {
-    reporter_.status(StatusReport{config_, identity_.reset_cause, identity_.boot_id, is_referenced_});
-}
-
-void Machine::event(const char* name, const char* detail) { reporter_.event(name, now_us_, streams_.stream(), detail); }
 
 }  // namespace gemelo

@@ -10,7 +10,9 @@
 #include "chunk.h"
 #include "command_log.h"
 #include "config.h"
+#include "homing.h"
 #include "path.h"
+#include "ramp.h"
 #include "report.h"
 #include "stepper.h"
 #include "stream_log.h"
@@ -53,9 +55,7 @@ class Machine {
     void slot(uint64_t slot_start_us);
     void report_status() const;
     // The platform is about to stop: slow down along the path.
-    void halt() {
-        if (mode_ == Mode::Run) hold("shutdown");
-    }
+    void halt();
 
     // For what stands before the machine on a line: what it could not read, and what it says itself.
     void count_bad_frame() { ++bad_frames_; }
@@ -74,8 +74,8 @@ class Machine {
     Stepper& stepper() { return stepper_; }
     const Stepper& stepper() const { return stepper_; }
     Mode mode() const { return mode_; }
-    bool is_referenced() const { return is_referenced_; }
-    bool is_moving() const { return mode_ == Mode::Run || !is_at_rest(); }
+    bool is_referenced() const { return rules_.joints != 0 && referenced_ == all_joints(); }
+    bool is_moving() const { return mode_ == Mode::Run || mode_ == Mode::Homing || !is_at_rest(); }
     // As of the end of the last whole slot.
     const Point& present() const { return points_[stepper_.latched_number() % kPoints]; }
     // The largest |path - executed| at any slot end so far, Q8 steps rounded up.
@@ -93,28 +93,64 @@ class Machine {
     void receive_command(const Frame& frame, const Arrival& arrival);
     Code judge_command(const Frame& frame, const Arrival& arrival) const;
     Code carry_out(const Frame& frame);
+    Code carry_out_hold();
     Code stop();
     Code resume();
+    Code switch_output(uint8_t index, uint16_t level);
+    Code change_speed(uint16_t permil);
+    Code arm();
+    Code disarm();
     Code reset();
-    Code reference(const Frame& frame);
+    Code reference(const Frame& frame, uint16_t joints);
     void receive_heartbeat(const Frame& frame, const Arrival& arrival);
     void receive_sync(const Frame& frame, const Arrival& arrival);
 
+    // Motion that is no stream.
+    Code home(uint16_t joints);
+    void start_ramps();
+    void bound_ramps();
+    bool ramps_are_there() const;
+    void watch_homing();
+    void finish_homing();
+    void note_homed();
+    void stop_homing(const char* cause);
+    void watch_following();
+    void advance_ramps(Point* point);
+
     void finish_slot();
+    void finish_stream_slot(const Point& point);
     void measure(const Point& point);
     void announce_start();
-    void end_stream(const char* event);
+    void end_motion(const char* event);
     void watch_supply(const Point& point);
-    void watch_heartbeat();
     void plan_slot();
+    bool offer(const Point& before, const Point& next);
     void hold(const char* cause);
-    void fail(FaultCode fault, const char* detail);
-    void report_state(const Point& point);
-    void event(const char* name, const char* detail = "");
     void place(const int64_t* position_q20);
+    void shift(uint8_t joint, int32_t steps);
+
+    // What keeps people and machines whole.
+    void watch_trips();
+    void watch_heartbeat();
+    void guard_switches();
+    void press_estop();
+    void fail(FaultCode fault, const char* detail, uint8_t joint = kNoJoint, bool was_moving = false);
+    void stop_dead(bool was_moving);
+    void set_armed(bool armed, const char* cause);
+    bool takes_motion() const;  // armed, for long enough
+
+    void begin_inputs();
+    void begin_outputs();
+    void report_due();
+    void report_state(const Point& point);
+    void report_sensors() const;
+    void event(const char* name, const char* detail = "");
     bool is_at_rest() const { return is_still_ && stepper_.is_quiet(); }
+    uint16_t all_joints() const { return static_cast<uint16_t>((1u << rules_.joints) - 1); }
+    uint32_t speed_q30() const;
     uint16_t buffered_ms() const;
 
+    static constexpr size_t kCommandSize = 24;
     static constexpr uint8_t kPoints = 4;  // before, finished, running, prepared
 
     DeviceConfig* config_ = nullptr;
@@ -122,6 +158,8 @@ class Machine {
     Reporter reporter_;
     KnotRules rules_{};
     Path path_;
+    Ramp ramp_[kMaxJoints];
+    Homing homing_;
     Stepper stepper_;
     StreamLog streams_;
     CommandLog commands_;
@@ -132,24 +170,33 @@ class Machine {
 
     Mode mode_ = Mode::Boot;
     FaultCode fault_ = FaultCode::None;
-    bool is_referenced_ = false;
-    bool is_armed_ = false;
+    uint8_t fault_joint_ = kNoJoint;
+    uint16_t referenced_ = 0;      // bit j: the place of joint j is known
+    uint16_t was_referenced_ = 0;  // when homing began
+    uint32_t limits_ = 0;          // bit i: input i is a limit switch
     uint16_t outputs_ = 0;
+    uint16_t speed_permil_ = 1000;
+    bool is_armed_ = false;
+    bool is_following_ = false;  // Run and Hold are text mode's
     bool is_stopping_ = false;
     bool is_dry_ = false;
     bool awaits_first_pulse_ = false;
 
     uint64_t now_us_ = 0;
+    uint64_t armed_us_ = 0;
     uint64_t alive_us_ = 0;  // of the last heartbeat, or of the start or resumption if that was later
     uint32_t session_ = 0;
     uint32_t counter_ = 0;
     bool has_session_ = false;
 
-    uint32_t slots_ = 0;
+    uint32_t slots_to_state_ = 0;
+    uint32_t slots_to_sensors_ = 0;
     uint32_t underruns_ = 0;
     uint32_t refused_ = 0;
     uint32_t bad_frames_ = 0;
     int64_t max_error_q20_ = 0;
+    uint16_t heard_ = 0;  // sensors that have a reading
+    int32_t sensor_milli_[kMaxSensors];
 };
 
 }  // namespace gemelo

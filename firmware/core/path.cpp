@@ -15,13 +15,13 @@ void Path::begin(const DeviceConfig& config) {
     flush();
 }
 
-void Path::start(const Knot& knot) {
+void Path::start(const Knot& knot, uint32_t scale_q30) {
     flush();
     from_ = knot;
     from_.ceiling_q26 = kUnknownCeiling;
     from_us_ = 0;
     is_active_ = true;
-    scale_.set(kFullScale);
+    scale_.set(scale_q30);
 }
 
 void Path::append(const Knot& knot) {
@@ -100,9 +100,9 @@ void Path::move(uint64_t step) {
     if (segment_.dt_us != 0) elapsed_ += step;
 }
 
-void Path::advance(bool hold, Point* point) {
+void Path::advance(uint32_t bound_q30, Point* point) {
     if (is_active_ && segment_.dt_us != 0) {
-        scale_.advance(hold, segment_, allowance());
+        scale_.advance(bound_q30, segment_, allowance());
         move((static_cast<uint64_t>(scale_.value()) * kSlotUs) >> (30 - kTimeBits));
         point->scale_q30 = scale_.value();
     } else {

@@ -24,16 +24,16 @@ class Path {
   public:
     void begin(const DeviceConfig& config);
 
-    // A new stream that starts at `knot`, at rest.
-    void start(const Knot& knot);
+    // A new stream that starts at `knot`, at rest, to be played at this time scale.
+    void start(const Knot& knot, uint32_t scale_q30);
     void append(const Knot& knot);
     // After the last append of a chunk; `ends` says that the stream's last knot is in.
     void accept(bool ends);
     // Forgets what has not been played; the path ends where it stands.
     void flush();
 
-    // Plays one slot; `hold` slows down along the path until it stands. Fills all but the positions of a flushed path.
-    void advance(bool hold, Point* point);
+    // Plays one slot, at a time scale of at most `bound` in the end. Fills all but the positions of a flushed path.
+    void advance(uint32_t bound_q30, Point* point);
 
     // The last knot that was accepted: the next chunk continues from it.
     const Knot& newest() const { return queue_.is_empty() ? from_ : queue_.newest(); }

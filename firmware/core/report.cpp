@@ -94,7 +94,7 @@ void Reporter::event(const char* name, uint64_t t_us, uint32_t stream, const cha
 void Reporter::status(const StatusReport& report) const {
     JsonWriter json;
     json.field("online", true);
-    json.field("device", report.config->name);
+    json.field("device", report.device);
     json.field("firmware", kFirmwareVersion);
     json.field("protocol", kProtocolVersion, kProtocolVersion);
     json.field("boot_id", static_cast<uint64_t>(report.boot_id));
@@ -102,9 +102,22 @@ void Reporter::status(const StatusReport& report) const {
     json.field("joints", static_cast<uint64_t>(report.config->joints));
     json.field("tick_hz", static_cast<uint64_t>(report.config->tick_hz));
     json.field("queue_capacity", static_cast<uint64_t>(report.config->queue_capacity));
-    json.field("referenced", report.referenced);
+    json.field("referenced", report.is_referenced);
+    json.field("armed", report.is_armed);
+    json.field("config_crc32", static_cast<uint64_t>(report.config->crc32));
+    json.field("virtual", report.is_virtual);
     const size_t size = json.close();
     sink_.put(sink_.context, Output::Status, json.bytes(), size);
+}
+
+void Reporter::sensors(const SensorReport& report) const {
+    JsonWriter json;
+    json.field("t_us", report.t_us);
+    json.field("boot_id", static_cast<uint64_t>(boot_id_));
+    for (uint8_t i = 0; i < report.config->sensors; ++i)
+        if ((report.heard >> i) & 1) json.field_milli(report.config->sensor[i].name, report.milli[i]);
+    const size_t size = json.close();
+    say(Output::Sensors, json.bytes(), size);
 }
 
 void Reporter::acknowledge_config(uint32_t crc32, bool accepted, const char* part, const char* reason) const {

@@ -54,9 +54,18 @@ struct StateReport {
 
 struct StatusReport {
     const DeviceConfig* config;
+    const char* device;
     const char* reset_cause;
     uint32_t boot_id;
-    bool referenced;
+    bool is_referenced, is_armed, is_virtual;
+};
+
+// Bit i of `heard`: sensor i has a reading, `milli` thousandths.
+struct SensorReport {
+    const DeviceConfig* config;
+    uint64_t t_us;
+    uint16_t heard;
+    const int32_t* milli;
 };
 
 class Reporter {
@@ -72,6 +81,7 @@ class Reporter {
     void state(const StateReport& report) const;
     void event(const char* name, uint64_t t_us, uint32_t stream, const char* detail) const;
     void status(const StatusReport& report) const;
+    void sensors(const SensorReport& report) const;
     void acknowledge_config(uint32_t crc32, bool accepted, const char* part, const char* reason) const;
     // Bytes as they are.
     void say(Output output, const uint8_t* bytes, size_t size) const { sink_.put(sink_.context, output, bytes, size); }

@@ -62,17 +62,15 @@ uint32_t TimeScale::change(const Segment& segment, bool slowing) const {
     return static_cast<uint32_t>(least);
 }
 
-void TimeScale::advance(bool hold, const Segment& segment, const Allowance& allowance) {
-    const bool unbounded = allowance.ceiling_q26 >= kFullCeiling;
-    if (!hold && unbounded && s_q30_ == kFullScale) return;
-    const uint32_t step = change(segment, hold);
-    uint32_t next = 0;
-    if (hold) {
-        next = s_q30_ > step ? s_q30_ - step : 0;
-    } else {
-        next = kFullScale - s_q30_ > step ? s_q30_ + step : kFullScale;
-    }
-    if (!unbounded) {
+void TimeScale::advance(uint32_t bound_q30, const Segment& segment, const Allowance& allowance) {
+    const bool is_unbounded = allowance.ceiling_q26 >= kFullCeiling;
+    if (is_unbounded && s_q30_ == bound_q30) return;
+    const bool is_slowing = s_q30_ > bound_q30;
+    const uint32_t step = change(segment, is_slowing);
+    uint32_t next = bound_q30;
+    if (is_slowing && s_q30_ - bound_q30 > step) next = s_q30_ - step;
+    if (!is_slowing && bound_q30 - s_q30_ > step) next = s_q30_ + step;
+    if (!is_unbounded) {
         const uint32_t highest = ceiling_scale(allowance);
         if (next > highest) next = fall_to(highest, s_q30_, allowance.slope_q30);
     }

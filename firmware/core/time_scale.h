@@ -25,8 +25,8 @@ class TimeScale {
     void set(uint32_t s_q30) { s_q30_ = s_q30; }
     uint32_t value() const { return s_q30_; }
 
-    // The scale of the next slot: towards 0 when `hold`, else towards 1, within the joints' accelerations.
-    void advance(bool hold, const Segment& segment, const Allowance& allowance);
+    // The scale of the next slot: towards `bound`, within the joints' accelerations.
+    void advance(uint32_t bound_q30, const Segment& segment, const Allowance& allowance);
 
   private:
     uint32_t change(const Segment& segment, bool slowing) const;

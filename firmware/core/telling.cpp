@@ -1,0 +1,71 @@
+// What the machine tells of itself.
+#include "machine.h"
+#include "sentence.h"
+
+namespace gemelo {
+namespace {
+
+int32_t as_q8(int64_t q20) { return static_cast<int32_t>((q20 + 2048) >> 12); }
+
+int32_t saturate(int64_t value) {
+    if (value > INT32_MAX) return INT32_MAX;
+    return value < INT32_MIN ? INT32_MIN : static_cast<int32_t>(value);
+}
+
+}  // namespace
+
+void Machine::report_state(const Point& point) {
+    const Point& before = points_[(stepper_.latched_number() + kPoints - 1) % kPoints];
+    StateReport report{};
+    report.t_us = now_us_;
+    report.mode = mode_;
+    report.fault = fault_;
+    report.fault_joint = fault_joint_;
+    report.inputs = static_cast<uint16_t>(stepper_.active_inputs());
+    report.outputs = outputs_;
+    report.flags = is_armed_ ? kFlagArmed : static_cast<uint8_t>(0);
+    report.referenced = referenced_;
+    report.speed_permil = speed_permil_;
+    report.scale_q30 = mode_ == Mode::Run || mode_ == Mode::Hold ? point.scale_q30 : 0;
+    report.buffered_ms = buffered_ms();
+    report.stream = streams_.stream();
+    report.next_seq = streams_.next_seq();
+    // Until the first slot of a new stream has been made, the arm stands where that stream begins.
+    report.play_us = point.stream == streams_.stream() ? point.play_us : 0;
+    report.underruns = underruns_;
+    report.refused = refused_;
+    report.bad_frames = bad_frames_;
+    for (uint8_t j = 0; j < rules_.joints; ++j) {
+        report.steps[j] = stepper_.latched(j);
+        report.velocity_q8[j] = as_q8((point.position_q20[j] - before.position_q20[j]) * kSlotHz);
+    }
+    reporter_.state(report);
+}
+
+void Machine::report_status() const {
+    StatusReport report{};
+    report.config = config_;
+    report.device = config_->joints != 0 ? config_->name : identity_.device;
+    report.reset_cause = identity_.reset_cause;
+    report.boot_id = identity_.boot_id;
+    report.is_referenced = is_referenced();
+    report.is_armed = is_armed_;
+    report.is_virtual = identity_.is_virtual;
+    reporter_.status(report);
+}
+
+void Machine::set_sensor(uint8_t index, int32_t raw) {
+    if (index >= config_->sensors) return;
+    const SensorConfig& sensor = config_->sensor[index];
+    const int64_t scaled = (static_cast<int64_t>(raw) * sensor.scale_q16) >> 16;
+    sensor_milli_[index] = saturate(scaled + sensor.offset_milli);
+    heard_ = static_cast<uint16_t>(heard_ | 1u << index);
+}
+
+void Machine::report_sensors() const { reporter_.sensors(SensorReport{config_, now_us_, heard_, sensor_milli_}); }
+
+void Machine::report_text_lost(uint32_t lines) { event("text_lost", Sentence().add(lines).text()); }
+
+void Machine::event(const char* name, const char* detail) { reporter_.event(name, now_us_, streams_.stream(), detail); }
+
+}  // namespace gemelo
