@@ -33,26 +33,36 @@ class Samples:
 
 def sample(trajectory: JointTrajectory, density: int = DENSITY) -> Samples:
     """The quintic through the points at `density` instants a segment, all at once, with both ends of every segment."""
-    times = np.array([point.time_from_start for point in trajectory.points])
+    stamps = np.array([point.time_from_start for point in trajectory.points])
+    shares = np.linspace(0.0, 1.0, density + 1)
+    times = (stamps[:-1, None] + shares * np.diff(stamps)[:, None]).reshape(-1)
+    return _evaluate(trajectory, times, np.repeat(np.arange(len(stamps) - 1), density + 1))
+
+
+def at_times(trajectory: JointTrajectory, times: Array) -> Samples:
+    """The quintic through the points at `times` (m,) [s], which lie within the trajectory."""
+    stamps = np.array([point.time_from_start for point in trajectory.points])
+    return _evaluate(trajectory, times, np.clip(np.searchsorted(stamps, times, side="right") - 1, 0, len(stamps) - 2))
+
+
+def _evaluate(trajectory: JointTrajectory, times: Array, index: NDArray[np.int64]) -> Samples:
+    """At `times` (m,) [s], each in the segment `index` (m,) (Biagiotti and Melchiorri 2008, section 2.1)."""
+    stamps = np.array([point.time_from_start for point in trajectory.points])
     p = np.array([point.positions for point in trajectory.points])
     v = np.array([point.velocities for point in trajectory.points])
     a = np.array([point.accelerations for point in trajectory.points])
-    dt = np.diff(times)[:, None]
-    rise = p[1:] - p[:-1] - (v[:-1] + 0.5 * a[:-1] * dt) * dt
-    climb = (v[1:] - v[:-1] - a[:-1] * dt) * dt
-    bend = (a[1:] - a[:-1]) * dt * dt
-    third, fourth, fifth = (
-        10 * rise - 4 * climb + bend / 2,
-        -15 * rise + 7 * climb - bend,
-        6 * rise - 3 * climb + bend / 2,
-    )
-    u = np.linspace(0.0, 1.0, density + 1)[:, None, None]  # share of the segment
-    positions = p[:-1] + u * dt * (v[:-1] + u * dt * a[:-1] / 2) + u**3 * (third + u * (fourth + u * fifth))
-    velocities = v[:-1] + u * dt * a[:-1] + u**2 * (3 * third + u * (4 * fourth + u * 5 * fifth)) / dt
-    accelerations = a[:-1] + u * (6 * third + u * (12 * fourth + u * 20 * fifth)) / dt**2
-    instants = (times[:-1] + u[:, :, 0] * dt[:, 0]).T.reshape(-1)
-    rows = (values.transpose(1, 0, 2).reshape(-1, p.shape[1]) for values in (positions, velocities, accelerations))
-    return Samples(instants, *rows)
+    dt = np.diff(stamps)[index][:, None]
+    u = (times - stamps[index])[:, None] / dt
+    p0, v0, a0 = p[index], v[index] * dt, a[index] * dt * dt
+    rise = p[index + 1] - p0 - v0 - 0.5 * a0
+    climb, bend = v[index + 1] * dt - v0 - a0, a[index + 1] * dt * dt - a0
+    third = 10 * rise - 4 * climb + bend / 2
+    fourth = -15 * rise + 7 * climb - bend
+    fifth = 6 * rise - 3 * climb + bend / 2
+    positions = p0 + u * (v0 + u * (a0 / 2 + u * (third + u * (fourth + u * fifth))))
+    velocities = (v0 + u * (a0 + u * (3 * third + u * (4 * fourth + u * 5 * fifth)))) / dt
+    accelerations = (a0 + u * (6 * third + u * (12 * fourth + u * 20 * fifth))) / dt**2
+    return Samples(times, positions, velocities, accelerations)
 
 
 def require_within_limits(arm: Arm, samples: Samples, limits: JointLimits) -> None:
