@@ -168,13 +168,13 @@ bool JsonReader::integer(JsonInteger* out) {
         ++at_;
     }
     if (at_ == end_ || !is_digit(*at_)) return fail(kError);
-    const bool is_zero = *at_ == '0';
+    const char* first = at_;
     for (; at_ != end_ && is_digit(*at_); ++at_) {
         const uint64_t digit = static_cast<uint64_t>(*at_ - '0');
         constexpr uint64_t kTenth = UINT64_MAX / 10;
         if (out->magnitude > kTenth || (out->magnitude == kTenth && digit > UINT64_MAX % 10))
             return fail("the number is too large");
-        if (is_zero && (out->magnitude != 0 || digit != 0)) return fail("a number begins with a zero");
+        if (at_ != first && *first == '0') return fail("a number begins with a zero");
         out->magnitude = out->magnitude * 10 + digit;
     }
     if (at_ != end_ && (*at_ == '.' || *at_ == 'e' || *at_ == 'E')) return fail(kError);

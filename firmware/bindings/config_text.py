@@ -1,0 +1,34 @@
+"""What the firmware core reads in the text of a configuration."""
+
+from __future__ import annotations
+
+import ctypes as c
+
+import msgspec
+
+from firmware.bindings.library import PART_SIZE, REASON_SIZE, load_library
+from schemas.device_config import DeviceConfig
+
+LARGEST = 1 << 16  # [bytes] of what the core says it has read
+
+
+class Refused(ValueError):
+    """The core does not take the text; the message is the part and the reason."""
+
+    def __init__(self, part: str, reason: str) -> None:
+        super().__init__(f"{part}: {reason}" if part else reason)
+        self.part = part
+        self.reason = reason
+
+
+def read_config(text: bytes) -> DeviceConfig:
+    """The configuration as the core has understood it; raises Refused."""
+    part, reason = c.create_string_buffer(PART_SIZE), c.create_string_buffer(REASON_SIZE)
+    out = c.create_string_buffer(LARGEST)
+    function = load_library().gemelo_read_config
+    function.restype = c.c_int64
+    function.argtypes = [c.c_char_p, c.c_size_t, c.c_char_p, c.c_char_p, c.c_char_p, c.c_size_t]
+    size = function(text, len(text), part, reason, out, LARGEST)
+    if size < 0:
+        raise Refused(part.value.decode(), reason.value.decode(errors="replace"))
+    return msgspec.json.decode(out.raw[:size], type=DeviceConfig)
