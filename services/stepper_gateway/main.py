@@ -1,4 +1,4 @@
-"""The process: one arm, one device, one MQTT link."""
+"""The process: one arm, one device, one link."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.links.mqtt import MqttLink
+from services.stepper_gateway.links.wires import open_link
 from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.shell import Shell
 
@@ -24,8 +24,7 @@ def run(node: Node, deployment: Deployment) -> None:
     parameters = node.parameters(GatewayParameters)
     core = GatewayCore(arm, secrets.randbelow(2**31 - 1) + 1, parameters.value)
     shell = Shell(node, core, parameters)
-    mqtt = deployment.mqtt
-    with closing(MqttLink(mqtt.host, mqtt.port, arm.device.name, shell.wake)) as link:
+    with closing(open_link(deployment, arm.device.name, shell.wake)) as link:
         shell.use(link)
         node.spin(shell.step, rate=RATE)
 

@@ -1,0 +1,147 @@
+"""A serial line to the device: the frames of MQTT as COBS packets, firmware/PROTOCOL.md.
+
+One thread opens the port, again and again, and reads; another one writes, so that a line which takes nothing holds
+nobody up. Both end with the port, and what has not been written by then is forgotten.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+
+from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
+from services.stepper_gateway.links.frames import FrameType
+from services.stepper_gateway.links.link import Kind, Received
+from services.stepper_gateway.links.serial_port import Line, complaint, open_port
+
+TYPES = {
+    FrameType.ACK: Kind.TRAJ_ACK,
+    FrameType.CMD_ACK: Kind.CMD_ACK,
+    FrameType.SYNC_R: Kind.SYNC_R,
+    FrameType.STATE: Kind.STATE,
+}
+TEXTS = {
+    JsonFrame.CONFIG: Kind.CONFIG,
+    JsonFrame.CONFIG_ACK: Kind.CONFIG_ACK,
+    JsonFrame.SENSORS: Kind.SENSORS,
+    JsonFrame.STATUS: Kind.STATUS,
+    JsonFrame.EVENT: Kind.EVENT,
+    JsonFrame.PRESS: Kind.PRESS,
+    JsonFrame.SHAFT: Kind.SHAFT,
+}
+FRAMES = {kind: frame for frame, kind in TEXTS.items()}  # of the kinds that are JSON
+INBOX = 4096  # [messages] 80 s of state
+BACKLOG = 16_384  # [bytes] that may wait: 0.2 s at 921,600 baud
+BACK_OFF = (0.1, 0.2, 0.5, 1.0)  # [s] between attempts
+
+
+class SerialLink:
+    """A link to the one device at the other end of `port`."""
+
+    def __init__(self, port: str, baud: int, wake: Callable[[], None]) -> None:
+        self._port, self._baud, self._wake = port, baud, wake
+        self._inbox: deque[Received] = deque(maxlen=INBOX)
+        self._outgoing: deque[bytes] = deque()
+        self._has_outgoing = threading.Event()
+        self._line: Line | None = None
+        self._reason = f"the serial port {port} has not been opened yet"
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._keep_open, name="serial-link", daemon=True)
+        self._thread.start()
+
+    @property
+    def connected(self) -> bool:
+        return self._line is not None
+
+    @property
+    def reason(self) -> str:
+        return "" if self._line is not None else self._reason
+
+    def send(self, kind: Kind, payload: bytes) -> bool:
+        if self._line is None or sum(map(len, tuple(self._outgoing))) + len(payload) > BACKLOG:
+            return False
+        self._outgoing.append(packet(json_frame(FRAMES[kind], payload) if kind in FRAMES else payload))
+        self._has_outgoing.set()
+        return True
+
+    def take(self, most: int) -> list[Received]:
+        taken: list[Received] = []
+        with contextlib.suppress(IndexError):
+            while len(taken) < most:
+                taken.append(self._inbox.popleft())
+        return taken
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join(timeout=3.0)
+
+    def _keep_open(self) -> None:
+        attempt = 0
+        while not self._stop.is_set():
+            if self._connection():
+                attempt = 0
+            self._stop.wait(BACK_OFF[min(attempt, len(BACK_OFF) - 1)])
+            attempt += 1
+
+    def _connection(self) -> bool:
+        """One open port from beginning to end; true if there was one."""
+        try:
+            line = open_port(self._port, self._baud)
+        except (OSError, ValueError) as error:
+            self._lose(complaint(self._port, error))
+            return False
+        self._outgoing.clear()
+        self._line = line
+        writer = threading.Thread(target=self._write, args=(line,), name="serial-writer", daemon=True)
+        writer.start()
+        self._wake()
+        try:
+            self._read(line)
+        except OSError as error:
+            self._lose(f"the serial port {self._port} has failed ({error}): is the board still plugged in?")
+        self._line = None
+        self._has_outgoing.set()
+        writer.join()
+        line.close()
+        self._wake()
+        return True
+
+    def _read(self, line: Line) -> None:
+        """Until the port fails, the writer gives it up, or the link is closed."""
+        packets = Packets()
+        while self._line is line and not self._stop.is_set():
+            data = line.read(max(1, line.in_waiting))
+            arrival, bad = time.monotonic_ns(), packets.bad
+            received = [found for frame in packets.feed(data) if (found := _received(frame, arrival)) is not None]
+            # What is no packet comes as no bytes at all: it is counted with the other bad ones.
+            received += [Received(Kind.STATE, b"", False, arrival)] * (packets.bad - bad)
+            if received:
+                self._inbox.extend(received)
+                self._wake()
+
+    def _write(self, line: Line) -> None:
+        while self._line is line:
+            self._has_outgoing.wait()
+            self._has_outgoing.clear()
+            try:
+                while self._outgoing and self._line is line:
+                    line.write(self._outgoing.popleft())
+            except OSError as error:
+                self._line = None
+                self._lose(f"the serial port {self._port} takes nothing ({error}): is the board still plugged in?")
+
+    def _lose(self, reason: str) -> None:
+        self._reason = reason
+        self._wake()
+
+
+def _received(frame: bytes, arrival: int) -> Received | None:
+    """A frame under its kind; one that is damaged stays as it is, to be counted; None for what is not the gateway's."""
+    text = parse_json_frame(frame)
+    if text is not None:
+        return Received(TEXTS[text.kind], text.text, False, arrival) if text.kind in TEXTS else None
+    kind = TYPES.get(FrameType(frame[2])) if len(frame) > 2 and frame[2] in FrameType._value2member_map_ else None
+    return Received(kind or Kind.STATE, frame, False, arrival)
