@@ -50,6 +50,7 @@ class PullOut(RobotRecord, frozen=True, kw_only=True):
     torque: tuple[NotNegative, ...]  # [N m] of the motor shaft at these speeds; 0 beyond the last
     inertia: Positive  # [kg m^2] rotor and load, at the motor shaft
     friction: NotNegative = 0.0  # [N m] at the motor shaft
+    full_steps_per_turn: Annotated[int, Meta(ge=4, le=1000)] = 200  # of the motor; it slips by four of them at once
 
 
 class Motor(RobotRecord, frozen=True, kw_only=True):

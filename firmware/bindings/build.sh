@@ -19,9 +19,14 @@ echo "firmware core: compiling libgemelo_core.so with $compiler (a few seconds) 
 mkdir -p "$firmware/build"
 # Written beside and then renamed: a process that has the old one loaded keeps it.
 fresh=$library.$$
-trap 'rm -f "$fresh"' EXIT
+begun=$fresh.begun
+trap 'rm -f "$fresh" "$begun"' EXIT
+: >"$begun"
 $compiler -std=c++17 -O2 -Wall -Wextra -fPIC -shared -fno-exceptions -fno-rtti -fvisibility=default \
     -I"$firmware/core" $sources -o "$fresh"
+# As old as its beginning: a source that was written meanwhile is newer.
+touch -r "$begun" "$fresh"
 mv "$fresh" "$library"
+rm -f "$begun"
 trap - EXIT
 echo "firmware core: built $library"

@@ -16,31 +16,52 @@ struct GemeloSnapshot {
     uint32_t mode;
     uint32_t referenced;
     uint32_t moving;
+    uint32_t still;
+    uint32_t armed;
+    uint32_t outputs;
+    uint32_t config_crc32;
     uint32_t max_slot_error_q8;
     int32_t steps[gemelo::kMaxJoints];
+    int32_t shaft[gemelo::kMaxJoints];
     int32_t commanded_q8[gemelo::kMaxJoints];
     int64_t commanded_q20[gemelo::kMaxJoints];
+    uint32_t level_low;
+    uint32_t level_high;
     uint32_t scale_q30;
 };
 
-// The device of a configuration, or nullptr and why not; `part` has room for 32 bytes, `reason` for 128.
+// The device of a configuration, or nullptr and why not; `part` has room for 32 bytes, `reason` for 128. An empty text
+// makes a device that has no configuration yet.
 VirtualDevice* gemelo_create(const char* text, size_t size, char* part, char* reason, uint32_t boot_id,
-                             const char* reset_cause, uint64_t now_us, const int32_t* steps, int referenced) {
-    DeviceConfig config;
+                             const char* reset_cause, uint64_t now_us) {
+    DeviceConfig config{};
     gemelo::Refusal refusal;
-    const bool is_taken = gemelo::parse_config(text, size, &config, &refusal);
+    const bool is_taken = size == 0 || gemelo::parse_config(text, size, &config, &refusal);
     memcpy(part, refusal.part, sizeof refusal.part);
     memcpy(reason, refusal.reason, sizeof refusal.reason);
-    if (!is_taken) return nullptr;
-    VirtualDevice* device = new VirtualDevice(config, boot_id, reset_cause, now_us);
-    device->start(steps, referenced != 0);
-    return device;
+    return is_taken ? new VirtualDevice(config, boot_id, reset_cause, now_us) : nullptr;
+}
+
+void gemelo_start(VirtualDevice* device, const int32_t* steps, const int32_t* shaft, int referenced) {
+    device->start(steps, referenced != 0, shaft);
 }
 
 void gemelo_destroy(VirtualDevice* device) { delete device; }
 
 void gemelo_receive(VirtualDevice* device, const uint8_t* bytes, size_t size, int retained, uint64_t received_us) {
     device->receive(bytes, size, retained != 0, received_us);
+}
+
+void gemelo_receive_config(VirtualDevice* device, const uint8_t* text, size_t size, int retained,
+                           uint64_t received_us) {
+    device->receive_config(text, size, retained != 0, received_us);
+}
+
+// The text of the configuration that was taken last; up to `capacity` bytes of it, returns its size.
+size_t gemelo_kept(VirtualDevice* device, uint8_t* text, size_t capacity) {
+    const std::string& kept = device->kept();
+    memcpy(text, kept.data(), kept.size() < capacity ? kept.size() : capacity);
+    return kept.size();
 }
 
 void gemelo_advance(VirtualDevice* device, uint64_t until_us) { device->advance(until_us); }
@@ -71,10 +92,17 @@ void gemelo_snapshot(VirtualDevice* device, GemeloSnapshot* snapshot) {
     snapshot->mode = static_cast<uint32_t>(machine.mode());
     snapshot->referenced = machine.is_referenced();
     snapshot->moving = machine.is_moving();
+    snapshot->still = machine.keeps_still();
+    snapshot->armed = machine.is_enabled();
+    snapshot->outputs = machine.outputs();
+    snapshot->config_crc32 = machine.config_crc32();
+    snapshot->level_low = device->world().levels().low;
+    snapshot->level_high = device->world().levels().high;
     snapshot->max_slot_error_q8 = machine.max_slot_error_q8();
     snapshot->scale_q30 = point.scale_q30;
     for (uint8_t j = 0; j < gemelo::kMaxJoints; ++j) {
         snapshot->steps[j] = machine.stepper().executed(j);
+        snapshot->shaft[j] = device->world().shaft(j);
         snapshot->commanded_q20[j] = point.position_q20[j];
         snapshot->commanded_q8[j] = static_cast<int32_t>((point.position_q20[j] + 2048) >> 12);
     }

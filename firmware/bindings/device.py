@@ -1,16 +1,23 @@
-"""The firmware core from Python: a device whose clock is moved by hand."""
+"""The firmware core from Python: a device whose clock is moved by hand, with motors and switches around it."""
 
 from __future__ import annotations
 
 import ctypes as c
+import json
+from collections.abc import Sequence
 from typing import NamedTuple
 
+import msgspec
+
 from firmware.bindings.library import MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
+from firmware.bindings.motor import motor_record
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, config_text
+from schemas.robot import Motor
 
-OUTPUTS = ("traj/ack", "cmd/ack", "sync/r", "state", "event", "status")
+OUTPUTS = ("traj/ack", "cmd/ack", "sync/r", "state", "event", "status", "config/ack", "sensors", "text")
 LARGEST_OUTPUT = 1024
+UNCONFIGURED = DeviceConfig(name="", joints=())
 
 
 class ConfigError(ValueError):
@@ -32,36 +39,58 @@ class PinChange(NamedTuple):
     dir: int
 
 
+class Levels(NamedTuple):
+    """What the device's input pins read: bit i is GPIO i, then GPIO 32 + i."""
+
+    low: int
+    high: int
+
+
 class Device:
-    """One device; nothing happens in it but by `receive` and `advance`."""
+    """One device; nothing happens in it but by `receive` and `advance`.
+
+    `config` may be the JSON text itself, and None for a device that has none yet. `motors` are ideal where there are
+    none; the shafts stand at `steps` unless `shaft` says where they truly are.
+    """
 
     def __init__(
         self,
-        config: DeviceConfig,
+        config: DeviceConfig | bytes | None,
         boot_id: int = 1,
         now_us: int = 0,
-        steps: tuple[int, ...] | None = None,
+        steps: Sequence[int] | None = None,
         referenced: bool = True,
         reset_cause: str = "power_on",
+        motors: Sequence[Motor] = (),
+        shaft: Sequence[int] | None = None,
     ) -> None:
         self._library = load_library()
         self._handle = None
-        self.config = config
         self.boot_id = boot_id
-        count = len(config.joints)
-        start = steps if steps is not None else (0,) * count
-        if len(start) != count:
-            raise ConfigError(f"{len(start)} start positions for {count} joints of {config.name!r}")
-        positions = (c.c_int32 * max(count, MAX_JOINTS))(*start)
-        text, part, reason = config_text(config), c.create_string_buffer(PART_SIZE), c.create_string_buffer(REASON_SIZE)
-        self._handle = self._library.gemelo_create(
-            text, len(text), part, reason, boot_id, reset_cause.encode(), now_us, positions, referenced
-        )
-        if self._handle is None:
-            subject = f"{part.value.decode()!r} of device" if part.value else "device"
-            raise ConfigError(f"{subject} {config.name!r}: {reason.value.decode()}")
         self._buffer = (c.c_uint8 * LARGEST_OUTPUT)()
         self._output = c.c_uint8()
+        text = config_text(config) if isinstance(config, DeviceConfig) else config or b""
+        self._config, self._config_crc = _decoded(text), 0
+        count = len(self._config.joints)
+        start = steps if steps is not None else (0,) * count
+        if len(start) != count:
+            raise ConfigError(f"{len(start)} start positions for {count} joints of {self._config.name!r}")
+        self._handle = self._created(text, boot_id, reset_cause, now_us)
+        for index, motor in enumerate(motors[:MAX_JOINTS]):
+            self._library.gemelo_set_motor(self._handle, index, c.byref(motor_record(motor)))
+        true = _positions(start if shaft is None else shaft)
+        self._library.gemelo_start(self._handle, _positions(start), true, referenced)
+        self._config_crc = self._snapshot().config_crc32
+
+    def _created(self, text: bytes, boot_id: int, reset_cause: str, now_us: int) -> int:
+        part, reason = c.create_string_buffer(PART_SIZE), c.create_string_buffer(REASON_SIZE)
+        handle: int | None = self._library.gemelo_create(
+            text, len(text), part, reason, boot_id, reset_cause.encode(), now_us
+        )
+        if handle is None:
+            subject = f"{part.value.decode()!r} of device" if part.value else "device"
+            raise ConfigError(f"{subject} {self._config.name!r}: {reason.value.decode()}")
+        return handle
 
     def __del__(self) -> None:
         if getattr(self, "_handle", None) is not None:
@@ -71,6 +100,32 @@ class Device:
         """Hand one frame over, at the device's present time; it may have arrived a little earlier [us]."""
         received = self.now_us if received_us is None else received_us
         self._library.gemelo_receive(self._handle, payload, len(payload), retained, received)
+
+    def receive_config(self, text: bytes, retained: bool = False, received_us: int | None = None) -> None:
+        """Hand a configuration's text over."""
+        received = self.now_us if received_us is None else received_us
+        self._library.gemelo_receive_config(self._handle, text, len(text), retained, received)
+
+    @property
+    def config(self) -> DeviceConfig:
+        """What the device works with now."""
+        crc = self.config_crc32
+        if crc != self._config_crc:
+            self._config, self._config_crc = _decoded(self.kept_config), crc
+        return self._config
+
+    @property
+    def config_crc32(self) -> int:
+        """Of the configuration's text; 0 for none."""
+        return int(self._snapshot().config_crc32)
+
+    @property
+    def kept_config(self) -> bytes:
+        """The text of the configuration that was taken last over a wire; empty if none was."""
+        size = self._library.gemelo_kept(self._handle, self._buffer, 0)
+        text = (c.c_uint8 * size)()
+        self._library.gemelo_kept(self._handle, text, size)
+        return bytes(text)
 
     def advance(self, until_us: int) -> None:
         """Let time pass; every tick before `until_us` is run."""
@@ -123,8 +178,13 @@ class Device:
         return DeviceMode(self._snapshot().mode)
 
     @property
+    def armed(self) -> bool:
+        """The drivers are energised."""
+        return bool(self._snapshot().armed)
+
+    @property
     def referenced(self) -> bool:
-        """Whether the device knows where its joints stand."""
+        """Whether the device knows where all its joints stand."""
         return bool(self._snapshot().referenced)
 
     @property
@@ -133,9 +193,57 @@ class Device:
         return bool(self._snapshot().moving)
 
     @property
+    def still(self) -> bool:
+        """Nothing moves and no pulse is due: the flash may be written."""
+        return bool(self._snapshot().still)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs that are on."""
+        bits = self._snapshot().outputs
+        return tuple(output.name for i, output in enumerate(self.config.outputs) if bits >> i & 1)
+
+    @property
+    def levels(self) -> Levels:
+        """What the input pins read now."""
+        record = self._snapshot()
+        return Levels(record.level_low, record.level_high)
+
+    @property
     def steps(self) -> tuple[int, ...]:
         """Executed steps, absolute, per joint."""
         return tuple(self._snapshot().steps[: len(self.config.joints)])
+
+    @property
+    def shaft(self) -> tuple[int, ...]:
+        """Where the shafts truly are [steps], per joint; the device does not know."""
+        return tuple(self._snapshot().shaft[: len(self.config.joints)])
+
+    def shaft_report(self) -> bytes:
+        """The JSON of `shaft`."""
+        count, record = len(self.config.joints), self._snapshot()
+        report = {"t_us": record.now_us, "steps": record.steps[:count], "shaft": record.shaft[:count]}
+        return json.dumps(report).encode()
+
+    def press_input(self, index: int, pressed: bool | None) -> None:
+        """Hold a switch closed or open; None leaves it to the arm."""
+        self._library.gemelo_press(self._handle, index, 0 if pressed is None else 1 if pressed else 2)
+
+    def block(self, joint: int, blocked: bool = True) -> None:
+        """Hold a shaft fast, or let it go."""
+        self._library.gemelo_block(self._handle, joint, blocked)
+
+    def slip(self, joint: int, steps: int) -> None:
+        """Push a shaft by so many steps, as when its coupling gives way."""
+        self._library.gemelo_slip(self._handle, joint, steps)
+
+    def set_sensor(self, index: int, value: float) -> None:
+        """What a sensor reads from now on, in its own unit."""
+        self._library.gemelo_set_sensor(self._handle, index, value)
+
+    def freeze(self, seconds: float) -> None:
+        """The slot's task hangs for so long; only the interrupt runs."""
+        self._library.gemelo_freeze(self._handle, round(seconds * 1e6))
 
     @property
     def commanded_q8(self) -> tuple[int, ...]:
@@ -161,3 +269,21 @@ class Device:
     def max_slot_error(self) -> int:
         """The largest |commanded - executed| at any slot end so far [1/256 step], rounded up."""
         return int(self._snapshot().max_slot_error_q8)
+
+
+def joint_count(text: bytes) -> int:
+    """How many joints a configuration has; raises ConfigError where it is none."""
+    return len(_decoded(text).joints)
+
+
+def _decoded(text: bytes) -> DeviceConfig:
+    if not text:
+        return UNCONFIGURED
+    try:
+        return msgspec.json.decode(text, type=DeviceConfig)
+    except msgspec.DecodeError as error:
+        raise ConfigError(f"the configuration cannot be read: {error}") from error
+
+
+def _positions(values: Sequence[int]) -> c.Array[c.c_int32]:
+    return (c.c_int32 * MAX_JOINTS)(*values)

@@ -7,6 +7,7 @@ import functools
 from pathlib import Path
 
 MAX_JOINTS = 8
+MAX_CURVE = 16  # of platform/host/motor.h
 PART_SIZE, REASON_SIZE = 32, 128  # of `Refusal` in core/refusal.h
 LIBRARY = Path(__file__).resolve().parents[1] / "build" / "libgemelo_core.so"
 
@@ -24,11 +25,32 @@ class SnapshotRecord(c.Structure):
         ("mode", c.c_uint32),
         ("referenced", c.c_uint32),
         ("moving", c.c_uint32),
+        ("still", c.c_uint32),
+        ("armed", c.c_uint32),
+        ("outputs", c.c_uint32),
+        ("config_crc32", c.c_uint32),
         ("max_slot_error_q8", c.c_uint32),
         ("steps", c.c_int32 * MAX_JOINTS),
+        ("shaft", c.c_int32 * MAX_JOINTS),
         ("commanded_q8", c.c_int32 * MAX_JOINTS),
         ("commanded_q20", c.c_int64 * MAX_JOINTS),
+        ("level_low", c.c_uint32),
+        ("level_high", c.c_uint32),
         ("scale_q30", c.c_uint32),
+    )
+
+
+class MotorRecord(c.Structure):
+    """`MotorConfig` of platform/host/motor.h."""
+
+    _fields_ = (
+        ("pulses_per_turn", c.c_int32),
+        ("full_steps_per_turn", c.c_int32),
+        ("points", c.c_uint8),
+        ("speed", c.c_double * MAX_CURVE),
+        ("torque", c.c_double * MAX_CURVE),
+        ("inertia", c.c_double),
+        ("friction", c.c_double),
     )
 
 
@@ -44,11 +66,15 @@ def load_library(path: Path = LIBRARY) -> c.CDLL:
     u8, u32, u64, size, device = c.POINTER(c.c_uint8), c.c_uint32, c.c_uint64, c.c_size_t, c.c_void_p
     text = c.c_char_p
     i32s = c.POINTER(c.c_int32)
+    motor, motor_config = c.c_void_p, c.POINTER(MotorRecord)
     u32s, u64s = c.POINTER(c.c_uint32), c.POINTER(c.c_uint64)
     signatures: dict[str, tuple[object, list[object]]] = {
-        "create": (device, [text, size, text, text, u32, text, u64, i32s, c.c_int]),
+        "create": (device, [text, size, text, text, u32, text, u64]),
+        "start": (None, [device, i32s, i32s, c.c_int]),
         "destroy": (None, [device]),
         "receive": (None, [device, c.c_char_p, size, c.c_int, u64]),
+        "receive_config": (None, [device, text, size, c.c_int, u64]),
+        "kept": (size, [device, u8, size]),
         "advance": (None, [device, u64]),
         "halt": (None, [device]),
         "report_status": (None, [device]),
@@ -56,6 +82,18 @@ def load_library(path: Path = LIBRARY) -> c.CDLL:
         "snapshot": (None, [device, c.POINTER(SnapshotRecord)]),
         "trace": (None, [device, c.c_int]),
         "take_trace": (size, [device, u64s, u32s, u32s, size]),
+        "set_motor": (None, [device, c.c_uint8, motor_config]),
+        "press": (None, [device, c.c_uint8, c.c_uint8]),
+        "block": (None, [device, c.c_uint8, c.c_int]),
+        "slip": (None, [device, c.c_uint8, c.c_int32]),
+        "set_sensor": (None, [device, c.c_uint8, c.c_double]),
+        "freeze": (None, [device, u64]),
+        "motor_create": (motor, [motor_config, c.c_double]),
+        "motor_destroy": (None, [motor]),
+        "motor_pulse": (None, [motor, c.c_int]),
+        "motor_run": (None, [motor, u64]),
+        "motor_hold": (None, [motor, c.c_int]),
+        "motor_shaft": (c.c_int32, [motor]),
     }
     for name, (result, arguments) in signatures.items():
         function = getattr(library, f"gemelo_{name}")

@@ -9,7 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from firmware.bindings.device import Device
+from firmware.bindings.press import press
+from schemas.device import DeviceCommandKind, DeviceMode, PressKind, PressRequest
 from schemas.device_config import DeviceConfig, JointConfig
+from schemas.robot import Motor
 
 BOOT = 0x12345678
 NEVER = (1 << 64) - 1
@@ -42,9 +45,9 @@ def traj(stream: int, seq: int, rows: Sequence[Row], flags: int = 0, dt_us: int 
     return seal(body + b"".join(struct.pack(f"<{2 * n}i", *positions, *velocities) for positions, velocities in rows))
 
 
-def command(cmd: int, cmd_id: int, boot: int = BOOT) -> bytes:
+def command(cmd: int, cmd_id: int, boot: int = BOOT, index: int = 0, argument: int = 0) -> bytes:
     """A CMD frame without positions."""
-    return seal(struct.pack("<BBBBIIQBBH", 0x67, 1, 3, 0, boot, cmd_id, NEVER, cmd, 0, 0))
+    return seal(struct.pack("<BBBBIIQBBH", 0x67, 1, 3, 0, boot, cmd_id, NEVER, cmd, index, argument))
 
 
 def heartbeat(counter: int) -> bytes:
@@ -62,12 +65,23 @@ def smooth(start: float, goal: float, duration: float, t: float) -> tuple[float,
 class Bench:
     """A device with a heartbeat, its answers read."""
 
-    def __init__(self, config: DeviceConfig) -> None:
-        self.device = Device(config, boot_id=BOOT)
+    def __init__(
+        self,
+        config: DeviceConfig | None,
+        motors: Sequence[Motor] = (),
+        shaft: Sequence[int] | None = None,
+        referenced: bool = True,
+    ) -> None:
+        self.device = Device(config, boot_id=BOOT, motors=motors, shaft=shaft, referenced=referenced)
         self.events: list[dict[str, object]] = []
         self.acks: list[Ack] = []
+        self.codes: list[int] = []  # of CMD_ACKs
+        self.config_acks: list[dict[str, object]] = []
+        self.sensors: dict[str, object] = {}
         self._beats = 0
         self._next_beat = 0
+        self._commands = 0
+        self._streams = 0
 
     def send(self, frame: bytes) -> Ack | None:
         """The ACK to a chunk; None for anything else."""
@@ -76,6 +90,39 @@ class Bench:
         self.device.receive(frame)
         self.listen()
         return self.acks[-1] if len(self.acks) > count else None
+
+    def order(self, cmd: DeviceCommandKind, index: int = 0, argument: int = 0) -> int:
+        """Give a command; the code of its acknowledgement."""
+        self._commands += 1
+        self.device.receive(command(cmd, self._commands, index=index, argument=argument))
+        self.listen()
+        return self.codes[-1]
+
+    def move(self, goal: Sequence[int], duration: float, knots: int = 100) -> int:
+        """Start a whole move from rest to rest [steps, s]; the code of its acknowledgement."""
+        self._streams += 1
+        start = [position / 256 for position in self.device.commanded_q8]
+        rows: list[Row] = []
+        for i in range(knots + 1):
+            pairs = zip(start, goal, strict=True)
+            points = [smooth(a, b, duration, duration * i / knots) for a, b in pairs]
+            rows.append(([round(p * 256) for p, _ in points], [round(v * 256) for _, v in points]))
+        dt_us = round(duration / knots * 1e6)
+        ack = self.send(traj(self._streams, 0, rows, FIRST | LAST, dt_us))
+        assert ack is not None
+        return ack.code
+
+    def press(self, kind: PressKind, target: str = "", value: float = 1.0) -> None:
+        """Do something to the device's world."""
+        press(self.device, PressRequest(press=kind, target=target, value=value))
+
+    def run_until(self, mode: DeviceMode, seconds: float) -> None:
+        """Let time pass until the device is in that mode; at most so long."""
+        for _ in range(round(seconds * 10)):
+            if self.device.mode == mode:
+                return
+            self.run(100)
+        raise AssertionError(f"after {seconds} s the device is in {self.device.mode.name}: {self.events[-5:]}")
 
     def run(self, ms: int, silent: bool = False) -> None:
         """Let time pass, in pieces between which a heartbeat may be due."""
@@ -96,6 +143,16 @@ class Bench:
             elif frame.kind == "traj/ack":
                 stream, seq, next_seq, code, _, _, _, _, room, buffered, _ = ACK.unpack(frame.payload[8:-4])
                 self.acks.append(Ack(stream, seq, next_seq, code, room, buffered))
+            elif frame.kind == "cmd/ack":
+                self.codes.append(frame.payload[13])
+            elif frame.kind == "config/ack":
+                self.config_acks.append(json.loads(frame.payload))
+            elif frame.kind == "sensors":
+                self.sensors = json.loads(frame.payload)
+
+    def details(self, name: str) -> list[object]:
+        """The details of all events of that name so far."""
+        return [event["detail"] for event in self.events if event["event"] == name]
 
     def names(self) -> list[object]:
         """The names of the events so far."""

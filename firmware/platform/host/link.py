@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import queue
 import socket
+import ssl
+import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
@@ -14,18 +17,33 @@ from paho.mqtt.enums import CallbackAPIVersion
 log = logging.getLogger("virtual_esp32")
 
 PREFIX = "gemelo/v1"
-COMMANDS = {"traj": 1, "cmd": 1, "hb": 0, "sync": 0}  # QoS of the subscription
-REPORTS = {"traj/ack": 0, "cmd/ack": 1, "sync/r": 0, "state": 0, "event": 1, "status": 1}  # QoS of the publication
+COMMANDS = {"traj": 1, "cmd": 1, "hb": 0, "sync": 0, "config": 1, "press": 1}  # QoS of the subscription
+REPORTS = {  # QoS of the publication
+    "traj/ack": 0, "cmd/ack": 1, "sync/r": 0, "state": 0, "event": 1, "status": 1,
+    "config/ack": 1, "sensors": 0, "shaft": 0,
+}  # fmt: skip
 FRAME_TYPES = {"traj": 1, "cmd": 3, "hb": 5, "sync": 6}
-LARGEST_FRAME = 16_384  # [bytes] the largest chunk has 8,228
+LARGEST = 16_384  # [bytes] the largest chunk has 8,228
 FULL_INBOX = 4096  # [messages]
 KEEP_ALIVE = 5  # [s]
 
 
 @dataclass(frozen=True)
-class Arrived:
-    """One message; what is on the wrong topic or too long for a frame comes as no bytes at all."""
+class BrokerAddress:
+    """Where the broker is, and how it is spoken to."""
 
+    host: str
+    port: int
+    user: str = ""
+    password: str = field(default="", repr=False)
+    tls: ssl.SSLContext | None = None
+
+
+@dataclass(frozen=True)
+class Arrived:
+    """One message; a frame on the wrong topic, and whatever is too long, comes as no bytes at all."""
+
+    kind: str  # the last part of its topic
     payload: bytes
     retained: bool
     monotonic: float  # [s]
@@ -54,7 +72,7 @@ Item = Arrived | Connected | Disconnected | Stop
 class DeviceLink:
     """One device's topics at one broker."""
 
-    def __init__(self, host: str, port: int, device: str, will: bytes, inbox: queue.SimpleQueue[Item]) -> None:
+    def __init__(self, broker: BrokerAddress, device: str, will: bytes, inbox: queue.SimpleQueue[Item]) -> None:
         self._topic = f"{PREFIX}/{device}/"
         self._inbox = inbox
         self._client = paho.Client(
@@ -64,6 +82,11 @@ class DeviceLink:
             protocol=paho.MQTTv311,
         )
         self._client.will_set(self._topic + "status", will, qos=1, retain=True)
+        if broker.user:
+            self._client.username_pw_set(broker.user, broker.password)
+        if broker.tls is not None:
+            self._client.tls_set_context(broker.tls)
+        self._is_broken_off = False
         self._client.on_socket_open = _send_at_once
         self._client.on_connect = self._on_connect
         self._client.on_connect_fail = self._on_connect_fail
@@ -71,12 +94,11 @@ class DeviceLink:
         self._client.on_message = self._on_message
         self._client.connect_timeout = 2.0
         self._client.reconnect_delay_set(min_delay=0.2, max_delay=1.0)  # type: ignore[arg-type]
-        self._address = (host, port)
+        self._broker = broker
 
     def start(self) -> None:
         """Connect, and again for as long as it takes, in paho's own thread."""
-        host, port = self._address
-        self._client.connect_async(host, port, keepalive=KEEP_ALIVE)
+        self._client.connect_async(self._broker.host, self._broker.port, keepalive=KEEP_ALIVE)
         self._client.loop_start()
 
     def publish(self, kind: str, payload: bytes) -> None:
@@ -94,29 +116,48 @@ class DeviceLink:
         self._client.disconnect()
         self._client.loop_stop()
 
+    def break_off(self) -> None:
+        """Vanish without a word, as a device that loses its power or its Wi-Fi; the broker says the last will."""
+        self._is_broken_off = True
+        wire = self._client.socket()
+        if isinstance(wire, socket.socket):
+            with contextlib.suppress(OSError):
+                wire.shutdown(socket.SHUT_RDWR)
+        self._client.disconnect()
+        # Its thread may be about to connect, and the steps cannot wait for that.
+        threading.Thread(target=self._client.loop_stop, daemon=True).start()
+
+    def _put(self, item: Item) -> None:
+        if not self._is_broken_off:
+            self._inbox.put(item)
+
     def _on_connect(self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
         if getattr(reason, "is_failure", False):
-            self._inbox.put(Disconnected(f"the broker refuses us: {reason}"))
+            self._put(Disconnected(f"the broker refuses us: {reason}"))
             return
         client.subscribe([(self._topic + kind, qos) for kind, qos in COMMANDS.items()])
-        self._inbox.put(Connected())
+        self._put(Connected())
 
     def _on_connect_fail(self, _client: paho.Client, _data: object) -> None:
-        host, port = self._address
-        self._inbox.put(Disconnected(f"no MQTT broker answers at {host}:{port}; is the process `broker` running?"))
+        where = f"{self._broker.host}:{self._broker.port}"
+        self._put(Disconnected(f"no MQTT broker answers at {where}; is the process `broker` running?"))
 
     def _on_disconnect(self, _client: paho.Client, _data: object, _flags: object, reason: object, _p: object) -> None:
-        self._inbox.put(Disconnected(str(reason)))
+        self._put(Disconnected(str(reason)))
 
     def _on_message(self, _client: paho.Client, _data: object, message: paho.MQTTMessage) -> None:
         arrival = time.monotonic()
         # A flood may fill the memory but not starve the steps.
         if self._inbox.qsize() > FULL_INBOX:
             return
-        expected = FRAME_TYPES.get(message.topic.removeprefix(self._topic))
-        payload = bytes(message.payload)
-        fits = 3 <= len(payload) <= LARGEST_FRAME and payload[2] == expected
-        self._inbox.put(Arrived(payload if fits else b"", message.retain, arrival))
+        kind, payload = message.topic.removeprefix(self._topic), bytes(message.payload)
+        self._put(Arrived(kind, payload if _fits(kind, payload) else b"", message.retain, arrival))
+
+
+def _fits(kind: str, payload: bytes) -> bool:
+    if kind not in FRAME_TYPES:
+        return len(payload) <= LARGEST
+    return 3 <= len(payload) <= LARGEST and payload[2] == FRAME_TYPES[kind]
 
 
 def _send_at_once(_client: paho.Client, _data: object, sock: object) -> None:

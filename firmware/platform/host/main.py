@@ -5,21 +5,20 @@ from __future__ import annotations
 import argparse
 import logging
 import queue
-import secrets
 import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from firmware.bindings.device import ConfigError, Device
+from firmware.bindings.device import ConfigError
 from firmware.bindings.library import CoreMissing
-from firmware.platform.host.link import DeviceLink, Item, Stop
-from firmware.platform.host.memory import PoseMemory
-from firmware.platform.host.virtual_esp32 import VirtualEsp32, offline_status
+from firmware.bindings.motor import MotorError
+from firmware.platform.host.board import Board
+from firmware.platform.host.link import BrokerAddress, Item, Stop
+from firmware.platform.host.network import Network
+from firmware.platform.host.virtual_esp32 import VirtualEsp32
 from schemas.deployment import Deployment
-from schemas.device_config import DeviceConfig
-from services.arm.description import Arm, load_arm
-from services.arm.device_config import device_config, reference_steps
+from services.arm.description import load_arm
 from services.arm.errors import DescriptionError
 from services.runtime.deployment import DeploymentError, load_deployment, project_root
 from services.runtime.logs import LEVELS, line_logger
@@ -37,46 +36,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     log.propagate = False
     try:
         run(load_deployment(options.config))
-    except (DeploymentError, DescriptionError, ConfigError, CoreMissing) as error:
+    except (DeploymentError, DescriptionError, ConfigError, MotorError, CoreMissing) as error:
         log.error("%s", error)
         return 1
     return 0
 
 
 def run(deployment: Deployment) -> None:
-    """Build the device of the deployment's robot and serve it."""
+    """Build the board of the deployment's robot and serve it."""
     arm = load_arm(project_root() / deployment.robot)
     folder = project_root() / deployment.paths.run
     folder.mkdir(parents=True, exist_ok=True)
-    config = device_config(arm)
-    memory = PoseMemory(folder / f"{NAME}.json", config.name)
-    device = _wake(config, arm, memory)
     inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: inbox.put(Stop()))
-    link = DeviceLink(deployment.mqtt.host, deployment.mqtt.port, config.name, offline_status(device), inbox)
-    VirtualEsp32(device, link, inbox, memory, Readiness(folder, NAME)).run()
-
-
-def _wake(config: DeviceConfig, arm: Arm, memory: PoseMemory) -> Device:
-    awakening = memory.wake(reference_steps(arm))
-    boot_id = secrets.randbelow((1 << 32) - 1) + 1
-    device = Device(
-        config,
-        boot_id=boot_id,
-        steps=awakening.steps,
-        referenced=awakening.referenced,
-        reset_cause=awakening.reset_cause,
-    )
-    where = "at " + ", ".join(f"{joint.name} {count}" for joint, count in zip(config.joints, device.steps, strict=True))
-    log.info(
-        "device %s, boot %08x (%s): %s",
-        config.name,
-        boot_id,
-        awakening.reset_cause,
-        where if awakening.referenced else "position unknown, `gemelo reference` declares it",
-    )
-    return device
+    network = Network(BrokerAddress(deployment.mqtt.host, deployment.mqtt.port), inbox)
+    VirtualEsp32(Board(arm, folder, NAME), network, inbox, Readiness(folder, NAME)).run()
 
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:

@@ -19,12 +19,14 @@ class Memory(msgspec.Struct, frozen=True, kw_only=True):
     steps: tuple[int, ...]
     moving: bool
     referenced: bool
+    shaft: tuple[int, ...] = ()  # where the arm truly is, which a real board does not know
 
 
 class Awakening(msgspec.Struct, frozen=True, kw_only=True):
     """How the device starts."""
 
     steps: tuple[int, ...]
+    shaft: tuple[int, ...]
     referenced: bool
     reset_cause: str
 
@@ -42,24 +44,35 @@ class PoseMemory:
         try:
             memory = msgspec.json.decode(self._path.read_bytes(), type=Memory)
         except FileNotFoundError:
-            return Awakening(steps=reference, referenced=True, reset_cause="first_start")
+            return _at(reference, "first_start")
         except (OSError, msgspec.DecodeError):
-            return Awakening(steps=(0,) * len(reference), referenced=False, reset_cause="memory_unreadable")
+            return _lost(reference, reference, "memory_unreadable")
         if memory.device != self._device or len(memory.steps) != len(reference):
-            return Awakening(steps=reference, referenced=True, reset_cause="first_start")
+            return _at(reference, "first_start")
+        shaft = memory.shaft if len(memory.shaft) == len(reference) else memory.steps
         if memory.moving:
-            return Awakening(steps=(0,) * len(reference), referenced=False, reset_cause="lost_while_moving")
-        return Awakening(steps=memory.steps, referenced=memory.referenced, reset_cause="power_on")
+            return _lost(reference, shaft, "lost_while_moving")
+        return Awakening(steps=memory.steps, shaft=shaft, referenced=memory.referenced, reset_cause="power_on")
 
-    def keep(self, steps: tuple[int, ...], moving: bool, referenced: bool) -> None:
+    def keep(self, memory: Memory) -> None:
         """Remember; touches the disk only when something has changed, and never while moving."""
         written = self._written
-        if written is not None and written.moving and moving:
-            return
-        memory = Memory(device=self._device, steps=steps, moving=moving, referenced=referenced)
-        if memory == written:
+        if memory == written or (written is not None and written.moving and memory.moving):
             return
         beside = self._path.with_suffix(".tmp")
         beside.write_bytes(msgspec.json.encode(memory) + b"\n")
         os.replace(beside, self._path)
         self._written = memory
+
+    def forget(self) -> None:
+        """Know nothing of where the joints are."""
+        self._path.write_bytes(b"")
+        self._written = None
+
+
+def _at(steps: tuple[int, ...], cause: str) -> Awakening:
+    return Awakening(steps=steps, shaft=steps, referenced=True, reset_cause=cause)
+
+
+def _lost(reference: tuple[int, ...], shaft: tuple[int, ...], cause: str) -> Awakening:
+    return Awakening(steps=(0,) * len(reference), shaft=shaft, referenced=False, reset_cause=cause)

@@ -4,42 +4,81 @@ namespace gemelo {
 
 VirtualDevice::VirtualDevice(const DeviceConfig& config, uint32_t boot_id, const std::string& reset_cause,
                              uint64_t now_us)
-    : config_(config),
-      reset_cause_(reset_cause),
-      ticks_per_slot_(ticks_per_slot(config)),
-      now_us_(now_us),
-      slot_start_us_(now_us) {
-    machine_.begin(config_, Identity{boot_id, reset_cause_.c_str()}, Sink{this, put});
-    traced_ = machine_.stepper().pins();
+    : config_(config), reset_cause_(reset_cause), now_us_(now_us), slot_start_us_(now_us) {
+    machine_.begin(config_, Identity{boot_id, reset_cause_.c_str(), true}, Sink{this, put, keep});
 }
 
 void VirtualDevice::put(void* self, Output output, const uint8_t* bytes, size_t size) {
     static_cast<VirtualDevice*>(self)->outputs_.push_back(OutFrame{output, {bytes, bytes + size}});
 }
 
+void VirtualDevice::keep(void* self, const uint8_t* text, size_t size) {
+    static_cast<VirtualDevice*>(self)->kept_.assign(reinterpret_cast<const char*>(text), size);
+}
+
+void VirtualDevice::start(const int32_t* steps, bool referenced, const int32_t* shaft) {
+    const uint8_t count = shaft == nullptr ? config_.joints : kMaxJoints;
+    for (uint8_t j = 0; j < count; ++j) world_.set_shaft(j, shaft == nullptr ? steps[j] : shaft[j]);
+    wire();
+    machine_.start(now_us_, steps, referenced);
+    drive_pins();
+}
+
+void VirtualDevice::wire() {
+    wired_crc32_ = machine_.config_crc32();
+    ticks_per_slot_ = ticks_per_slot(config_);
+    tick_in_slot_ = 0;
+    slot_start_us_ = now_us_;
+    traced_ = machine_.stepper().pins();
+    world_.wire(config_, traced_);
+}
+
 void VirtualDevice::receive(const uint8_t* bytes, size_t size, bool is_retained, uint64_t received_us) {
-    machine_.receive(Arrival{bytes, size, is_retained, received_us}, now_us_);
+    arrive(Arrived{Way::Frame, {bytes, bytes + size}, is_retained, received_us});
+}
+
+void VirtualDevice::receive_config(const uint8_t* text, size_t size, bool is_retained, uint64_t received_us) {
+    arrive(Arrived{Way::Config, {text, text + size}, is_retained, received_us});
+}
+
+void VirtualDevice::arrive(Arrived&& arrived) {
+    if (is_frozen() || !waiting_.empty()) return waiting_.push_back(std::move(arrived));
+    hand_over(arrived);
+}
+
+void VirtualDevice::hand_over(const Arrived& arrived) {
+    const Arrival arrival{arrived.bytes.data(), arrived.bytes.size(), arrived.is_retained, arrived.received_us};
+    if (arrived.way == Way::Config) {
+        machine_.receive_config(arrival, now_us_);
+    } else {
+        machine_.receive(arrival, now_us_);
+    }
+    if (machine_.config_crc32() != wired_crc32_) wire();
+    drive_pins();
 }
 
 void VirtualDevice::advance(uint64_t until_us) {
     while (until_us > slot_start_us_) {
+        if (tick_in_slot_ == 0 && !is_frozen()) hand_over_waiting();
         const uint64_t span_us = until_us - slot_start_us_;
         const bool is_whole = span_us >= kSlotUs;
         const uint64_t due = is_whole ? ticks_per_slot_ : (span_us * ticks_per_slot_ + kSlotUs - 1) / kSlotUs;
         run_until_tick(static_cast<uint32_t>(due));
         if (!is_whole) break;
         slot_start_us_ += kSlotUs;
+        now_us_ = slot_start_us_;
         tick_in_slot_ = 0;
     }
     if (until_us > now_us_) now_us_ = until_us;
 }
 
 void VirtualDevice::run_until_tick(uint32_t due) {
+    if (ticks_per_slot_ == 0) return run_slot_task();  // without a configuration there is no tick
     if (tick_in_slot_ == 0 && due > 0) {
         tick();
-        machine_.slot(slot_start_us_);
+        if (!is_frozen()) run_slot_task();
     }
-    if (tick_in_slot_ < due && machine_.stepper().is_quiet()) {
+    if (tick_in_slot_ < due && machine_.stepper().is_quiet() && world_.is_settled()) {
         const uint32_t count = due - tick_in_slot_;
         machine_.stepper().skip(count);
         tick_in_slot_ += count;
@@ -48,17 +87,33 @@ void VirtualDevice::run_until_tick(uint32_t due) {
     while (tick_in_slot_ < due) tick();
 }
 
-void VirtualDevice::advance_without_slots(uint32_t slots) {
-    for (uint32_t i = 0; i < slots * ticks_per_slot_; ++i) tick();
-    tick_in_slot_ = 0;
-    slot_start_us_ += static_cast<uint64_t>(slots) * kSlotUs;
-    now_us_ = slot_start_us_;
+void VirtualDevice::run_slot_task() {
+    machine_.slot(slot_start_us_);
+    drive_pins();
 }
+
+void VirtualDevice::hand_over_waiting() {
+    for (; !waiting_.empty(); waiting_.pop_front()) hand_over(waiting_.front());
+}
+
+void VirtualDevice::drive_pins() {
+    world_.enable(machine_.is_enabled());
+    for (uint8_t i = 0; i < config_.sensors; ++i) machine_.set_sensor(i, world_.sensor_raw(i));
+}
+
+void VirtualDevice::advance_without_slots(uint32_t slots) {
+    const uint64_t duration_us = static_cast<uint64_t>(slots) * kSlotUs;
+    freeze(duration_us);
+    advance(now_us_ + duration_us);
+}
+
+void VirtualDevice::set_sensor(uint8_t index, double value) { world_.set_sensor(index, value); }
 
 void VirtualDevice::tick() {
     Stepper& stepper = machine_.stepper();
-    stepper.tick();
+    stepper.tick(world_.levels());
     const Pins& pins = stepper.pins();
+    world_.tick(pins);
     if (is_tracing_ && (pins.step != traced_.step || pins.dir != traced_.dir)) trace_.push_back(PinChange{tick_, pins});
     traced_ = pins;
     ++tick_;

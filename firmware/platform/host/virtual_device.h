@@ -1,4 +1,5 @@
-// The core with a clock that is moved by hand: tests run it as fast as they like, the virtual ESP32 in real time.
+// The core with a clock that is moved by hand, and a world around it: tests run it as fast as they like, the virtual
+// ESP32 in real time.
 #pragma once
 
 #include <deque>
@@ -6,6 +7,7 @@
 #include <vector>
 
 #include "machine.h"
+#include "world.h"
 
 namespace gemelo {
 
@@ -26,35 +28,64 @@ class VirtualDevice {
     VirtualDevice(const VirtualDevice&) = delete;
     VirtualDevice& operator=(const VirtualDevice&) = delete;
 
-    void start(const int32_t* steps, bool referenced) { machine_.start(now_us_, steps, referenced); }
+    // The counters begin at `steps`; the shafts stand there too, unless the kMaxJoints of `shaft` say where they are.
+    void start(const int32_t* steps, bool referenced, const int32_t* shaft = nullptr);
     void receive(const uint8_t* bytes, size_t size, bool is_retained, uint64_t received_us);
     void receive(const std::vector<uint8_t>& bytes) { receive(bytes.data(), bytes.size(), false, now_us_); }
+    void receive_config(const uint8_t* text, size_t size, bool is_retained, uint64_t received_us);
 
     // Runs every tick whose time is before `until_us`; at a multiple of a slot since the start, a slot has just ended.
     void advance(uint64_t until_us);
-    // Only the interrupt runs: the slot task hangs.
+    // The slot's task hangs for so long; only the interrupt runs, and what arrives waits.
+    void freeze(uint64_t duration_us) { frozen_until_us_ = now_us_ + duration_us; }
     void advance_without_slots(uint32_t slots);
+    void set_sensor(uint8_t index, double value);
 
     uint64_t now_us() const { return now_us_; }
     Machine& machine() { return machine_; }
+    World& world() { return world_; }
+    const DeviceConfig& config() const { return config_; }
     std::deque<OutFrame>& outputs() { return outputs_; }
+    // The text of the configuration that was taken last; empty if none was.
+    const std::string& kept() const { return kept_; }
     void set_tracing(bool on) { is_tracing_ = on; }
     std::deque<PinChange>& trace() { return trace_; }
 
   private:
+    enum class Way : uint8_t { Frame, Config };
+    struct Arrived {
+        Way way;
+        std::vector<uint8_t> bytes;
+        bool is_retained;
+        uint64_t received_us;
+    };
+
     static void put(void* self, Output output, const uint8_t* bytes, size_t size);
+    static void keep(void* self, const uint8_t* text, size_t size);
+    void arrive(Arrived&& arrived);
+    void hand_over(const Arrived& arrived);
+    void hand_over_waiting();
     void run_until_tick(uint32_t due);
     void tick();
+    void run_slot_task();
+    void drive_pins();
+    void wire();
+    bool is_frozen() const { return slot_start_us_ < frozen_until_us_; }
 
     DeviceConfig config_;
     std::string reset_cause_;
     Machine machine_;
-    uint32_t ticks_per_slot_;
+    World world_;
+    uint32_t wired_crc32_ = 0;
+    uint32_t ticks_per_slot_ = 0;
     uint64_t now_us_;
     uint64_t slot_start_us_;
+    uint64_t frozen_until_us_ = 0;
     uint32_t tick_in_slot_ = 0;
     uint64_t tick_ = 0;
+    std::deque<Arrived> waiting_;
     std::deque<OutFrame> outputs_;
+    std::string kept_;
     std::deque<PinChange> trace_;
     Pins traced_;
     bool is_tracing_ = false;

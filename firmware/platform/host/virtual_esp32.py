@@ -1,4 +1,4 @@
-"""The firmware core in real time: frames in, steps made as the clock says, reports out."""
+"""A board in real time: what arrives goes in, steps are made as the clock says, reports go out."""
 
 from __future__ import annotations
 
@@ -6,10 +6,17 @@ import json
 import logging
 import queue
 import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 
-from firmware.bindings.device import Device, OutFrame
-from firmware.platform.host.link import Arrived, Connected, DeviceLink, Disconnected, Item, Stop
-from firmware.platform.host.memory import PoseMemory
+from firmware.bindings.device import OutFrame
+from firmware.bindings.press import PressRefused, press, read_press, within
+from firmware.platform.host.board import Board
+from firmware.platform.host.clock import DeviceClock
+from firmware.platform.host.link import Arrived, Connected, Disconnected, Item, Stop
+from firmware.platform.host.network import Network
+from schemas.device import PressKind, PressRequest
 from services.runtime.readiness import Readiness
 
 log = logging.getLogger("virtual_esp32")
@@ -19,42 +26,37 @@ PAUSE_AT_REST = 0.020  # [s] a state is due as often
 STALL = 0.1  # [s] a loop that was late by more was stopped by the operating system
 LONGEST_STOP = 5.0  # [s] when the process is asked to end while the arm moves
 BEAT = 1.0  # [s] of the readiness file
-PATIENCE = 3.0  # [s] that a broker which is started together with us may take
+SHAFT_PERIOD = 0.1  # [s]
+LARGEST_DRIFT = 10_000.0  # [ppm]
+LONGEST_OFFLINE = 3600.0  # [s]
+LOUD = ("fault", "estop", "hold", "underrun")
+QUIET = ("homed", "configured", "pressed", "press_refused")
 
 
 class VirtualEsp32:
-    """One device on one link; everything but paho's thread happens in `run`."""
+    """One board on its network; everything but paho's thread happens in `run`."""
 
-    def __init__(
-        self,
-        device: Device,
-        link: DeviceLink,
-        inbox: queue.SimpleQueue[Item],
-        memory: PoseMemory,
-        readiness: Readiness,
-    ) -> None:
-        self._device = device
-        self._link = link
+    def __init__(self, board: Board, network: Network, inbox: queue.SimpleQueue[Item], readiness: Readiness) -> None:
+        self._board = board
+        self._network = network
         self._inbox = inbox
-        self._memory = memory
         self._readiness = readiness
-        self._started = time.monotonic() - device.now_us / 1e6
+        self._device = board.boot()
         self._born = self._looked = time.monotonic()
-        self._next_beat = 0.0
-        self._connected = False
-        self._was_refused = ""
+        self._clock = DeviceClock(self._looked)
+        self._next_beat = self._next_shaft = 0.0
         self._running = True
 
     def run(self) -> None:
         """Until a Stop arrives in the inbox."""
-        self._remember()
-        self._link.start()
+        self._announce()
+        self._join()
         while self._running:
             self._turn()
         self._come_to_rest()
         self._readiness.not_ready()
-        self._remember()
-        self._link.close(offline_status(self._device))
+        self._board.remember(self._device)
+        self._network.leave()
 
     def _come_to_rest(self) -> None:
         """Only a device that stands knows where it will wake up."""
@@ -63,7 +65,7 @@ class VirtualEsp32:
         while self._device.moving and time.monotonic() < deadline:
             time.sleep(PAUSE_MOVING)
             self._advance(time.monotonic())
-            self._publish()
+            self._publish(time.monotonic())
 
     def _turn(self) -> None:
         items = self._wait()
@@ -75,9 +77,11 @@ class VirtualEsp32:
         for item in items:
             self._handle(item)
         self._advance(time.monotonic())
-        self._remember()
-        self._publish()
+        self._board.remember(self._device)
+        self._publish(now)
         self._beat(now)
+        if self._network.is_due_back(now):
+            self._join()
 
     def _wait(self) -> list[Item]:
         """Everything that has arrived, at once when there is something."""
@@ -104,67 +108,112 @@ class VirtualEsp32:
         for index, item in enumerate(items):
             if isinstance(item, Arrived):
                 due = begin + (end - begin) * (index + 1) / (len(items) + 1)
-                item = Arrived(item.payload, item.retained, min(item.monotonic, due))
+                item = replace(item, monotonic=min(item.monotonic, due))
             spread.append(item)
         return spread
 
     def _handle(self, item: Item) -> None:
         match item:
             case Arrived():
-                self._advance(item.monotonic)
-                self._device.receive(item.payload, item.retained, self._device_time(item.monotonic))
+                self._take_in(item)
             case Connected():
-                self._connected, self._was_refused = True, ""
-                log.info("connected to the broker")
+                self._network.on_connected()
                 self._device.report_status()
             case Disconnected():
-                self._on_lost(item.reason)
+                self._network.on_disconnected(item.reason)
+                self._readiness.not_ready()
             case Stop():
                 self._running = False
 
-    def _on_lost(self, reason: str) -> None:
-        if self._connected:
-            log.warning("lost the broker (%s); trying again", reason)
-            self._readiness.not_ready()
-            self._connected = False
-        elif reason != self._was_refused and time.monotonic() - self._born > PATIENCE:
-            log.warning("no connection: %s", reason)
-            self._was_refused = reason
+    def _take_in(self, item: Arrived) -> None:
+        self._advance(item.monotonic)
+        received_us = self._clock.at(item.monotonic)
+        match item.kind:
+            case "press":
+                if not item.retained:
+                    self._press(item.payload)
+            case "config":
+                self._device.receive_config(item.payload, item.retained, received_us)
+            case _:
+                self._device.receive(item.payload, item.retained, received_us)
 
-    def _device_time(self, monotonic: float) -> int:
-        return max(0, int((monotonic - self._started) * 1e6))
+    def _press(self, text: bytes) -> None:
+        """A press is answered by an event, whatever comes of it."""
+        try:
+            request = read_press(text)
+            after = self._carry_out(request)
+        except PressRefused as error:
+            self._say_event("press_refused", str(error))
+            return
+        self._say_event("pressed", f"{request.press} {request.target} {request.value:g}".replace("  ", " "))
+        if after is not None:
+            after()
+
+    def _carry_out(self, request: PressRequest) -> Callable[[], None] | None:
+        """Do it; what would keep the answer from being said is returned, to be done after it."""
+        match request.press:
+            case PressKind.REBOOT:
+                return partial(self._reboot, "reset_button")
+            case PressKind.OFFLINE:
+                return partial(self._network.break_off, within(request, LONGEST_OFFLINE))
+            case PressKind.DRIFT:
+                self._clock.drift(time.monotonic(), within(request, LARGEST_DRIFT, -LARGEST_DRIFT))
+            case _:
+                press(self._device, request)
+        return None
+
+    def _reboot(self, cause: str) -> None:
+        self._network.break_off()
+        self._board.remember(self._device)
+        self._device = self._board.boot(cause)
+        self._clock.restart(time.monotonic())
+        self._announce()
+        self._join()
+
+    def _join(self) -> None:
+        self._network.join(self._device, self._board.device_name, self._board.credentials)
+
+    def _announce(self) -> None:
+        self._board.remember(self._device)
+        device = self._device
+        joints = zip(device.config.joints, device.steps, strict=True)
+        where = "at " + ", ".join(f"{joint.name} {count}" for joint, count in joints)
+        lost = "position unknown: `gemelo home` finds it, `gemelo reference` declares it"
+        log.info("device %s, boot %08x: %s", self._board.name, device.boot_id, where if device.referenced else lost)
 
     def _advance(self, monotonic: float) -> None:
-        self._device.advance(self._device_time(monotonic))
+        self._device.advance(self._clock.at(monotonic))
         self._looked = max(self._looked, monotonic)
 
-    def _publish(self) -> None:
-        """What is said while there is no broker is lost: state and status come again."""
+    def _publish(self, now: float) -> None:
         for frame in self._device.take():
-            if frame.kind == "event":
-                _log_event(frame)
-            if self._connected:
-                self._link.publish(frame.kind, frame.payload)
+            self._say(frame)
+        if now >= self._next_shaft:
+            self._next_shaft = now + SHAFT_PERIOD
+            self._say(OutFrame("shaft", self._device.shaft_report()))
 
-    def _remember(self) -> None:
-        device = self._device
-        self._memory.keep(device.steps, device.moving, device.referenced)
+    def _say(self, frame: OutFrame) -> None:
+        if frame.kind == "event":
+            _log_event(frame)
+        self._network.publish(frame)
+
+    def _say_event(self, name: str, detail: str) -> None:
+        """As the firmware says its own; this one is the world's."""
+        event = {"event": name, "t_us": self._device.now_us, "boot_id": self._device.boot_id, "stream": 0}
+        self._say(OutFrame("event", json.dumps({**event, "detail": detail}).encode()))
 
     def _beat(self, now: float) -> None:
-        if now < self._next_beat or not self._connected:
+        if now < self._next_beat or not self._network.is_connected:
             return
         self._next_beat = now + BEAT
         self._readiness.ready()
         self._readiness.beat()
 
 
-def offline_status(device: Device) -> bytes:
-    """The last will, and the farewell."""
-    return json.dumps({"online": False, "device": device.config.name, "boot_id": device.boot_id}).encode()
-
-
 def _log_event(frame: OutFrame) -> None:
     event = json.loads(frame.payload)
-    if event["event"] in ("fault", "hold", "underrun"):
+    if event["event"] in LOUD:
         level = logging.INFO if event["detail"] == "command" else logging.WARNING
         log.log(level, "%s %s at %.3f s", event["event"], event["detail"], event["t_us"] / 1e6)
+    elif event["event"] in QUIET:
+        log.info("%s %s", event["event"], event["detail"])

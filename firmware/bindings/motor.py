@@ -1,0 +1,60 @@
+"""The virtual motor: what a device's joint hangs on, and one alone that pulses are given to by hand."""
+
+from __future__ import annotations
+
+import ctypes as c
+
+from firmware.bindings.library import MAX_CURVE, MotorRecord, load_library
+from schemas.robot import Motor
+
+
+class MotorError(ValueError):
+    """No such motor can be; the message says what is wrong with it."""
+
+
+def motor_record(motor: Motor) -> MotorRecord:
+    """The core's form of it; one without a pull-out curve is ideal."""
+    record = MotorRecord(pulses_per_turn=motor.pulses_per_turn, full_steps_per_turn=200, points=0)
+    curve = motor.pull_out
+    if curve is None:
+        return record
+    count = len(curve.speed)
+    if count != len(curve.torque) or not 1 <= count <= MAX_CURVE:
+        raise MotorError(f"pull_out has {count} speeds and {len(curve.torque)} torques: 1 to {MAX_CURVE} of each")
+    record.full_steps_per_turn, record.points = curve.full_steps_per_turn, count
+    record.speed[:count], record.torque[:count] = curve.speed, curve.torque
+    record.inertia, record.friction = curve.inertia, curve.friction
+    return record
+
+
+class VirtualMotor:
+    """A motor on a bench, at its place 0."""
+
+    def __init__(self, motor: Motor, tick_hz: int = 50_000) -> None:
+        self._library = load_library()
+        self._tick_hz = tick_hz
+        self._ticks = 0
+        self._handle = self._library.gemelo_motor_create(c.byref(motor_record(motor)), 1.0 / tick_hz)
+
+    def __del__(self) -> None:
+        if getattr(self, "_handle", None) is not None:
+            self._library.gemelo_motor_destroy(self._handle)
+
+    def run(self, until: float) -> None:
+        """Let time pass until then [s]."""
+        ticks = round(until * self._tick_hz)
+        self._library.gemelo_motor_run(self._handle, max(0, ticks - self._ticks))
+        self._ticks = max(self._ticks, ticks)
+
+    def pulse(self, direction: int) -> None:
+        """One step pulse, now; `direction` is 1 or -1."""
+        self._library.gemelo_motor_pulse(self._handle, direction)
+
+    def hold(self, held: bool = True) -> None:
+        """Hold the shaft fast, or let it go."""
+        self._library.gemelo_motor_hold(self._handle, held)
+
+    @property
+    def shaft(self) -> int:
+        """Where the shaft truly is [pulses]."""
+        return int(self._library.gemelo_motor_shaft(self._handle))

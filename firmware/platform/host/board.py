@@ -1,0 +1,100 @@
+"""A virtual board: what it keeps over a restart, and the device that wakes up from it."""
+
+from __future__ import annotations
+
+import logging
+import secrets
+from pathlib import Path
+
+from firmware.bindings.device import ConfigError, Device, joint_count
+from firmware.platform.host.flash import Credentials, Flash
+from firmware.platform.host.memory import Awakening, Memory, PoseMemory
+from schemas.device_config import config_text
+from services.arm.description import Arm
+from services.arm.device_config import device_config, reference_steps
+
+log = logging.getLogger("virtual_esp32")
+
+
+class Board:
+    """One board of an arm's; its files lie in `folder`.
+
+    It leaves the factory with the configuration that robot.toml asks for, and the arm in its reference pose.
+    """
+
+    def __init__(self, arm: Arm, folder: Path, name: str) -> None:
+        self._factory = config_text(device_config(arm))
+        self._reference = reference_steps(arm)
+        self._motors = tuple(joint.drive.motor for joint in arm.joints)
+        self.name = arm.device.name
+        self._flash = Flash(folder / f"{name}_flash.json", self.name)
+        self._memory = PoseMemory(folder / f"{name}.json", self.name)
+        self._shaft: tuple[int, ...] = ()  # [steps] where the arm truly is; empty: as the memory has it
+        self._crc32 = 0  # of the configuration that the flash has
+
+    @property
+    def credentials(self) -> Credentials:
+        return self._flash.credentials
+
+    @property
+    def device_name(self) -> str:
+        """Part of every topic."""
+        return self._flash.credentials.device or self.name
+
+    def boot(self, reset_cause: str = "") -> Device:
+        """The device after a reset; `reset_cause` says why, unless its memory knows better."""
+        kept = self._flash.configuration
+        text = self._factory if kept is None else kept.encode()
+        try:
+            return self._boot(text, reset_cause)
+        except ConfigError as error:
+            log.warning("%s; the board starts without a configuration", error)
+            return self._boot(b"", reset_cause)
+
+    def remember(self, device: Device) -> None:
+        """Keep what a restart must find; to be called often, writes seldom."""
+        if device.config_crc32 != self._crc32:
+            self._crc32 = device.config_crc32
+            self._flash.keep_configuration(device.kept_config.decode())
+        if not device.config.joints:
+            return
+        self._shaft = device.shaft
+        self._memory.keep(
+            Memory(
+                device=self.name,
+                steps=device.steps,
+                moving=not device.still,
+                referenced=device.referenced,
+                shaft=self._shaft,
+            )
+        )
+
+    def provision(self, credentials: Credentials) -> None:
+        """Keep new credentials; they count from the next boot on."""
+        self._flash.keep_credentials(credentials)
+
+    def factory_reset(self) -> None:
+        """Forget configuration, credentials and position."""
+        self._flash.forget()
+        self._memory.forget()
+
+    def _boot(self, text: bytes, reset_cause: str) -> Device:
+        awakening = self._memory.wake(self._reference)
+        self._shaft = self._shaft or awakening.shaft
+        count = joint_count(text)
+        is_known = count == len(awakening.steps)
+        device = Device(
+            text or None,
+            boot_id=secrets.randbelow((1 << 32) - 1) + 1,
+            steps=awakening.steps if is_known else (0,) * count,
+            referenced=awakening.referenced and is_known,
+            reset_cause=_cause(awakening, reset_cause),
+            motors=self._motors,
+            shaft=self._shaft,
+        )
+        self._crc32 = device.config_crc32
+        return device
+
+
+def _cause(awakening: Awakening, reset_cause: str) -> str:
+    return reset_cause if reset_cause and awakening.reset_cause == "power_on" else awakening.reset_cause

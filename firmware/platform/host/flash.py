@@ -1,0 +1,79 @@
+"""What a board keeps for good: its configuration, and the credentials that it was provisioned with.
+
+The file is readable by its owner only, and nothing of the credentials is ever logged.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import msgspec
+
+
+class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """How the device reaches its network; a virtual one has no use for the Wi-Fi's."""
+
+    device: str = ""  # empty: the configuration's name
+    wifi_ssid: str = ""
+    wifi_password: str = ""
+    mqtt_uri: str = ""  # empty: the deployment's broker
+    mqtt_user: str = ""
+    mqtt_password: str = ""
+    mqtt_ca: str = ""  # PEM
+
+    def __repr__(self) -> str:
+        return f"Credentials(device={self.device!r}, mqtt_uri={self.mqtt_uri!r}, ...)"
+
+
+class Content(msgspec.Struct, frozen=True, kw_only=True):
+    """The file."""
+
+    board: str
+    configuration: str | None = None  # JSON text; None: what it left the factory with; empty: forgotten
+    credentials: Credentials = Credentials()
+
+
+class Flash:
+    """The file of one board; one of another board, or one that cannot be read, counts as new."""
+
+    def __init__(self, path: Path, board: str) -> None:
+        self._path = path
+        self._content = _read(path, board)
+
+    @property
+    def configuration(self) -> str | None:
+        return self._content.configuration
+
+    @property
+    def credentials(self) -> Credentials:
+        return self._content.credentials
+
+    def keep_configuration(self, text: str) -> None:
+        """Keep the configuration over a restart."""
+        self._write(msgspec.structs.replace(self._content, configuration=text))
+
+    def keep_credentials(self, credentials: Credentials) -> None:
+        """Keep the credentials over a restart."""
+        self._write(msgspec.structs.replace(self._content, credentials=credentials))
+
+    def forget(self) -> None:
+        """Factory reset: neither configuration nor credentials."""
+        self._write(Content(board=self._content.board, configuration=""))
+
+    def _write(self, content: Content) -> None:
+        beside = self._path.with_suffix(".tmp")
+        beside.unlink(missing_ok=True)
+        file = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(file, "wb") as stream:
+            stream.write(msgspec.json.encode(content) + b"\n")
+        os.replace(beside, self._path)
+        self._content = content
+
+
+def _read(path: Path, board: str) -> Content:
+    try:
+        content = msgspec.json.decode(path.read_bytes(), type=Content)
+    except (OSError, msgspec.DecodeError):
+        return Content(board=board)
+    return content if content.board == board else Content(board=board)

@@ -1,0 +1,117 @@
+"""The board's way to its broker: which one, whether it is reached, and how it is lost."""
+
+from __future__ import annotations
+
+import json
+import logging
+import queue
+import ssl
+import time
+from urllib.parse import urlsplit
+
+from firmware.bindings.device import Device, OutFrame
+from firmware.platform.host.flash import Credentials
+from firmware.platform.host.link import REPORTS, BrokerAddress, DeviceLink, Item
+
+log = logging.getLogger("virtual_esp32")
+
+PATIENCE = 3.0  # [s] that a broker which is started together with us may take
+MQTT_PORT, MQTTS_PORT = 1883, 8883
+
+
+class AddressError(ValueError):
+    """The provisioned address of the broker is none."""
+
+
+class Network:
+    """One device's MQTT; `here` is the broker where none was provisioned."""
+
+    def __init__(self, here: BrokerAddress, inbox: queue.SimpleQueue[Item]) -> None:
+        self._here = here
+        self._inbox = inbox
+        self._link: DeviceLink | None = None
+        self._farewell = b""
+        self._born = time.monotonic()
+        self._back_at = 0.0  # [s] when the Wi-Fi returns; 0: it is there
+        self._was_refused = ""
+        self.is_connected = False
+
+    def join(self, device: Device, name: str, credentials: Credentials) -> None:
+        """Connect for as long as it takes, with this device's last will."""
+        self._farewell = offline_status(name, device.boot_id)
+        try:
+            broker = broker_address(credentials, self._here)
+        except AddressError as error:
+            log.error("%s", error)
+            return
+        self._link = DeviceLink(broker, name, self._farewell, self._inbox)
+        self._link.start()
+
+    def break_off(self, seconds: float = 0.0) -> None:
+        """Vanish without a word; the Wi-Fi is away for so long."""
+        if self._link is not None:
+            self._link.break_off()
+        self._link, self.is_connected = None, False
+        self._back_at = time.monotonic() + seconds if seconds else 0.0
+
+    def is_due_back(self, now: float) -> bool:
+        """Once, when the Wi-Fi has returned."""
+        if not self._back_at or now < self._back_at:
+            return False
+        self._back_at = 0.0
+        return True
+
+    def leave(self) -> None:
+        """Say goodbye and end."""
+        if self._link is not None:
+            self._link.close(self._farewell)
+
+    def publish(self, frame: OutFrame) -> None:
+        """What is said while there is no broker is lost: state and status come again."""
+        if self._link is not None and self.is_connected and frame.kind in REPORTS:
+            self._link.publish(frame.kind, frame.payload)
+
+    def on_connected(self) -> None:
+        self.is_connected, self._was_refused = True, ""
+        log.info("connected to the broker")
+
+    def on_disconnected(self, reason: str) -> None:
+        if self.is_connected:
+            log.warning("lost the broker (%s); trying again", reason)
+        elif reason != self._was_refused and time.monotonic() - self._born > PATIENCE:
+            log.warning("no connection: %s", reason)
+            self._was_refused = reason
+        self.is_connected = False
+
+
+def offline_status(name: str, boot_id: int) -> bytes:
+    """The last will, and the farewell."""
+    return json.dumps({"online": False, "device": name, "boot_id": boot_id}).encode()
+
+
+def broker_address(credentials: Credentials, here: BrokerAddress) -> BrokerAddress:
+    """The provisioned broker, or `here` where none was; raises AddressError."""
+    if not credentials.mqtt_uri:
+        return here
+    try:
+        uri = urlsplit(credentials.mqtt_uri)
+        port = uri.port
+    except ValueError as error:
+        raise AddressError(f"the provisioned broker {credentials.mqtt_uri!r} is no address: {error}") from error
+    if uri.scheme not in ("mqtt", "mqtts") or not uri.hostname:
+        raise AddressError(f"the provisioned broker {credentials.mqtt_uri!r} is not mqtt://host or mqtts://host")
+    is_secure = uri.scheme == "mqtts"
+    return BrokerAddress(
+        uri.hostname,
+        port or (MQTTS_PORT if is_secure else MQTT_PORT),
+        credentials.mqtt_user,
+        credentials.mqtt_password,
+        _tls(credentials.mqtt_ca) if is_secure else None,
+    )
+
+
+def _tls(authority: str) -> ssl.SSLContext:
+    try:
+        return ssl.create_default_context(cadata=authority or None)
+    except ssl.SSLError as error:
+        raise AddressError(f"the provisioned certificate authority cannot be read: {error}") from error

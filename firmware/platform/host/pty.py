@@ -1,0 +1,62 @@
+"""The virtual ESP32's USB: a pseudo-terminal behind a stable path."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import threading
+import time
+import tty
+from collections.abc import Callable
+from pathlib import Path
+
+MOST = 4096  # [bytes] read at once
+
+
+class SerialLine:
+    """The device's end of the line; whoever opens `path` has the other one."""
+
+    def __init__(self, path: Path, on_bytes: Callable[[bytes, float], None]) -> None:
+        self.path = path
+        self._on_bytes = on_bytes
+        # The other end stays open here too, or reading would fail whenever nobody else has it open.
+        self._ours, self._theirs = os.openpty()
+        tty.setraw(self._theirs)
+        os.set_blocking(self._ours, False)
+        self._wake, self._asleep = os.pipe()
+        self._link()
+        self._reader = threading.Thread(target=self._read, name="serial", daemon=True)
+
+    def start(self) -> None:
+        """Read in a thread of its own; each piece comes with its time of arrival [s, monotonic]."""
+        self._reader.start()
+
+    def write(self, data: bytes) -> None:
+        """Send; what nobody reads is lost, as on a wire."""
+        with contextlib.suppress(BlockingIOError):
+            os.write(self._ours, data)
+
+    def close(self) -> None:
+        """Take the path away and end the thread."""
+        os.close(self._asleep)
+        self._reader.join(timeout=1.0)
+        with contextlib.suppress(OSError):
+            if os.readlink(self.path) == os.ttyname(self._theirs):
+                self.path.unlink()
+        for descriptor in (self._ours, self._theirs, self._wake):
+            os.close(descriptor)
+
+    def _link(self) -> None:
+        beside = self.path.with_suffix(".new")
+        beside.unlink(missing_ok=True)
+        beside.symlink_to(os.ttyname(self._theirs))
+        os.replace(beside, self.path)
+
+    def _read(self) -> None:
+        while True:
+            ready, _, _ = select.select([self._ours, self._wake], [], [])
+            if self._wake in ready:
+                return
+            with contextlib.suppress(BlockingIOError):
+                self._on_bytes(os.read(self._ours, MOST), time.monotonic())

@@ -1,0 +1,157 @@
+"""A virtual ESP32 as a process, a real mosquitto, and a client that hears all of it."""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from bench_firmware import FIRST, LAST, Row, command, heartbeat, smooth, traj
+from paho.mqtt import client as paho
+from paho.mqtt.enums import CallbackAPIVersion
+
+from schemas.device import DeviceCommandKind, PressKind
+
+ROOT = Path(__file__).resolve().parents[2]
+PATIENCE = 10.0  # [s]
+NOT_ARMED = 17
+
+
+def mosquitto_path() -> str:
+    found = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
+    assert found, "these tests need mosquitto: sudo apt-get install mosquitto"
+    return found
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def wait_for(condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
+    deadline = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < deadline, f"waited {patience} s for {what}"
+        time.sleep(0.01)
+
+
+class Bed:
+    """A broker, a client that listens to everything of the device, and the device's process."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.port = folder, free_port()
+        self.broker: subprocess.Popen[bytes] | None = None
+        self.process: subprocess.Popen[bytes] | None = None
+        self.heard: dict[str, queue.SimpleQueue[bytes]] = {}
+        self.status: dict[str, object] = {}
+        self.client = paho.Client(CallbackAPIVersion.VERSION2)
+        self.client.on_message = self._hear
+        self.client.on_connect = lambda client, *_: client.subscribe("gemelo/v1/rm1/#", 1)
+        self.client.reconnect_delay_set(min_delay=1, max_delay=1)
+        self._beats = self._commands = 0
+
+    def start_broker(self) -> None:
+        config = self.folder / "mosquitto.conf"
+        config.write_text(f"listener {self.port} 127.0.0.1\nallow_anonymous true\nset_tcp_nodelay true\n")
+        self.broker = subprocess.Popen([mosquitto_path(), "-c", config], stderr=subprocess.DEVNULL)
+        wait_for(self._answers, "mosquitto")
+
+    def _answers(self) -> bool:
+        with socket.socket() as probe:
+            return probe.connect_ex(("127.0.0.1", self.port)) == 0
+
+    def stop_broker(self) -> None:
+        assert self.broker is not None
+        self.broker.kill()
+        self.broker.wait()
+
+    def listen(self) -> None:
+        self.client.connect("127.0.0.1", self.port)
+        self.client.loop_start()
+        wait_for(self.client.is_connected, "our own connection")
+
+    def start_device(self) -> None:
+        before = self.status.get("boot_id")
+        environ = os.environ | {"GEMELO_MQTT_PORT": str(self.port), "GEMELO_PATHS_RUN": str(self.folder / "run")}
+        self.process = subprocess.Popen([sys.executable, "-m", "firmware.platform.host.main"], cwd=ROOT, env=environ)
+        wait_for(lambda: self.status.get("online") is True and self.status["boot_id"] != before, "the device's status")
+
+    def end_device(self, number: int) -> int:
+        assert self.process is not None
+        self.process.send_signal(number)
+        return self.process.wait(PATIENCE)
+
+    def close(self) -> None:
+        for process in (self.process, self.broker):
+            if process is not None and process.poll() is None:
+                process.kill()
+                process.wait()
+        self.client.disconnect()
+        self.client.loop_stop()
+
+    def _hear(self, _client: paho.Client, _data: object, message: paho.MQTTMessage) -> None:
+        kind = message.topic.removeprefix("gemelo/v1/rm1/")
+        if kind == "status":
+            self.status = json.loads(message.payload)
+        self.heard.setdefault(kind, queue.SimpleQueue()).put(message.payload)
+
+    def publish(self, kind: str, frame: bytes, retain: bool = False) -> None:
+        self.client.publish(f"gemelo/v1/rm1/{kind}", frame, qos=0 if kind in ("hb", "sync") else 1, retain=retain)
+
+    def answer(self, kind: str) -> bytes:
+        return self.heard.setdefault(kind, queue.SimpleQueue()).get(timeout=PATIENCE)
+
+    def beat(self) -> None:
+        self._beats += 1
+        self.publish("hb", heartbeat(self._beats))
+
+    def move(self, goal: int, duration: float, start: int = 0, stream: int = 1) -> bytes:
+        """Send a whole move of q1, once the drivers have been energised for long enough; returns the ACK."""
+        boot = self.status["boot_id"]
+        assert isinstance(boot, int)
+        rows: list[Row] = []
+        for i in range(round(duration * 50) + 1):
+            p, v = smooth(start, goal, duration, i * 0.02)
+            rows.append(([round(p * 256), 0, 0], [round(v * 256), 0, 0]))
+        while True:
+            self.publish("traj", traj(stream, 0, rows, FIRST | LAST, boot=boot))
+            answer = self.answer("traj/ack")
+            if answer[20] != NOT_ARMED:
+                return answer
+            time.sleep(0.02)
+
+    def order(self, cmd: DeviceCommandKind, argument: int = 0) -> int:
+        """Give a command; the code of its acknowledgement."""
+        self._commands += 1
+        boot = self.status["boot_id"]
+        assert isinstance(boot, int)
+        self.publish("cmd", command(cmd, self._commands, boot=boot, argument=argument))
+        return self.answer("cmd/ack")[13]
+
+    def press(self, kind: PressKind, target: str = "", value: float = 1.0) -> None:
+        """Ask for it; `event` says what came of it."""
+        self.publish("press", json.dumps({"press": kind, "target": target, "value": value}).encode())
+
+    def shaft(self) -> dict[str, list[int]]:
+        """What the device says of its shafts next."""
+        self.heard.pop("shaft", None)
+        report: dict[str, list[int]] = json.loads(self.answer("shaft"))
+        return report
+
+    def event(self, name: str) -> dict[str, object]:
+        while True:
+            event: dict[str, object] = json.loads(self.answer("event"))
+            if event["event"] == name:
+                return event
+
+    def memory(self) -> dict[str, object]:
+        content: dict[str, object] = json.loads((self.folder / "run/virtual_esp32.json").read_text())
+        return content
