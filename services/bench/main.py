@@ -21,7 +21,13 @@ from services.bench.report import report_of, text_of
 from services.bench.stacks import Stacks
 from services.runtime.deployment import project_root
 
-ALONE = ("frame_lookup_us", "plan_ms", "lost_of_45000_at_25hz", "cli_start_ms")  # before any stack disturbs them
+ALONE = (
+    "frame_lookup_us",
+    "plan_ms",
+    "lost_of_45000_at_25hz",
+    "seed_move_percent",
+    "cli_start_ms",
+)  # before any stack disturbs them
 ON_A_STACK = ("stack_idle_cpu_percent", "stack_rss_mb", "state_to_frame_ms", "move_accept_to_first_step_ms")
 BROKERS = {"chunk_ack_ms": "mosquitto", "chunk_ack_ms_amqtt": "amqtt"}
 CHIP = ("tick_instructions", "slot_instructions", "core_text_bytes", "core_ram_bytes")

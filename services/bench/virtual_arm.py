@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import heapq
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import count
 
 from firmware.bindings.device import Device
 from schemas.message import Message
+from schemas.robot import Motor
 from services.arm.description import Arm
 from services.arm.device_config import device_config
 from services.stepper_gateway.core import GatewayCore
@@ -24,11 +25,18 @@ EPOCH = 1_700_000_000_000_000_000  # [ns] UNIX at virtual time 0
 class VirtualArm:
     """Moves time on; hands every message of the gateway to `on_message`.
 
-    The gateway's loop beats `phase` [us] after the device's reports.
+    The gateway's loop beats `phase` [us] after the device's reports. Without `motors`, none ever loses a step.
     """
 
-    def __init__(self, arm: Arm, on_message: Callable[[Message], None], seed: int = 3, phase: int = 0) -> None:
-        self.device = Device(device_config(arm), boot_id=1)
+    def __init__(
+        self,
+        arm: Arm,
+        on_message: Callable[[Message], None],
+        seed: int = 3,
+        phase: int = 0,
+        motors: Sequence[Motor] = (),
+    ) -> None:
+        self.device = Device(device_config(arm), boot_id=1, motors=motors)
         self.gateway = GatewayCore(arm, session_id=1)
         self.now = 0  # [us]
         self.outcomes: list[Output] = []

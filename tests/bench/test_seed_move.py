@@ -1,0 +1,38 @@
+"""The seed's stepping, and how much of a move arrives by it and by ours."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from services.bench.seed_move_percent import measure
+from services.bench.seed_sketch import Message, SeedStepper, relative_moves
+
+
+def end_of(stepper: SeedStepper, messages: list[Message], until: float = 30.0) -> int:
+    return sum(direction for _, direction in stepper.pulses(messages, until))
+
+
+def test_a_move_that_is_sent_once_arrives_whole():
+    assert end_of(SeedStepper(4665.6, 3110.0), [Message(0.0, 4665)]) == 4665
+    assert end_of(SeedStepper(4665.6, 3110.0), [Message(0.0, -4665)]) == -4665
+
+
+def test_a_ramp_takes_as_long_as_its_acceleration_says():
+    times = [time for time, _ in SeedStepper(1000.0, 500.0).pulses([Message(0.0, 4000)], 60.0)]
+    assert times[-1] == pytest.approx(4000 / 1000 + 1000 / 500, rel=0.03)
+    assert min(b - a for a, b in pairwise(times)) == pytest.approx(1 / 1000, rel=1e-6)
+
+
+def test_a_message_throws_away_what_is_left_of_the_last_one():
+    assert end_of(SeedStepper(4665.6, 3110.0), relative_moves(4665, 0.1, 5.0)) == pytest.approx(48, abs=2)
+    assert end_of(SeedStepper(100.0, 100.0), relative_moves(100, 0.1, 5.0)) == pytest.approx(4, abs=1)
+
+
+def test_a_90_degree_move_arrives_whole_where_the_seed_lost_97_percent_and_more():
+    figure = measure()
+    assert figure.median == 100.0
+    assert figure.met
+    assert sorted(figure.reference) == ["seed: antebrazo_joint", "seed: brazo_joint"]
+    assert all(0.5 < share < 5.0 for share in figure.reference.values())
