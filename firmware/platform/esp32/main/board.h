@@ -1,0 +1,33 @@
+// What the tasks share: rings between them, and nothing else. Each ring has one writer and one reader.
+#pragma once
+
+#include <stdint.h>
+
+#include "ring.h"
+
+namespace gemelo {
+
+// What a record to the slot's task is.
+enum class Inbound : uint8_t {
+    Frame,         // of MQTT; flags: kRetained
+    Config,        // text of MQTT
+    Connected,     // to the broker
+    Bytes,         // of the serial wire, as they came
+    Sensor,        // flags: its index; bytes: i32 raw
+    FactoryReset,  // asked for with the button
+};
+
+constexpr uint8_t kRetained = 1;
+
+// Records to the network and to the wire have their Output as kind; the wire's bytes are ready to be sent.
+struct Board {
+    Ring<20480> from_mqtt;  // written in esp-mqtt's task
+    Ring<8192> from_wire;
+    Ring<1024> from_sensors;
+    Ring<8192> to_mqtt;
+    Ring<8192> to_wire;
+};
+
+extern Board board;
+
+}  // namespace gemelo

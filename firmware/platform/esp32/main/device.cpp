@@ -1,0 +1,204 @@
+#include "device.h"
+
+#include <string.h>
+
+#include "board.h"
+#include "board_check.h"
+#include "esp_attr.h"
+#include "esp_err.h"
+#include "esp_system.h"
+#include "esp_task_wdt.h"
+#include "esp_timer.h"
+#include "json.h"
+#include "reset_cause.h"
+#include "sensors.h"
+#include "store.h"
+#include "this_chip.h"
+
+namespace gemelo {
+namespace {
+
+constexpr uint32_t kLongestWaitMs = 2;    // where no tick runs, for want of a configuration
+constexpr uint64_t kInboxBudgetUs = 400;  // of a slot, so that a flood of frames cannot starve the steps
+constexpr uint32_t kSlotsPerFeeding = 100;
+
+RTC_NOINIT_ATTR PoseMemory pose_memory;
+
+uint64_t clock_us() { return static_cast<uint64_t>(esp_timer_get_time()); }
+
+}  // namespace
+
+void Device::begin(const Credentials& credentials, uint32_t boot_id) {
+    device_ = credentials.device;
+    boot_id_ = boot_id;
+    const ResetCause cause = reset_cause();
+    is_warm_ = cause.is_warm;
+    strncat(reset_cause_, cause.text, sizeof reset_cause_ - 1);
+    provisioning_.begin(credentials, serial_);
+    load_config();
+}
+
+// What is in the flash was taken once; with another firmware or on another board it may not be good any more.
+void Device::load_config() {
+    Refusal refusal;
+    const size_t size = gemelo::load_config(text_, sizeof text_);
+    const bool is_good = size != 0 && parse_config(text_, size, &config_, &refusal) &&
+                         find_board_fault(config_, kThisChip).sentence == nullptr;
+    if (!is_good) config_ = DeviceConfig{};
+}
+
+void Device::run() {
+    ESP_ERROR_CHECK(esp_task_wdt_add(nullptr));
+    wake_up();
+    for (;;) {
+        ulTaskNotifyTake(pdTRUE, pdMS_TO_TICKS(kLongestWaitMs));
+        now_us_ = tick_.slot_start_us();
+        machine_.slot(now_us_);
+        pins_.drive(machine_);
+        remember();
+        serve();
+        keep_config();
+        provisioning_.restart_if_due(machine_, clock_us());
+        if (slots_++ % kSlotsPerFeeding == 0) esp_task_wdt_reset();
+    }
+}
+
+void Device::wake_up() {
+    const Awakening awakening = wake(pose_memory, is_warm_, config_.crc32);
+    if (awakening.was_moving) strncat(reset_cause_, " while moving", sizeof reset_cause_ - strlen(reset_cause_) - 1);
+    machine_.begin(config_, Identity{boot_id_, reset_cause_, false, device_}, Sink{this, put, keep, check});
+    serial_.begin(machine_, boot_id_, other, this);
+    tick_.begin(machine_.stepper(), xTaskGetCurrentTaskHandle());
+    machine_.start(clock_us(), awakening.steps, awakening.is_referenced);
+    set_up();
+}
+
+void Device::serve() {
+    const uint64_t until_us = clock_us() + kInboxBudgetUs;
+    bool has_more = true;
+    while (has_more && clock_us() < until_us) {
+        has_more = take_from(board.from_mqtt);
+        has_more = take_from(board.from_wire) || has_more;
+        has_more = take_from(board.from_sensors) || has_more;
+    }
+}
+
+template <uint32_t kCapacity>
+bool Device::take_from(Ring<kCapacity>& ring) {
+    Record record;
+    if (!ring.front(&record)) return false;
+    take(record);
+    ring.pop();
+    return true;
+}
+
+// A configuration changes the stepper, the rate and the pins: the tick stands still then. It comes over the wire too.
+void Device::take(const Record& record) {
+    const Inbound kind = static_cast<Inbound>(record.kind);
+    const bool may_change = machine_.takes_config() && (kind == Inbound::Config || kind == Inbound::Bytes);
+    if (!may_change) return dispatch(record);
+    const uint32_t before = machine_.config_crc32();
+    tick_.stop();
+    dispatch(record);
+    if (machine_.config_crc32() != before) return set_up();
+    tick_.resume();
+}
+
+void Device::dispatch(const Record& record) {
+    const Arrival arrival{record.bytes, record.size, (record.flags & kRetained) != 0, record.time_us};
+    switch (static_cast<Inbound>(record.kind)) {
+        case Inbound::Frame:
+            serial_.yield_to_mqtt(arrival);
+            return machine_.receive(arrival, now_us_);
+        case Inbound::Config:
+            return machine_.receive_config(arrival, now_us_);
+        case Inbound::Connected:
+            return machine_.report_status();
+        case Inbound::Bytes:
+            return serial_.receive(record.bytes, record.size, record.time_us, now_us_);
+        case Inbound::Sensor: {
+            int32_t raw = 0;
+            memcpy(&raw, record.bytes, sizeof raw);
+            return machine_.set_sensor(record.flags, raw);
+        }
+        case Inbound::FactoryReset:
+            return provisioning_.ask_for_factory_reset();
+    }
+}
+
+void Device::set_up() {
+    pins_.set_up(config_);
+    set_sensors(config_);
+    if (config_.joints == 0) return;
+    warn();
+    tick_.start(config_);
+}
+
+void Device::warn() {
+    uint8_t from = 0;
+    for (;;) {
+        const ConfigFault warning = next_board_warning(config_, kThisChip, &from);
+        if (warning.sentence == nullptr) return;
+        char detail[120] = "";
+        strncat(detail, warning.part, sizeof detail - 1);
+        strncat(detail, ": ", sizeof detail - 1 - strlen(detail));
+        strncat(detail, warning.sentence, sizeof detail - 1 - strlen(detail));
+        JsonWriter json;
+        json.field("event", "pin_warning");
+        json.field("t_us", now_us_);
+        json.field("boot_id", static_cast<uint64_t>(boot_id_));
+        json.field("stream", uint64_t{0});
+        json.field("detail", detail);
+        const size_t size = json.close();
+        machine_.say(Output::Event, json.bytes(), size);
+    }
+}
+
+// Twice a motion only: where it begins, and where it has ended.
+void Device::remember() {
+    Pose pose = kept_;
+    pose.config_crc32 = machine_.config_crc32();
+    pose.is_referenced = machine_.is_referenced();
+    pose.is_moving = machine_.is_moving();
+    for (uint8_t j = 0; !pose.is_moving && j < config_.joints; ++j) pose.steps[j] = machine_.stepper().executed(j);
+    if (pose == kept_ && slots_ != 0) return;
+    kept_ = pose;
+    pose_memory.keep(pose);
+}
+
+// The flash stalls both cores for as long as it is written, so only this task, which alone can begin a motion, writes.
+void Device::keep_config() {
+    if (text_size_ == 0 || !machine_.keeps_still()) return;
+    save_config(text_, text_size_);  // where it fails the gateway sends it again after the next start
+    text_size_ = 0;
+}
+
+void Device::put(void* self, Output output, const uint8_t* bytes, size_t size) {
+    Device& device = *static_cast<Device*>(self);
+    const uint8_t kind = static_cast<uint8_t>(output);
+    if (device.serial_.carries(output)) {
+        uint8_t framed[SerialPort::kLargestReport];
+        const size_t length = device.serial_.wrap(output, bytes, size, framed, sizeof framed);
+        if (length != 0) board.to_wire.push(kind, 0, 0, framed, length);
+    }
+    if (device.serial_.leaves_to_mqtt(output) && device.network_ != nullptr) {
+        board.to_mqtt.push(kind, 0, 0, bytes, size);
+        xTaskNotifyGive(device.network_);
+    }
+}
+
+void Device::keep(void* self, const uint8_t* text, size_t size) {
+    Device& device = *static_cast<Device*>(self);
+    if (size > sizeof device.text_) return;
+    memcpy(device.text_, text, size);
+    device.text_size_ = size;
+}
+
+ConfigFault Device::check(void*, const DeviceConfig& config) { return find_board_fault(config, kThisChip); }
+
+void Device::other(void* self, FrameType type, const uint8_t* text, size_t size) {
+    Device& device = *static_cast<Device*>(self);
+    if (type == FrameType::Provision) device.provisioning_.receive(text, size, device.machine_, clock_us());
+}
+
+}  // namespace gemelo

@@ -1,0 +1,25 @@
+// The slow pins: set up for a configuration, and driven after each slot. The tick drives STEP and DIR itself.
+#pragma once
+
+#include "machine.h"
+
+namespace gemelo {
+
+class SlowPins {
+  public:
+    // Lets go of the pins of the configuration before; all outputs start switched off, the drivers disabled.
+    void set_up(const DeviceConfig& config);
+    // The drivers' enable and the outputs, where they have changed.
+    void drive(const Machine& machine);
+
+  private:
+    void let_go();
+    void hand_over(uint8_t pin);
+
+    const DeviceConfig* config_ = nullptr;
+    uint64_t taken_ = 0;  // bit i: GPIO i is set up
+    uint16_t outputs_ = 0;
+    bool is_enabled_ = false;
+};
+
+}  // namespace gemelo

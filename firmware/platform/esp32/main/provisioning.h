@@ -1,0 +1,36 @@
+// What a person tells the board over the serial wire, once: its name, its network, its broker. No answer tells it
+// again.
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "machine.h"
+#include "provision.h"
+#include "serial.h"
+
+namespace gemelo {
+
+class Provisioning {
+  public:
+    void begin(const Credentials& credentials, const SerialPort& serial) {
+        credentials_ = &credentials;
+        serial_ = &serial;
+    }
+    // Answers and, if it is taken, has the board restart a little later.
+    void receive(const uint8_t* text, size_t size, const Machine& machine, uint64_t now_us);
+    void ask_for_factory_reset() { is_reset_asked_ = true; }
+    // Never returns where a restart is due and nothing moves.
+    void restart_if_due(const Machine& machine, uint64_t now_us);
+
+  private:
+    void answer(bool is_accepted, const char* reason) const;
+
+    const Credentials* credentials_ = nullptr;
+    const SerialPort* serial_ = nullptr;
+    Credentials proposed_;     // what runs keeps the old ones until the restart
+    uint64_t restart_us_ = 0;  // 0: none is due
+    bool is_reset_asked_ = false;
+};
+
+}  // namespace gemelo

@@ -1,0 +1,13 @@
+// The readings: a task of low priority that measures and puts raw values into its ring.
+#pragma once
+
+#include "config.h"
+
+namespace gemelo {
+
+void start_sensors();
+
+// From the slot's task: measure what `config` says from now on. Kept, not copied; without joints nothing is measured.
+void set_sensors(const DeviceConfig& config);
+
+}  // namespace gemelo

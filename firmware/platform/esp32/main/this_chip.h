@@ -1,0 +1,19 @@
+// The chip that this is compiled for.
+#pragma once
+
+#include "chip.h"
+#include "sdkconfig.h"
+
+namespace gemelo {
+
+#if CONFIG_IDF_TARGET_ESP32
+constexpr const Chip& kThisChip = kEsp32;
+#elif CONFIG_IDF_TARGET_ESP32S3
+constexpr const Chip& kThisChip = kEsp32S3;
+#elif CONFIG_IDF_TARGET_ESP32C3
+constexpr const Chip& kThisChip = kEsp32C3;
+#else
+#error "this chip has no table of pins yet: add it to chip.h"
+#endif
+
+}  // namespace gemelo

@@ -1,0 +1,16 @@
+// How the broker is reached: TCP, or TLS that proves whom it speaks to.
+#pragma once
+
+#include "esp_transport.h"
+#include "provision.h"
+
+// In ESP-IDF's library and used across its components, but declared in a private header only (5.0 to 5.5).
+extern "C" int esp_transport_get_socket(esp_transport_handle_t t);
+
+namespace gemelo {
+
+// By the scheme of `mqtt_uri`. With mqtts:// the broker must show a certificate of `mqtt_ca`, or of a public authority
+// where that is empty. `credentials` must stay.
+esp_transport_handle_t make_transport(const Credentials& credentials);
+
+}  // namespace gemelo
