@@ -1,0 +1,171 @@
+"""The ESP32 layer as far as it can be shown without the chip: it compiles, its tick is in IRAM, its source is clean."""
+
+from __future__ import annotations
+
+import configparser
+import re
+import shutil
+import subprocess
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from machine_code import Function, functions, reached
+
+ROOT = Path(__file__).parents[2]
+FIRMWARE = ROOT / "firmware"
+LAYER = FIRMWARE / "platform/esp32"
+CHIPS = ("esp32", "esp32s3", "esp32c3")
+INTERRUPT = "_ZN6gemelo4Tick8on_alarmEP9gptimer_tPK26gptimer_alarm_event_data_tPv"
+# Of ESP-IDF, and in IRAM there.
+ALLOWED = {"esp_timer_get_time", "vTaskNotifyGiveFromISR"}
+DIVIDES = re.compile(r"^(div|rem)u?$")
+
+SECRETS = {
+    "a value for a password or a key": r"(?i)(ssid|passw|secret|token|api_?key)\w*\s*(\[\w*\])?\s*[=:(]\s*R?\"[^\"\s]",
+    "a broker's address": r"(?i)mqtts?://(?!host\b)[\w.]",
+    "an address of a network": r"\b(?!127\.0\.0\.1|0\.0\.0\.0)\d{1,3}(\.\d{1,3}){3}\b",
+    "a certificate or a private key": r"-----BEGIN",
+}
+
+
+@pytest.fixture(scope="module")
+def objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("esp32")
+    done = subprocess.run([LAYER / "check", folder], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def interrupt_code(objects: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Function]:
+    """The layer's interrupt and what of the core is mapped into IRAM, for the C3, as ESP-IDF would compile it."""
+    if shutil.which("riscv64-unknown-elf-g++") is None:
+        pytest.skip("riscv64-unknown-elf-g++ missing: sudo apt-get install gcc-riscv64-unknown-elf")
+    folder = tmp_path_factory.mktemp("core")
+    mapped = []
+    for name in _mapped(LAYER / "gemelo_core/linker.lf"):
+        mapped.append(folder / f"{name}.o")
+        subprocess.run(
+            ["riscv64-unknown-elf-g++", "-std=c++17", "-O2", "-march=rv32imc", "-mabi=ilp32", "-ffreestanding",
+             "-fno-exceptions", "-fno-rtti", f"-I{LAYER}/stubs/bare", f"-I{FIRMWARE}/core",
+             "-c", FIRMWARE / f"core/{name}.cpp", "-o", mapped[-1]],
+            check=True,
+        )  # fmt: skip
+    return functions([objects / "esp32c3/tick.o", *mapped])
+
+
+def _mapped(fragment: Path) -> list[str]:
+    return re.findall(r"^\s+(\w+) \(noflash\)$", fragment.read_text(), re.MULTILINE)
+
+
+def _sources() -> list[Path]:
+    return sorted((LAYER / "main").glob("*.cpp")) + sorted((LAYER / "main").glob("*.h"))
+
+
+def test_the_layer_compiles_for_every_chip_with_all_warnings_as_errors(objects: Path) -> None:
+    expected = {source.stem for source in (LAYER / "main").glob("*.cpp")}
+    for chip in CHIPS:
+        assert {path.stem for path in (objects / chip).glob("*.o")} == expected
+
+
+def test_the_tick_never_leaves_iram(interrupt_code: dict[str, Function]) -> None:
+    inside, outside = reached(interrupt_code, INTERRUPT)
+    assert outside <= ALLOWED
+    assert len(inside) > 3
+    assert interrupt_code[INTERRUPT].section.startswith(".iram1")
+    # A weak function, one of a header, may be taken from another object: from one that lies in flash.
+    assert {name for name in inside if interrupt_code[name].is_weak} == set()
+
+
+def test_the_tick_neither_divides_nor_calls_through_a_pointer(interrupt_code: dict[str, Function]) -> None:
+    inside, _ = reached(interrupt_code, INTERRUPT)
+    for name in inside:
+        assert not {m for m in interrupt_code[name].mnemonics if DIVIDES.match(m)}, name
+
+
+def test_objects_with_interrupt_code_are_mapped_out_of_the_flash() -> None:
+    assert {"stepper", "input_watch"} <= set(_mapped(LAYER / "gemelo_core/linker.lf"))
+    assert _mapped(LAYER / "main/linker.lf") == ["tick"]
+    settings = (LAYER / "sdkconfig.defaults").read_text()
+    assert "CONFIG_GPTIMER_ISR_IRAM_SAFE=y" in settings
+
+
+def test_tasks_share_no_lock_and_allocate_nothing() -> None:
+    lock = re.compile(r"Semaphore|Mutex|mutex|CRITICAL|xQueue|\bnew \w|malloc|calloc|printf|\bfloat\b|\bdouble\b")
+    found = {f"{path.name}: {line.strip()}" for path in _sources() for line in path.read_text().splitlines()
+             if lock.search(line.split("//")[0])}  # fmt: skip
+    assert found == set()
+
+
+def test_no_source_holds_credentials() -> None:
+    listed = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "firmware"],
+        cwd=ROOT, capture_output=True, text=True, check=True,
+    ).stdout.split()  # fmt: skip
+    files = [ROOT / name for name in listed if not name.endswith((".md", ".svg")) and "/tests/" not in name]
+    assert len(files) > 80
+    found = [f"{path}: {what}" for path in files if path.exists() for what in _secrets_in(path.read_text())]
+    assert found == []
+
+
+def _secrets_in(text: str) -> list[str]:
+    return [what for what, pattern in SECRETS.items() if re.search(pattern, text)]
+
+
+@pytest.mark.parametrize(
+    "planted",
+    [
+        'const char* WIFI_PASSWORD = "hunter2";',
+        'char wifi_ssid[] = "lab";',
+        '#define MQTT_TOKEN ("abc")',
+        'config.uri = "mqtt://broker.lan";',
+        'connect("192.168.1.7");',
+        'R"(-----BEGIN CERTIFICATE-----',
+    ],
+)
+def test_credentials_would_be_found(planted: str) -> None:
+    assert _secrets_in(planted)
+
+
+def test_every_stand_in_declares_only_what_the_layer_uses() -> None:
+    code = "".join(path.read_text() for path in _sources())
+    unused = []
+    for header in sorted((LAYER / "stubs").rglob("*.h")):
+        name = str(header.relative_to(LAYER / "stubs"))
+        if name.startswith("bare/"):
+            continue
+        text = header.read_text()
+        includers = code + "".join(h.read_text() for h in (LAYER / "stubs").rglob("*.h") if h != header)
+        assert f'#include "{name}"' in includers, name
+        declared = set(
+            re.findall(
+                r"\b(\w+)\([^;{}()]*(?:\([^()]*\)\([^()]*\)[^;{}()]*)?\)(?: __attribute__\(\(noreturn\)\))?;", text
+            )
+        )
+        unused += [f"{name}: {function}" for function in declared if not re.search(rf"\b{function}\b", code)]
+    unused.remove("esp_err.h: abort")  # of the macro there
+    assert unused == []
+
+
+def test_platformio_builds_the_three_chips_from_what_is_there() -> None:
+    settings = configparser.ConfigParser()
+    settings.read(FIRMWARE / "platformio.ini")
+    assert {f"env:{chip}" for chip in CHIPS} == {section for section in settings if section.startswith("env:")}
+    assert re.fullmatch(r"espressif32@\d+\.\d+\.\d+", settings["env"]["platform"])
+    assert settings["env"]["framework"] == "espidf"
+    assert (FIRMWARE / settings["platformio"]["src_dir"] / "CMakeLists.txt").exists()
+    assert (FIRMWARE / settings["env"]["board_build.partitions"]).exists()
+    project = (FIRMWARE / "CMakeLists.txt").read_text()
+    for named in re.findall(r"\$\{CMAKE_CURRENT_LIST_DIR\}/(platform/esp32/\S+?)\)", project):
+        assert (FIRMWARE / named).exists(), named
+
+
+def test_the_partitions_do_not_overlap_and_fit_the_flash() -> None:
+    rows = [line.split(",") for line in (LAYER / "partitions.csv").read_text().splitlines() if line[:1] not in "#"]
+    places = [(int(row[3], 16), int(row[3], 16) + int(row[4], 16)) for row in rows]
+    assert places[0][0] >= 0x9000
+    for (_, end), (begin, _) in pairwise(places):
+        assert end <= begin
+    assert places[-1][0] % 0x10000 == 0
+    assert places[-1][1] <= 4 << 20
