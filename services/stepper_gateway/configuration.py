@@ -43,12 +43,11 @@ class Configuration:
     def device_crc32(self) -> int:
         """Of what the present boot works with; 0: none, or not known."""
         status = self._session.status
-        return status.config_crc32 or 0 if status is not None else 0
+        return status.config_crc32 if status is not None else 0
 
     @property
     def is_in_force(self) -> bool:
-        status = self._session.status
-        return status is not None and status.config_crc32 in (None, self.crc32)
+        return self.device_crc32 == self.crc32
 
     def objection(self) -> str:
         """Why the device may not move by what it was told, with the remedy; empty if it may."""

@@ -16,7 +16,16 @@ from typing import Any
 
 from firmware.bindings.device import Device
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse
+from schemas.device import (
+    ConfigureResponse,
+    DeviceCommandKind,
+    DeviceCommandRequest,
+    DeviceCommandResponse,
+    DeviceState,
+    PressRequest,
+    PressResponse,
+)
+from schemas.device_config import DeviceConfig
 from schemas.joints import JointTargets
 from schemas.message import Vector
 from schemas.motion import (
@@ -37,11 +46,13 @@ from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import (
     CommandAnswer,
+    ConfigureAnswer,
     GoalExecuting,
     GoalFinished,
     GoalProgress,
     LogLine,
     Output,
+    PressAnswer,
     Publish,
     SendFrame,
 )
@@ -53,7 +64,7 @@ UNIX = 1_700_000_000_000_000_000  # [ns] at the start of virtual time
 GATEWAY_ZERO = 1000.0  # [s] of the gateway's monotonic clock at the start
 # A broker keeps status and event until they are delivered. Heartbeats are spared because two lost ones hold the
 # device, as they should: tests of that cut the wire instead.
-SAFE = ("status", "event", "hb")
+SAFE = ("status", "event", "hb", "config", "config/ack")
 
 
 @cache
@@ -82,8 +93,10 @@ class Rig:
         start: Vector | None = None,
         referenced: bool = True,
         parameters: GatewayParameters | None = None,
+        arm: Arm | None = None,
+        config: DeviceConfig | None = None,
     ) -> None:
-        self.arm = rm1()
+        self.arm = arm or rm1()
         self.wire = wire or Wire()
         self.rng = random.Random(seed)
         self.now_us = 0
@@ -91,16 +104,20 @@ class Rig:
         if start is not None:
             steps = tuple(round(j.steps.to_steps(p)) for j, p in zip(self.arm.joints, start, strict=True))
         self._device_zero = -5_000_000  # [us] of virtual time at which the device booted
-        self.device = Device(device_config(self.arm), 77, 5_000_000, steps, referenced)
+        self.config = config or device_config(self.arm)  # what the device works with when it starts
+        self.device = Device(self.config, 77, 5_000_000, _fitting(steps, self.config), referenced)
         self.device_is_on = self.gateway_is_on = True
         self.published: dict[str, list[Any]] = defaultdict(list)
         self.finished: dict[str, tuple[GoalStatusCode, FollowJointTrajectoryResult]] = {}
         self.executing: list[str] = []
         self.feedback: list[FollowJointTrajectoryFeedback] = []
         self.answers: dict[int, DeviceCommandResponse] = {}
+        self.configured: dict[int, ConfigureResponse] = {}
+        self.pressed: dict[int, PressResponse] = {}
         self.log: list[str] = []
         self.sent: list[tuple[float, str, bytes]] = []
         self.path: list[tuple[float, ...]] = []  # [steps] of the device's path, every millisecond
+        self.lost: set[str] = set()  # kinds that never arrive
         self._flying: list[tuple[int, int, bool, str, bytes]] = []  # due, order, to the device?, kind, payload
         self._order = 0
         self.new_gateway(parameters)
@@ -135,8 +152,9 @@ class Rig:
         return until is None or until()
 
     def ready(self) -> Rig:
-        """Run until the gateway may accept goals."""
+        """Run until the gateway may accept goals and the drivers have been on for as long as they need."""
         assert self.run(3.0, lambda: not self.core.not_ready(self.moment)), self.core.not_ready(self.moment)
+        self.run(max(0.0, self.config.enable_lead_ms * 1e-3 - self.now))
         return self
 
     def goal(self, goal: FollowJointTrajectoryGoal | JointTrajectory, goal_id: str = "g") -> GoalVerdict:
@@ -161,8 +179,34 @@ class Rig:
         self._do(self.core.on_targets(targets, self.moment))
 
     def command(self, kind: DeviceCommandKind, ticket: int = 1, **positions: float) -> None:
-        request = DeviceCommandRequest(command=kind, name=tuple(positions), position=tuple(positions.values()))
+        self.ask(DeviceCommandRequest(command=kind, name=tuple(positions), position=tuple(positions.values())), ticket)
+
+    def ask(self, request: DeviceCommandRequest, ticket: int = 1) -> None:
+        """Ask for a command; its answer comes in `answers`."""
         self._do(self.core.on_command(request, ticket, self.moment))
+
+    def answer(self, request: DeviceCommandRequest, ticket: int = 1) -> DeviceCommandResponse:
+        """The answer to a command, once the next states have come too."""
+        self.ask(request, ticket)
+        assert self.run(3.0, lambda: ticket in self.answers)
+        self.run(0.1)
+        return self.answers.pop(ticket)
+
+    def configure(self) -> ConfigureResponse:
+        """The answer to a request for the configuration."""
+        self._do(self.core.on_configure(1, self.moment))
+        assert self.run(6.0, lambda: 1 in self.configured)
+        self.run(0.1)
+        return self.configured.pop(1)
+
+    def press(self, request: PressRequest, ticket: int = 1) -> None:
+        self._do(self.core.on_press(request, ticket, self.moment))
+
+    @property
+    def state(self) -> DeviceState:
+        """What the gateway has last said of the device."""
+        state: DeviceState = self.published["device/state"][-1]
+        return state
 
     def receive(self, kind: Kind, payload: bytes, retained: bool = False) -> None:
         """Hand the gateway a payload as if it came over the wire."""
@@ -180,7 +224,12 @@ class Rig:
     def reboot(self, boot_id: int, referenced: bool = True) -> None:
         """The device loses power and starts again where it stands, with a clock of its own."""
         self._device_zero = self.now_us
-        self.device = Device(device_config(self.arm), boot_id, 0, self.device.steps, referenced)
+        self.device = Device(self.config, boot_id, 0, self.device.steps, referenced)
+
+    def unconfigure(self) -> None:
+        """Another device at its very first start."""
+        self._device_zero = self.now_us
+        self.device = Device(None, 79)
 
     def messages(self, topic: Topic[Any]) -> list[Any]:
         return self.published[topic.key]
@@ -200,7 +249,7 @@ class Rig:
             self._do(self.core.step(self.moment))
 
     def _launch(self, to_device: bool, kind: str, payload: bytes) -> None:
-        if self.wire.is_cut:
+        if self.wire.is_cut or kind in self.lost:
             return
         is_safe = kind in SAFE
         copies = 1
@@ -217,7 +266,9 @@ class Rig:
         due = sorted(item for item in self._flying if item[0] <= self.now_us)
         self._flying = [item for item in self._flying if item[0] > self.now_us]
         for _, _, to_device, kind, payload in due:
-            if to_device and self.device_is_on:
+            if to_device and self.device_is_on and kind == Kind.CONFIG:
+                self.device.receive_config(payload)
+            elif to_device and self.device_is_on:
                 self.device.receive(payload)
             elif not to_device and self.gateway_is_on:
                 self.receive(Kind(kind), payload)
@@ -239,8 +290,17 @@ class Rig:
                     self.finished[goal_id] = (status, result)
                 case CommandAnswer(ticket, response):
                     self.answers[ticket] = response
+                case ConfigureAnswer(ticket, response):
+                    self.configured[ticket] = response
+                case PressAnswer(ticket, response):
+                    self.pressed[ticket] = response
                 case LogLine(_, text):
                     self.log.append(text)
+
+
+def _fitting(steps: tuple[int, ...], config: DeviceConfig) -> tuple[int, ...]:
+    """One start position for each joint of a device that may have other joints."""
+    return tuple(steps[index] if index < len(steps) else 0 for index in range(len(config.joints)))
 
 
 def move(start: Vector, end: Vector, period: float = 0.05, slower: float = 1.0) -> JointTrajectory:

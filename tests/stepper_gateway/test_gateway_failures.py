@@ -51,8 +51,10 @@ def test_a_lost_link_aborts_the_goal_the_device_holds_and_nothing_resumes() -> N
     assert rig.path[-1] != held
 
 
-def test_a_short_cut_is_bridged_by_the_lead() -> None:
+@pytest.mark.parametrize("phase", [0.0, 0.03, 0.06, 0.09])
+def test_a_short_cut_is_bridged_by_the_lead(phase: float) -> None:
     rig = moving_rig()
+    rig.run(phase)
     rig.wire.is_cut = True
     rig.run(0.25)
     rig.wire.is_cut = False

@@ -30,7 +30,7 @@ class StatusReport(Report, frozen=True, kw_only=True):
     queue_capacity: int = 0  # [knots]
     referenced: bool = False
     armed: bool = False
-    config_crc32: int | None = None  # of the configuration it works with; 0: none yet; None: it does not say
+    config_crc32: int = 0  # of the configuration it works with; 0: none yet
     virtual: bool = False
 
 

@@ -1,0 +1,116 @@
+"""Presses of a virtual device's world, as its own process takes them; a real device's cannot be pressed."""
+
+from __future__ import annotations
+
+import json
+from contextlib import closing
+
+import pytest
+
+from schemas.device import DeviceMode, PressKind, PressRequest
+from services.stepper_gateway.links.link import Kind
+from services.stepper_gateway.presses import target_of
+from services.stepper_gateway.refusals import GoalRejected
+from tests.stepper_gateway.harness import Rig, rm1
+from tests.stepper_gateway.processes import Processes
+from tests.stepper_gateway.wired import Gateway
+
+ESTOP = PressRequest(press=PressKind.ESTOP)
+
+
+def virtual(rig: Rig) -> Rig:
+    """What this device says of itself from now on."""
+    rig.ready()
+    status = {"online": True, "device": "rm1", "boot_id": 77, "joints": 3, "tick_hz": 50_000, "queue_capacity": 128}
+    crc = rig.core.mover.configuration.crc32
+    rig.receive(Kind.STATUS, json.dumps(status | {"config_crc32": crc, "virtual": True}).encode())
+    return rig
+
+
+def say(rig: Rig, event: str, detail: str = "") -> None:
+    rig.receive(Kind.EVENT, json.dumps({"event": event, "t_us": 1, "detail": detail}).encode())
+
+
+def presses(rig: Rig) -> list[str]:
+    return [json.loads(payload)["press"] for _, kind, payload in rig.sent if kind == Kind.PRESS]
+
+
+def test_a_real_device_is_not_pressed_by_a_request() -> None:
+    rig = Rig().ready()
+    status = {"online": True, "boot_id": 77, "joints": 3, "config_crc32": rig.core.mover.configuration.crc32}
+    rig.receive(Kind.STATUS, json.dumps(status).encode())
+    rig.press(ESTOP)
+    assert not rig.pressed[1].accepted
+    assert "by hand" in rig.pressed[1].reason
+    assert not presses(rig)
+
+
+def test_presses_go_out_one_at_a_time_and_each_gets_its_own_answer() -> None:
+    rig = virtual(Rig())
+    rig.press(ESTOP, 1)
+    rig.press(PressRequest(press=PressKind.SWITCH, target="limit_q1"), 2)
+    assert presses(rig) == ["estop"]
+    say(rig, "pressed")
+    assert rig.pressed[1].accepted
+    assert presses(rig) == ["estop", "switch"]
+    say(rig, "press_refused", "no such switch")
+    assert (rig.pressed[2].accepted, rig.pressed[2].reason) == (False, "no such switch")
+
+
+def test_a_press_that_is_not_answered_is_given_up_and_the_next_one_goes_out() -> None:
+    rig = virtual(Rig())
+    rig.press(ESTOP, 1)
+    rig.press(ESTOP, 2)
+    rig.run(2.5)
+    assert "not answered" in rig.pressed[1].reason
+    assert presses(rig) == ["estop", "estop"]
+
+
+def test_an_absent_device_is_not_pressed() -> None:
+    rig = virtual(Rig())
+    rig.wire.is_cut = True
+    rig.run(1.0)
+    rig.press(ESTOP)
+    assert "silent" in rig.pressed[1].reason
+
+
+@pytest.mark.parametrize(
+    ("press", "target", "known"),
+    [
+        (PressKind.BLOCK, "antebrazo_joint", "q2"),
+        (PressKind.SLIP, "q3", "q3"),
+        (PressKind.SWITCH, "limit_q1", "limit_q1"),
+        (PressKind.SENSOR, "ultra", "ultra"),
+        (PressKind.REBOOT, "", ""),
+    ],
+)
+def test_a_target_is_said_as_the_device_knows_it(press: PressKind, target: str, known: str) -> None:
+    assert target_of(PressRequest(press=press, target=target), rm1()) == known
+
+
+@pytest.mark.parametrize(
+    ("press", "target", "nearest"),
+    [
+        (PressKind.BLOCK, "antebraso_joint", "antebrazo_joint"),
+        (PressKind.SWITCH, "limt_q1", "limit_q1"),
+        (PressKind.SENSOR, "baterya", "bateria"),
+    ],
+)
+def test_a_target_that_is_not_there_is_refused_with_the_nearest(press: PressKind, target: str, nearest: str) -> None:
+    with pytest.raises(GoalRejected, match=f'did you mean "{nearest}"'):
+        target_of(PressRequest(press=press, target=target), rm1())
+
+
+def test_the_virtual_devices_own_process_is_pressed_released_and_blocked(processes: Processes) -> None:
+    with closing(Gateway(processes.port)) as gateway:
+        gateway.ready()
+        assert gateway.press(ESTOP).accepted
+        assert gateway.run(2.0, lambda: gateway.state.mode == DeviceMode.ESTOP)
+        assert gateway.state.inputs == ("estop",)
+        assert gateway.press(PressRequest(press=PressKind.ESTOP, value=0.0)).accepted
+        assert gateway.run(2.0, lambda: gateway.state.inputs == ())
+        assert gateway.press(PressRequest(press=PressKind.SLIP, target="brazo_joint", value=25.0)).accepted
+        assert gateway.run(2.0, lambda: gateway.published["device/shaft"][-1].shaft[0] == 25)
+        refused = gateway.press(PressRequest(press=PressKind.DRIFT, value=1e9))
+        assert not refused.accepted
+        assert refused.reason
