@@ -9,7 +9,6 @@
 #include "esp_system.h"
 #include "esp_task_wdt.h"
 #include "esp_timer.h"
-#include "json.h"
 #include "reset_cause.h"
 #include "sensors.h"
 #include "store.h"
@@ -31,11 +30,7 @@ uint64_t clock_us() { return static_cast<uint64_t>(esp_timer_get_time()); }
 void Device::begin(const Credentials& credentials, uint32_t boot_id) {
     device_ = credentials.device;
     boot_id_ = boot_id;
-    const ResetCause cause = reset_cause();
-    is_warm_ = cause.is_warm;
-    strncat(reset_cause_, cause.text, sizeof reset_cause_ - 1);
     provisioning_.begin(credentials, serial_);
-    load_config();
 }
 
 // What is in the flash was taken once; with another firmware or on another board it may not be good any more.
@@ -64,8 +59,10 @@ void Device::run() {
 }
 
 void Device::wake_up() {
-    const Awakening awakening = wake(pose_memory, is_warm_, config_.crc32);
-    if (awakening.was_moving) strncat(reset_cause_, " while moving", sizeof reset_cause_ - strlen(reset_cause_) - 1);
+    load_config();
+    const ResetCause cause = reset_cause();
+    const Awakening awakening = wake(pose_memory, cause.is_warm, config_.crc32);
+    Phrase(reset_cause_, sizeof reset_cause_).add(cause.text).add(awakening.was_moving ? " while moving" : "");
     machine_.begin(config_, Identity{boot_id_, reset_cause_, false, device_}, Sink{this, put, keep, check});
     serial_.begin(machine_, boot_id_, other, this);
     tick_.begin(machine_.stepper(), xTaskGetCurrentTaskHandle());
@@ -134,26 +131,6 @@ void Device::set_up() {
     tick_.start(config_);
 }
 
-void Device::warn() {
-    uint8_t from = 0;
-    for (;;) {
-        const ConfigFault warning = next_board_warning(config_, kThisChip, &from);
-        if (warning.sentence == nullptr) return;
-        char detail[120] = "";
-        strncat(detail, warning.part, sizeof detail - 1);
-        strncat(detail, ": ", sizeof detail - 1 - strlen(detail));
-        strncat(detail, warning.sentence, sizeof detail - 1 - strlen(detail));
-        JsonWriter json;
-        json.field("event", "pin_warning");
-        json.field("t_us", now_us_);
-        json.field("boot_id", static_cast<uint64_t>(boot_id_));
-        json.field("stream", uint64_t{0});
-        json.field("detail", detail);
-        const size_t size = json.close();
-        machine_.say(Output::Event, json.bytes(), size);
-    }
-}
-
 // Twice a motion only: where it begins, and where it has ended.
 void Device::remember() {
     Pose pose = kept_;
@@ -171,34 +148,6 @@ void Device::keep_config() {
     if (text_size_ == 0 || !machine_.keeps_still()) return;
     save_config(text_, text_size_);  // where it fails the gateway sends it again after the next start
     text_size_ = 0;
-}
-
-void Device::put(void* self, Output output, const uint8_t* bytes, size_t size) {
-    Device& device = *static_cast<Device*>(self);
-    const uint8_t kind = static_cast<uint8_t>(output);
-    if (device.serial_.carries(output)) {
-        uint8_t framed[SerialPort::kLargestReport];
-        const size_t length = device.serial_.wrap(output, bytes, size, framed, sizeof framed);
-        if (length != 0) board.to_wire.push(kind, 0, 0, framed, length);
-    }
-    if (device.serial_.leaves_to_mqtt(output) && device.network_ != nullptr) {
-        board.to_mqtt.push(kind, 0, 0, bytes, size);
-        xTaskNotifyGive(device.network_);
-    }
-}
-
-void Device::keep(void* self, const uint8_t* text, size_t size) {
-    Device& device = *static_cast<Device*>(self);
-    if (size > sizeof device.text_) return;
-    memcpy(device.text_, text, size);
-    device.text_size_ = size;
-}
-
-ConfigFault Device::check(void*, const DeviceConfig& config) { return find_board_fault(config, kThisChip); }
-
-void Device::other(void* self, FrameType type, const uint8_t* text, size_t size) {
-    Device& device = *static_cast<Device*>(self);
-    if (type == FrameType::Provision) device.provisioning_.receive(text, size, device.machine_, clock_us());
 }
 
 }  // namespace gemelo

@@ -54,7 +54,6 @@ class Device {
     const char* device_ = "";
     uint32_t boot_id_ = 0;
     char reset_cause_[40] = "";
-    bool is_warm_ = false;
     Pose kept_{};
     uint64_t now_us_ = 0;
     uint32_t slots_ = 0;

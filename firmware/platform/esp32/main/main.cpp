@@ -49,7 +49,7 @@ void start() {
     start_wire();
     device.set_network(start_network(credentials, boot_id));
     start_sensors();
-    xTaskCreatePinnedToCore(run_device, "slot", kSlotStack, nullptr, kSlotPriority, nullptr, kSlotCore);
+    start_task(run_device, "slot", kSlotStack, kSlotPriority, kSlotCore);
 }
 
 }  // namespace

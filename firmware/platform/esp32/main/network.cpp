@@ -50,9 +50,7 @@ TaskHandle_t start_network(const Credentials& provisioned, uint32_t boot) {
     if (!is_provisioned) return nullptr;
     credentials = &provisioned;
     boot_id = boot;
-    TaskHandle_t task = nullptr;
-    xTaskCreatePinnedToCore(run, "network", kNetworkStack, nullptr, kNetworkPriority, &task, kNetworkCore);
-    return task;
+    return start_task(run, "network", kNetworkStack, kNetworkPriority, kNetworkCore);
 }
 
 }  // namespace gemelo

@@ -85,7 +85,7 @@ void start_sensors() {
     button.mode = GPIO_MODE_INPUT;
     button.pull_up_en = GPIO_PULLUP_ENABLE;
     ESP_ERROR_CHECK(gpio_config(&button));
-    xTaskCreatePinnedToCore(run, "sensors", kSensorStack, nullptr, kSensorPriority, nullptr, kNetworkCore);
+    start_task(run, "sensors", kSensorStack, kSensorPriority, kNetworkCore);
 }
 
 void set_sensors(const DeviceConfig& config) {

@@ -1,6 +1,7 @@
 // Who runs where. Pulses and the slot have one core for themselves where the chip has two; Wi-Fi is on the other.
 #pragma once
 
+#include "esp_err.h"
 #include "freertos/FreeRTOS.h"
 #include "freertos/task.h"
 #include "sdkconfig.h"
@@ -24,5 +25,14 @@ constexpr uint32_t kSlotStack = 12288;
 constexpr uint32_t kWireStack = 4096;
 constexpr uint32_t kNetworkStack = 6144;
 constexpr uint32_t kSensorStack = 4096;
+
+// A board without the memory for its tasks does not start.
+inline TaskHandle_t start_task(TaskFunction_t code, const char* name, uint32_t stack, UBaseType_t priority,
+                               BaseType_t core) {
+    TaskHandle_t task = nullptr;
+    const BaseType_t result = xTaskCreatePinnedToCore(code, name, stack, nullptr, priority, &task, core);
+    ESP_ERROR_CHECK(result == pdPASS ? ESP_OK : ESP_ERR_NO_MEM);
+    return task;
+}
 
 }  // namespace gemelo

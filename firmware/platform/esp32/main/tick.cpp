@@ -78,6 +78,7 @@ void Tick::start(const DeviceConfig& config) {
     drive();
     ticks_per_slot_ = ticks_per_slot(config);
     tick_in_slot_ = 0;
+    slot_start_low_us_ = static_cast<uint32_t>(esp_timer_get_time());
     gptimer_alarm_config_t alarm = {};
     alarm.alarm_count = kTimerHz / config.tick_hz;
     alarm.flags.auto_reload_on_alarm = true;

@@ -55,6 +55,6 @@ void run(void*) {
 
 }  // namespace
 
-void start_wire() { xTaskCreatePinnedToCore(run, "wire", kWireStack, nullptr, kWirePriority, nullptr, kNetworkCore); }
+void start_wire() { start_task(run, "wire", kWireStack, kWirePriority, kNetworkCore); }
 
 }  // namespace gemelo

@@ -10,5 +10,6 @@ typedef uint32_t TickType_t;
 #define configTICK_RATE_HZ 1000
 #define pdFALSE 0
 #define pdTRUE 1
+#define pdPASS pdTRUE
 #define pdMS_TO_TICKS(ms) (static_cast<TickType_t>((static_cast<uint64_t>(ms) * configTICK_RATE_HZ) / 1000))
 #define portYIELD_FROM_ISR(is_woken) (static_cast<void>(is_woken))

@@ -1,0 +1,60 @@
+// What the machine and the wire hand to the board: outputs to their rings, a configuration to be kept or checked.
+#include <string.h>
+
+#include "board.h"
+#include "board_check.h"
+#include "device.h"
+#include "esp_timer.h"
+#include "json.h"
+#include "this_chip.h"
+
+namespace gemelo {
+
+void Device::put(void* self, Output output, const uint8_t* bytes, size_t size) {
+    Device& device = *static_cast<Device*>(self);
+    const uint8_t kind = static_cast<uint8_t>(output);
+    if (device.serial_.carries(output)) {
+        uint8_t framed[SerialPort::kLargestReport];
+        const size_t length = device.serial_.wrap(output, bytes, size, framed, sizeof framed);
+        if (length != 0) board.to_wire.push(kind, 0, 0, framed, length);
+    }
+    if (device.serial_.leaves_to_mqtt(output) && device.network_ != nullptr) {
+        board.to_mqtt.push(kind, 0, 0, bytes, size);
+        xTaskNotifyGive(device.network_);
+    }
+}
+
+void Device::keep(void* self, const uint8_t* text, size_t size) {
+    Device& device = *static_cast<Device*>(self);
+    if (size > sizeof device.text_) return;
+    memcpy(device.text_, text, size);
+    device.text_size_ = size;
+}
+
+ConfigFault Device::check(void*, const DeviceConfig& config) { return find_board_fault(config, kThisChip); }
+
+void Device::other(void* self, FrameType type, const uint8_t* text, size_t size) {
+    Device& device = *static_cast<Device*>(self);
+    if (type == FrameType::Provision)
+        device.provisioning_.receive(text, size, device.machine_, static_cast<uint64_t>(esp_timer_get_time()));
+}
+
+void Device::warn() {
+    uint8_t from = 0;
+    for (;;) {
+        const ConfigFault warning = next_board_warning(config_, kThisChip, &from);
+        if (warning.sentence == nullptr) return;
+        char detail[120];
+        Phrase(detail, sizeof detail).add(warning.part).add(": ").add(warning.sentence);
+        JsonWriter json;
+        json.field("event", "pin_warning");
+        json.field("t_us", now_us_);
+        json.field("boot_id", static_cast<uint64_t>(boot_id_));
+        json.field("stream", uint64_t{0});
+        json.field("detail", detail);
+        const size_t size = json.close();
+        machine_.say(Output::Event, json.bytes(), size);
+    }
+}
+
+}  // namespace gemelo
