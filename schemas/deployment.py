@@ -20,6 +20,13 @@ class Broker(StrEnum):
     MOSQUITTO = "mosquitto"  # real arms and tests
 
 
+class DeviceKind(StrEnum):
+    """What plays the arm."""
+
+    VIRTUAL = "virtual"  # the process virtual_esp32
+    BOARD = "board"  # a real ESP32; virtual_esp32 stands aside
+
+
 class Wire(StrEnum):
     """How the gateway reaches the device."""
 
@@ -69,6 +76,7 @@ class Deployment(DeploymentRecord, frozen=True, kw_only=True):
 
     robot: str = "urdf/rm1"
     router: RouterSection = RouterSection()
+    device: DeviceKind = DeviceKind.VIRTUAL
     wire: Wire = Wire.MQTT  # how the gateway reaches the device
     mqtt: MqttSection = MqttSection()
     serial: SerialSection = SerialSection()

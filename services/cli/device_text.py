@@ -18,7 +18,7 @@ def text_of(view: DeviceSnapshot) -> str:
     lines = [f"device   {_who(view.status)}", f"config   {view.configuration}"]
     if view.state is None:
         return "\n".join(lines)
-    lines += [f"mode     {_mode(view.state)}", *_fault(view), f"drivers  {_drivers(view.state)}"]
+    lines += [f"mode     {_mode(view)}", *_fault(view), f"drivers  {_drivers(view.state)}"]
     lines += [f"speed    {view.state.speed:.0%} asked for, the path runs at {view.state.time_scale:.0%}"]
     lines += _named("inputs", view.inputs, "PRESSED", "released") + _named("outputs", view.outputs, "on", "off")
     lines += [f"sensors  {', '.join(map(reading_text, view.sensors))}"] if view.sensors else []
@@ -36,16 +36,16 @@ def _who(status: DeviceStatus) -> str:
     if not status.online:
         return f"{name}: OFFLINE: {status.reason or 'no reason is known'}"
     kind = "virtual, " if status.virtual else ""
-    reason = f"; {status.reason}" if status.reason else ""
     return (
         f"{name}: online, {kind}firmware {status.firmware}, boot {status.boot_id:08x} ({status.reset_cause}), "
-        f"{status.joints} joints, tick {status.tick_hz / 1000:g} kHz{reason}"
+        f"{status.joints} joints, tick {status.tick_hz / 1000:g} kHz"
     )
 
 
-def _mode(state: DeviceState) -> str:
-    hint = HINTS.get(state.mode)
-    return f"{state.mode.name}: {hint}" if hint else state.mode.name
+def _mode(view: DeviceSnapshot) -> str:
+    mode = view.state.mode if view.state is not None else DeviceMode.BOOT
+    hint = "" if view.fault else view.status.reason or HINTS.get(mode)
+    return f"{mode.name}: {hint}" if hint else mode.name
 
 
 def _fault(view: DeviceSnapshot) -> list[str]:

@@ -74,7 +74,7 @@ class Homing:
         velocity = dict(zip(state.name, state.velocity, strict=False))
         for joint in self.joints:
             if self.phases[joint.name] != HOME:
-                self.phases[joint.name] = phase_of(joint, velocity.get(joint.name, 0.0))
+                self.phases[joint.name] = phase_of(joint, velocity.get(joint.name, 0.0)) or self.phases[joint.name]
 
     def _on_homed(self, detail: str) -> None:
         name, _, rest = detail.partition(":")
@@ -88,9 +88,9 @@ class Homing:
 
 
 def phase_of(joint: Joint, velocity: float) -> str:
-    """What the joint does at `velocity` [steps/s]."""
+    """What the joint does at `velocity` [steps/s]; empty where it stands, as it does at every turn."""
     if abs(velocity) < 1.0 or joint.drive.homing is None:
-        return WAITS
+        return ""
     towards = 1.0 if joint.drive.homing.direction is HomingDirection.UPPER else -1.0
     return TO if math.copysign(1.0, velocity) == towards else OFF
 
@@ -99,8 +99,9 @@ def home_text(name: str, steps_off: int | None) -> str:
     """What is said of a joint that has found its place."""
     if steps_off is None:
         return f"{name}: home"
-    lost = " (steps were lost, or it was moved by hand)" if abs(steps_off) > 1 else ""
-    return f"{name}: home; its counter was {steps_off:+d} steps off{lost}"
+    if abs(steps_off) <= 1:
+        return f"{name}: home; its counter was right to {abs(steps_off)} steps"
+    return f"{name}: home; its counter was {steps_off:+d} steps off (steps were lost, or it was moved by hand)"
 
 
 def stopped_text(detail: str) -> str:

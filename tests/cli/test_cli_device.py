@@ -55,7 +55,7 @@ def test_homing_says_how_many_steps_were_lost(session, rm1_device, capsys):
     assert home(session, ["q1", "antebrazo_joint"]) is ExitCode.OK
     text = capsys.readouterr().out
     assert "brazo_joint: home; its counter was -37 steps off (steps were lost, or it was moved by hand)\n" in text
-    assert "antebrazo_joint: home; its counter was +0 steps off\n" in text
+    assert "antebrazo_joint: home; its counter was right to 0 steps\n" in text
     assert rm1_device.asked[-1].name == ("brazo_joint", "antebrazo_joint")
 
 
