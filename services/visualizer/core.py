@@ -75,7 +75,9 @@ class Visualizer:
         """Where a virtual device's shafts truly are; a joint that leaves its counter, or comes back, is a line."""
         before, after = shaft_errors(self._facts.shaft), shaft_errors(message)
         self._facts = replace(self._facts, shaft=message)
-        self._shaft.add(message.stamp, self._row(message.name, [float(each) for each in after.values()], self._shaft))
+        # A loaded motor lags by a step and catches up; only what stays behind is worth the plot's scale.
+        lost = [float(error) if is_lost(error) else 0.0 for error in after.values()]
+        self._shaft.add(message.stamp, self._row(message.name, lost, self._shaft))
         for name, error in after.items():
             if is_lost(error) is not is_lost(before.get(name, 0)):
                 text = f"{name}: its shaft is {error:+d} steps from its counter"

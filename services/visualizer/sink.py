@@ -121,7 +121,7 @@ class Sink:
         self._style(entities.executed(joint.name), [("executed", palette.EXECUTED, 1.5)])
         band = [("+0.5 step", palette.BAND, 1.5), ("-0.5 step", palette.BAND, 1.5)]
         self._style(entities.error(joint.name), [("commanded - executed", palette.ERROR, 1.5), *band])
-        self._style(entities.shaft(joint.name), [("true shaft - counter", palette.SHAFT, 1.5)])
+        self._style(entities.shaft(joint.name), [("lost steps: true shaft - counter", palette.SHAFT, 1.5)])
 
     def _style(self, entity: str, series: list[tuple[str, palette.Color, float]]) -> None:
         names, colors, widths = zip(*series, strict=True)

@@ -206,7 +206,7 @@ def test_a_shaft_that_leaves_its_counter_is_a_series_a_line_and_a_warning_in_the
     core.on_device_state(DeviceState(stamp=START, mode=DeviceMode.IDLE))
     core.on_shaft(shaft(START, 100, 201, 300))
     updates = by_entity(core.step(START))
-    assert updates[entities.shaft("antebrazo_joint")].values.tolist() == [[1.0]]
+    assert updates[entities.shaft("antebrazo_joint")].values.tolist() == [[0.0]]
     assert entities.LOG not in updates
     assert "STEPS LOST" not in updates[entities.PANEL].markdown
     later = START + 1_000_000_000

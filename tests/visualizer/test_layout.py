@@ -74,7 +74,7 @@ def test_series_say_what_they_are_and_the_band_is_half_a_step(said, model):
         assert series(said[entities.executed(joint.name)]) == ["executed"]
         assert series(said[entities.commanded(joint.name)]) == ["commanded"]
         assert series(said[entities.error(joint.name)]) == ["commanded - executed", "+0.5 step", "-0.5 step"]
-        assert series(said[entities.shaft(joint.name)]) == ["true shaft - counter"]
+        assert series(said[entities.shaft(joint.name)]) == ["lost steps: true shaft - counter"]
 
 
 def test_the_measured_arm_is_solid_and_the_commanded_one_a_translucent_ghost(said, model, tmp_path):
