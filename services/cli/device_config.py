@@ -49,6 +49,7 @@ def push(session: Session, yes: bool) -> ExitCode:
     if state.armed:
         confirm(QUESTION, yes)
         ask(session, DeviceCommandRequest(command=DeviceCommandKind.DISARM))
+        view.wait_for(lambda: view.state.message is not None and not view.state.message.armed)
     answer = session.node.call(DEVICE_CONFIGURE, ConfigureRequest(), timeout=TO_ANSWER)
     if not answer.accepted:
         again = "; the drivers are off now: `gemelo device arm`" if state.armed else ""

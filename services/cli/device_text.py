@@ -19,7 +19,7 @@ def text_of(view: DeviceSnapshot) -> str:
     if view.state is None:
         return "\n".join(lines)
     lines += [f"mode     {_mode(view)}", *_fault(view), f"drivers  {_drivers(view.state)}"]
-    lines += [f"speed    {view.state.speed:.0%} asked for, the path runs at {view.state.time_scale:.0%}"]
+    lines += [f"speed    {_speed(view.state)}"]
     lines += _named("inputs", view.inputs, "PRESSED", "released") + _named("outputs", view.outputs, "on", "off")
     lines += [f"sensors  {', '.join(map(reading_text, view.sensors))}"] if view.sensors else []
     return "\n".join([*lines, f"link     {_link(view.state)}", "", _joints(view)])
@@ -57,6 +57,12 @@ def _fault(view: DeviceSnapshot) -> list[str]:
 
 def _drivers(state: DeviceState) -> str:
     return "armed: the motors hold" if state.armed else "disarmed: the motors are without current, `gemelo device arm`"
+
+
+def _speed(state: DeviceState) -> str:
+    is_on_path = state.mode in (DeviceMode.RUN, DeviceMode.HOLD)
+    now = f"; the path runs at {state.time_scale:.0%} now" if is_on_path else ""
+    return f"{state.speed:.0%} of the planned one{now}"
 
 
 def _named(heading: str, parts: dict[str, bool], yes: str, no: str) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 
 UP_AND_CLEAR = "\x1b[{}F\x1b[J"
@@ -24,9 +25,12 @@ class LiveBlock:
         """The block as it is now."""
         if not self.is_live:
             return
+        columns, lines = shutil.get_terminal_size()
+        # A line that wraps, or a block that scrolls, could not be drawn over.
+        shown = [line[: columns - 1] for line in text.splitlines()[: lines - 1]]
         self._clear()
-        print(text, flush=True)
-        self._height = text.count("\n") + 1
+        print("\n".join(shown), flush=True)
+        self._height = len(shown)
 
     def _clear(self) -> None:
         if self._height:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import sys
+from functools import partial
 
 import pytest
 
@@ -13,24 +13,14 @@ from schemas.actions import GoalStatusCode
 from schemas.device import DeviceMode
 from schemas.topics import DEVICE_SHAFT
 from services.cli.exits import ExitCode
+from tests.stack import gemelo as command
 
 NEAR_ITS_SWITCHES = ("brazo_joint=-2.9", "antebrazo_joint=-2.9", "efector_joint=0.19")  # a homing is short from there
-LONGEST = 120.0  # [s] of one command
 
 
 @pytest.fixture
 def gemelo(stack):
-    """Runs a command line on the stack; what it printed, and the exit code."""
-
-    def run(*words, code=ExitCode.OK):
-        done = subprocess.run(
-            [sys.executable, "-m", "services.cli.main", *words],
-            cwd=stack.root, env=stack.environment, capture_output=True, text=True, timeout=LONGEST, check=False,
-        )  # fmt: skip
-        assert done.returncode == code, f"{words} ended with {done.returncode}:\n{done.stdout}{done.stderr}"
-        return done.stdout + done.stderr
-
-    return run
+    return partial(command.gemelo, stack)
 
 
 @pytest.fixture
@@ -97,7 +87,7 @@ def test_lost_steps_are_seen_beside_the_counter_and_proven_by_homing(ready, geme
 
 
 def test_ctrl_c_stops_a_homing_and_the_joint_is_unreferenced(ready, stack):
-    words = [sys.executable, "-m", "services.cli.main", "home", "efector_joint"]
+    words = [*command.COMMAND, "home", "efector_joint"]
     with subprocess.Popen(words, cwd=stack.root, env=stack.environment, stderr=subprocess.PIPE, text=True) as homing:
         assert mode_becomes(ready, DeviceMode.HOMING, 15.0)
         homing.send_signal(signal.SIGINT)
