@@ -1,0 +1,12 @@
+// What goes wrong when a model is built; becomes a ValueError.
+#pragma once
+
+#include <stdexcept>
+
+namespace gemelo {
+
+struct BadModel : std::invalid_argument {
+    using std::invalid_argument::invalid_argument;
+};
+
+}  // namespace gemelo

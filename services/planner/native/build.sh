@@ -1,0 +1,56 @@
+#!/bin/sh
+# Builds the motion core for the interpreter given (.venv's by default); skipped when nothing has changed.
+# Exit code 3 where the interpreter has no headers: the caller may go on without the core.
+set -eu
+here=$(CDPATH= cd -- "$(dirname -- "$0")" && pwd)
+root=$(CDPATH= cd -- "$here/../../.." && pwd)
+python=${1:-$root/.venv/bin/python}
+compiler=${CXX:-c++}
+build=$here/build
+
+ask() { "$python" -c "$1"; }
+headers=$(ask 'import sysconfig; print(sysconfig.get_paths()["include"])')
+library=$here/_motion$(ask 'import sysconfig; print(sysconfig.get_config_var("EXT_SUFFIX"))')
+if [ ! -f "$headers/Python.h" ]; then
+    echo "motion core: $headers/Python.h is missing; install it: sudo apt-get install python3-dev" >&2
+    exit 3
+fi
+nanobind=$(ask 'import nanobind; print(nanobind.source_dir())')
+stamp="$compiler $headers $nanobind"
+if [ -f "$library" ] && [ "$(cat "$build/stamp" 2>/dev/null)" = "$stamp" ] && \
+        [ -z "$(find "$here" -maxdepth 1 \( -name '*.cpp' -o -name '*.h' -o -name build.sh \) -newer "$library" -print | head -n 1)" ]; then
+    echo "motion core: up to date"
+    exit 0
+fi
+if ! command -v ${compiler%% *} >/dev/null 2>&1; then
+    echo "motion core: no C++ compiler ($compiler); install one: sudo apt-get install g++" >&2
+    exit 1
+fi
+echo "motion core: compiling $(basename "$library") with $compiler (about half a minute) ..."
+mkdir -p "$build"
+common="-std=c++17 -fPIC -fvisibility=hidden -DNDEBUG"
+# The same bits on every processor: no fused multiply-add, no reassociation. No sqrt call for its errno.
+exact="-O3 -ffp-contract=off -fno-math-errno -fno-exceptions -fno-rtti -Wno-psabi"
+warnings="-Wall -Wextra -Wconversion -Wshadow -Werror"
+system="-isystem $nanobind/../include -isystem $nanobind/../ext/robin_map/include -isystem $headers"
+objects="$build/nanobind.o $build/module.o $build/vector.o $build/plain.o"
+
+$compiler $common $exact $warnings -c "$here/kernel.cpp" -o "$build/vector.o"
+$compiler $common $exact $warnings -fno-tree-vectorize -DGEMELO_PLAIN_LANES -c "$here/kernel.cpp" -o "$build/plain.o"
+if $compiler -dM -E -x c++ /dev/null | grep -q __x86_64__; then
+    $compiler $common $exact $warnings -mavx2 -c "$here/kernel.cpp" -o "$build/avx2.o"
+    objects="$objects $build/avx2.o"
+fi
+$compiler $common -O3 -ffp-contract=off $warnings $system -c "$here/module.cpp" -o "$build/module.o"
+[ "$(cat "$build/nanobind.stamp" 2>/dev/null)" = "$stamp" ] && [ -f "$build/nanobind.o" ] || {
+    $compiler $common -Os -w -fno-strict-aliasing $system -c "$nanobind/nb_combined.cpp" -o "$build/nanobind.o"
+    printf '%s\n' "$stamp" >"$build/nanobind.stamp"
+}
+# Written beside and then renamed: a process that has the old one loaded keeps it.
+fresh=$library.$$
+trap 'rm -f "$fresh"' EXIT
+$compiler -shared $objects -o "$fresh"
+mv "$fresh" "$library"
+trap - EXIT
+printf '%s\n' "$stamp" >"$build/stamp"
+echo "motion core: built $library"

@@ -1,0 +1,80 @@
+// A way through the joints' space, in spans of the parameter 0 to 1: straight lines, or the cubics of a B-spline.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "views.h"
+
+namespace gemelo {
+
+using Joints = std::vector<double>;  // (dof,) [rad] or [m]
+
+class Course {
+  public:
+    virtual ~Course() = default;
+    virtual size_t span_count() const = 0;
+    // Where the way is at `share` of a span, into `joints` (dof,).
+    virtual void at(size_t span, double share, double* joints) const = 0;
+    // The most that each joint value changes per unit of the span's parameter.
+    virtual void speed(size_t span, double* speeds) const = 0;
+};
+
+class Polyline : public Course {
+  public:
+    Polyline(const double* rows, size_t count, size_t dof) : rows_(rows), count_(count), dof_(dof) {}
+
+    size_t span_count() const override { return count_ - 1; }
+
+    void at(size_t span, double share, double* joints) const override {
+        const double *from = rows_ + span * dof_, *to = from + dof_;
+        for (size_t i = 0; i < dof_; ++i) joints[i] = from[i] + share * (to[i] - from[i]);
+    }
+
+    void speed(size_t span, double* speeds) const override {
+        const double *from = rows_ + span * dof_, *to = from + dof_;
+        for (size_t i = 0; i < dof_; ++i) speeds[i] = std::abs(to[i] - from[i]);
+    }
+
+  private:
+    const double* rows_;
+    size_t count_, dof_;
+};
+
+// The uniform cubic B-spline of control points (n, dof); span i is that of the points i to i + 3.
+//
+// With both end points given thrice it begins and ends on them, at rest in its parameter.
+class Spline : public Course {
+  public:
+    Spline(const double* points, size_t count, size_t dof) : points_(points), count_(count), dof_(dof) {}
+
+    size_t span_count() const override { return count_ - 3; }
+
+    void at(size_t span, double u, double* joints) const override {
+        const double v = 1.0 - u;
+        const double weights[4] = {v * v * v / 6.0, (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0,
+                                   (3.0 * v * v * v - 6.0 * v * v + 4.0) / 6.0, u * u * u / 6.0};
+        for (size_t i = 0; i < dof_; ++i) {
+            joints[i] = 0.0;
+            for (size_t k = 0; k < 4; ++k) joints[i] += weights[k] * points_[(span + k) * dof_ + i];
+        }
+    }
+
+    // The derivative is a mean of the three differences, so it is never more than the largest.
+    void speed(size_t span, double* speeds) const override {
+        for (size_t i = 0; i < dof_; ++i) {
+            speeds[i] = 0.0;
+            for (size_t k = span; k < span + 3; ++k) {
+                speeds[i] = std::max(speeds[i], std::abs(points_[(k + 1) * dof_ + i] - points_[k * dof_ + i]));
+            }
+        }
+    }
+
+  private:
+    const double* points_;
+    size_t count_, dof_;
+};
+
+}  // namespace gemelo

@@ -1,0 +1,174 @@
+// Whether an arm touches itself or anything else, in eight configurations at once. Compiled once for each processor.
+//
+// Spheres in trees: what is far from the sphere around a whole link is far from the link. `near` asks the same question
+// with the way added that a part may move within the stretch that a lane stands for: a lane that is not near is free
+// on its whole stretch.
+#include "gaps.h"
+
+namespace gemelo {
+namespace {
+
+constexpr int kBatch = 32;  // obstacles that go down a tree together
+
+class Checker {
+  public:
+    Checker(const WorldView& world, const Question& ask, Answer& answer) : world_(world), ask_(ask), answer_(answer) {
+        answer_ = {0, 0, -1, -1};
+        half_ = load(ask.half);
+        place_frames(world_, ask.joints, frames_);
+    }
+
+    void run() {
+        for (int32_t part = 0; part < world_.part_count && !is_over(); ++part) {
+            const PartView& view = world_.parts[part];
+            roots_[part] = centre_of(frames_[view.frame], view.nodes[0]);
+            if (view.frame != 0) against_obstacles(part);  // what stands fixed cannot come nearer to anything
+        }
+        for (int32_t pair = 0; pair < world_.pair_count && !is_over(); ++pair) against_itself(pair);
+        answer_.hits &= ask_.lanes;
+        answer_.near &= ask_.lanes;
+    }
+
+  private:
+    bool is_over() const {
+        const uint32_t hits = answer_.hits & ask_.lanes;
+        return hits == ask_.lanes || (ask_.first_hit_is_all && hits != 0);
+    }
+
+    // The lanes that could still learn something from a squared distance of which `limit` is the least that is free.
+    uint32_t within(const Lanes& gap, float limit) const {
+        const Lanes wide = open_ + limit;
+        return not_beyond(gap, wide * wide) & ask_.lanes & ~answer_.hits;
+    }
+
+    void note(const Lanes& gap, float limit, uint32_t near, int32_t first, int32_t second) {
+        const Lanes narrow(limit * limit);
+        const uint32_t hits = not_beyond(gap, narrow) & near;
+        answer_.hits |= hits;
+        if ((near & ~answer_.near) != 0 || hits != 0) {
+            answer_.first = first;
+            answer_.second = second;
+        }
+        answer_.near |= near;
+        close();
+    }
+
+    // Lanes that are already known to be near only want to know of hits.
+    void close() { open_ = select(spread(answer_.near), 0.0f, way_); }
+
+    void begin(float motion) {
+        way_ = half_ * motion;
+        close();
+    }
+
+    void against_obstacles(int32_t part) {
+        begin(ask_.part_motion[part]);
+        const Descent down{world_.parts[part].nodes, &frames_[world_.parts[part].frame], world_.obstacles, part, -1};
+        const NodeView& root = down.nodes[0];
+        int32_t batch[kBatch];
+        int count = 0;
+        const auto push = [&](int32_t item) {
+            if (world_.obstacles[item].touching >> part & 1u) return;
+            batch[count++] = item;
+            if (count < kBatch) return;
+            descend(down, 0, roots_[part], batch, count);
+            count = 0;
+        };
+        for (int32_t i = 0; i < world_.unbounded_count; ++i) push(world_.unbounded[i]);
+        for (int32_t i = 0; i < world_.tree_count && !is_over();) {
+            const NodeView& node = world_.tree[i];
+            const Lanes gap = squared(roots_[part] - Point{node.x, node.y, node.z});
+            const bool is_near = within(gap, root.radius + node.radius + ask_.margin) != 0;
+            if (is_near && node.skip == i + 1) push(node.item);
+            i = is_near ? i + 1 : node.skip;
+        }
+        if (count > 0 && !is_over()) descend(down, 0, roots_[part], batch, count);
+    }
+
+    void against_itself(int32_t pair) {
+        const PairView& both = world_.pairs[pair];
+        const PartView &first = world_.parts[both.first], &second = world_.parts[both.second];
+        begin(ask_.pair_motion[pair]);
+        const float limit = first.nodes[0].radius + second.nodes[0].radius + ask_.margin;
+        if (within(squared(roots_[both.first] - roots_[both.second]), limit) == 0) return;
+        const Placement seen = relative(frames_[second.frame], frames_[first.frame]);
+        const Descent down{first.nodes, &seen, second.solids, both.first, both.second};
+        for (int32_t done = 0; done < second.solid_count && !is_over(); done += kBatch) {
+            int32_t batch[kBatch];
+            int count = 0;
+            while (count < kBatch && done + count < second.solid_count) {
+                batch[count] = done + count;
+                ++count;
+            }
+            descend(down, 0, centre_of(seen, first.nodes[0]), batch, count);
+        }
+    }
+
+    // A tree of spheres, where its frame is as seen from the obstacles, and who they are.
+    struct Descent {
+        const NodeView* nodes;
+        const Placement* at;
+        const ObstacleView* obstacles;
+        int32_t first;
+        int32_t second;  // -1: the obstacle's own number
+    };
+
+    void descend(const Descent& down, int32_t index, const Point& centre, const int32_t* obstacles, int count) {
+        const NodeView& node = down.nodes[index];
+        const bool is_leaf = node.skip == index + 1;
+        int32_t kept[kBatch];
+        int keep = 0;
+        for (int i = 0; i < count; ++i) {
+            const ObstacleView& obstacle = down.obstacles[obstacles[i]];
+            const float limit = node.radius + ask_.margin + obstacle.round;
+            const Lanes gap = squared_gap(obstacle, centre, open_ + limit);
+            const uint32_t near = within(gap, limit);
+            if (near == 0) continue;
+            kept[keep++] = obstacles[i];
+            if (is_leaf) note(gap, limit, near, down.first, down.second < 0 ? kMaxParts + obstacles[i] : down.second);
+        }
+        if (is_leaf || keep == 0) return;
+        for (int32_t child = index + 1; child < node.skip && !is_over(); child = down.nodes[child].skip) {
+            descend(down, child, centre_of(*down.at, down.nodes[child]), kept, keep);
+        }
+    }
+
+    const WorldView& world_;
+    const Question& ask_;
+    Answer& answer_;
+    Lanes half_;
+    Lanes way_;   // [m] the present part or pair may move within a lane's stretch
+    Lanes open_;  // the same, and 0 in lanes that are known to be near
+    Placement frames_[kMaxFrames];
+    Point roots_[kMaxParts];
+};
+
+void check(const WorldView& world, const Question& ask, Answer& answer) { Checker(world, ask, answer).run(); }
+
+void place(const WorldView& world, const float* joints, float* centres) {
+    Placement frames[kMaxFrames];
+    place_frames(world, joints, frames);
+    for (int32_t part = 0; part < world.part_count; ++part) {
+        const NodeView* nodes = world.parts[part].nodes;
+        for (int32_t i = 0; i < nodes[0].skip; ++i) {
+            if (nodes[i].skip != i + 1) continue;
+            const Point p = centre_of(frames[world.parts[part].frame], nodes[i]);
+            store(p.x, centres);
+            store(p.y, centres + kLanes);
+            store(p.z, centres + 2 * kLanes);
+            centres += 3 * kLanes;
+        }
+    }
+}
+
+}  // namespace
+
+#if defined(GEMELO_PLAIN_LANES)
+const Kernel kPlainKernel = {"plain", check, place};
+#elif defined(__AVX2__)
+const Kernel kAvx2Kernel = {"avx2", check, place};
+#else
+const Kernel kVectorKernel = {"vector", check, place};
+#endif
+
+}  // namespace gemelo

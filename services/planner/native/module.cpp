@@ -1,0 +1,324 @@
+// The motion core for Python: arrays in, arrays out, the interpreter's lock released while it works.
+//
+// Shapes and finiteness are checked here and in __init__.py; the headers trust what they are given.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "cover.h"
+#include "kernels.h"
+#include "plan.h"
+
+namespace nb = nanobind;
+
+namespace gemelo {
+namespace {
+
+using Rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Integers = nb::ndarray<const int32_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Flag = std::shared_ptr<CancelFlag>;
+
+template <class T>
+nb::ndarray<nb::numpy, T> array_of(std::vector<T> values, std::initializer_list<size_t> shape) {
+    auto* owned = new std::vector<T>(std::move(values));
+    nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+    return nb::ndarray<nb::numpy, T>(owned->data(), shape, owner);
+}
+
+void require(bool is_so, const char* otherwise) {
+    if (!is_so) throw BadModel(otherwise);
+}
+
+void require_columns(size_t is, size_t wanted, const char* what) {
+    if (is == wanted) return;
+    throw BadModel(std::string(what) + " must have " + std::to_string(wanted) + " columns, not " + std::to_string(is));
+}
+
+// Finite, and of a size that a float still knows to the needed digits.
+void require_usable(const double* values, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        if (std::abs(values[i]) <= static_cast<double>(kMostTurn)) continue;
+        throw BadModel("joint value " + std::to_string(values[i]) +
+                       " is not within 100 rad or m of 0: wrap it into one turn");
+    }
+}
+
+Joints joints_of(const Row& row, const World& world) {
+    require_columns(row.size(), static_cast<size_t>(world.dof()), "joint values");
+    require_usable(row.data(), row.size());
+    return {row.data(), row.data() + row.size()};
+}
+
+std::shared_ptr<const Chain> make_chain(const Integers& links, const Rows& numbers, int dof) {
+    require_columns(links.shape(1), 3, "links (parent, drive, slides)");
+    require_columns(numbers.shape(1), 15, "numbers (12 of the transform, multiplier, offset, travel)");
+    require(links.shape(0) == numbers.shape(0), "links and numbers must have the same number of rows");
+    auto chain = std::make_shared<Chain>();
+    chain->dof = dof;
+    for (size_t i = 0; i < links.shape(0); ++i) {
+        const double* row = numbers.data() + 15 * i;
+        FrameView frame{links(i, 0), links(i, 1), links(i, 2), static_cast<float>(row[12]), static_cast<float>(row[13]),
+                        {}};
+        std::transform(row, row + 12, frame.fixed, [](double value) { return static_cast<float>(value); });
+        chain->frames.push_back(frame);
+        chain->travel.push_back(row[14]);
+    }
+    chain->require_sound();
+    return chain;
+}
+
+std::vector<Ball> balls_of(const Rows& rows) {
+    require_columns(rows.shape(1), 4, "spheres (x, y, z, radius)");
+    std::vector<Ball> balls;
+    for (size_t i = 0; i < rows.shape(0); ++i) balls.push_back({rows(i, 0), rows(i, 1), rows(i, 2), rows(i, 3)});
+    return balls;
+}
+
+std::shared_ptr<const Part> make_part(int frame, const Rows& balls, std::vector<Obstacle> solids) {
+    return std::make_shared<Part>(frame, balls_of(balls), std::move(solids));
+}
+
+nb::ndarray<nb::numpy, double> cover(const Rows& cells, const Rows& candidates, double least) {
+    const std::vector<Ball> held = balls_of(cells);
+    std::vector<double> rows;
+    for (const Ball& ball : Coverer(held, balls_of(candidates), least).choose()) {
+        rows.insert(rows.end(), {ball.x, ball.y, ball.z, ball.radius});
+    }
+    const size_t count = rows.size() / 4;
+    return array_of(std::move(rows), {count, size_t{4}});
+}
+
+std::vector<Triangle> triangles_of(const Rows& vertices, const Integers& faces) {
+    require_columns(vertices.shape(1), 3, "vertices");
+    require_columns(faces.shape(1), 3, "faces");
+    std::vector<Triangle> triangles(faces.shape(0));
+    for (size_t i = 0; i < faces.shape(0); ++i) {
+        for (size_t k = 0; k < 3; ++k) {
+            const int32_t index = faces(i, k);
+            require(index >= 0 && static_cast<size_t>(index) < vertices.shape(0), "a face's vertex must exist");
+            for (size_t axis = 0; axis < 3; ++axis) triangles[i][k][axis] = vertices(static_cast<size_t>(index), axis);
+        }
+    }
+    return triangles;
+}
+
+std::shared_ptr<const Mesh> make_mesh(const Rows& vertices, const Integers& faces) {
+    auto triangles = triangles_of(vertices, faces);
+    nb::gil_scoped_release release;
+    return std::make_shared<const Mesh>(std::move(triangles));
+}
+
+// The cells that hold any of the solid, for the fit of spheres: centres [m] and at least how deep, -1 at the surface.
+nb::ndarray<nb::numpy, double> solid_cells(const Rows& vertices, const Integers& faces, double cell) {
+    require(cell > 0.0, "a cell's edge must be above 0 m");
+    const auto triangles = triangles_of(vertices, faces);
+    require(!triangles.empty(), "a mesh needs at least one triangle");
+    const DistanceGrid grid(triangles, cell);
+    std::vector<double> rows;
+    for (size_t i = 0; i < grid.cells.size(); ++i) {
+        if (grid.kinds[i] == CellKind::kEmpty) continue;
+        const Vector centre = grid.centre(i);
+        const double depth = grid.kinds[i] == CellKind::kSolid ? static_cast<double>(grid.cells[i]) : -1.0;
+        rows.insert(rows.end(), {centre[0], centre[1], centre[2], depth});
+    }
+    const size_t count = rows.size() / 4;
+    return array_of(std::move(rows), {count, size_t{4}});
+}
+
+Obstacle make_obstacle(int shape, const Row& pose, const Row& size, double round, uint64_t touching,
+                       std::shared_ptr<const Mesh> mesh) {
+    require(shape >= 0 && shape <= 3, "a shape is 0 to 3");
+    require_columns(pose.size(), 12, "a pose");
+    require_columns(size.size(), 3, "a size");
+    require((shape == 3) == (mesh != nullptr), "a mesh, and only a mesh, comes with its triangles");
+    Obstacle obstacle{static_cast<Shape>(shape), {}, {}, round, touching, std::move(mesh)};
+    std::copy(pose.data(), pose.data() + 12, obstacle.pose);
+    std::copy(size.data(), size.data() + 3, obstacle.size);
+    return obstacle;
+}
+
+std::shared_ptr<const World> make_world(std::shared_ptr<const Chain> chain, Parts parts, const Integers& pairs,
+                                        std::vector<Obstacle> obstacles) {
+    require_columns(pairs.shape(1), 2, "pairs");
+    std::vector<PairView> both;
+    for (size_t i = 0; i < pairs.shape(0); ++i) both.push_back({pairs(i, 0), pairs(i, 1)});
+    return std::make_shared<const World>(std::move(chain), std::move(parts), std::move(both), std::move(obstacles));
+}
+
+// Which rows are free; eight at a time.
+nb::ndarray<nb::numpy, bool> are_free(const World& world, const Kernel& kernel, const Rows& rows, double margin) {
+    require_columns(rows.shape(1), static_cast<size_t>(world.dof()), "joint values");
+    require_usable(rows.data(), rows.size());
+    const size_t count = rows.shape(0), dof = rows.shape(1);
+    auto* verdicts = new bool[count + 1];
+    nb::capsule owner(verdicts, [](void* p) noexcept { delete[] static_cast<bool*>(p); });
+    {
+        nb::gil_scoped_release release;
+        std::vector<float> still(std::max<size_t>(kMaxParts, static_cast<size_t>(world.view().pair_count)), 0.0f);
+        float joints[kMaxDof * kLanes];
+        const float half[kLanes] = {};
+        for (size_t first = 0; first < count; first += kLanes) {
+            const size_t lanes = std::min<size_t>(kLanes, count - first);
+            for (size_t lane = 0; lane < kLanes; ++lane) {
+                const double* row = rows.data() + (first + std::min(lane, lanes - 1)) * dof;
+                for (size_t i = 0; i < dof; ++i) joints[i * kLanes + lane] = static_cast<float>(row[i]);
+            }
+            Answer answer;
+            kernel.check(
+                world.view(),
+                {joints, half, still.data(), still.data(), static_cast<float>(margin), (1u << lanes) - 1, false},
+                answer);
+            for (size_t lane = 0; lane < lanes; ++lane) verdicts[first + lane] = !(answer.hits >> lane & 1u);
+        }
+    }
+    return nb::ndarray<nb::numpy, bool>(verdicts, {count}, owner);
+}
+
+// Eight paddings at once: the largest in [low, high] with which nothing is near, narrowed eightfold each time.
+nb::tuple clearance(const World& world, const Kernel& kernel, const Row& row, double most) {
+    const Joints at = joints_of(row, world);
+    std::vector<float> unit(std::max<size_t>(kMaxParts, static_cast<size_t>(world.view().pair_count)), 1.0f);
+    float joints[kMaxDof * kLanes], half[kLanes];
+    for (size_t i = 0; i < at.size(); ++i) std::fill_n(joints + i * kLanes, kLanes, static_cast<float>(at[i]));
+    double low = 0.0, high = most;
+    Answer answer{}, nearest{0, 0, -1, -1};
+    while (high - low > 1e-6) {
+        for (int lane = 0; lane < kLanes; ++lane)
+            half[lane] = static_cast<float>(low + (high - low) * (lane + 1) / kLanes);
+        kernel.check(world.view(), {joints, half, unit.data(), unit.data(), 0.0f, kAllLanes, true}, answer);
+        if (answer.hits != 0) return nb::make_tuple(0.0, answer.first, answer.second);
+        if (answer.near == 0 && low == 0.0 && high == most) return nb::make_tuple(most, -1, -1);
+        int free = 0;
+        while (free < kLanes && !(answer.near >> free & 1u)) ++free;
+        if (answer.near != 0) nearest = answer;
+        const double step = (high - low) / kLanes;
+        high = free == kLanes ? high : low + step * (free + 1);
+        low = low + step * free;
+        if (free == kLanes) break;
+    }
+    return nb::make_tuple(low, nearest.first, nearest.second);
+}
+
+nb::tuple first_contact(const World& world, const Kernel& kernel, const Row& row, double margin) {
+    const Joints at = joints_of(row, world);
+    Rake rake(world, kernel, {margin, 0.0, 0.0});
+    const bool is_free = rake.is_free(at.data());
+    return nb::make_tuple(!is_free, rake.answer().first, rake.answer().second);
+}
+
+// Verdict of a polyline (degree 1) or of a B-spline by its control points (degree 3).
+nb::tuple look(const World& world, const Kernel& kernel, const Rows& rows, int degree, double margin, double finest,
+               double seconds, Flag cancel) {
+    require_columns(rows.shape(1), static_cast<size_t>(world.dof()), "joint values");
+    require_usable(rows.data(), rows.size());
+    require(degree == 1 || degree == 3, "a course is of degree 1 or 3");
+    require(rows.shape(0) > static_cast<size_t>(degree), "a course needs more rows than its degree");
+    nb::gil_scoped_release release;
+    Tolerances tolerances;
+    tolerances.margin = margin;
+    tolerances.finest = finest;
+    Rake rake(world, kernel, tolerances);
+    const Stop stop(seconds, cancel);
+    const Verdict verdict = degree == 1 ? rake.look(Polyline(rows.data(), rows.shape(0), rows.shape(1)), stop)
+                                        : rake.look(Spline(rows.data(), rows.shape(0), rows.shape(1)), stop);
+    nb::gil_scoped_acquire acquire;
+    return nb::make_tuple(static_cast<int>(verdict), rake.checks(), rake.answer().first, rake.answer().second);
+}
+
+std::vector<Joints> each_row(const Rows& rows, const World& world, const char* what) {
+    require_columns(rows.shape(1), static_cast<size_t>(world.dof()), what);
+    require_usable(rows.data(), rows.size());
+    std::vector<Joints> each;
+    for (size_t i = 0; i < rows.shape(0); ++i) each.emplace_back(&rows(i, 0), &rows(i, 0) + rows.shape(1));
+    return each;
+}
+
+Plan find(const World& world, const Kernel& kernel, const Rows& bounds, const Row& start, const Rows& goals,
+          uint64_t seed, double margin, double seconds, Flag cancel) {
+    const auto limits = each_row(bounds, world, "bounds (lower, upper, weights)");
+    require(limits.size() == 3, "bounds are three rows: lower, upper, weights");
+    const Space space{limits[0], limits[1], limits[2]};
+    Wish wish{joints_of(start, world), each_row(goals, world, "goals"), seed};
+    require(!wish.goals.empty(), "a plan needs at least one goal");
+    nb::gil_scoped_release release;
+    Tolerances tolerances;
+    tolerances.margin = margin;
+    return plan(world, kernel, space, tolerances, wish, Stop(seconds, cancel));
+}
+
+nb::ndarray<nb::numpy, double> way_of(const Plan& plan, size_t dof) {
+    std::vector<double> rows;
+    for (const Joints& joints : plan.way) rows.insert(rows.end(), joints.begin(), joints.end());
+    return array_of(std::move(rows), {plan.way.size(), dof});
+}
+
+// The leaves' centres (n, leaves, 3), for the tests of the kinematics.
+nb::ndarray<nb::numpy, float> centres(const World& world, const Kernel& kernel, const Rows& rows) {
+    require_columns(rows.shape(1), static_cast<size_t>(world.dof()), "joint values");
+    require_usable(rows.data(), rows.size());
+    const size_t dof = rows.shape(1), balls = world.ball_count();
+    std::vector<float> result(rows.shape(0) * balls * 3), joints(dof * kLanes), placed(balls * 3 * kLanes);
+    for (size_t row = 0; row < rows.shape(0); ++row) {
+        for (size_t i = 0; i < dof * kLanes; ++i) joints[i] = static_cast<float>(rows(row, i / kLanes));
+        kernel.place(world.view(), joints.data(), placed.data());
+        for (size_t i = 0; i < balls * 3; ++i) result[row * balls * 3 + i] = placed[i * kLanes + row % kLanes];
+    }
+    return array_of(std::move(result), {rows.shape(0), balls, size_t{3}});
+}
+
+}  // namespace
+}  // namespace gemelo
+
+NB_MODULE(_motion, module) {
+    using namespace gemelo;
+    using namespace nb::literals;
+    nb::class_<Chain>(module, "Chain");
+    nb::class_<Part>(module, "Part");
+    nb::class_<Mesh>(module, "Mesh");
+    nb::class_<Obstacle>(module, "Obstacle");
+    nb::class_<World>(module, "World");
+    nb::class_<Kernel>(module, "Kernel").def_ro("name", &Kernel::name);
+    nb::class_<CancelFlag>(module, "CancelFlag")
+        .def(nb::init<>())
+        .def("set", [](CancelFlag& flag) { flag.is_set.store(true); })
+        .def("is_set", [](const CancelFlag& flag) { return flag.is_set.load(); });
+    nb::class_<Plan>(module, "Plan")
+        .def_prop_ro("outcome", [](const Plan& plan) { return static_cast<int>(plan.outcome); })
+        .def("way", &way_of, "dof"_a)
+        .def(
+            "control",
+            [](const Plan& plan, size_t dof) {
+                return array_of(std::vector<double>(plan.control), {plan.control.size() / dof, dof});
+            },
+            "dof"_a)
+        .def_ro("search_s", &Plan::search_s)
+        .def_ro("shorten_s", &Plan::shorten_s)
+        .def_ro("smooth_s", &Plan::smooth_s)
+        .def_ro("iterations", &Plan::iterations)
+        .def_ro("checks", &Plan::checks);
+    module.def("kernel_names", [] {
+        std::vector<std::string> names;
+        for (const Kernel* kernel : kernels()) names.emplace_back(kernel->name);
+        return names;
+    });
+    module.def(
+        "kernel", [](const std::string& name) { return &kernel_named(name); }, "name"_a, nb::rv_policy::reference);
+    module.def("chain", &make_chain, "links"_a, "numbers"_a, "dof"_a);
+    module.def("part", &make_part, "frame"_a, "balls"_a, "solids"_a);
+    module.def("cover", &cover, "cells"_a, "candidates"_a, "least"_a);
+    module.def("mesh", &make_mesh, "vertices"_a, "faces"_a);
+    module.def("solid_cells", &solid_cells, "vertices"_a, "faces"_a, "cell"_a);
+    module.def("obstacle", &make_obstacle, "shape"_a, "pose"_a, "size"_a, "round"_a, "touching"_a, "mesh"_a.none());
+    module.def("world", &make_world, "chain"_a, "parts"_a, "pairs"_a, "obstacles"_a);
+    module.def("are_free", &are_free, "world"_a, "kernel"_a, "rows"_a, "margin"_a);
+    module.def("clearance", &clearance, "world"_a, "kernel"_a, "row"_a, "most"_a);
+    module.def("first_contact", &first_contact, "world"_a, "kernel"_a, "row"_a, "margin"_a);
+    module.def("look", &look, "world"_a, "kernel"_a, "rows"_a, "degree"_a, "margin"_a, "finest"_a, "seconds"_a,
+               "cancel"_a.none());
+    module.def("plan", &find, "world"_a, "kernel"_a, "bounds"_a, "start"_a, "goals"_a, "seed"_a, "margin"_a,
+               "seconds"_a, "cancel"_a.none());
+    module.def("centres", &centres, "world"_a, "kernel"_a, "rows"_a);
+}

@@ -1,0 +1,61 @@
+// A plan: search, shorten, smooth, each within the same time and until the same flag.
+#pragma once
+
+#include "shorten.h"
+#include "smooth.h"
+
+namespace gemelo {
+
+enum class Outcome { kFound, kStartTouches, kGoalTouches, kTimedOut, kCancelled };
+
+struct Plan {
+    Outcome outcome = Outcome::kTimedOut;
+    std::vector<Joints> way;      // corners of the polyline, start and goal included
+    std::vector<double> control;  // of the B-spline, by rows
+    double search_s = 0.0, shorten_s = 0.0, smooth_s = 0.0;
+    uint64_t iterations = 0, checks = 0;
+};
+
+struct Wish {
+    Joints start;
+    std::vector<Joints> goals;  // any of them will do
+    uint64_t seed = 0;
+    int patience = 30;  // of the shortener
+};
+
+inline Plan plan(const World& world, const Kernel& kernel, const Space& space, const Tolerances& tolerances,
+                 const Wish& wish, const Stop& stop) {
+    Plan result;
+    Rake rake(world, kernel, tolerances);
+    Random random(wish.seed);
+    std::vector<Joints> goals;
+    for (const Joints& goal : wish.goals) {
+        if (rake.is_free(goal.data())) goals.push_back(goal);
+    }
+    if (!rake.is_free(wish.start.data())) {
+        result.outcome = Outcome::kStartTouches;
+        return result;
+    }
+    if (goals.empty()) {
+        result.outcome = Outcome::kGoalTouches;
+        return result;
+    }
+    Search search(space, rake, random, stop);
+    result.way = search.find(wish.start, goals);
+    result.search_s = stop.elapsed();
+    result.iterations = search.iterations();
+    if (result.way.empty()) {
+        result.outcome = stop.is_cancelled() ? Outcome::kCancelled : Outcome::kTimedOut;
+        result.checks = rake.checks();
+        return result;
+    }
+    result.way = Shortener(space, rake, random, stop).shorten(std::move(result.way), wish.patience);
+    result.shorten_s = stop.elapsed() - result.search_s;
+    result.control = Smoother(rake, stop).smooth(result.way);
+    result.smooth_s = stop.elapsed() - result.search_s - result.shorten_s;
+    result.checks = rake.checks();
+    result.outcome = stop.is_cancelled() ? Outcome::kCancelled : Outcome::kFound;
+    return result;
+}
+
+}  // namespace gemelo

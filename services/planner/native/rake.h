@@ -1,0 +1,144 @@
+// Whether a whole course is free, nothing left out between the samples.
+//
+// A sample stands for the stretch around it. Eight stretches, taken from all over the course, make one question to the
+// check. No part moves farther within a stretch than its bound, so a lane without anything that near is free on all of
+// its stretch; one that touches ends everything; any other is cut in two. What cannot be told apart at `finest` is
+// called not free.
+#pragma once
+
+#include "course.h"
+#include "stop.h"
+#include "world.h"
+
+namespace gemelo {
+
+struct Tolerances {
+    double margin = 1e-3;   // [m] that stays free
+    double finest = 2e-4;   // [m] of motion within a stretch that is not cut any further
+    double coarsest = 0.2;  // [m] of motion within the first stretches, at most
+};
+
+enum class Verdict { kFree, kTouching, kTooNear, kStopped };
+
+class Rake {
+  public:
+    Rake(const World& world, const Kernel& kernel, const Tolerances& tolerances)
+        : world_(world), kernel_(kernel), tolerances_(tolerances) {}
+
+    // How many configurations have been looked at.
+    uint64_t checks() const { return checks_; }
+    const Answer& answer() const { return answer_; }  // the last contact, where the verdict is not kFree
+
+    bool is_free(const double* joints) {
+        stretches_.assign(1, {0, 0.5, 0.0});
+        ends_.assign(joints, joints + dof());
+        ends_.insert(ends_.end(), joints, joints + dof());
+        const Polyline point(ends_.data(), 2, dof());
+        const Joints still(dof(), 0.0);
+        world_.bound_motion(still.data(), part_motion_, pair_motion_);
+        return ask(point, 0, 1) == 0 && answer_.near == 0;
+    }
+
+    bool is_free_line(const double* from, const double* to, const Stop& stop) {
+        ends_.assign(from, from + dof());
+        ends_.insert(ends_.end(), to, to + dof());
+        return look(Polyline(ends_.data(), 2, dof()), stop) == Verdict::kFree;
+    }
+
+    Verdict look(const Course& course, const Stop& stop) {
+        begin(course);
+        for (size_t next = 0; next < stretches_.size();) {
+            if (stop()) return Verdict::kStopped;
+            const size_t count = std::min<size_t>(kLanes, stretches_.size() - next);
+            if (ask(course, next, count) != 0) return Verdict::kTouching;
+            for (size_t lane = 0; lane < count; ++lane) {
+                if ((answer_.near >> lane & 1u) != 0 && !cut(stretches_[next + lane])) return Verdict::kTooNear;
+            }
+            next += count;
+        }
+        return Verdict::kFree;
+    }
+
+  private:
+    struct Stretch {
+        size_t span;
+        double middle, half;
+    };
+
+    size_t dof() const { return static_cast<size_t>(world_.dof()); }
+
+    // The bounds for the fastest span, how much of them each span needs, and the first stretches.
+    void begin(const Course& course) {
+        const size_t spans = course.span_count();
+        Joints fastest(dof(), 0.0), speed(dof());
+        for (size_t span = 0; span < spans; ++span) {
+            course.speed(span, speed.data());
+            for (size_t i = 0; i < dof(); ++i) fastest[i] = std::max(fastest[i], speed[i]);
+        }
+        world_.bound_motion(fastest.data(), part_motion_, pair_motion_);
+        motion_ = *std::max_element(part_motion_.begin(), part_motion_.end());
+        for (float pair : pair_motion_) motion_ = std::max(motion_, static_cast<double>(pair));
+        slowness_.assign(spans, 0.0);
+        for (size_t span = 0; span < spans; ++span) {
+            course.speed(span, speed.data());
+            for (size_t i = 0; i < dof(); ++i) {
+                if (fastest[i] > 0.0) slowness_[span] = std::max(slowness_[span], speed[i] / fastest[i]);
+            }
+        }
+        first_stretches(spans);
+    }
+
+    // As many in every span, in an order that jumps about the course, so that a contact is found early.
+    void first_stretches(size_t spans) {
+        const double wanted = std::max(motion_ / tolerances_.coarsest, 1.0 * kLanes / static_cast<double>(spans));
+        const size_t each = static_cast<size_t>(std::ceil(std::min(wanted, 1e4)));
+        const size_t total = each * spans, rakes = (total + kLanes - 1) / kLanes;
+        stretches_.clear();
+        for (size_t rake = 0; rake < rakes; ++rake) {
+            for (size_t i = rake; i < total; i += rakes) {
+                const double width = 1.0 / static_cast<double>(each);
+                stretches_.push_back({i / each, (static_cast<double>(i % each) + 0.5) * width, 0.5 * width});
+            }
+        }
+    }
+
+    // The lanes that touch.
+    uint32_t ask(const Course& course, size_t next, size_t count) {
+        float joints[kMaxDof * kLanes], half[kLanes];
+        double row[kMaxDof];
+        for (size_t lane = 0; lane < kLanes; ++lane) {
+            const Stretch& stretch = stretches_[next + std::min(lane, count - 1)];
+            course.at(stretch.span, stretch.middle, row);
+            for (size_t i = 0; i < dof(); ++i) joints[i * kLanes + lane] = static_cast<float>(row[i]);
+            half[lane] = rounded_up(stretch.half * (slowness_.empty() ? 0.0 : slowness_[stretch.span]));
+        }
+        const uint32_t lanes = (1u << count) - 1;
+        const float margin = static_cast<float>(tolerances_.margin);
+        kernel_.check(world_.view(), {joints, half, part_motion_.data(), pair_motion_.data(), margin, lanes, true},
+                      answer_);
+        checks_ += count;
+        return answer_.hits;
+    }
+
+    // Two halves at the end of the queue; false where that would be too fine.
+    bool cut(const Stretch whole) {
+        if (whole.half * slowness_[whole.span] * motion_ < tolerances_.finest) return false;
+        const double half = 0.5 * whole.half;
+        stretches_.push_back({whole.span, whole.middle - half, half});
+        stretches_.push_back({whole.span, whole.middle + half, half});
+        return true;
+    }
+
+    const World& world_;
+    const Kernel& kernel_;
+    Tolerances tolerances_;
+    Answer answer_{};
+    uint64_t checks_ = 0;
+    double motion_ = 0.0;
+    Joints ends_;
+    std::vector<Stretch> stretches_;
+    std::vector<double> slowness_;
+    std::vector<float> part_motion_, pair_motion_;
+};
+
+}  // namespace gemelo

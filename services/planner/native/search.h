@@ -1,0 +1,148 @@
+// RRT-Connect (Kuffner and LaValle 2000): two trees that grow towards one another, from the start and from the goals.
+#pragma once
+
+#include "rake.h"
+#include "random.h"
+
+namespace gemelo {
+
+struct Space {
+    Joints lower, upper;
+    Joints weights;  // [1/rad] or [1/m]: what a unit of each joint costs; distances are weighted Euclidean
+
+    double distance(const double* a, const double* b) const {
+        double sum = 0.0;
+        for (size_t i = 0; i < weights.size(); ++i) {
+            const double way = weights[i] * (a[i] - b[i]);
+            sum += way * way;
+        }
+        return std::sqrt(sum);
+    }
+};
+
+// Configurations, and from which one each was reached.
+class SearchTree {
+  public:
+    explicit SearchTree(const Space& space) : space_(space), dof_(space.lower.size()) {}
+
+    size_t size() const { return parents_.size(); }
+    const double* row(size_t index) const { return rows_.data() + index * dof_; }
+
+    size_t add(const double* joints, size_t parent) {
+        const Joints copy(joints, joints + dof_);  // `joints` may be a row of this very tree
+        rows_.insert(rows_.end(), copy.begin(), copy.end());
+        parents_.push_back(parent);
+        return parents_.size() - 1;
+    }
+
+    size_t nearest(const double* joints) const {
+        size_t best = 0;
+        double least = std::numeric_limits<double>::infinity();
+        for (size_t index = 0; index < size(); ++index) {
+            double sum = 0.0;
+            for (size_t i = 0; i < dof_; ++i) {
+                const double way = space_.weights[i] * (joints[i] - rows_[index * dof_ + i]);
+                sum += way * way;
+            }
+            if (sum < least) {
+                least = sum;
+                best = index;
+            }
+        }
+        return best;
+    }
+
+    // From `index` to its root.
+    std::vector<Joints> way_up(size_t index) const {
+        std::vector<Joints> way;
+        for (;; index = parents_[index]) {
+            way.emplace_back(row(index), row(index) + dof_);
+            if (parents_[index] == index) return way;
+        }
+    }
+
+  private:
+    const Space& space_;
+    size_t dof_;
+    std::vector<double> rows_;
+    std::vector<size_t> parents_;
+};
+
+class Search {
+  public:
+    Search(const Space& space, Rake& rake, Random& random, const Stop& stop)
+        : space_(space), rake_(rake), random_(random), stop_(stop) {
+        range_ = 0.25 * space_.distance(space_.lower.data(), space_.upper.data());
+    }
+
+    size_t iterations() const { return iterations_; }
+
+    // A way from `start` to one of `goals`, all of which must be free; none when it was stopped.
+    std::vector<Joints> find(const Joints& start, const std::vector<Joints>& goals) {
+        for (const Joints& goal : goals) {
+            if (rake_.is_free_line(start.data(), goal.data(), stop_)) return {start, goal};
+        }
+        SearchTree from_start(space_), from_goals(space_);
+        from_start.add(start.data(), 0);
+        for (const Joints& goal : goals) from_goals.add(goal.data(), from_goals.size());
+        SearchTree *grows = &from_start, *meets = &from_goals;
+        Joints sample(start.size());
+        for (iterations_ = 1; !stop_(); ++iterations_) {
+            for (size_t i = 0; i < sample.size(); ++i) {
+                sample[i] = space_.lower[i] + random_.share() * (space_.upper[i] - space_.lower[i]);
+            }
+            const size_t before = grows->size();
+            extend(*grows, grows->nearest(sample.data()), sample.data());
+            if (grows->size() > before && connect(*grows, *meets)) {
+                const bool is_turned = grows == &from_goals;
+                return is_turned ? joined(*meets, *grows) : joined(*grows, *meets);
+            }
+            if (grows->size() > meets->size()) std::swap(grows, meets);
+        }
+        return {};
+    }
+
+  private:
+    // One step of at most `range_` from a node towards `target`; true when it got there.
+    bool extend(SearchTree& tree, size_t from, const double* target) {
+        const double distance = space_.distance(tree.row(from), target);
+        const double share = std::min(1.0, range_ / std::max(distance, 1e-12));
+        Joints next(tree.row(from), tree.row(from) + space_.lower.size());
+        for (size_t i = 0; i < next.size(); ++i) {
+            next[i] = share < 1.0 ? next[i] + share * (target[i] - next[i]) : target[i];
+        }
+        if (!rake_.is_free_line(tree.row(from), next.data(), stop_)) return false;
+        tree.add(next.data(), from);
+        return share >= 1.0;
+    }
+
+    // From the other tree towards the newest node of the one that grew, until there or blocked.
+    bool connect(const SearchTree& grown, SearchTree& other) {
+        const Joints target(grown.row(grown.size() - 1), grown.row(grown.size() - 1) + space_.lower.size());
+        size_t from = other.nearest(target.data());
+        for (;;) {
+            const size_t before = other.size();
+            if (extend(other, from, target.data())) return true;
+            if (other.size() == before) return false;
+            from = other.size() - 1;
+        }
+    }
+
+    // The newest nodes of both are the same configuration.
+    std::vector<Joints> joined(const SearchTree& from_start, const SearchTree& from_goals) const {
+        std::vector<Joints> way = from_start.way_up(from_start.size() - 1);
+        std::reverse(way.begin(), way.end());
+        const std::vector<Joints> rest = from_goals.way_up(from_goals.size() - 1);
+        way.insert(way.end(), rest.begin() + 1, rest.end());
+        return way;
+    }
+
+    const Space& space_;
+    Rake& rake_;
+    Random& random_;
+    const Stop& stop_;
+    double range_;
+    size_t iterations_ = 0;
+};
+
+}  // namespace gemelo

@@ -1,0 +1,83 @@
+// A curve without corners in place of a polyline: the control points of a uniform cubic B-spline.
+//
+// Each corner keeps its own control point, with one before and one after it on its edges. The curve cuts the corner by
+// a share of these edges; where that is not free the share is halved, and at last the corner is taken as it is: three
+// equal control points, at which the curve comes to rest in its parameter.
+#pragma once
+
+#include "rake.h"
+
+namespace gemelo {
+
+class Smoother {
+  public:
+    Smoother(Rake& rake, const Stop& stop) : rake_(rake), stop_(stop) {}
+
+    // Control points by rows; both ends are there three times. The whole curve is free where the polyline is.
+    std::vector<double> smooth(const std::vector<Joints>& way) {
+        shares_.assign(way.size(), 0.5);
+        std::vector<bool> open(way.size(), true);
+        for (bool is_done = false; !is_done && !stop_();) {
+            is_done = true;
+            lay(way);
+            for (size_t corner = 1; corner + 1 < way.size(); ++corner) {
+                if (!open[corner] || is_free(corner)) {
+                    open[corner] = false;
+                    continue;
+                }
+                shares_[corner] = shares_[corner] > kLeast ? 0.5 * shares_[corner] : 0.0;
+                open[corner] = open[corner - 1] = open[corner + 1] = true;  // the neighbours share its edges
+                is_done = false;
+            }
+        }
+        if (stop_() || rake_.look(Spline(points_.data(), count(), dof_), stop_) != Verdict::kFree) {
+            shares_.assign(way.size(), 0.0);
+            lay(way);
+        }
+        return points_;
+    }
+
+  private:
+    static constexpr double kLeast = 1.0 / 64.0;
+
+    size_t count() const { return points_.size() / dof_; }
+
+    void lay(const std::vector<Joints>& way) {
+        dof_ = way[0].size();
+        points_.clear();
+        places_.assign(way.size(), 0);
+        for (int i = 0; i < 3; ++i) push(way.front(), way.front(), 0.0);
+        for (size_t corner = 1; corner + 1 < way.size(); ++corner) {
+            const double share = shares_[corner];
+            const bool is_sharp = share == 0.0;
+            const bool is_shared = corner > 1 && share == 0.5 && shares_[corner - 1] == 0.5;
+            if (is_sharp) push(way[corner], way[corner], 0.0);
+            if (!is_sharp && !is_shared) push(way[corner], way[corner - 1], share);
+            places_[corner] = count();
+            push(way[corner], way[corner], 0.0);
+            if (is_sharp) push(way[corner], way[corner], 0.0);
+            if (!is_sharp) push(way[corner], way[corner + 1], share);
+        }
+        for (int i = 0; i < 3; ++i) push(way.back(), way.back(), 0.0);
+    }
+
+    void push(const Joints& from, const Joints& to, double share) {
+        for (size_t i = 0; i < dof_; ++i) points_.push_back(from[i] + share * (to[i] - from[i]));
+    }
+
+    // The four spans that the corner's control point has a part in.
+    bool is_free(size_t corner) {
+        if (shares_[corner] == 0.0) return true;
+        const size_t first = places_[corner] - 3;
+        return rake_.look(Spline(points_.data() + first * dof_, 7, dof_), stop_) == Verdict::kFree;
+    }
+
+    Rake& rake_;
+    const Stop& stop_;
+    size_t dof_ = 1;
+    std::vector<double> shares_;
+    std::vector<double> points_;
+    std::vector<size_t> places_;  // of the corners' control points
+};
+
+}  // namespace gemelo

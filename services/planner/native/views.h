@@ -1,0 +1,122 @@
+// What the check reads and writes: plain records without functions, so that it can be compiled for several processors.
+//
+// Lengths in m, angles in rad. A rigid transform is 12 floats: the 3 x 3 rotation by rows, then the translation.
+#pragma once
+
+#include <stdint.h>
+
+namespace gemelo {
+
+constexpr int kLanes = 8;
+constexpr uint32_t kAllLanes = (1u << kLanes) - 1;
+constexpr int kMaxDof = 16;
+constexpr int kMaxFrames = 32;       // the base and one for each moving joint, followers included
+constexpr int kMaxParts = 64;        // links and attached objects: bits of ObstacleView::touching
+constexpr float kMostTurn = 100.0f;  // [rad] joint values beyond that lose their precision in a float
+
+// A frame that a joint moves: its z is the joint's axis. Frame 0 is the base.
+struct FrameView {
+    int32_t parent;
+    int32_t drive;  // the column of the joint values that moves it
+    int32_t slides;
+    float multiplier, offset;  // of a joint that follows another; 1 and 0 otherwise
+    float fixed[12];           // from the parent's frame at joint value 0
+};
+
+// A sphere around all that comes after it up to `skip`; one that has nothing inside (`skip` is the next) is the cover's
+// own.
+struct NodeView {
+    float x, y, z, radius;
+    int32_t skip;
+    int32_t item;  // of a leaf: which of the things that the tree was built of
+};
+
+enum class Shape : int32_t {
+    kRoundedBox,  // half sizes and a radius: sphere, capsule along z, box
+    kCylinder,    // along z: size = {radius, -, half length}
+    kHalfSpace,   // solid where z <= 0
+    kMesh,
+};
+
+struct TriangleView {
+    float corner[3][3];
+    float normal[3];  // of length 1; zeros where the triangle has no area
+};
+
+// An axis-aligned box around the triangles first .. first + count; inner ones have count 0.
+struct BoxView {
+    float low[3], high[3];
+    int32_t skip, first, count;
+};
+
+// Triangles, and cells that say how far at least the surface is from any point in them; below 0: inside the solid.
+struct MeshView {
+    const BoxView* boxes;
+    const TriangleView* triangles;
+    const float* cells;
+    int32_t box_count;
+    int32_t size[3];
+    float low[3], cell, per_cell;  // the grid's corner [m], a cell's edge [m] and its inverse
+};
+
+struct ObstacleView {
+    Shape shape;
+    float pose[12];  // from the base into the obstacle's own frame
+    float size[3];
+    float round;        // [m] radius and padding, added to the shape on all sides
+    uint64_t touching;  // bit for every part that may touch it
+    const MeshView* mesh;
+};
+
+// A link or an attached object: spheres in a frame, and the solids that they cover.
+struct PartView {
+    const NodeView* nodes;
+    const ObstacleView* solids;  // their poses: from the part's frame into their own
+    int32_t solid_count;
+    int32_t frame;
+};
+
+// Parts that may not touch: the spheres of the first against the solids of the second.
+struct PairView {
+    int32_t first, second;
+};
+
+struct WorldView {
+    const FrameView* frames;
+    const PartView* parts;
+    const PairView* pairs;
+    const ObstacleView* obstacles;
+    const NodeView* tree;  // spheres around the bounded obstacles; its leaves' items are obstacles
+    const int32_t* unbounded;
+    int32_t frame_count, part_count, pair_count, tree_count, unbounded_count;
+};
+
+struct Question {
+    const float* joints;       // [dof][kLanes]
+    const float* half;         // [kLanes] of the curve's parameter that each lane stands for, on both sides
+    const float* part_motion;  // [parts], [pairs]: how far at most they move per unit of the parameter [m]
+    const float* pair_motion;
+    float margin;           // [m] that must stay free
+    uint32_t lanes;         // which lanes matter
+    bool first_hit_is_all;  // whether one lane's hit ends the question
+};
+
+struct Answer {
+    uint32_t hits;          // lanes that are nearer than the margin
+    uint32_t near;          // lanes that are nearer than the margin and the motion within `half`
+    int32_t first, second;  // the parts of the newest contact; an obstacle is kMaxParts + its index
+};
+
+using Check = void (*)(const WorldView&, const Question&, Answer&);
+using Place = void (*)(const WorldView&, const float* joints, float* centres);
+
+// One build of the check.
+struct Kernel {
+    const char* name;
+    Check check;
+    Place place;  // the leaves' centres [leaf][3][kLanes] in the base, in the parts' order
+};
+
+extern const Kernel kPlainKernel, kVectorKernel, kAvx2Kernel;
+
+}  // namespace gemelo

@@ -1,0 +1,103 @@
+"""Solids by name and pose: what stands around the arm, what it holds, what it is made of."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.transforms import IDENTITY, Rigid
+
+Array = NDArray[np.float64]
+
+
+class ShapeKind(StrEnum):
+    """And what `Shape.size` means for each, in m."""
+
+    BOX = "box"  # x, y, z: whole lengths of the edges
+    SPHERE = "sphere"  # radius
+    CYLINDER = "cylinder"  # radius, length; along z
+    CAPSULE = "capsule"  # radius, length of the straight part; along z
+    HALF_SPACE = "half_space"  # nothing: solid where z <= 0
+    MESH = "mesh"  # nothing
+
+
+SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "half_space": 0, "mesh": 0}
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles: `vertices` (v, 3) [m], `faces` (f, 3) vertex numbers. Solid where the surface is closed."""
+
+    vertices: Array
+    faces: NDArray[np.int32]
+
+    @property
+    def arrays(self) -> tuple[Array, NDArray[np.int32]]:
+        """Vertices and faces as the compiled core wants them; raises ValueError for a vertex that is not finite."""
+        vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
+        if not np.isfinite(vertices).all():
+            raise ValueError("a vertex of the mesh is not finite")
+        return vertices, np.ascontiguousarray(self.faces, dtype=np.int32)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One solid; `pose` is in the arm's base, or in the link that it belongs to."""
+
+    name: str
+    kind: ShapeKind
+    size: tuple[float, ...] = ()
+    pose: Rigid = IDENTITY
+    mesh: Mesh | None = None
+    padding: float = 0.0  # [m] added on all sides
+    touching: frozenset[str] = frozenset()  # links and attached things that may touch it
+
+    def __post_init__(self) -> None:
+        wanted = SIZES[self.kind]
+        if len(self.size) != wanted or not all(0.0 < value < math.inf for value in self.size):
+            raise ValueError(f'"{self.name}": a {self.kind} has {wanted} sizes above 0 m, not {self.size}')
+        if (self.kind is ShapeKind.MESH) != (self.mesh is not None):
+            raise ValueError(f'"{self.name}": a mesh, and only a mesh, comes with its triangles')
+        if not 0.0 <= self.padding < math.inf:
+            raise ValueError(f'"{self.name}": padding must be 0 m or more, not {self.padding}')
+        if not all(math.isfinite(value) for part in self.pose for value in part):
+            raise ValueError(f'"{self.name}": its pose is not finite')
+        if abs(math.hypot(*self.pose[1]) - 1.0) > 1e-3:
+            raise ValueError(f'"{self.name}": its rotation is no unit quaternion (x, y, z, w)')
+
+    @property
+    def matrix(self) -> Array:
+        """(4, 4), the pose with its quaternion brought to length 1."""
+        return matrix_of(self.pose)
+
+    @property
+    def rotation(self) -> Array:
+        """(3, 3)."""
+        return self.matrix[:3, :3]
+
+
+def matrix_of(pose: Rigid) -> Array:
+    """(4, 4) of a translation and a quaternion of any length but 0."""
+    x, y, z, w = np.array(pose[1]) / np.linalg.norm(pose[1])
+    matrix = np.eye(4)
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:3, 3] = pose[0]
+    return matrix
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """Shapes that move with a link, their poses in it; `touching` links may be touched by them."""
+
+    name: str
+    link: str
+    shapes: tuple[Shape, ...]
+    touching: frozenset[str] = frozenset()

@@ -1,0 +1,100 @@
+"""Convex solids as the fit of spheres sees them: how deep a point lies, and what is the nearest point."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Solid(Hashable, Protocol):
+    """A convex solid about its own origin; points are (..., 3) [m]."""
+
+    @property
+    def half(self) -> Array:
+        """(3,) half sizes [m] of the box around it."""
+
+    def depth(self, points: Array) -> Array:
+        """(...) [m] to the surface from inside; below 0 outside."""
+
+    def nearest(self, points: Array) -> Array:
+        """The points themselves, or where they are outside the nearest ones of the solid."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """Half the lengths of its edges [m]."""
+
+    half_sizes: tuple[float, float, float]
+
+    @property
+    def half(self) -> Array:
+        return np.array(self.half_sizes)
+
+    def depth(self, points: Array) -> Array:
+        over = np.abs(points) - self.half
+        outside = np.linalg.norm(np.maximum(over, 0.0), axis=-1)
+        depth: Array = np.where(outside > 0.0, -outside, -over.max(axis=-1))
+        return depth
+
+    def nearest(self, points: Array) -> Array:
+        nearest: Array = np.clip(points, -self.half, self.half)
+        return nearest
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Along z, both ends flat; [m]."""
+
+    radius: float
+    half_length: float
+
+    @property
+    def half(self) -> Array:
+        return np.array([self.radius, self.radius, self.half_length])
+
+    def depth(self, points: Array) -> Array:
+        aside = np.hypot(points[..., 0], points[..., 1]) - self.radius
+        above = np.abs(points[..., 2]) - self.half_length
+        outside = np.hypot(np.maximum(aside, 0.0), np.maximum(above, 0.0))
+        return np.where(outside > 0.0, -outside, -np.maximum(aside, above))
+
+    def nearest(self, points: Array) -> Array:
+        aside = np.maximum(np.hypot(points[..., 0], points[..., 1]), self.radius)
+        moved = points.copy()
+        moved[..., :2] *= (self.radius / aside)[..., None]
+        moved[..., 2] = np.clip(points[..., 2], -self.half_length, self.half_length)
+        return moved
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """All points within `radius` of the line along z; a ball where `half_length` is 0; [m]."""
+
+    radius: float
+    half_length: float
+
+    @property
+    def half(self) -> Array:
+        return np.array([self.radius, self.radius, self.half_length + self.radius])
+
+    def depth(self, points: Array) -> Array:
+        distance: Array = np.linalg.norm(points - self._on_axis(points), axis=-1)
+        return self.radius - distance
+
+    def nearest(self, points: Array) -> Array:
+        axis = self._on_axis(points)
+        off = points - axis
+        distance = np.maximum(np.linalg.norm(off, axis=-1, keepdims=True), self.radius)
+        nearest: Array = axis + off * (self.radius / distance)
+        return nearest
+
+    def _on_axis(self, points: Array) -> Array:
+        axis = np.zeros_like(points)
+        axis[..., 2] = np.clip(points[..., 2], -self.half_length, self.half_length)
+        return axis

@@ -1,0 +1,107 @@
+"""The spheres of the links, of convex solids and of meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from services.planner.link_spheres import cover_shapes, link_shapes
+from services.planner.shapes import Shape, ShapeKind
+from services.planner.solids import Box, Capsule, Cylinder, Solid
+from services.planner.spheres import cover_of, mesh_cover
+from tests.planner.native.conftest import load
+from tests.planner.native.scenes import star_mesh
+
+HAIR = 1e-9  # [m]
+
+
+def inside(solid: Solid, count: int, seed: int = 0) -> np.ndarray:
+    """Points of the solid, most of them on its surface: what lies around it, brought to it."""
+    rng = np.random.default_rng(seed)
+    around = rng.uniform(-1.3, 1.3, (count, 3)) * solid.half
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 2.0 * solid.half
+    return solid.nearest(np.vstack((around, corners)))
+
+
+def sticks_out(points: np.ndarray, spheres: np.ndarray) -> float:
+    """[m] by how much the worst point is outside of all spheres."""
+    worst = -np.inf
+    for some in np.array_split(points, max(1, len(points) // 500)):
+        away = np.linalg.norm(some[:, None, :] - spheres[None, :, :3], axis=2) - spheres[None, :, 3]
+        worst = max(worst, float(away.min(axis=1).max()))
+    return worst
+
+
+def directions(count: int) -> np.ndarray:
+    """(count, 3) of length 1."""
+    some = np.random.default_rng(1).normal(size=(count, 3))
+    return some / np.linalg.norm(some, axis=1)[:, None]
+
+
+sizes = st.floats(0.004, 0.08)
+solids = st.one_of(
+    st.builds(lambda x, y, z: Box((x, y, z)), sizes, sizes, sizes),
+    st.builds(Cylinder, sizes, sizes),
+    st.builds(Capsule, sizes, st.one_of(st.just(0.0), sizes)),
+)
+
+
+@settings(max_examples=40)
+@given(solid=solids, bulge=st.floats(0.006, 0.02))
+def test_every_point_of_a_solid_is_in_a_sphere_and_no_sphere_bulges_more_than_reported(solid, bulge):
+    cover = cover_of(solid, bulge)
+    assert sticks_out(inside(solid, 3000), cover.spheres) <= HAIR
+    assert cover.bulge <= bulge + HAIR
+    skin = cover.spheres[:, None, :3] + cover.spheres[:, None, 3:] * directions(200)[None, :, :]
+    assert -solid.depth(skin).min() <= cover.bulge + HAIR
+
+
+def test_a_ball_is_its_own_sphere():
+    assert cover_of(Capsule(0.03, 0.0)).spheres.tolist() == [[0.0, 0.0, 0.0, 0.03]]
+
+
+def test_the_same_solid_gets_the_same_spheres():
+    box = Box((0.05, 0.02, 0.03))
+    assert np.array_equal(cover_of.__wrapped__(box, 0.005).spheres, cover_of.__wrapped__(box, 0.005).spheres)
+
+
+def test_a_smaller_bulge_takes_more_spheres():
+    box = Box((0.05, 0.02, 0.03))
+    assert len(cover_of(box, 0.003).spheres) > len(cover_of(box, 0.006).spheres) > len(cover_of(box, 0.012).spheres)
+
+
+@pytest.mark.parametrize(("name", "links", "most"), [("rm1", 4, 2000), ("parol6", 7, 2600)])
+def test_every_link_of_the_arms_is_covered(name, links, most):
+    shapes = link_shapes(load(name))
+    assert len(shapes) == links
+    total = 0
+    for several in shapes.values():
+        cover = cover_shapes(several, 0.005)
+        total += len(cover.spheres)
+        assert 0.0 < cover.bulge <= 0.005 + HAIR
+        for shape in several:
+            solid = {"box": lambda s: Box(tuple(0.5 * x for x in s)), "cylinder": lambda s: Cylinder(s[0], 0.5 * s[1])}
+            points = inside(solid[shape.kind](shape.size), 4000)
+            assert sticks_out(points @ shape.rotation.T + shape.pose[0], cover.spheres) <= HAIR
+    assert 0 < total <= most
+
+
+def test_a_mesh_is_covered_inside_too():
+    mesh = star_mesh(np.random.default_rng(3))
+    cover = mesh_cover(*mesh.arrays, 0.006)
+    vertices, faces = mesh.arrays
+    shares = np.random.default_rng(4).dirichlet((1.0, 1.0, 1.0), (6, len(faces)))
+    surface = np.einsum("sfk,fkx->sfx", shares, vertices[faces]).reshape(-1, 3)
+    depths = np.random.default_rng(5).random((len(surface), 1))
+    points = np.vstack((surface, surface * depths))  # the star is seen whole from its middle
+    assert sticks_out(points, cover.spheres) <= HAIR
+    spacing = 0.008  # [m] between these points, about
+    skin = (cover.spheres[:, None, :3] + cover.spheres[:, None, 3:] * directions(8)[None, :, :]).reshape(-1, 3)
+    assert sticks_out(skin[:1000], np.column_stack((points, np.zeros(len(points))))) <= cover.bulge + spacing
+
+
+def test_what_has_no_end_cannot_be_covered():
+    with pytest.raises(ValueError, match=r'"floor": a half_space has no end'):
+        cover_shapes([Shape("floor", ShapeKind.HALF_SPACE)], 0.005)
