@@ -25,12 +25,12 @@ check: setup ## ruff, mypy, import-linter, clang-format
 	@$(bin)/ruff format --check --quiet . || { echo "remedy: make format"; exit 1; }
 	@$(bin)/mypy --no-error-summary schemas services firmware
 	@$(bin)/lint-imports --no-logo >/dev/null || $(bin)/lint-imports --no-logo
-	@git ls-files 'firmware/*.h' 'firmware/*.hpp' 'firmware/*.cpp' | xargs -r $(bin)/clang-format --dry-run -Werror
+	@git ls-files '*.h' '*.hpp' '*.cpp' | xargs -r $(bin)/clang-format --dry-run -Werror
 	@echo "check: all good"
 
 format: setup ## let ruff and clang-format write
 	@$(bin)/ruff check --quiet --fix . ; $(bin)/ruff format --quiet .
-	@git ls-files 'firmware/*.h' 'firmware/*.hpp' 'firmware/*.cpp' | xargs -r $(bin)/clang-format -i
+	@git ls-files '*.h' '*.hpp' '*.cpp' | xargs -r $(bin)/clang-format -i
 
 demo: setup ## a sine and a tour, without a display: out/demo.json, recording, picture
 	@$(bin)/python -m services.demo
@@ -42,4 +42,4 @@ lock: setup ## resolve pyproject.toml anew into requirements.lock
 	@deploy/lock
 
 clean: ## remove everything that setup and runs made
-	rm -rf .venv .gemelo out firmware/build gemelo.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf .venv .gemelo out firmware/build services/planner/native/build services/planner/native/_motion.*.so gemelo.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

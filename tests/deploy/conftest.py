@@ -45,6 +45,8 @@ class Machine:
             self.root / "firmware/bindings/build.sh", "mkdir -p firmware/build; touch firmware/build/libgemelo_core.so"
         )
 
+        self.write(self.root / "services/planner/native/build.sh", "exit 0")
+
     def link(self, name: str) -> None:
         """Gives the machine this machine's own `name`."""
         found = shutil.which(name)

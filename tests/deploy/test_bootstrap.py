@@ -95,6 +95,23 @@ def test_a_missing_compiler_is_said_with_the_remedy(machine):
     assert "sudo apt-get install g++" in ended.stderr
 
 
+def test_without_python_headers_all_but_the_motion_core_is_made_and_the_remedy_is_said(machine):
+    machine.complete()
+    machine.write(machine.root / "services/planner/native/build.sh", "echo Python.h is missing >&2; exit 3")
+    done = machine.bootstrap()
+    assert done.returncode == 0, done.stderr
+    assert "sudo apt-get install python3-dev" in done.stdout
+    assert (machine.root / ".venv/bin/process-compose").exists()
+
+
+def test_a_motion_core_that_does_not_compile_ends_the_bootstrap(machine):
+    machine.complete()
+    machine.write(machine.root / "services/planner/native/build.sh", "exit 1")
+    failed = machine.bootstrap()
+    assert failed.returncode == 1
+    assert "the motion core did not compile" in failed.stderr
+
+
 def test_after_a_failure_the_next_run_goes_on_where_it_stopped(machine):
     machine.complete()
     (machine.bin / "c++").unlink()
