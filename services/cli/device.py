@@ -25,6 +25,8 @@ AFTERWARDS = {
 def command(session: Session, kind: DeviceCommandKind) -> ExitCode:
     """Sends a command and says what the device answered."""
     code = _send(session, DeviceCommandRequest(command=kind))
+    if kind is DeviceCommandKind.ARM:
+        wait_for_drivers(session)
     if kind in AFTERWARDS:
         print(f"  {AFTERWARDS[kind]}")
     return code
@@ -78,6 +80,11 @@ def ask(session: Session, request: DeviceCommandRequest, what: str = "") -> Devi
         what = what or request.command.name.lower()
         raise CommandError(f"{what} refused: {answer.reason} (device mode {answer.mode.name})")
     return answer
+
+
+def wait_for_drivers(session: Session) -> None:
+    """Until drivers that were just energised take steps: the next command may be a homing."""
+    session.node.wait(max(joint.driver.enable_lead_ms for joint in session.arm.joints) * 1e-3)
 
 
 def _send(session: Session, request: DeviceCommandRequest, what: str = "") -> ExitCode:

@@ -16,7 +16,7 @@ from schemas.device import (
 )
 from schemas.topics import DEVICE_CONFIGURE
 from services.cli.confirm import confirm
-from services.cli.device import ask
+from services.cli.device import ask, wait_for_drivers
 from services.cli.device_view import DeviceView
 from services.cli.exits import CommandError, ExitCode
 
@@ -57,6 +57,7 @@ def push(session: Session, yes: bool) -> ExitCode:
     print(f"the device works with configuration {answer.crc32:08x}")
     if state.armed:
         ask(session, DeviceCommandRequest(command=DeviceCommandKind.ARM))
+        wait_for_drivers(session)
         print("armed again; no joint is referenced: `gemelo home` or `gemelo reference`")
     else:
         print("disarmed; no joint is referenced: `gemelo device arm`, then `gemelo home` or `gemelo reference`")
