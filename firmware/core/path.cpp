@@ -76,15 +76,23 @@ void Path::refresh_ceilings() {
     }
 }
 
-// On the straight line between the ceilings of the segment's two knots.
+// Where the next slot will end at the present scale, on the straight line between the ceilings of the knots there.
 Allowance Path::allowance() const {
-    const uint32_t high = from_.ceiling_q26, low = queue_[0].ceiling_q26;
+    uint64_t at = elapsed_ + ((static_cast<uint64_t>(scale_.value()) * kSlotUs) >> (30 - kTimeBits));
+    uint16_t i = 0;
+    uint32_t high = from_.ceiling_q26;
+    uint64_t whole = static_cast<uint64_t>(segment_.dt_us) << kTimeBits;
+    while (at >= whole && i + 1 < queue_.size()) {
+        at -= whole;
+        high = queue_[i].ceiling_q26;
+        whole = static_cast<uint64_t>(queue_[++i].dt_us) << kTimeBits;
+    }
+    const uint32_t low = queue_[i].ceiling_q26;
     if (high >= kFullCeiling && low >= kFullCeiling) return Allowance{kFullCeiling, 0};
     const int64_t fall = static_cast<int64_t>(high) - low;
-    const uint64_t whole = static_cast<uint64_t>(segment_.dt_us) << kTimeBits;
-    const int64_t left_q20 = static_cast<int64_t>((segment_left() << 20) / whole);
+    const int64_t left_q20 = at < whole ? static_cast<int64_t>(((whole - at) << 20) / whole) : 0;
     const int64_t ceiling = low + ((fall * left_q20) >> 20);
-    const int64_t slope_q30 = fall > 0 ? fall * 16 * (kSlotUs / 2) / segment_.dt_us : 0;
+    const int64_t slope_q30 = fall > 0 ? fall * 16 * (kSlotUs / 2) / queue_[i].dt_us : 0;
     return Allowance{static_cast<uint32_t>(ceiling), static_cast<uint32_t>(slope_q30)};
 }
 

@@ -29,8 +29,8 @@ Drift drift_between(int32_t v0_q8, int32_t v1_q8) {
     Drift drift;
     drift.speed_q8 = s0 > s1 ? s0 : s1;
     // Through a reversal the joint first brakes; that is the side that limits a stop.
-    const bool reverses = (v0_q8 < 0) != (v1_q8 < 0) && v0_q8 != 0 && v1_q8 != 0;
-    drift.gain_q8 = reverses ? -(s0 + s1) : s1 - s0;
+    drift.reverses = (v0_q8 < 0) != (v1_q8 < 0) && v0_q8 != 0 && v1_q8 != 0;
+    drift.gain_q8 = drift.reverses ? -(s0 + s1) : s1 - s0;
     return drift;
 }
 

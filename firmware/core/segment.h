@@ -30,6 +30,7 @@ Cubic make_cubic(int32_t p0_q8, int32_t v0_q8, int32_t p1_q8, int32_t v1_q8, uin
 struct Drift {
     int32_t speed_q8;  // the larger |velocity| of the two ends
     int32_t gain_q8;   // change of |velocity| along the motion: positive speeds up, negative brakes
+    bool reverses;     // brakes first, and then speeds up as much
 };
 
 Drift drift_between(int32_t v0_q8, int32_t v1_q8);

@@ -11,15 +11,8 @@ constexpr uint32_t kSlowest = 256;  // creeps on to the last knot instead of nev
 uint32_t ceiling_scale(const Allowance& allowance) {
     const uint32_t half_slot = allowance.slope_q30 / 2 > kSlowest ? allowance.slope_q30 / 2 : kSlowest;
     const uint32_t highest = root(static_cast<uint64_t>(allowance.ceiling_q26) << 34);
-    // Half a slot's fall ahead of the curve, so that s falls by equal amounts and ends on the last knot.
-    return highest > 2 * half_slot ? highest - half_slot : half_slot;
-}
-
-// Onto the ceiling, but hardly steeper than it falls: where s meets it, it is half a slot too high.
-uint32_t fall_to(uint32_t highest, uint32_t present, uint32_t slope) {
-    const uint32_t most = slope + slope / 64 > kSlowest ? slope + slope / 64 : kSlowest;
-    const uint32_t lowest = present > most ? present - most : 0;
-    return highest > lowest ? highest : lowest;
+    // Half a slot's fall above the curve at the slot's end, so that s falls by equal amounts and ends on the last knot.
+    return highest + half_slot;
 }
 
 }  // namespace
@@ -52,7 +45,7 @@ uint32_t TimeScale::change(const Segment& segment, bool slowing) const {
     for (uint8_t j = 0; j < joints_; ++j) {
         const Drift& drift = segment.drift[j];
         if (drift.speed_q8 == 0) continue;
-        int64_t own = slowing ? -static_cast<int64_t>(drift.gain_q8) : drift.gain_q8;
+        int64_t own = slowing || drift.reverses ? -static_cast<int64_t>(drift.gain_q8) : drift.gain_q8;
         if (own < 0) own = 0;
         const int64_t own_q16 = (own * 256 * kSlotUs / segment.dt_us * y_q30) >> 30;
         const int64_t room_q16 = swing_q16_[j] > own_q16 ? swing_q16_[j] - own_q16 : 0;
@@ -62,8 +55,17 @@ uint32_t TimeScale::change(const Segment& segment, bool slowing) const {
     return static_cast<uint32_t>(least);
 }
 
+// Onto the ceiling, as steeply as the joints can; where it is a joint's own limit, hardly steeper than it falls.
+uint32_t TimeScale::fall_to(uint32_t highest, const Segment& segment, uint32_t slope) const {
+    uint32_t most = slope + slope / 64 > kSlowest ? slope + slope / 64 : kSlowest;
+    const uint32_t able = change(segment, true);
+    if (able > most) most = able;
+    const uint32_t lowest = s_q30_ > most ? s_q30_ - most : 0;
+    return highest > lowest ? highest : lowest;
+}
+
 void TimeScale::advance(uint32_t bound_q30, const Segment& segment, const Allowance& allowance) {
-    const bool is_unbounded = allowance.ceiling_q26 >= kFullCeiling;
+    const bool is_unbounded = allowance.ceiling_q26 >= kFullCeiling && allowance.slope_q30 == 0;
     if (is_unbounded && s_q30_ == bound_q30) return;
     const bool is_slowing = s_q30_ > bound_q30;
     const uint32_t step = change(segment, is_slowing);
@@ -72,7 +74,7 @@ void TimeScale::advance(uint32_t bound_q30, const Segment& segment, const Allowa
     if (!is_slowing && bound_q30 - s_q30_ > step) next = s_q30_ + step;
     if (!is_unbounded) {
         const uint32_t highest = ceiling_scale(allowance);
-        if (next > highest) next = fall_to(highest, s_q30_, allowance.slope_q30);
+        if (next > highest) next = fall_to(highest, segment, allowance.slope_q30);
     }
     s_q30_ = next;
 }

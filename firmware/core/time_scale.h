@@ -30,6 +30,7 @@ class TimeScale {
 
   private:
     uint32_t change(const Segment& segment, bool slowing) const;
+    uint32_t fall_to(uint32_t highest, const Segment& segment, uint32_t slope) const;
 
     uint8_t joints_ = 0;
     int64_t swing_q16_[kMaxJoints];  // A times a slot, Q16 steps/s
