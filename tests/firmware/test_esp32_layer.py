@@ -135,7 +135,7 @@ def test_every_stand_in_declares_only_what_the_layer_uses() -> None:
         name = str(header.relative_to(LAYER / "stubs"))
         if name.startswith("bare/"):
             continue
-        text = header.read_text()
+        text = re.sub(r"#define(?:.*\\\n)*.*", "", header.read_text())
         includers = code + "".join(h.read_text() for h in (LAYER / "stubs").rglob("*.h") if h != header)
         assert f'#include "{name}"' in includers, name
         declared = set(
@@ -144,7 +144,6 @@ def test_every_stand_in_declares_only_what_the_layer_uses() -> None:
             )
         )
         unused += [f"{name}: {function}" for function in declared if not re.search(rf"\b{function}\b", code)]
-    unused.remove("esp_err.h: abort")  # of the macro there
     assert unused == []
 
 

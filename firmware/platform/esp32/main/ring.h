@@ -29,12 +29,12 @@ class Ring {
         const uint32_t tail = __atomic_load_n(&tail_, __ATOMIC_ACQUIRE);
         uint32_t at = head_;
         if (!has_room(at, tail, need)) {
-            if (at < tail || need >= tail) return false;
+            if (at < tail || at >= kGrains || need >= tail) return false;
             write(at, Header{0, kSeam, 0, 0, 0}, nullptr);
             at = 0;
         }
         write(at, Header{time_us, static_cast<uint32_t>(size), kind, flags, 0}, bytes);
-        __atomic_store_n(&head_, at + need == kCapacity ? 0 : at + need, __ATOMIC_RELEASE);
+        __atomic_store_n(&head_, at + need == kGrains ? 0 : at + need, __ATOMIC_RELEASE);
         return true;
     }
 
@@ -47,14 +47,14 @@ class Ring {
             __atomic_store_n(&tail_, 0u, __ATOMIC_RELEASE);
             header = read(0);
         }
-        *record = Record{header.time_us, header.size, header.kind, header.flags, bytes_ + tail_ + kGrain};
+        *record = Record{header.time_us, header.size, header.kind, header.flags, place(tail_) + kGrain};
         return true;
     }
 
     // Forgets the record that front() gave.
     void pop() {
         const uint32_t next = tail_ + space_for(read(tail_).size);
-        __atomic_store_n(&tail_, next == kCapacity ? 0 : next, __ATOMIC_RELEASE);
+        __atomic_store_n(&tail_, next == kGrains ? 0 : next, __ATOMIC_RELEASE);
     }
 
   private:
@@ -65,28 +65,28 @@ class Ring {
         uint8_t flags;
         uint16_t unused;
     };
-    static constexpr uint32_t kGrain = 16;
+    static constexpr uint32_t kGrain = 16;  // bytes; places and lengths are counted in grains
+    static constexpr uint32_t kGrains = kCapacity / kGrain;
     static constexpr uint32_t kSeam = UINT32_MAX;  // the size of a header that says: go on at the ring's begin
     static_assert(sizeof(Header) == kGrain, "a header takes one grain, so it always fits before the seam");
     static_assert(kCapacity % kGrain == 0, "the ring holds whole grains");
 
-    static uint32_t space_for(size_t size) {
-        return kGrain + (static_cast<uint32_t>(size) + kGrain - 1) / kGrain * kGrain;
-    }
+    static uint32_t space_for(size_t size) { return 1 + (static_cast<uint32_t>(size) + kGrain - 1) / kGrain; }
     // Room at `at` before the seam or the tail; a full ring must not look empty.
     static bool has_room(uint32_t at, uint32_t tail, uint32_t need) {
         if (at < tail) return need < tail - at;
-        return need < kCapacity - at || (need == kCapacity - at && tail != 0);
+        return need < kGrains - at || (need == kGrains - at && tail != 0);
     }
     void write(uint32_t at, const Header& header, const void* bytes) {
-        memcpy(bytes_ + at, &header, sizeof header);
-        if (bytes != nullptr && header.size != 0) memcpy(bytes_ + at + kGrain, bytes, header.size);
+        memcpy(place(at), &header, sizeof header);
+        if (bytes != nullptr && header.size != 0) memcpy(place(at) + kGrain, bytes, header.size);
     }
     Header read(uint32_t at) const {
         Header header;
-        memcpy(&header, bytes_ + at, sizeof header);
+        memcpy(&header, bytes_ + at * kGrain, sizeof header);
         return header;
     }
+    uint8_t* place(uint32_t at) { return bytes_ + at * kGrain; }
 
     alignas(8) uint8_t bytes_[kCapacity];
     uint32_t head_ = 0;  // stored by the writer only

@@ -7,11 +7,11 @@
 namespace gemelo {
 
 #if CONFIG_IDF_TARGET_ESP32
-constexpr const Chip& kThisChip = kEsp32;
+inline constexpr const Chip& kThisChip = kEsp32;
 #elif CONFIG_IDF_TARGET_ESP32S3
-constexpr const Chip& kThisChip = kEsp32S3;
+inline constexpr const Chip& kThisChip = kEsp32S3;
 #elif CONFIG_IDF_TARGET_ESP32C3
-constexpr const Chip& kThisChip = kEsp32C3;
+inline constexpr const Chip& kThisChip = kEsp32C3;
 #else
 #error "this chip has no table of pins yet: add it to chip.h"
 #endif

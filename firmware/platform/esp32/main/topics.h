@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "protocol.h"
+#include "refusal.h"
 #include "report.h"
 
 namespace gemelo {
@@ -54,15 +55,12 @@ inline Said said(Output output) {
 class Topics {
   public:
     void begin(const char* device) {
-        strcpy(text_, "gemelo/v1/");
-        strncat(text_, device, kLongestDevice);
-        strcat(text_, "/");
-        prefix_ = strlen(text_);
+        Phrase text(text_, sizeof text_);
+        prefix_ = text.add("gemelo/v1/").add(device).add("/").size();
     }
     // Valid until the next call.
     const char* full(const char* name) {
-        text_[prefix_] = 0;
-        strncat(text_, name, kLongestName);
+        Phrase(text_ + prefix_, sizeof text_ - prefix_).add(name);
         return text_;
     }
     // nullptr for a topic that nobody listens to.

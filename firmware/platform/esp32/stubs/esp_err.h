@@ -1,6 +1,6 @@
 #pragma once
 
-extern "C" void abort(void) __attribute__((noreturn));
+#include <stdlib.h>
 
 typedef int esp_err_t;
 

@@ -1,0 +1,3 @@
+#pragma once
+
+extern "C" void abort(void) __attribute__((noreturn));

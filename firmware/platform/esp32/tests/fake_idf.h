@@ -1,0 +1,57 @@
+// ESP-IDF as far as the layer uses it, in virtual time on the host: the layer itself runs as it is.
+//
+// The slot's task is a thread that gets its slots one by one; the tick's interrupt is called in between. The GPIO
+// registers are memory at their own address.
+#pragma once
+
+#include <stdint.h>
+
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "esp_event.h"
+#include "esp_system.h"
+#include "mqtt_client.h"
+
+namespace fake {
+
+struct Restarted {};  // thrown by esp_restart()
+struct Ended {};      // thrown where the task would wait for ever
+
+struct Chip {
+    uint64_t now_us = 0;
+    uint64_t inputs = 0;          // levels, bit i: GPIO i
+    uint64_t outputs = 0;         // levels
+    uint64_t is_output = 0;       // bit i: GPIO i is set up as an output
+    std::map<int, uint32_t> ups;  // rising edges of each output that the tick drives
+    esp_reset_reason_t reset_reason = ESP_RST_POWERON;
+    std::map<std::string, std::string> nvs;
+    uint32_t flash_writes = 0;
+    std::vector<std::string> subscriptions;  // topic and QoS
+    esp_mqtt_client_config_t mqtt{};
+    std::string will;
+    esp_event_handler_t mqtt_handler = nullptr;
+    void* mqtt_context = nullptr;
+    std::vector<std::string> published;  // topic and retained
+};
+
+extern Chip chip;
+
+// Everything but the flash, as after a reset.
+void reset();
+
+// Runs `task`, which waits for notifications, for as many slots as it is granted; the destructor ends it.
+class Task {
+  public:
+    explicit Task(std::function<void()> task);
+    ~Task();
+    void grant(uint32_t slots);
+    bool has_restarted() const { return has_restarted_; }
+
+  private:
+    bool has_restarted_ = false;
+};
+
+}  // namespace fake

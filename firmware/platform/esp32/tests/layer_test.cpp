@@ -1,0 +1,254 @@
+// The layer itself, from the flash and the rings to the pins, in virtual time.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <memory>
+#include <string>
+
+#include "board.h"
+#include "device.h"
+#include "fake_idf.h"
+#include "frames.h"
+#include "mqtt.h"
+#include "store.h"
+
+using namespace gemelo;
+using fake::chip;
+
+namespace gemelo {
+Board board;
+}
+
+namespace {
+
+constexpr int kStep = 25, kDir = 27, kEnable = 13, kEstop = 21, kLamp = 2;
+
+const std::string kConfig =
+    R"({"name":"rm1","joints":[{"name":"q1","lower_q8":-2560000,"upper_q8":2560000,"max_velocity_q8":1280000,)"
+    R"("max_acceleration_q8":12800000,"dir_setup_us":5,"step_pin":25,"dir_pin":27}],"armed_at_boot":true,)"
+    R"("enable_pin":13,"enable_inverted":true,"inputs":[{"name":"estop","pin":21,"role":"estop","pull":"up"}],)"
+    R"("outputs":[{"name":"lamp","pin":2}]})";
+
+bool is_high(int pin) { return (chip.outputs >> pin & 1) != 0; }
+
+// A device after a reset, in its task, and a serial line and a broker to speak with it.
+class Running {
+  public:
+    explicit Running(esp_reset_reason_t reason) {
+        chip.reset_reason = reason;
+        fake::reset();
+        board = Board{};
+        load_credentials(&credentials_);
+        line_.begin(nobody_, rig::kBoot, nullptr, nullptr);
+        device_->begin(credentials_, rig::kBoot);
+        device_->set_network(reinterpret_cast<TaskHandle_t>(&credentials_));
+        task_ = std::make_unique<fake::Task>([this] { device_->run(); });
+        pass_ms(5);
+    }
+    void pass_ms(uint32_t ms) { task_->grant(ms); }
+    bool has_restarted() const { return task_->has_restarted(); }
+
+    void tell_over_wire(FrameType type, const std::string& json) {
+        uint8_t packet[8400];
+        const size_t size =
+            line_.wrap_json(type, reinterpret_cast<const uint8_t*>(json.data()), json.size(), packet, sizeof packet);
+        for (size_t at = 0; at < size; at += 200)
+            board.from_wire.push(static_cast<uint8_t>(Inbound::Bytes), 0, chip.now_us, packet + at,
+                                 size - at < 200 ? size - at : 200);
+        pass_ms(5);
+    }
+    void tell_over_mqtt(const rig::Bytes& frame, Inbound kind = Inbound::Frame) {
+        board.from_mqtt.push(static_cast<uint8_t>(kind), 0, chip.now_us, frame.data(), frame.size());
+        pass_ms(3);
+    }
+    void command(Command command, const std::vector<int32_t>& position = {}) {
+        tell_over_mqtt(rig::build_command(command, ++commands_, position));
+    }
+    // A stream of its own from rest to rest.
+    void move(int32_t from, int32_t to, int slices = 20) {
+        rig::ChunkSpec chunk;
+        chunk.stream = ++streams_;
+        chunk.first = chunk.last = true;
+        chunk.rows.push_back({{from * 256}, {0}});
+        for (int i = 1; i <= slices; ++i) {
+            const double u = static_cast<double>(i) / slices;
+            const double place = from + (to - from) * u * u * (3 - 2 * u);
+            const double speed = (to - from) * 6 * u * (1 - u) / (slices * 0.02);
+            chunk.rows.push_back({{static_cast<int32_t>(place * 256)}, {static_cast<int32_t>(speed * 256)}});
+        }
+        chunk.rows.back() = {{to * 256}, {0}};
+        tell_over_mqtt(rig::build_heartbeat(1, ++beats_));
+        tell_over_mqtt(rig::build(chunk));
+    }
+    // What has been said since the last call: all bytes, as they went to the wire.
+    std::string said_on_wire() { return drain(board.to_wire, 255); }
+    std::string said(Output output) { return drain(board.to_mqtt, static_cast<uint8_t>(output)); }
+
+  private:
+    template <uint32_t kCapacity>
+    static std::string drain(Ring<kCapacity>& ring, uint8_t kind) {
+        std::string all;
+        for (Record record; ring.front(&record); ring.pop())
+            if (kind == 255 || record.kind == kind)
+                all.append(reinterpret_cast<const char*>(record.bytes), record.size);
+        return all;
+    }
+
+    Credentials credentials_;
+    Machine nobody_;
+    SerialPort line_;
+    std::unique_ptr<Device> device_ = std::make_unique<Device>();
+    std::unique_ptr<fake::Task> task_;
+    uint32_t commands_ = 0, streams_ = 0, beats_ = 0;
+};
+
+// One that has its configuration and knows where it is.
+std::unique_ptr<Running> ready() {
+    chip.nvs = {{"config", kConfig}};
+    auto running = std::make_unique<Running>(ESP_RST_POWERON);
+    running->command(Command::Reference, {0});
+    return running;
+}
+
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+}  // namespace
+
+TEST(Esp32Layer, ANewBoardIsConfiguredOverTheWireAndKeepsIt) {
+    chip.nvs.clear();
+    Running board_without(ESP_RST_POWERON);
+    EXPECT_TRUE(has(board_without.said(Output::Status), "\"joints\": 0"));
+    EXPECT_EQ(chip.is_output, 0u);
+    board_without.tell_over_wire(FrameType::Config, kConfig);
+    EXPECT_TRUE(has(board_without.said_on_wire(), "\"accepted\": true"));
+    EXPECT_EQ(chip.nvs["config"], kConfig);
+    const uint64_t outputs = 1ull << kStep | 1ull << kDir | 1ull << kEnable | 1ull << kLamp;
+    EXPECT_EQ(chip.is_output, outputs);
+    EXPECT_TRUE(is_high(kEnable));  // the drivers are off: a new configuration wants a person
+}
+
+TEST(Esp32Layer, AConfigurationThatTheChipCannotServeIsRefusedByName) {
+    chip.nvs.clear();
+    Running running(ESP_RST_POWERON);
+    std::string config = kConfig;
+    config.replace(config.find("\"step_pin\":25"), 13, "\"step_pin\":36");
+    running.tell_over_wire(FrameType::Config, config);
+    const std::string said = running.said_on_wire();
+    EXPECT_TRUE(has(said, "\"accepted\": false"));
+    EXPECT_TRUE(has(said, "its pin can only be an input"));
+    EXPECT_EQ(chip.is_output, 0u);
+    EXPECT_EQ(chip.nvs.count("config"), 0u);
+}
+
+TEST(Esp32Layer, WarnsOfAPinThatIsReadAtReset) {
+    auto running = ready();
+    EXPECT_TRUE(has(running->said(Output::Event), "lamp: its pin is read at reset"));
+}
+
+TEST(Esp32Layer, EveryStepOfAStreamComesOutOfItsPin) {
+    auto running = ready();
+    running->pass_ms(250);
+    EXPECT_FALSE(is_high(kEnable));
+    const uint32_t before = chip.ups[kStep];
+    running->move(0, 700);
+    running->pass_ms(500);
+    EXPECT_EQ(chip.ups[kStep] - before, 700u);
+    EXPECT_TRUE(is_high(kDir));
+    running->move(700, 350);
+    running->pass_ms(500);
+    EXPECT_EQ(chip.ups[kStep] - before, 1050u);
+    EXPECT_FALSE(is_high(kDir));
+    EXPECT_TRUE(has(running->said(Output::Event), "finished"));
+}
+
+TEST(Esp32Layer, TheEstopSilencesThePinsAndTakesTheDriversPower) {
+    auto running = ready();
+    running->pass_ms(250);
+    running->move(0, 700);
+    running->pass_ms(150);
+    chip.inputs |= 1ull << kEstop;
+    running->pass_ms(1);
+    const uint32_t at_once = chip.ups[kStep];
+    running->pass_ms(100);
+    EXPECT_GT(at_once, 0u);
+    EXPECT_EQ(chip.ups[kStep], at_once);
+    EXPECT_TRUE(is_high(kEnable));
+    EXPECT_TRUE(has(running->said(Output::Event), "estop"));
+}
+
+TEST(Esp32Layer, AWarmResetAtRestKeepsThePlace) {
+    {
+        ready()->pass_ms(10);
+    }
+    Running again(ESP_RST_SW);
+    const std::string status = again.said(Output::Status);
+    EXPECT_TRUE(has(status, "\"reset_cause\": \"restart\""));
+    EXPECT_TRUE(has(status, "\"referenced\": true"));
+}
+
+TEST(Esp32Layer, PowerOnAndBrownOutForgetThePlace) {
+    for (const esp_reset_reason_t reason : {ESP_RST_POWERON, ESP_RST_BROWNOUT}) {
+        {
+            ready()->pass_ms(10);
+        }
+        Running again(reason);
+        EXPECT_TRUE(has(again.said(Output::Status), "\"referenced\": false"));
+    }
+}
+
+TEST(Esp32Layer, AResetInAMotionIsToldAndForgetsThePlace) {
+    {
+        auto running = ready();
+        running->pass_ms(250);
+        running->move(0, 700);
+        running->pass_ms(100);
+    }
+    Running again(ESP_RST_TASK_WDT);
+    const std::string status = again.said(Output::Status);
+    EXPECT_TRUE(has(status, "\"reset_cause\": \"task_watchdog while moving\""));
+    EXPECT_TRUE(has(status, "\"referenced\": false"));
+}
+
+TEST(Esp32Layer, NothingIsWrittenIntoTheFlashWhileTheArmMoves) {
+    auto running = ready();
+    running->pass_ms(250);
+    const uint32_t writes = chip.flash_writes;
+    running->move(0, 700);
+    running->pass_ms(50);
+    running->tell_over_wire(FrameType::Provision, R"({"wifi_ssid":"lab"})");
+    running->tell_over_mqtt(rig::Bytes(kConfig.begin(), kConfig.end()), Inbound::Config);
+    board.from_sensors.push(static_cast<uint8_t>(Inbound::FactoryReset), 0, 0, nullptr, 0);
+    running->pass_ms(50);
+    EXPECT_EQ(chip.flash_writes, writes);
+    EXPECT_TRUE(has(running->said_on_wire(), "the arm is moving: stop it first"));
+    EXPECT_FALSE(running->has_restarted());
+    running->pass_ms(400);
+    EXPECT_TRUE(running->has_restarted());  // the button's wish waits for rest
+}
+
+TEST(Esp32Layer, CredentialsAreKeptAndNeverSaid) {
+    chip.nvs.clear();
+    Running running(ESP_RST_POWERON);
+    running.tell_over_wire(FrameType::Provision, R"({"device":"rm1","wifi_ssid":"lab","wifi_password":"hush-hush"})");
+    const std::string said = running.said_on_wire() + running.said(Output::Event) + running.said(Output::Status);
+    EXPECT_TRUE(has(said, "\"accepted\": true"));
+    EXPECT_FALSE(has(said, "hush"));
+    EXPECT_STREQ(chip.nvs["wifi_password"].c_str(), "hush-hush");
+    running.pass_ms(400);
+    EXPECT_TRUE(running.has_restarted());
+}
+
+TEST(Esp32Layer, AFactoryResetForgetsAll) {
+    chip.nvs = {{"config", kConfig}, {"wifi_password", "hush-hush"}};
+    Running running(ESP_RST_POWERON);
+    running.tell_over_wire(FrameType::Provision, R"({"factory_reset":true})");
+    EXPECT_TRUE(chip.nvs.empty()) << running.said_on_wire();
+    running.pass_ms(400);
+    EXPECT_TRUE(running.has_restarted());
+}
+
+TEST(Esp32Layer, AConfigurationInTheFlashThatIsNoneLeavesTheBoardWithoutOne) {
+    chip.nvs = {{"config", "{\"name\":"}};
+    Running running(ESP_RST_POWERON);
+    EXPECT_TRUE(has(running.said(Output::Status), "\"joints\": 0"));
+}
