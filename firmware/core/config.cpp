@@ -8,17 +8,6 @@ namespace {
 constexpr uint8_t kMaxGroup = 15;
 constexpr uint32_t kMaxHomingMs = 600000;
 
-bool is_name(const char* name) {
-    const void* end = memchr(name, 0, kNameSize);
-    if (end == nullptr || end == name) return false;
-    for (; *name != 0; ++name) {
-        const char c = *name;
-        const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-        if (!plain && c != '_' && c != '-') return false;
-    }
-    return true;
-}
-
 bool is_same(const char* a, const char* b) {
     while (*a == *b && *a != 0) ++a, ++b;
     return *a == *b;
@@ -147,6 +136,17 @@ const char* find_device_fault(const DeviceConfig& config, PinBoard* pins) {
 }
 
 }  // namespace
+
+bool is_name(const char* name) {
+    const void* end = memchr(name, 0, kNameSize);
+    if (end == nullptr || end == name) return false;
+    for (; *name != 0; ++name) {
+        const char c = *name;
+        const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+        if (!plain && c != '_' && c != '-') return false;
+    }
+    return true;
+}
 
 ConfigFault find_fault(const DeviceConfig& config) {
     PinBoard pins;

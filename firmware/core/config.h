@@ -112,6 +112,9 @@ struct ConfigFault {
 
 ConfigFault find_fault(const DeviceConfig& config);
 
+// 1 to 31 letters, digits, '_' or '-'.
+bool is_name(const char* name);
+
 inline uint32_t ticks_per_slot(const DeviceConfig& config) { return config.tick_hz / kSlotHz; }
 
 // The fastest this joint may turn: its own limit, or one pulse in two ticks.

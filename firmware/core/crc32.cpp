@@ -21,8 +21,8 @@ constexpr Table kTable = make_table();
 
 }  // namespace
 
-uint32_t crc32(const uint8_t* bytes, size_t size) {
-    uint32_t value = 0xFFFFFFFFu;
+uint32_t crc32(const uint8_t* bytes, size_t size, uint32_t before) {
+    uint32_t value = ~before;
     for (size_t i = 0; i < size; ++i) value = kTable.entry[(value ^ bytes[i]) & 0xFF] ^ (value >> 8);
     return ~value;
 }

@@ -6,6 +6,7 @@
 
 namespace gemelo {
 
-uint32_t crc32(const uint8_t* bytes, size_t size);
+// `before` is the CRC of what precedes these bytes.
+uint32_t crc32(const uint8_t* bytes, size_t size, uint32_t before = 0);
 
 }  // namespace gemelo

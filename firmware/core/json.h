@@ -8,6 +8,7 @@ namespace gemelo {
 
 class JsonWriter {
   public:
+    static constexpr size_t kSize = 512;
     JsonWriter() { put('{'); }
     void field(const char* key, const char* text);
     void field(const char* key, uint64_t number);
@@ -27,7 +28,6 @@ class JsonWriter {
     void put_escaped(char c);
     void put_number(uint64_t number);
 
-    static constexpr size_t kSize = 512;
     char text_[kSize];
     size_t size_ = 0;
 };

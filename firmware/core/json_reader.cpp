@@ -85,12 +85,12 @@ bool JsonReader::text(char* out, size_t capacity) {
             is_too_long_ = true;
             return fail("the text is too long");
         }
-        for (size_t i = 0; i < count && out != nullptr; ++i) out[size + i] = bytes[i];
+        for (size_t i = 0; i < count; ++i) out[size + i] = bytes[i];
         size += count;
     }
     if (at_ == end_) return fail("a text has no end");
     ++at_;
-    if (out != nullptr) out[size] = 0;
+    out[size] = 0;
     return true;
 }
 

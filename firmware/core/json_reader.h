@@ -24,7 +24,7 @@ class JsonReader {
     bool next(char closing_bracket);
     // A member's name and the colon.
     bool key(char* out, size_t capacity);
-    // Into `out` with a 0 at its end; `out` may be nullptr: only to be checked.
+    // Into `out`, with a 0 at its end.
     bool text(char* out, size_t capacity);
     bool integer(JsonInteger* out);
     bool truth(bool* out);

@@ -103,9 +103,11 @@ bool RecordReader::read_member(const Record& record, uint8_t* out, uint32_t* see
         if (!is_same(field.key, key)) continue;
         if ((*seen >> i & 1) != 0) return refuse(key, "is there twice");
         *seen |= 1u << i;
-        return read_value(field, out == nullptr ? nullptr : out + field.offset);
+        return read_value(field, out + field.offset);
     }
-    return refuse(key, "is not a key that is known here");
+    if (!record.is_secret) return refuse(key, "is not a key that is known here");
+    reason().add("it has a key that is not known here");
+    return false;
 }
 
 bool RecordReader::read_value(const Field& field, uint8_t* out) {
@@ -118,7 +120,7 @@ bool RecordReader::read_value(const Field& field, uint8_t* out) {
         case Kind::Truth: {
             bool is_true = false;
             if (!json_.truth(&is_true)) return refuse_json(field.key);
-            if (out != nullptr) *out = is_true;
+            *out = is_true;
             return true;
         }
         case Kind::Word:
@@ -141,7 +143,7 @@ bool RecordReader::read_integer(const Field& field, uint8_t* out) {
         return false;
     }
     const uint64_t value = integer.is_negative ? 0 - integer.magnitude : integer.magnitude;
-    if (out != nullptr) memcpy(out, &value, size_of(field.kind));
+    memcpy(out, &value, size_of(field.kind));
     return true;
 }
 
@@ -150,7 +152,7 @@ bool RecordReader::read_word(const Field& field, uint8_t* out) {
     if (!json_.text(word, sizeof word) && !json_.is_too_long()) return refuse_json(field.key);
     for (uint8_t i = 0; field.words[i] != nullptr && !json_.is_too_long(); ++i) {
         if (!is_same(field.words[i], word)) continue;
-        if (out != nullptr) *out = i;
+        *out = i;
         return true;
     }
     Phrase sentence = reason();
@@ -167,7 +169,7 @@ bool RecordReader::read_list(const Field& field, uint8_t* out) {
             reason().quote(field.key).add(" has more than ").add(field.capacity).add(" entries");
             return false;
         }
-        uint8_t* entry = out == nullptr ? nullptr : out + field.stride * count;
+        uint8_t* entry = out + field.stride * count;
         if (!read(*field.record, entry)) {
             name_part(field, count, entry);
             return false;
@@ -175,14 +177,14 @@ bool RecordReader::read_list(const Field& field, uint8_t* out) {
         ++count;
     }
     if (json_.error() != nullptr) return refuse_json(field.key);
-    if (out != nullptr) out[field.count_offset - field.offset] = count;
+    out[field.count_offset - field.offset] = count;
     return true;
 }
 
 // By its name if that has been read, else by its place.
 void RecordReader::name_part(const Field& list, size_t index, const uint8_t* entry) {
     Phrase part(refusal_->part, sizeof refusal_->part);
-    const char* name = entry == nullptr ? "" : reinterpret_cast<const char*>(entry) + list.record->fields[0].offset;
+    const char* name = reinterpret_cast<const char*>(entry) + list.record->fields[0].offset;
     if (*name != 0) {
         part.add(name);
     } else {

@@ -29,11 +29,12 @@ struct Field {
 
 struct Record {
     const Field* fields;
-    uint8_t size;  // at most 32
+    uint8_t size;            // at most 32
+    bool is_secret = false;  // no refusal may hold what was sent
 };
 
 // The object that `text` is, to `out`; false with a refusal where it is not as the table says. Members that are
-// missing leave `out` as it is. With `out` nullptr nothing is written.
+// missing leave `out` as it is.
 bool read_record(const char* text, size_t size, const Record& record, void* out, Refusal* refusal);
 
 }  // namespace gemelo

@@ -24,6 +24,7 @@ class Phrase {
     Phrase& add_signed(int64_t number);
     // In quotes.
     Phrase& quote(const char* text);
+    size_t size() const { return size_; }
 
   private:
     void put(char c);

@@ -1,0 +1,27 @@
+// What a person tells a device over its serial line, once: the JSON of `provision` in PROTOCOL.md.
+#pragma once
+
+#include <stddef.h>
+
+#include "config.h"
+#include "refusal.h"
+
+namespace gemelo {
+
+// Texts with a 0 at their end; the bounds of SSID and password are those of IEEE 802.11.
+struct Credentials {
+    char device[kNameSize] = "";
+    char wifi_ssid[33] = "";
+    char wifi_password[64] = "";
+    char mqtt_uri[128] = "";
+    char mqtt_user[64] = "";
+    char mqtt_password[64] = "";
+    char mqtt_ca[2049] = "";        // PEM
+    bool is_factory_reset = false;  // asked for; nothing to be kept
+};
+
+// Puts what is said into `credentials`; what is not said stays. False with a refusal that holds nothing of what was
+// said, and `credentials` is not to be used then.
+bool parse_provision(const char* text, size_t size, Credentials* credentials, Refusal* refusal);
+
+}  // namespace gemelo
