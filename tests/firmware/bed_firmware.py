@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import queue
+import select
 import shutil
 import socket
 import subprocess
@@ -18,6 +19,7 @@ from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
 from schemas.device import DeviceCommandKind, PressKind
+from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 10.0  # [s]
@@ -46,15 +48,17 @@ def wait_for(condition: Callable[[], bool], what: str, patience: float = PATIENC
 class Bed:
     """A broker, a client that listens to everything of the device, and the device's process."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, device: str = "rm1", robot: str = "urdf/rm1") -> None:
         self.folder, self.port = folder, free_port()
+        self._topic, self._robot = f"gemelo/v1/{device}/", robot
+        self.states: list[tuple[float, bytes]] = []  # arrival [s, monotonic] and frame
         self.broker: subprocess.Popen[bytes] | None = None
         self.process: subprocess.Popen[bytes] | None = None
         self.heard: dict[str, queue.SimpleQueue[bytes]] = {}
         self.status: dict[str, object] = {}
         self.client = paho.Client(CallbackAPIVersion.VERSION2)
         self.client.on_message = self._hear
-        self.client.on_connect = lambda client, *_: client.subscribe("gemelo/v1/rm1/#", 1)
+        self.client.on_connect = lambda client, *_: client.subscribe(f"{self._topic}#", 1)
         self.client.reconnect_delay_set(min_delay=1, max_delay=1)
         self._beats = self._commands = 0
 
@@ -78,10 +82,13 @@ class Bed:
         self.client.loop_start()
         wait_for(self.client.is_connected, "our own connection")
 
-    def start_device(self) -> None:
+    def start_device(self, *arguments: str) -> None:
         before = self.status.get("boot_id")
-        environ = os.environ | {"GEMELO_MQTT_PORT": str(self.port), "GEMELO_PATHS_RUN": str(self.folder / "run")}
-        self.process = subprocess.Popen([sys.executable, "-m", "firmware.platform.host.main"], cwd=ROOT, env=environ)
+        settings = {"MQTT_PORT": str(self.port), "PATHS_RUN": str(self.folder / "run"), "ROBOT": self._robot}
+        environ = os.environ | {f"GEMELO_{key}": value for key, value in settings.items()}
+        command = [sys.executable, "-m", "firmware.platform.host.main", *arguments]
+        with open(self.folder / "device.log", "ab") as log:
+            self.process = subprocess.Popen(command, cwd=ROOT, env=environ, stdout=log, stderr=log)
         wait_for(lambda: self.status.get("online") is True and self.status["boot_id"] != before, "the device's status")
 
     def end_device(self, number: int) -> int:
@@ -98,13 +105,20 @@ class Bed:
         self.client.loop_stop()
 
     def _hear(self, _client: paho.Client, _data: object, message: paho.MQTTMessage) -> None:
-        kind = message.topic.removeprefix("gemelo/v1/rm1/")
+        kind = message.topic.removeprefix(self._topic)
         if kind == "status":
             self.status = json.loads(message.payload)
+        elif kind == "state":
+            self.states.append((time.monotonic(), message.payload))
         self.heard.setdefault(kind, queue.SimpleQueue()).put(message.payload)
 
+    @property
+    def log(self) -> str:
+        """What the device's processes have logged."""
+        return (self.folder / "device.log").read_text()
+
     def publish(self, kind: str, frame: bytes, retain: bool = False) -> None:
-        self.client.publish(f"gemelo/v1/rm1/{kind}", frame, qos=0 if kind in ("hb", "sync") else 1, retain=retain)
+        self.client.publish(self._topic + kind, frame, qos=0 if kind in ("hb", "sync") else 1, retain=retain)
 
     def answer(self, kind: str) -> bytes:
         return self.heard.setdefault(kind, queue.SimpleQueue()).get(timeout=PATIENCE)
@@ -155,3 +169,42 @@ class Bed:
     def memory(self) -> dict[str, object]:
         content: dict[str, object] = json.loads((self.folder / "run/virtual_esp32.json").read_text())
         return content
+
+
+class SerialPort:
+    """Our end of a device's serial line."""
+
+    def __init__(self, path: Path) -> None:
+        self._line = os.open(path, os.O_RDWR | os.O_NOCTTY)
+        self._packets = Packets()
+        self._heard: list[bytes] = []
+
+    def send(self, frame: bytes) -> None:
+        os.write(self._line, packet(frame))
+
+    def send_json(self, kind: JsonFrame, message: dict[str, object] | bytes) -> None:
+        text = message if isinstance(message, bytes) else json.dumps(message).encode()
+        self.send(json_frame(kind, text))
+
+    def answer(self, kind: int) -> bytes:
+        """The next frame of that type."""
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            for index, frame in enumerate(self._heard):
+                if frame[2] == kind:
+                    del self._heard[: index + 1]
+                    return frame
+            self._heard.clear()
+            ready, _, _ = select.select([self._line], [], [], max(0.0, deadline - time.monotonic()))
+            assert ready, f"waited {PATIENCE} s for a frame of type {kind}"
+            self._heard += [frame for frame in self._packets.feed(os.read(self._line, 4096)) if len(frame) > 8]
+
+    def json(self, kind: JsonFrame) -> dict[str, object]:
+        """The next JSON of that type."""
+        found = parse_json_frame(self.answer(kind))
+        assert found is not None
+        message: dict[str, object] = json.loads(found.text)
+        return message
+
+    def close(self) -> None:
+        os.close(self._line)

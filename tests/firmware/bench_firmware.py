@@ -71,8 +71,9 @@ class Bench:
         motors: Sequence[Motor] = (),
         shaft: Sequence[int] | None = None,
         referenced: bool = True,
+        steps: Sequence[int] | None = None,
     ) -> None:
-        self.device = Device(config, boot_id=BOOT, motors=motors, shaft=shaft, referenced=referenced)
+        self.device = Device(config, BOOT, steps=steps, motors=motors, shaft=shaft, referenced=referenced)
         self.events: list[dict[str, object]] = []
         self.acks: list[Ack] = []
         self.codes: list[int] = []  # of CMD_ACKs
