@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "../core/config_text.h"
+#include "../core/provision.h"
 #include "../platform/host/virtual_device.h"
 
 using gemelo::DeviceConfig;
@@ -55,6 +56,48 @@ void gemelo_receive(VirtualDevice* device, const uint8_t* bytes, size_t size, in
 void gemelo_receive_config(VirtualDevice* device, const uint8_t* text, size_t size, int retained,
                            uint64_t received_us) {
     device->receive_config(text, size, retained != 0, received_us);
+}
+
+void gemelo_attach_line(VirtualDevice* device) { device->attach_line(); }
+
+void gemelo_receive_serial(VirtualDevice* device, const uint8_t* bytes, size_t size, uint64_t received_us) {
+    device->receive_serial(bytes, size, received_us);
+}
+
+// Up to `capacity` bytes of what goes over the serial line; they are gone then. Returns how many.
+size_t gemelo_take_serial(VirtualDevice* device, uint8_t* bytes, size_t capacity) {
+    std::string& line = device->line();
+    const size_t size = line.size() < capacity ? line.size() : capacity;
+    memcpy(bytes, line.data(), size);
+    line.erase(0, size);
+    return size;
+}
+
+// The oldest request's size, or -1 for none; taken out of the queue only if `capacity` suffices.
+int64_t gemelo_take_request(VirtualDevice* device, uint8_t* type, uint8_t* text, size_t capacity) {
+    auto& requests = device->requests();
+    if (requests.empty()) return -1;
+    const gemelo::Request& request = requests.front();
+    const size_t size = request.text.size();
+    if (size > capacity) return static_cast<int64_t>(size);
+    *type = static_cast<uint8_t>(request.type);
+    memcpy(text, request.text.data(), size);
+    requests.pop_front();
+    return static_cast<int64_t>(size);
+}
+
+int gemelo_say(VirtualDevice* device, uint8_t type, const uint8_t* text, size_t size) {
+    return device->say(static_cast<gemelo::FrameType>(type), text, size);
+}
+
+// Whether the text can be taken; if not, `reason` (128 bytes) says why. `is_factory_reset` if it asks for that.
+int gemelo_check_provision(const char* text, size_t size, int* is_factory_reset, char* reason) {
+    gemelo::Credentials credentials;
+    gemelo::Refusal refusal;
+    const bool is_taken = gemelo::parse_provision(text, size, &credentials, &refusal);
+    *is_factory_reset = credentials.is_factory_reset;
+    memcpy(reason, refusal.reason, sizeof refusal.reason);
+    return is_taken;
 }
 
 // The text of the configuration that was taken last; up to `capacity` bytes of it, returns its size.

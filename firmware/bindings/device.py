@@ -5,18 +5,20 @@ from __future__ import annotations
 import ctypes as c
 import json
 from collections.abc import Sequence
+from enum import IntEnum
 from typing import NamedTuple
 
 import msgspec
 
 from firmware.bindings.library import MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
-from firmware.bindings.motor import motor_record
+from firmware.bindings.motor import MotorError, motor_record
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, config_text
 from schemas.robot import Motor
 
 OUTPUTS = ("traj/ack", "cmd/ack", "sync/r", "state", "event", "status", "config/ack", "sensors", "text")
 LARGEST_OUTPUT = 1024
+LARGEST_REQUEST = 8232  # a frame's length
 UNCONFIGURED = DeviceConfig(name="", joints=())
 
 
@@ -29,6 +31,23 @@ class OutFrame(NamedTuple):
 
     kind: str
     payload: bytes
+
+
+class JsonFrame(IntEnum):
+    """JSON that travels in a frame and is the platform's own matter."""
+
+    EVENT = 13
+    PROVISION = 14
+    PROVISION_ACK = 15
+    PRESS = 16
+    SHAFT = 17
+
+
+class Request(NamedTuple):
+    """PROVISION or PRESS, as it came over the serial line."""
+
+    kind: JsonFrame
+    text: bytes
 
 
 class PinChange(NamedTuple):
@@ -77,7 +96,11 @@ class Device:
             raise ConfigError(f"{len(start)} start positions for {count} joints of {self._config.name!r}")
         self._handle = self._created(text, boot_id, reset_cause, now_us)
         for index, motor in enumerate(motors[:MAX_JOINTS]):
-            self._library.gemelo_set_motor(self._handle, index, c.byref(motor_record(motor)))
+            try:
+                record = motor_record(motor)
+            except MotorError as error:
+                raise MotorError(f"the motor of joint {index + 1}: {error}") from error
+            self._library.gemelo_set_motor(self._handle, index, c.byref(record))
         true = _positions(start if shaft is None else shaft)
         self._library.gemelo_start(self._handle, _positions(start), true, referenced)
         self._config_crc = self._snapshot().config_crc32
@@ -139,6 +162,36 @@ class Device:
             if size < 0:
                 return frames
             frames.append(OutFrame(OUTPUTS[self._output.value], c.string_at(self._buffer, size)))
+
+    def attach_line(self) -> None:
+        """From now on `take_serial` is called: the device has a serial line."""
+        self._library.gemelo_attach_line(self._handle)
+
+    def receive_serial(self, data: bytes, received_us: int | None = None) -> None:
+        """Hand over bytes that came over the serial line."""
+        received = self.now_us if received_us is None else received_us
+        self._library.gemelo_receive_serial(self._handle, data, len(data), received)
+
+    def take_serial(self) -> bytes:
+        """The bytes that went out over the serial line since the last call."""
+        data = bytearray()
+        while size := self._library.gemelo_take_serial(self._handle, self._buffer, LARGEST_OUTPUT):
+            data += c.string_at(self._buffer, size)
+        return bytes(data)
+
+    def take_requests(self) -> list[Request]:
+        """What came over the serial line and is the platform's matter, oldest first."""
+        requests: list[Request] = []
+        text = (c.c_uint8 * LARGEST_REQUEST)()
+        while True:
+            size = self._library.gemelo_take_request(self._handle, c.byref(self._output), text, LARGEST_REQUEST)
+            if size < 0:
+                return requests
+            requests.append(Request(JsonFrame(self._output.value), c.string_at(text, size)))
+
+    def say(self, kind: JsonFrame, text: bytes) -> bool:
+        """JSON of the platform's own; true: it is to be said over MQTT too, by the caller."""
+        return bool(self._library.gemelo_say(self._handle, kind, text, len(text)))
 
     def halt(self) -> None:
         """Slow down along the path and hold, because the platform is about to stop."""
@@ -224,6 +277,10 @@ class Device:
         count, record = len(self.config.joints), self._snapshot()
         report = {"t_us": record.now_us, "steps": record.steps[:count], "shaft": record.shaft[:count]}
         return json.dumps(report).encode()
+
+    def inherit_world(self, before: Device) -> None:
+        """Wake up in the world that the board was in: what is pressed, blocked and measured stays."""
+        self._library.gemelo_inherit(self._handle, before._handle)
 
     def press_input(self, index: int, pressed: bool | None) -> None:
         """Hold a switch closed or open; None leaves it to the arm."""

@@ -12,6 +12,8 @@ void gemelo_set_motor(VirtualDevice* device, uint8_t joint, const MotorConfig* m
     device->world().set_motor(joint, *motor);
 }
 
+void gemelo_inherit(VirtualDevice* device, const VirtualDevice* before) { device->world().inherit(before->world()); }
+
 // 0: left to the arm, 1: held, 2: held open.
 void gemelo_press(VirtualDevice* device, uint8_t input, uint8_t press) {
     device->world().press(input, static_cast<gemelo::Press>(press));

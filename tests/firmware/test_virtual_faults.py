@@ -78,6 +78,16 @@ def test_a_device_that_is_reset_while_moving_wakes_up_without_its_place_where_it
     assert 0 < report["shaft"][0] < 3000
 
 
+def test_an_e_stop_that_is_pressed_stays_pressed_over_a_reset(bed: Bed):
+    bed.start_device()
+    before = bed.status["boot_id"]
+    bed.press(PressKind.ESTOP)
+    bed.event("estop")
+    bed.press(PressKind.REBOOT)
+    wait_for(lambda: bed.status["online"] is True and bed.status["boot_id"] != before, "the next boot")
+    assert mode_of(bed) == DeviceMode.ESTOP
+
+
 def test_a_reset_at_rest_forgets_nothing(bed: Bed):
     bed.start_device()
     before = bed.status["boot_id"]
@@ -93,6 +103,7 @@ def test_a_device_without_wifi_holds_by_itself_and_comes_back_as_the_same(bed: B
     bed.beat()
     assert bed.move(4000, 2.5)[20] == OK
     bed.press(PressKind.OFFLINE, value=2.0)
+    assert bed.event("pressed")["detail"] == "offline 2"
     wait_for(lambda: bed.status["online"] is False, "the last will")
     wait_for(lambda: bed.status["online"] is True, "the device's return")
     assert bed.status["boot_id"] == before

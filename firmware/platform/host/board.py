@@ -6,6 +6,8 @@ import logging
 import secrets
 from pathlib import Path
 
+import msgspec
+
 from firmware.bindings.device import ConfigError, Device, joint_count
 from firmware.platform.host.flash import Credentials, Flash
 from firmware.platform.host.memory import Awakening, Memory, PoseMemory
@@ -69,14 +71,17 @@ class Board:
             )
         )
 
-    def provision(self, credentials: Credentials) -> None:
-        """Keep new credentials; they count from the next boot on."""
-        self._flash.keep_credentials(credentials)
+    def provision(self, said: dict[str, str]) -> None:
+        """Keep these fields of the credentials, and the others as they were; they count from the next boot on."""
+        self._flash.keep_credentials(msgspec.structs.replace(self._flash.credentials, **said))
 
     def factory_reset(self) -> None:
-        """Forget configuration, credentials and position."""
+        """Forget configuration, credentials and position; the arm stays where it is."""
         self._flash.forget()
-        self._memory.forget()
+        nowhere = (0,) * len(self._reference)
+        self._memory.keep(
+            Memory(device=self.name, steps=nowhere, moving=False, referenced=False, shaft=self._shaft or nowhere)
+        )
 
     def _boot(self, text: bytes, reset_cause: str) -> Device:
         awakening = self._memory.wake(self._reference)

@@ -50,6 +50,14 @@ class Arrived:
 
 
 @dataclass(frozen=True)
+class SerialBytes:
+    """A piece of what came over the serial line."""
+
+    data: bytes
+    monotonic: float  # [s]
+
+
+@dataclass(frozen=True)
 class Connected:
     """The broker has accepted us."""
 
@@ -66,7 +74,7 @@ class Stop:
     """The process is asked to end."""
 
 
-Item = Arrived | Connected | Disconnected | Stop
+Item = Arrived | SerialBytes | Connected | Disconnected | Stop
 
 
 class DeviceLink:

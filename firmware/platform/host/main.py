@@ -16,8 +16,10 @@ from firmware.bindings.motor import MotorError
 from firmware.platform.host.board import Board
 from firmware.platform.host.link import BrokerAddress, Item, Stop
 from firmware.platform.host.network import Network
+from firmware.platform.host.pty import SerialLine
 from firmware.platform.host.virtual_esp32 import VirtualEsp32
-from schemas.deployment import Deployment
+from firmware.platform.host.wires import Wires
+from schemas.deployment import Deployment, DeviceKind, Wire
 from services.arm.description import load_arm
 from services.arm.errors import DescriptionError
 from services.runtime.deployment import DeploymentError, load_deployment, project_root
@@ -25,6 +27,7 @@ from services.runtime.logs import LEVELS, line_logger
 from services.runtime.readiness import Readiness
 
 NAME = "virtual_esp32"
+BEAT = 1.0  # [s] between two touches of the readiness file
 log = logging.getLogger(NAME)
 
 
@@ -35,28 +38,50 @@ def main(arguments: Sequence[str] | None = None) -> int:
     log.handlers = line_logger(NAME).handlers
     log.propagate = False
     try:
-        run(load_deployment(options.config))
+        run(load_deployment(options.config), options.serial)
     except (DeploymentError, DescriptionError, ConfigError, MotorError, CoreMissing) as error:
         log.error("%s", error)
         return 1
     return 0
 
 
-def run(deployment: Deployment) -> None:
-    """Build the board of the deployment's robot and serve it."""
+def run(deployment: Deployment, has_line: bool = False) -> None:
+    """Build the board of the deployment's robot and serve it, also over a serial line if that is asked for."""
     arm = load_arm(project_root() / deployment.robot)
     folder = project_root() / deployment.paths.run
     folder.mkdir(parents=True, exist_ok=True)
     inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: inbox.put(Stop()))
+    if deployment.device is DeviceKind.BOARD:
+        return stand_aside(inbox, Readiness(folder, NAME))
     network = Network(BrokerAddress(deployment.mqtt.host, deployment.mqtt.port), inbox)
-    VirtualEsp32(Board(arm, folder, NAME), network, inbox, Readiness(folder, NAME)).run()
+    line = _serial_line(folder, inbox) if has_line or deployment.wire is Wire.SERIAL else None
+    VirtualEsp32(Board(arm, folder, NAME), Wires(network, line), inbox, Readiness(folder, NAME)).run()
+
+
+def _serial_line(folder: Path, inbox: queue.SimpleQueue[Item]) -> SerialLine:
+    line = SerialLine(folder / f"{NAME}.tty", inbox)
+    log.info("serial line at %s", line.path)
+    return line
+
+
+def stand_aside(inbox: queue.SimpleQueue[Item], readiness: Readiness) -> None:
+    """Be ready and do nothing until asked to stop: a real board plays the arm."""
+    log.info("the deployment has a board: this virtual one stands aside")
+    readiness.ready()
+    while True:
+        try:
+            if isinstance(inbox.get(timeout=BEAT), Stop):
+                return readiness.not_ready()
+        except queue.Empty:
+            readiness.beat()
 
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="gemelo-virtual-esp32", description=__doc__)
     parser.add_argument("--config", type=Path, default=None, help="deployment file [deploy/local.toml]")
+    parser.add_argument("--serial", action="store_true", help='have a serial line too, as wire = "serial" does')
     parser.add_argument("--log-level", default="info", choices=LEVELS)
     return parser.parse_args(arguments)
 

@@ -64,11 +64,6 @@ class PoseMemory:
         os.replace(beside, self._path)
         self._written = memory
 
-    def forget(self) -> None:
-        """Know nothing of where the joints are."""
-        self._path.write_bytes(b"")
-        self._written = None
-
 
 def _at(steps: tuple[int, ...], cause: str) -> Awakening:
     return Awakening(steps=steps, shaft=steps, referenced=True, reset_cause=cause)

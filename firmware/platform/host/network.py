@@ -32,12 +32,12 @@ class Network:
         self._link: DeviceLink | None = None
         self._farewell = b""
         self._born = time.monotonic()
-        self._back_at = 0.0  # [s] when the Wi-Fi returns; 0: it is there
         self._was_refused = ""
         self.is_connected = False
 
     def join(self, device: Device, name: str, credentials: Credentials) -> None:
-        """Connect for as long as it takes, with this device's last will."""
+        """Connect for as long as it takes, with this device's last will; whatever was connected vanishes."""
+        self.break_off()
         self._farewell = offline_status(name, device.boot_id)
         try:
             broker = broker_address(credentials, self._here)
@@ -47,19 +47,11 @@ class Network:
         self._link = DeviceLink(broker, name, self._farewell, self._inbox)
         self._link.start()
 
-    def break_off(self, seconds: float = 0.0) -> None:
-        """Vanish without a word; the Wi-Fi is away for so long."""
+    def break_off(self) -> None:
+        """Vanish without a word; `join` comes back."""
         if self._link is not None:
             self._link.break_off()
         self._link, self.is_connected = None, False
-        self._back_at = time.monotonic() + seconds if seconds else 0.0
-
-    def is_due_back(self, now: float) -> bool:
-        """Once, when the Wi-Fi has returned."""
-        if not self._back_at or now < self._back_at:
-            return False
-        self._back_at = 0.0
-        return True
 
     def leave(self) -> None:
         """Say goodbye and end."""

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import os
+import queue
 import select
 import threading
 import time
 import tty
-from collections.abc import Callable
 from pathlib import Path
+
+from firmware.platform.host.link import Item, SerialBytes
 
 MOST = 4096  # [bytes] read at once
 
@@ -17,9 +19,9 @@ MOST = 4096  # [bytes] read at once
 class SerialLine:
     """The device's end of the line; whoever opens `path` has the other one."""
 
-    def __init__(self, path: Path, on_bytes: Callable[[bytes, float], None]) -> None:
+    def __init__(self, path: Path, inbox: queue.SimpleQueue[Item]) -> None:
         self.path = path
-        self._on_bytes = on_bytes
+        self._inbox = inbox
         # The other end stays open here too, or reading would fail whenever nobody else has it open.
         self._ours, self._theirs = os.openpty()
         tty.setraw(self._theirs)
@@ -29,13 +31,14 @@ class SerialLine:
         self._reader = threading.Thread(target=self._read, name="serial", daemon=True)
 
     def start(self) -> None:
-        """Read in a thread of its own; each piece comes with its time of arrival [s, monotonic]."""
+        """Read in a thread of its own; each piece comes with its time of arrival."""
         self._reader.start()
 
     def write(self, data: bytes) -> None:
         """Send; what nobody reads is lost, as on a wire."""
-        with contextlib.suppress(BlockingIOError):
-            os.write(self._ours, data)
+        if data:
+            with contextlib.suppress(BlockingIOError):
+                os.write(self._ours, data)
 
     def close(self) -> None:
         """Take the path away and end the thread."""
@@ -59,4 +62,4 @@ class SerialLine:
             if self._wake in ready:
                 return
             with contextlib.suppress(BlockingIOError):
-                self._on_bytes(os.read(self._ours, MOST), time.monotonic())
+                self._inbox.put(SerialBytes(os.read(self._ours, MOST), time.monotonic()))

@@ -6,10 +6,34 @@ VirtualDevice::VirtualDevice(const DeviceConfig& config, uint32_t boot_id, const
                              uint64_t now_us)
     : config_(config), reset_cause_(reset_cause), now_us_(now_us), slot_start_us_(now_us) {
     machine_.begin(config_, Identity{boot_id, reset_cause_.c_str(), true}, Sink{this, put, keep});
+    serial_.begin(machine_, boot_id, take_request, this);
 }
 
-void VirtualDevice::put(void* self, Output output, const uint8_t* bytes, size_t size) {
-    static_cast<VirtualDevice*>(self)->outputs_.push_back(OutFrame{output, {bytes, bytes + size}});
+void VirtualDevice::put(void* context, Output output, const uint8_t* bytes, size_t size) {
+    VirtualDevice& self = *static_cast<VirtualDevice*>(context);
+    if (self.serial_.leaves_to_mqtt(output)) self.outputs_.push_back(OutFrame{output, {bytes, bytes + size}});
+    if (!self.has_line_ || !self.serial_.carries(output)) return;
+    uint8_t wrapped[SerialPort::kLargestReport];
+    const size_t length = self.serial_.wrap(output, bytes, size, wrapped, sizeof wrapped);
+    self.line_.append(reinterpret_cast<const char*>(wrapped), length);
+}
+
+bool VirtualDevice::say(FrameType type, const uint8_t* text, size_t size) {
+    if (type == FrameType::Event) {
+        machine_.say(Output::Event, text, size);
+        return false;
+    }
+    const bool is_answer = type == FrameType::ProvisionAck;
+    if (has_line_ && (is_answer || serial_.carries(Output::State))) {
+        uint8_t wrapped[SerialPort::kLargestReport];
+        const size_t length = serial_.wrap_json(type, text, size, wrapped, sizeof wrapped);
+        line_.append(reinterpret_cast<const char*>(wrapped), length);
+    }
+    return !is_answer && serial_.leaves_to_mqtt(Output::State);
+}
+
+void VirtualDevice::take_request(void* self, FrameType type, const uint8_t* text, size_t size) {
+    static_cast<VirtualDevice*>(self)->requests_.push_back(Request{type, {text, text + size}});
 }
 
 void VirtualDevice::keep(void* self, const uint8_t* text, size_t size) {
@@ -41,6 +65,10 @@ void VirtualDevice::receive_config(const uint8_t* text, size_t size, bool is_ret
     arrive(Arrived{Way::Config, {text, text + size}, is_retained, received_us});
 }
 
+void VirtualDevice::receive_serial(const uint8_t* bytes, size_t size, uint64_t received_us) {
+    arrive(Arrived{Way::Serial, {bytes, bytes + size}, false, received_us});
+}
+
 void VirtualDevice::arrive(Arrived&& arrived) {
     if (is_frozen() || !waiting_.empty()) return waiting_.push_back(std::move(arrived));
     hand_over(arrived);
@@ -48,10 +76,17 @@ void VirtualDevice::arrive(Arrived&& arrived) {
 
 void VirtualDevice::hand_over(const Arrived& arrived) {
     const Arrival arrival{arrived.bytes.data(), arrived.bytes.size(), arrived.is_retained, arrived.received_us};
-    if (arrived.way == Way::Config) {
-        machine_.receive_config(arrival, now_us_);
-    } else {
-        machine_.receive(arrival, now_us_);
+    switch (arrived.way) {
+        case Way::Frame:
+            serial_.yield_to_mqtt(arrival);
+            machine_.receive(arrival, now_us_);
+            break;
+        case Way::Config:
+            machine_.receive_config(arrival, now_us_);
+            break;
+        case Way::Serial:
+            serial_.receive(arrival.bytes, arrival.size, arrival.received_us, now_us_);
+            break;
     }
     if (machine_.config_crc32() != wired_crc32_) wire();
     drive_pins();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "machine.h"
+#include "serial.h"
 #include "world.h"
 
 namespace gemelo {
@@ -14,6 +15,12 @@ namespace gemelo {
 struct OutFrame {
     Output output;
     std::vector<uint8_t> payload;
+};
+
+// PROVISION or PRESS, as JSON, as it came over the line.
+struct Request {
+    FrameType type;
+    std::string text;
 };
 
 // Pin levels after a tick in which they changed.
@@ -33,6 +40,11 @@ class VirtualDevice {
     void receive(const uint8_t* bytes, size_t size, bool is_retained, uint64_t received_us);
     void receive(const std::vector<uint8_t>& bytes) { receive(bytes.data(), bytes.size(), false, now_us_); }
     void receive_config(const uint8_t* text, size_t size, bool is_retained, uint64_t received_us);
+    void receive_serial(const uint8_t* bytes, size_t size, uint64_t received_us);
+    // From now on somebody takes what goes over the serial line.
+    void attach_line() { has_line_ = true; }
+    // JSON of the platform's own: EVENT, SHAFT or PROVISION_ACK; true if it is to be said over MQTT too, by the caller.
+    bool say(FrameType type, const uint8_t* text, size_t size);
 
     // Runs every tick whose time is before `until_us`; at a multiple of a slot since the start, a slot has just ended.
     void advance(uint64_t until_us);
@@ -44,15 +56,20 @@ class VirtualDevice {
     uint64_t now_us() const { return now_us_; }
     Machine& machine() { return machine_; }
     World& world() { return world_; }
+    const World& world() const { return world_; }
     const DeviceConfig& config() const { return config_; }
+    // What goes over MQTT.
     std::deque<OutFrame>& outputs() { return outputs_; }
+    // What goes over the serial line, as bytes.
+    std::string& line() { return line_; }
+    std::deque<Request>& requests() { return requests_; }
     // The text of the configuration that was taken last; empty if none was.
     const std::string& kept() const { return kept_; }
     void set_tracing(bool on) { is_tracing_ = on; }
     std::deque<PinChange>& trace() { return trace_; }
 
   private:
-    enum class Way : uint8_t { Frame, Config };
+    enum class Way : uint8_t { Frame, Config, Serial };
     struct Arrived {
         Way way;
         std::vector<uint8_t> bytes;
@@ -62,6 +79,7 @@ class VirtualDevice {
 
     static void put(void* self, Output output, const uint8_t* bytes, size_t size);
     static void keep(void* self, const uint8_t* text, size_t size);
+    static void take_request(void* self, FrameType type, const uint8_t* text, size_t size);
     void arrive(Arrived&& arrived);
     void hand_over(const Arrived& arrived);
     void hand_over_waiting();
@@ -75,6 +93,7 @@ class VirtualDevice {
     DeviceConfig config_;
     std::string reset_cause_;
     Machine machine_;
+    SerialPort serial_;
     World world_;
     uint32_t wired_crc32_ = 0;
     uint32_t ticks_per_slot_ = 0;
@@ -85,7 +104,10 @@ class VirtualDevice {
     uint64_t tick_ = 0;
     std::deque<Arrived> waiting_;
     std::deque<OutFrame> outputs_;
+    std::string line_;
+    std::deque<Request> requests_;
     std::string kept_;
+    bool has_line_ = false;
     std::deque<PinChange> trace_;
     Pins traced_;
     bool is_tracing_ = false;

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import queue
 import time
@@ -10,12 +9,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from firmware.bindings.device import OutFrame
+from firmware.bindings.device import Device, JsonFrame, Request
 from firmware.bindings.press import PressRefused, press, read_press, within
+from firmware.bindings.provision import ProvisionRefused
 from firmware.platform.host.board import Board
 from firmware.platform.host.clock import DeviceClock
-from firmware.platform.host.link import Arrived, Connected, Disconnected, Item, Stop
-from firmware.platform.host.network import Network
+from firmware.platform.host.link import Arrived, Connected, Disconnected, Item, SerialBytes, Stop
+from firmware.platform.host.provisioning import provision, provision_answer
+from firmware.platform.host.wires import Wires, say_event
 from schemas.device import PressKind, PressRequest
 from services.runtime.readiness import Readiness
 
@@ -26,37 +27,37 @@ PAUSE_AT_REST = 0.020  # [s] a state is due as often
 STALL = 0.1  # [s] a loop that was late by more was stopped by the operating system
 LONGEST_STOP = 5.0  # [s] when the process is asked to end while the arm moves
 BEAT = 1.0  # [s] of the readiness file
-SHAFT_PERIOD = 0.1  # [s]
+PARTING = 0.1  # [s] that an answer has to leave, before the wire is lost
 LARGEST_DRIFT = 10_000.0  # [ppm]
 LONGEST_OFFLINE = 3600.0  # [s]
-LOUD = ("fault", "estop", "hold", "underrun")
-QUIET = ("homed", "configured", "pressed", "press_refused")
 
 
 class VirtualEsp32:
-    """One board on its network; everything but paho's thread happens in `run`."""
+    """One board on its wires; everything but their threads happens in `run`."""
 
-    def __init__(self, board: Board, network: Network, inbox: queue.SimpleQueue[Item], readiness: Readiness) -> None:
+    def __init__(self, board: Board, wires: Wires, inbox: queue.SimpleQueue[Item], readiness: Readiness) -> None:
         self._board = board
-        self._network = network
+        self._wires = wires
         self._inbox = inbox
         self._readiness = readiness
-        self._device = board.boot()
-        self._born = self._looked = time.monotonic()
+        self._device = self._boot()
+        self._looked = time.monotonic()
         self._clock = DeviceClock(self._looked)
-        self._next_beat = self._next_shaft = 0.0
+        self._next_beat = 0.0
+        self._later: list[tuple[float, Callable[[], None]]] = []  # [s] when, and what
         self._running = True
 
     def run(self) -> None:
         """Until a Stop arrives in the inbox."""
         self._announce()
         self._join()
+        self._wires.listen()
         while self._running:
             self._turn()
         self._come_to_rest()
         self._readiness.not_ready()
         self._board.remember(self._device)
-        self._network.leave()
+        self._wires.close()
 
     def _come_to_rest(self) -> None:
         """Only a device that stands knows where it will wake up."""
@@ -65,7 +66,7 @@ class VirtualEsp32:
         while self._device.moving and time.monotonic() < deadline:
             time.sleep(PAUSE_MOVING)
             self._advance(time.monotonic())
-            self._publish(time.monotonic())
+            self._wires.publish(self._device, time.monotonic())
 
     def _turn(self) -> None:
         items = self._wait()
@@ -78,10 +79,15 @@ class VirtualEsp32:
             self._handle(item)
         self._advance(time.monotonic())
         self._board.remember(self._device)
-        self._publish(now)
+        self._wires.publish(self._device, now)
         self._beat(now)
-        if self._network.is_due_back(now):
-            self._join()
+        self._do_what_is_due(now)
+
+    def _do_what_is_due(self, now: float) -> None:
+        due = [action for when, action in self._later if when <= now]
+        self._later = [each for each in self._later if each[0] > now]
+        for action in due:
+            action()
 
     def _wait(self) -> list[Item]:
         """Everything that has arrived, at once when there is something."""
@@ -103,10 +109,11 @@ class VirtualEsp32:
         while not self._inbox.empty():
             items.append(self._inbox.get())
         begin, end = self._looked, time.monotonic()
-        log.warning("the operating system kept us waiting for %.0f ms", (end - begin) * 1e3)
+        level = logging.WARNING if self._device.moving else logging.INFO
+        log.log(level, "the operating system kept us waiting for %.0f ms", (end - begin) * 1e3)
         spread = []
         for index, item in enumerate(items):
-            if isinstance(item, Arrived):
+            if isinstance(item, Arrived | SerialBytes):
                 due = begin + (end - begin) * (index + 1) / (len(items) + 1)
                 item = replace(item, monotonic=min(item.monotonic, due))
             spread.append(item)
@@ -116,11 +123,16 @@ class VirtualEsp32:
         match item:
             case Arrived():
                 self._take_in(item)
+            case SerialBytes():
+                self._advance(item.monotonic)
+                self._device.receive_serial(item.data, self._clock.at(item.monotonic))
+                for request in self._device.take_requests():
+                    self._on_request(request)
             case Connected():
-                self._network.on_connected()
+                self._wires.network.on_connected()
                 self._device.report_status()
             case Disconnected():
-                self._network.on_disconnected(item.reason)
+                self._wires.network.on_disconnected(item.reason)
                 self._readiness.not_ready()
             case Stop():
                 self._running = False
@@ -137,83 +149,87 @@ class VirtualEsp32:
             case _:
                 self._device.receive(item.payload, item.retained, received_us)
 
+    def _on_request(self, request: Request) -> None:
+        if request.kind is JsonFrame.PRESS:
+            self._press(request.text)
+        else:
+            self._provision(request.text)
+
+    def _provision(self, text: bytes) -> None:
+        """Credentials, or a factory reset, over the serial line; the device starts anew with them."""
+        try:
+            cause = provision(self._board, self._device, text)
+        except ProvisionRefused as error:
+            self._device.say(JsonFrame.PROVISION_ACK, provision_answer(str(error)))
+            return
+        self._device.say(JsonFrame.PROVISION_ACK, provision_answer())
+        self._start_anew(cause)
+
     def _press(self, text: bytes) -> None:
         """A press is answered by an event, whatever comes of it."""
         try:
             request = read_press(text)
-            after = self._carry_out(request)
+            self._carry_out(request)
         except PressRefused as error:
-            self._say_event("press_refused", str(error))
-            return
-        self._say_event("pressed", f"{request.press} {request.target} {request.value:g}".replace("  ", " "))
-        if after is not None:
-            after()
+            say_event(self._device, "press_refused", str(error))
+        else:
+            words = (request.press, request.target, f"{request.value:g}")
+            say_event(self._device, "pressed", " ".join(word for word in words if word))
 
-    def _carry_out(self, request: PressRequest) -> Callable[[], None] | None:
-        """Do it; what would keep the answer from being said is returned, to be done after it."""
+    def _carry_out(self, request: PressRequest) -> None:
+        """Do it; what keeps the answer from being said is done a little later."""
+        now = time.monotonic()
         match request.press:
             case PressKind.REBOOT:
-                return partial(self._reboot, "reset_button")
+                self._later.append((now + PARTING, partial(self._reboot, "reset_button")))
             case PressKind.OFFLINE:
-                return partial(self._network.break_off, within(request, LONGEST_OFFLINE))
+                away = within(request, LONGEST_OFFLINE)
+                self._later.append((now + PARTING, self._wires.network.break_off))
+                self._later.append((now + PARTING + away, self._join))
             case PressKind.DRIFT:
-                self._clock.drift(time.monotonic(), within(request, LARGEST_DRIFT, -LARGEST_DRIFT))
+                self._clock.drift(now, within(request, LARGEST_DRIFT, -LARGEST_DRIFT))
             case _:
                 press(self._device, request)
-        return None
 
     def _reboot(self, cause: str) -> None:
-        self._network.break_off()
         self._board.remember(self._device)
-        self._device = self._board.boot(cause)
+        self._start_anew(cause)
+
+    def _start_anew(self, cause: str) -> None:
+        self._wires.publish(self._device, time.monotonic())
+        self._later.clear()
+        before, self._device = self._device, self._boot(cause)
+        self._device.inherit_world(before)
         self._clock.restart(time.monotonic())
         self._announce()
         self._join()
 
+    def _boot(self, cause: str = "") -> Device:
+        device = self._board.boot(cause)
+        self._wires.attach(device)
+        return device
+
     def _join(self) -> None:
-        self._network.join(self._device, self._board.device_name, self._board.credentials)
+        self._wires.network.join(self._device, self._board.device_name, self._board.credentials)
 
     def _announce(self) -> None:
         self._board.remember(self._device)
         device = self._device
         joints = zip(device.config.joints, device.steps, strict=True)
         where = "at " + ", ".join(f"{joint.name} {count}" for joint, count in joints)
-        lost = "position unknown: `gemelo home` finds it, `gemelo reference` declares it"
-        log.info("device %s, boot %08x: %s", self._board.name, device.boot_id, where if device.referenced else lost)
+        if not device.config.joints:
+            where = "no configuration yet: `gemelo device config --push` gives it one"
+        elif not device.referenced:
+            where = "position unknown: `gemelo home` finds it, `gemelo reference` declares it"
+        log.info("device %s, boot %08x: %s", self._board.device_name, device.boot_id, where)
 
     def _advance(self, monotonic: float) -> None:
         self._device.advance(self._clock.at(monotonic))
         self._looked = max(self._looked, monotonic)
 
-    def _publish(self, now: float) -> None:
-        for frame in self._device.take():
-            self._say(frame)
-        if now >= self._next_shaft:
-            self._next_shaft = now + SHAFT_PERIOD
-            self._say(OutFrame("shaft", self._device.shaft_report()))
-
-    def _say(self, frame: OutFrame) -> None:
-        if frame.kind == "event":
-            _log_event(frame)
-        self._network.publish(frame)
-
-    def _say_event(self, name: str, detail: str) -> None:
-        """As the firmware says its own; this one is the world's."""
-        event = {"event": name, "t_us": self._device.now_us, "boot_id": self._device.boot_id, "stream": 0}
-        self._say(OutFrame("event", json.dumps({**event, "detail": detail}).encode()))
-
     def _beat(self, now: float) -> None:
-        if now < self._next_beat or not self._network.is_connected:
+        if now < self._next_beat or not self._wires.is_reachable:
             return
         self._next_beat = now + BEAT
         self._readiness.ready()
         self._readiness.beat()
-
-
-def _log_event(frame: OutFrame) -> None:
-    event = json.loads(frame.payload)
-    if event["event"] in LOUD:
-        level = logging.INFO if event["detail"] == "command" else logging.WARNING
-        log.log(level, "%s %s at %.3f s", event["event"], event["detail"], event["t_us"] / 1e6)
-    elif event["event"] in QUIET:
-        log.info("%s %s", event["event"], event["detail"])

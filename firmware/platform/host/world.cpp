@@ -72,6 +72,13 @@ void World::enable(bool is_enabled) {
     }
 }
 
+void World::inherit(const World& before) {
+    for (uint8_t i = 0; i < kMaxInputs; ++i) press_[i] = before.press_[i];
+    for (uint8_t i = 0; i < config_.sensors && i < before.config_.sensors; ++i) raw_[i] = before.raw_[i];
+    for (uint8_t j = 0; j < kMaxJoints; ++j) block(j, before.is_blocked_[j]);
+    read_switches();
+}
+
 void World::press(uint8_t input, Press press) {
     press_[input] = press;
     read_switches();

@@ -29,6 +29,8 @@ class World {
     // No shaft moves by itself, and the switches have been read as they are.
     bool is_settled() const { return unread_ == 0 && are_motors_settled(); }
 
+    // A board that starts anew wakes up in the world that it was in: what is pressed, blocked and measured stays.
+    void inherit(const World& before);
     void press(uint8_t input, Press press);
     void block(uint8_t joint, bool is_blocked);
     void slip(uint8_t joint, int32_t pulses);

@@ -1,0 +1,75 @@
+"""What a virtual board says, on all its wires: MQTT, and a serial line if it has one."""
+
+from __future__ import annotations
+
+import json
+import logging
+
+from firmware.bindings.device import Device, JsonFrame, OutFrame
+from firmware.platform.host.network import Network
+from firmware.platform.host.pty import SerialLine
+
+log = logging.getLogger("virtual_esp32")
+
+SHAFT_PERIOD = 0.1  # [s]
+LOUD = ("fault", "estop", "hold", "underrun")
+QUIET = ("homed", "configured", "pressed", "press_refused")
+
+
+class Wires:
+    """The network and the line of one board; the device itself knows what goes where."""
+
+    def __init__(self, network: Network, line: SerialLine | None) -> None:
+        self.network = network
+        self._line = line
+        self._next_shaft = 0.0
+
+    @property
+    def is_reachable(self) -> bool:
+        """Somebody can speak to the board."""
+        return self.network.is_connected or self._line is not None
+
+    def attach(self, device: Device) -> None:
+        """A device that has just started speaks over the line from now on."""
+        if self._line is not None:
+            device.attach_line()
+
+    def listen(self) -> None:
+        """Hear the line; the network is joined by itself."""
+        if self._line is not None:
+            self._line.start()
+
+    def close(self) -> None:
+        """Say goodbye and end."""
+        self.network.leave()
+        if self._line is not None:
+            self._line.close()
+
+    def publish(self, device: Device, now: float) -> None:
+        """Send all that the device has said, and ten times a second where its shafts are."""
+        if now >= self._next_shaft:
+            self._next_shaft = now + SHAFT_PERIOD
+            report = device.shaft_report()
+            if device.say(JsonFrame.SHAFT, report):
+                self.network.publish(OutFrame("shaft", report))
+        for frame in device.take():
+            if frame.kind == "event":
+                _log_event(frame)
+            self.network.publish(frame)
+        if self._line is not None:
+            self._line.write(device.take_serial())
+
+
+def say_event(device: Device, name: str, detail: str) -> None:
+    """As the firmware says its own; this one is the world's."""
+    event = {"event": name, "t_us": device.now_us, "boot_id": device.boot_id, "stream": 0, "detail": detail}
+    device.say(JsonFrame.EVENT, json.dumps(event).encode())
+
+
+def _log_event(frame: OutFrame) -> None:
+    event = json.loads(frame.payload)
+    if event["event"] in LOUD:
+        level = logging.INFO if event["detail"] == "command" else logging.WARNING
+        log.log(level, "%s %s at %.3f s", event["event"], event["detail"], event["t_us"] / 1e6)
+    elif event["event"] in QUIET:
+        log.info("%s %s", event["event"], event["detail"])
