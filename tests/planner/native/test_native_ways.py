@@ -1,0 +1,102 @@
+"""Whole ways: nothing is skipped between samples, on straight lines and on curves."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from services.planner.native import FreePath, MotionCore, Shape, ShapeKind
+from services.planner.native.paths import Effort
+from tests.planner.native.coal_truth import Truth
+from tests.planner.native.conftest import load
+from tests.planner.native.scenes import random_shape
+
+UNSURE = 1e-5  # [m] of coal's own distances
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+def test_no_line_is_free_that_touches_anything_between_its_ends(arm, core, postures):
+    rng = np.random.default_rng(21)
+    refused = passed = 0
+    for round_ in range(4):
+        scene = [random_shape(rng, kind, kind) for kind in ShapeKind if kind is not ShapeKind.MESH]
+        core.set_scene(scene)
+        truth, rows = Truth(arm, scene), postures(60, round_)
+        rows = rows[core.free(rows)]
+        for start, goal in pairwise(rows):
+            ways = start + np.linspace(0.0, 1.0, 40)[:, None] * (goal - start)
+            if core.edge_free(start, goal):
+                passed += 1
+                assert min(truth.distance(row) for row in ways) > core.margin - UNSURE
+            else:
+                refused += 1
+    assert refused > 5
+    assert passed > 5
+
+
+def test_a_refused_line_comes_within_the_margin_and_the_bulge(arm, core, postures):
+    rows = postures(60, 5)
+    rows = rows[core.free(rows)]
+    for start, goal in pairwise(rows):
+        if not core.edge_free(start, goal):
+            ways = start + np.linspace(0.0, 1.0, 3000)[:, None] * (goal - start)
+            assert not core.free(ways).all() or min(core.distance(row) for row in ways) < core.margin + 0.001
+
+
+@pytest.mark.parametrize("thickness", [0.02, 0.002, 0.0002, 0.00002])
+def test_the_thinnest_sheet_is_not_tunnelled_through(thickness):
+    core = MotionCore(load("rm1"))
+    sheet = Shape("sheet", ShapeKind.BOX, (0.5, thickness, 0.5), ((0.35, 0.0, 0.25), UPRIGHT))
+    core.set_scene([sheet])
+    left, right = [1.0, 0.0, 0.1], [-1.0, 0.0, 0.1]
+    assert core.free([left, right]).all()
+    assert not core.edge_free(left, right)
+
+
+def test_a_thin_wire_is_not_tunnelled_through_from_any_side():
+    core = MotionCore(load("parol6"))
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        place = rng.uniform([0.15, -0.3, 0.1], [0.35, 0.3, 0.4]).tolist()
+        core.set_scene([Shape("bead", ShapeKind.SPHERE, (1e-4,), ((place[0], place[1], place[2]), UPRIGHT))])
+        rows = rng.uniform([-2, -2.4, 1.9, -1.8, -1.5, 0], [2, -0.1, 5.0, 1.8, 1.5, 6], (20, 6))
+        rows = rows[core.free(rows)]
+        for start, goal in pairwise(rows):
+            if core.edge_free(start, goal):
+                assert core.free(start + np.linspace(0.0, 1.0, 2000)[:, None] * (goal - start)).all()
+
+
+def test_a_line_to_itself_is_as_free_as_its_posture(core, postures):
+    rows = postures(100, 8)
+    assert [core.edge_free(row, row) for row in rows] == core.free(rows).tolist()
+
+
+def test_a_line_is_as_free_backwards(core, postures):
+    rows = postures(80, 9)
+    for start, goal in pairwise(rows):
+        assert core.edge_free(start, goal) == core.edge_free(goal, start)
+
+
+def test_a_polyline_is_free_where_all_its_lines_are(core, postures):
+    rows = postures(90, 10)
+    rows = rows[core.free(rows)]
+    for start in range(0, len(rows) - 3, 3):
+        some = rows[start : start + 3]
+        both = core.edge_free(some[0], some[1]) and core.edge_free(some[1], some[2])
+        assert core.way_free(some) == both
+
+
+def test_a_curve_is_looked_at_where_it_goes():
+    core = MotionCore(load("rm1"))
+    post = Shape("post", ShapeKind.CYLINDER, (0.01, 0.5), ((0.4, 0.0, 0.25), UPRIGHT))
+    core.set_scene([post])
+    left, right, folded = [1.0, 0.0, 0.1], [-1.0, 0.0, 0.1], [0.0, 2.6, 0.1]
+    assert not core.spline_free([left] * 3 + [right] * 3)
+    around = [left] * 3 + [[1.0, 2.6, 0.1], folded, folded, [-1.0, 2.6, 0.1]] + [right] * 3
+    assert core.spline_free(around)
+    truth = Truth(load("rm1"), [post])
+    path = FreePath(np.array(around), np.array(around), Effort(0.0, 0.0, 0.0, 0, 0))
+    rows, _, _ = path.at(np.linspace(0.0, path.spans, 500))
+    assert min(truth.distance(row) for row in rows) > core.margin
