@@ -8,3 +8,7 @@ from services.runtime.deployment import project_root
 
 def rm1() -> Arm:
     return load_arm(project_root() / "urdf/rm1")
+
+
+def parol6() -> Arm:
+    return load_arm(project_root() / "urdf/parol6")

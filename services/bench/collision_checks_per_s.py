@@ -1,0 +1,59 @@
+"""How many postures a second one core decides along the lines that a search asks for, self and scene."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.bench.arms import parol6
+from services.bench.figure import Figure, NotMeasured, of_samples, quantile
+from services.bench.postures import SCENE, random_postures
+
+if TYPE_CHECKING:
+    from services.planner.native import MotionCore
+
+Array = NDArray[np.float64]
+
+UNIT = "1/s"
+WAYS, POINTS = 300, 200
+
+
+def measure() -> Figure:
+    """parol6 with the best build of the check; the others are the references."""
+    try:
+        from services.planner.native import MotionCore
+        from services.planner.native.library import motion
+    except ImportError as error:
+        raise NotMeasured(str(error)) from error
+    arm = parol6()
+    ways = lines(random_postures(arm, 2 * WAYS))
+    samples: dict[str, list[float]] = {}
+    for name in motion.kernel_names():
+        core = MotionCore(arm, kernel=name)
+        core.set_scene(SCENE)
+        samples[name] = rates(core, ways)
+    best = motion.kernel_names()[0]
+    reference = {name: quantile(rate, 0.5) for name, rate in samples.items() if name != best}
+    note = (
+        f"parol6, {len(SCENE)} boxes, {best}, {WAYS} lines of {POINTS} postures; p99 is the fastest; one thread"
+    )
+    return of_samples(samples[best], UNIT, None, reference, note)
+
+
+def lines(rows: Array) -> list[Array]:
+    """(points, n) each, between every two rows."""
+    shares = np.linspace(0.0, 1.0, POINTS)[:, None]
+    return [start + shares * (goal - start) for start, goal in zip(rows[::2], rows[1::2], strict=True)]
+
+
+def rates(core: MotionCore, ways: list[Array]) -> list[float]:
+    """[1/s] for each line."""
+    measured = []
+    for way in ways:
+        started = time.perf_counter()
+        core.free(way)
+        measured.append(len(way) / (time.perf_counter() - started))
+    return measured

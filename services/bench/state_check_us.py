@@ -1,0 +1,85 @@
+"""Whether one posture is free, self and scene: the motion core in batches, against pinocchio and coal."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.bench.arms import parol6, rm1
+from services.bench.figure import Figure, NotMeasured, of_samples, quantile
+from services.bench.postures import SCENE, CoalChecker, random_postures
+
+if TYPE_CHECKING:
+    from services.planner.native import MotionCore
+
+Array = NDArray[np.float64]
+
+UNIT = "us"
+BATCH, BATCHES = 1000, 40
+ONE_BY_ONE = 2000
+
+
+def measure() -> Figure:
+    """parol6's figure; the references are of the same postures in the same run."""
+    try:
+        from services.planner.native import MotionCore
+    except ImportError as error:
+        raise NotMeasured(str(error)) from error
+    arm = parol6()
+    core = MotionCore(arm)
+    core.set_scene(SCENE)
+    rows = random_postures(arm, BATCH * BATCHES)
+    samples = []
+    for batch in np.array_split(rows, BATCHES):
+        started = time.perf_counter()
+        core.free(batch)
+        samples.append((time.perf_counter() - started) / BATCH * 1e6)
+    reference = {
+        "pinocchio + coal, same scene": coal_us(arm),
+        "services.arm.kinematics, self only": self_us(arm),
+        "motion core, one posture a call": single_us(core, rows),
+        "rm1, motion core": batch_us(rm1()),
+        "rm1, pinocchio + coal": coal_us(rm1()),
+    }
+    note = f"parol6, {core.sphere_count} spheres, {len(SCENE)} boxes, batches of {BATCH} random postures, {core.kernel}"
+    return of_samples(samples, UNIT, None, reference, note)
+
+
+def batch_us(arm: Arm) -> float:
+    """[us] median of a posture in a batch, with the motion core."""
+    from services.planner.native import MotionCore
+
+    core = MotionCore(arm)
+    core.set_scene(SCENE)
+    return median_us(core.free, np.array_split(random_postures(arm, BATCH * BATCHES), BATCHES)) / BATCH
+
+
+def single_us(core: MotionCore, rows: Array) -> float:
+    """[us] median of one posture, the call from Python included."""
+    return median_us(core.free, [row[None, :] for row in rows[:ONE_BY_ONE]])
+
+
+def coal_us(arm: Arm) -> float:
+    """[us] median of one posture with pinocchio and coal."""
+    return median_us(CoalChecker(arm).is_free, random_postures(arm, ONE_BY_ONE))
+
+
+def self_us(arm: Arm) -> float:
+    """[us] median of one posture as services/planner asks today: distances of the links to one another, no scene."""
+    return median_us(Kinematics(arm).collisions.distance, random_postures(arm, ONE_BY_ONE))
+
+
+def median_us(ask: Callable[[Array], object], questions: Iterable[Array]) -> float:
+    """[us] of one question, half of them faster."""
+    samples = []
+    for question in questions:
+        started = time.perf_counter()
+        ask(question)
+        samples.append((time.perf_counter() - started) * 1e6)
+    return quantile(samples, 0.5)
