@@ -23,9 +23,13 @@ from services.runtime.deployment import project_root
 
 ALONE = (
     "frame_lookup_us",
+    "state_check_us",
+    "collision_checks_per_s",
     "plan_ms",
     "lost_of_45000_at_25hz",
     "seed_move_percent",
+    "clock_sync_error_us",
+    "hold_reaction_ms",
     "cli_start_ms",
 )  # before any stack disturbs them
 ON_A_STACK = ("stack_idle_cpu_percent", "stack_rss_mb", "state_to_frame_ms", "move_accept_to_first_step_ms")

@@ -39,6 +39,7 @@ class VirtualArm:
         self.device = Device(device_config(arm), boot_id=1, motors=motors)
         self.gateway = GatewayCore(arm, session_id=1)
         self.now = 0  # [us]
+        self.last_beat = 0  # [us] when the device heard a heartbeat
         self.outcomes: list[Output] = []
         self._on_message = on_message
         self._random = random.Random(seed)
@@ -64,6 +65,14 @@ class VirtualArm:
                 self._deliver()
             self._advance(beat)
             self.carry_out(self.gateway.step(self.moment))
+
+    def idle(self, seconds: float) -> None:
+        """Lets time pass in which the gateway's loop hangs: no heartbeat leaves."""
+        end = self.now + round(seconds * 1e6)
+        while (due := self._next_arrival()) < end:
+            self._advance(due)
+            self._deliver()
+        self._advance(end)
 
     def carry_out(self, outputs: list[Output]) -> None:
         """Puts frames on the wire, and hands messages over."""
@@ -91,7 +100,9 @@ class VirtualArm:
 
     def _deliver(self) -> None:
         while self._wire and self._wire[0][0] <= self.now:
-            self.device.receive(heapq.heappop(self._wire)[3])
+            _, _, kind, payload = heapq.heappop(self._wire)
+            self.last_beat = self.now if kind is Kind.HB else self.last_beat
+            self.device.receive(payload)
         while self._back and self._back[0][0] <= self.now:
             _, _, kind, payload = heapq.heappop(self._back)
             received = Received(kind, payload, False, self.now * 1000)

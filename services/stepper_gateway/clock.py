@@ -1,20 +1,36 @@
-"""The device's clock as seen from here, by the exchange with the shortest round trip (as NTP does)."""
+"""The device's clock as seen from here: offset and drift, by the exchanges whose round trips were short.
+
+An exchange is wrong by half its round trip at most, and by little where both ways were quick. So a straight line goes
+through the offsets by weighted least squares: the longer a round trip beyond the shortest, the less it weighs.
+"""
 
 from __future__ import annotations
 
 from collections import deque
 from typing import NamedTuple
 
-WINDOW = 12  # exchanges, 6 s at 2 Hz: a drift of 50 ppm moves the offset by 0.3 ms
-DRIFT = 5_000.0  # [us] that two clocks may part within the window, generously
+WINDOW = 64  # exchanges, 32 s at 2 Hz
 ENOUGH = 3  # exchanges until the offset is trusted
+QUICK = 200.0  # [us] beyond the shortest round trip, at which an exchange weighs a quarter
+SPAN = 5e6  # [us] that the exchanges must cover until they tell of a drift
+MOST_DRIFT = 2e-4  # twice what a crystal's data sheet allows
+STEADY = 1000.0  # [us] that two clocks may part beyond any drift
 
 
 class Exchange(NamedTuple):
     """One SYNC and its reply."""
 
+    at: float  # [us] of our monotonic clock, in the middle
     offset: float  # [us] device clock minus our monotonic clock
     round_trip: float  # [us] without the device's own thinking time
+
+
+class Line(NamedTuple):
+    """The offset as it was at `at`, and how it changes."""
+
+    at: float  # [us]
+    offset: float  # [us]
+    drift: float  # [us/us]
 
 
 class ClockSync:
@@ -22,7 +38,7 @@ class ClockSync:
 
     def __init__(self) -> None:
         self._exchanges: deque[Exchange] = deque(maxlen=WINDOW)
-        self._offset = 0.0
+        self._line = Line(0.0, 0.0, 0.0)
 
     def reset(self) -> None:
         """Forget everything: another boot is another clock."""
@@ -33,11 +49,11 @@ class ClockSync:
         round_trip = (t3 - t0) - (t2 - t1)
         if round_trip < 0 or t2 < t1:
             return
-        exchange = Exchange(((t1 - t0) + (t2 - t3)) / 2.0, round_trip)
+        exchange = Exchange((t0 + t3) / 2.0, ((t1 - t0) + (t2 - t3)) / 2.0, round_trip)
         if self._exchanges and not _agree(exchange, min(self._exchanges, key=lambda one: one.round_trip)):
             self._exchanges.clear()
         self._exchanges.append(exchange)
-        self._offset = min(self._exchanges, key=lambda exchange: exchange.round_trip).offset
+        self._line = _line(self._exchanges)
 
     @property
     def exchanges(self) -> int:
@@ -54,16 +70,39 @@ class ClockSync:
 
     def device_time(self, monotonic: float) -> int:
         """[us] of the device's clock at an instant of ours [s]."""
-        return max(0, round(monotonic * 1e6 + self._offset))
+        at, offset, drift = self._line
+        ours = monotonic * 1e6
+        return max(0, round(ours + offset + drift * (ours - at)))
 
     def monotonic(self, device_us: int) -> float:
         """[s] of our monotonic clock at an instant of the device's [us]."""
-        return (device_us - self._offset) * 1e-6
+        at, offset, drift = self._line
+        return (device_us - offset + drift * at) / (1.0 + drift) * 1e-6
+
+
+def _line(exchanges: deque[Exchange]) -> Line:
+    shortest = min(exchange.round_trip for exchange in exchanges)
+    weights = [(1.0 + (exchange.round_trip - shortest) / QUICK) ** -2 for exchange in exchanges]
+    total = sum(weights)
+    at = sum(w * exchange.at for w, exchange in zip(weights, exchanges, strict=True)) / total
+    offset = sum(w * exchange.offset for w, exchange in zip(weights, exchanges, strict=True)) / total
+    return Line(at, offset, _drift(exchanges, weights, at, offset))
+
+
+def _drift(exchanges: deque[Exchange], weights: list[float], at: float, offset: float) -> float:
+    if exchanges[-1].at - exchanges[0].at < SPAN:
+        return 0.0
+    spread = product = 0.0
+    for weight, exchange in zip(weights, exchanges, strict=True):
+        spread += weight * (exchange.at - at) ** 2
+        product += weight * (exchange.at - at) * (exchange.offset - offset)
+    return max(-MOST_DRIFT, min(MOST_DRIFT, product / spread)) if spread > 0.0 else 0.0
 
 
 def _agree(first: Exchange, second: Exchange) -> bool:
-    """Whether one offset can explain both: each is wrong by half its round trip at most.
+    """Whether one clock can explain both: each is wrong by half its round trip at most.
 
     It cannot when this machine has slept meanwhile, as its monotonic clock stands still then.
     """
-    return abs(first.offset - second.offset) <= (first.round_trip + second.round_trip) / 2.0 + DRIFT
+    drift = MOST_DRIFT * abs(first.at - second.at) + STEADY
+    return abs(first.offset - second.offset) <= (first.round_trip + second.round_trip) / 2.0 + drift

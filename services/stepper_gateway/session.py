@@ -132,10 +132,10 @@ class DeviceSession:
         if not self.link_up:
             return f'no link to device "{name}": {self.link_reason}'
         if not self.is_fresh(moment, timeout):
+            if self._offline_boot and self.boot_id in (0, self._offline_boot):
+                return f'device "{name}" is offline: switch it on, or check its network'
             if self.latest is None and not self._reports:
                 return f'device "{name}" has not been heard: is it switched on and does it use the same broker?'
-            if self._offline_boot == self.boot_id:
-                return f'device "{name}" is offline: switch it on, or check its network'
             return f'device "{name}" is silent for more than {timeout:g} s: check its power and network'
         if self.status is None:
             return f'device "{name}" has not said yet who it is: wait a second, or restart it'

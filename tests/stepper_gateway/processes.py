@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-from schemas.deployment import Broker, Deployment, MqttSection, PathsSection
+from schemas.deployment import Broker, Deployment, MqttSection, PathsSection, Wire
 from tests.stepper_gateway.harness import ROOT
 
 BROKER = "services.broker.main"
@@ -26,13 +26,15 @@ def free_port() -> int:
 class Processes:
     """Started by module name, killed with everything they have started themselves."""
 
-    def __init__(self, broker: str, folder: Path) -> None:
+    def __init__(self, broker: str, folder: Path, wire: Wire = Wire.MQTT) -> None:
         self.port = free_port()
         self.deployment = Deployment(
+            wire=wire,
             mqtt=MqttSection(broker=Broker(broker), port=self.port),
             paths=PathsSection(run=str(folder / "run"), out=str(folder / "out")),
         )
         self._environment = os.environ | {
+            "GEMELO_WIRE": wire.value,
             "GEMELO_MQTT_BROKER": broker,
             "GEMELO_MQTT_PORT": str(self.port),
             "GEMELO_PATHS_RUN": self.deployment.paths.run,

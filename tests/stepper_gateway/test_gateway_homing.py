@@ -10,9 +10,10 @@ from msgspec.structs import replace
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse, DeviceFault, DeviceMode
 from schemas.topics import JOINT_STATES
+from services.arm.description import load_arm
 from services.arm.device_config import device_config
 from services.stepper_gateway.links.link import Kind
-from tests.stepper_gateway.harness import Rig, assert_within_limits, move, rm1
+from tests.stepper_gateway.harness import ROOT, Rig, assert_within_limits, move, rm1
 
 ARM, DISARM, HOME = DeviceCommandKind.ARM, DeviceCommandKind.DISARM, DeviceCommandKind.HOME
 OUTPUT, SPEED, RESET, STOP = (
@@ -264,3 +265,15 @@ def test_a_goal_right_after_arming_waits_for_the_drivers() -> None:
     assert rig.goal(move(ZERO, NEAR)).accepted
     assert rig.finish()[0] == GoalStatusCode.SUCCEEDED
     assert_within_limits(rig)
+
+
+def test_parol6_lifts_its_forearm_before_it_turns() -> None:
+    rig = Rig(arm=load_arm(ROOT / "urdf" / "parol6"), referenced=False).ready()
+    done(rig, HOME)
+    assert rig.run(90.0, lambda: rig.device.mode == DeviceMode.IDLE)
+    rig.run(0.1)
+    order = [event.detail for event in rig.published["device/events"] if event.event == "homed"]
+    assert order[:3] == ["J3", "J2", "J1"]
+    assert set(order[3:]) == {"J4", "J5", "J6"}
+    assert all(rig.state.referenced)
+    assert all(abs(counted - true) <= 1 for counted, true in zip(rig.device.steps, rig.device.shaft, strict=True))

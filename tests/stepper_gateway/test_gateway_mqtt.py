@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from contextlib import closing
 
+from msgspec.structs import replace
 from paho.mqtt import publish
 
 from schemas.actions import GoalStatusCode
+from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceStatus
+from schemas.device_config import config_crc, config_text
 from schemas.motion import FollowErrorCode
+from services.arm.device_config import device_config
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.links.mqtt import MqttLink
+from tests.stepper_gateway.harness import rm1
 from tests.stepper_gateway.processes import BROKER, DEVICE, Processes, free_port
 from tests.stepper_gateway.wired import Gateway
 
@@ -87,3 +93,83 @@ def test_a_link_without_a_broker_says_so_and_costs_nothing() -> None:
         assert str(port) in link.reason
         assert "broker" in link.reason
         assert not link.send(Kind.HB, b"")
+
+
+def said(gateway: Gateway) -> DeviceStatus:
+    status: DeviceStatus = gateway.published["device/status"][-1]
+    return status
+
+
+def test_a_dead_device_is_said_dead_to_every_gateway_that_comes_after(processes: Processes) -> None:
+    with closing(Gateway(processes.port)) as gateway:
+        gateway.ready()
+        assert said(gateway).online
+        processes.kill(DEVICE)
+        assert gateway.run(3.0, lambda: not said(gateway).online)
+        assert gateway.run(10.0, lambda: "offline" in said(gateway).reason), "its last will has come"
+    with closing(Gateway(processes.port)) as late:
+        late.run(1.5)
+        assert not said(late).online
+        assert said(late).boot_id == 0
+        assert not late.published["joint_states"]
+        assert late.core.not_ready(late.moment)
+
+
+def test_a_retained_status_of_long_ago_is_no_sign_of_life(processes: Processes) -> None:
+    processes.kill(DEVICE)
+    time.sleep(0.5)
+    alive: dict[str, object] = {
+        "online": True,
+        "device": "rm1",
+        "boot_id": 5,
+        "joints": 3,
+        "armed": True,
+        "referenced": True,
+    }
+    alive["config_crc32"] = config_crc(config_text(device_config(rm1())))
+    publish.single(
+        "gemelo/v1/rm1/status", json.dumps(alive), qos=1, retain=True, hostname="127.0.0.1", port=processes.port
+    )
+    with closing(Gateway(processes.port)) as gateway:
+        gateway.run(1.0)
+        assert not said(gateway).online
+        assert "silent" in said(gateway).reason
+        processes.start(DEVICE)
+        gateway.ready()
+        assert said(gateway).online
+        assert said(gateway).boot_id not in (0, 5)
+
+
+def test_a_retained_configuration_of_another_robot_is_replaced_and_nothing_moves_by_it(processes: Processes) -> None:
+    wanted = device_config(rm1())
+    stale = replace(wanted, joints=(replace(wanted.joints[0], max_velocity_q8=400_000), *wanted.joints[1:]))
+    with closing(Gateway(processes.port)) as gateway:
+        gateway.ready()
+        assert gateway.command(DeviceCommandRequest(command=DeviceCommandKind.DISARM)).accepted
+        publish.single(
+            "gemelo/v1/rm1/config", config_text(stale), qos=1, retain=True, hostname="127.0.0.1", port=processes.port
+        )
+        taken = ["configured", "configured"]  # the stale one, then ours
+        assert gateway.run(
+            5.0, lambda: [e.event for e in gateway.published["device/events"] if e.event in taken] == taken
+        )
+        assert gateway.run(5.0, lambda: gateway.published["device/configuration"][-1].accepted)
+        assert said(gateway).config_crc32 == config_crc(config_text(wanted))
+        for kind in (DeviceCommandKind.ARM, DeviceCommandKind.REFERENCE):
+            gateway.run(0.4)
+            assert gateway.command(DeviceCommandRequest(command=kind)).accepted
+        gateway.run(0.4)
+        assert gateway.goal(NEAR).accepted
+        assert gateway.finish()[0] == GoalStatusCode.SUCCEEDED
+    processes.kill(DEVICE)
+    processes.start(DEVICE)  # it meets what the broker has retained now
+    with closing(Gateway(processes.port)) as gateway:
+        gateway.ready()
+        gateway.run(0.5)
+        assert gateway.published["device/configuration"][-1].accepted
+
+
+def test_a_gateway_gives_the_configuration_when_it_is_asked_for(processes: Processes) -> None:
+    with closing(Gateway(processes.port)) as gateway:
+        gateway.ready()
+        assert gateway.configure().accepted, "the one it has already"

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceMode
+from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceMode
 from schemas.joints import JointTargets
 from schemas.message import Vector
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
@@ -56,12 +56,56 @@ class Play:
         if self.rig.goal(goal, goal_id).accepted:
             self.accepted[goal_id] = self.rig.now + max(0.0, trajectory.stamp * 1e-9 - self.rig.moment.unix * 1e-9)
 
-    def command(self, kind: DeviceCommandKind) -> None:
+    def command(self, kind: DeviceCommandKind, value: float = 0.0) -> None:
         """A reference is taken where the arm stands: the count of a joint that is told another place jumps."""
         self.tickets += 1
         is_reference = kind == DeviceCommandKind.REFERENCE
         here = dict(zip(rm1().joint_names, self.here(), strict=True)) if is_reference else {}
-        self.rig.command(kind, self.tickets, **here)
+        request = DeviceCommandRequest(
+            command=kind, name=tuple(here), position=tuple(here.values()), output="avanzar", value=value
+        )
+        self.rig.ask(request, self.tickets)
+
+    def home(self, seconds: float) -> None:
+        """One joint looks for its switch, for so long; its way is not the gateway's, and its count jumps."""
+        self.finish_track()
+        self.tickets += 1
+        self.rig.ask(DeviceCommandRequest(command=DeviceCommandKind.HOME, name=("efector_joint",)), self.tickets)
+        if self.rig.run(0.5, lambda: self.rig.device.mode == DeviceMode.HOMING):
+            self.rig.run(seconds, lambda: self.rig.device.mode != DeviceMode.HOMING)
+            if self.rig.device.mode == DeviceMode.HOMING:
+                self.command(DeviceCommandKind.STOP)
+                self.rig.run(5.0, lambda: self.rig.device.mode != DeviceMode.HOMING)
+            self.quiet_since = len(self.rig.path)
+            self.place_within()
+
+    def press_estop(self, seconds: float) -> None:
+        """The arm stops dead, which is no braking; then somebody brings it back."""
+        self.finish_track()
+        self.rig.device.press_input(0, True)
+        self.wait(seconds)
+        self.rig.device.press_input(0, None)
+        self.wait(0.1)
+        self.revive()
+        self.quiet_since = len(self.rig.path)
+
+    def revive(self) -> None:
+        """What a person does who follows the refusals."""
+        kinds = (DeviceCommandKind.RESET, DeviceCommandKind.ARM, DeviceCommandKind.REFERENCE)
+        for kind in kinds if self.rig.device.mode != DeviceMode.UNREFERENCED else kinds[1:]:
+            self.command(kind)
+            self.rig.run(0.5)
+
+    def place_within(self) -> None:
+        """A homing that was stopped beyond the limits is brought back by hand, and declared."""
+        if self.rig.device.mode == DeviceMode.UNREFERENCED:
+            self.tickets += 1
+            self.rig.ask(DeviceCommandRequest(command=DeviceCommandKind.REFERENCE), self.tickets)
+            self.rig.run(0.5)
+            self.quiet_since = len(self.rig.path)
+            device = self.rig.device
+            for joint, (counted, true) in enumerate(zip(device.steps, device.shaft, strict=True)):
+                device.slip(joint, counted - true)
 
     def reboot(self, referenced: bool) -> None:
         self.finish_track()
@@ -162,6 +206,7 @@ def restart(play: Play) -> None:
 
 
 PAUSES = (DeviceCommandKind.HOLD, DeviceCommandKind.RESUME)
+PLAIN = [kind for kind in DeviceCommandKind if kind not in (DeviceCommandKind.HOME, DeviceCommandKind.SPEED)]
 waits = st.one_of(st.floats(0.0, 0.06), st.floats(0.0, 3.0))
 reaches = st.sampled_from([0.0, 1e-4, 0.003, 0.02, 0.1, 0.4, 1.0])
 EXPLORED = st.one_of(
@@ -174,7 +219,12 @@ EXPLORED = st.one_of(
     st.builds(lambda rests: lambda play: play.goal(point(play.here(), 0.0, rests)), st.booleans()),
     st.builds(lambda back: lambda play: play.rig.cancel(f"g{max(0, len(play.accepted) - back)}"), st.integers(1, 2)),
     st.builds(stream, shares, reaches, st.integers(1, 12), st.sampled_from([0.02, 0.1, 0.4])),
-    st.builds(lambda kind: lambda play: play.command(kind), st.sampled_from(list(DeviceCommandKind))),
+    st.builds(lambda kind: lambda play: play.command(kind), st.sampled_from(PLAIN)),
+    st.builds(
+        lambda speed: lambda play: play.command(DeviceCommandKind.SPEED, speed), st.sampled_from([0.0, 0.1, 0.6, 1.0])
+    ),
+    st.builds(lambda seconds: lambda play: play.home(seconds), st.sampled_from([0.3, 3.0, 40.0])),
+    st.builds(lambda seconds: lambda play: play.press_estop(seconds), st.sampled_from([0.001, 0.5])),
     st.builds(lambda kind: lambda play: play.command(kind), st.sampled_from(PAUSES)),
     st.builds(link, st.floats(0.02, 2.0), st.booleans()),
     st.builds(freeze, st.floats(0.02, 1.5)),
@@ -195,6 +245,7 @@ def settle(play: Play) -> None:
     rig = play.rig
     rig.wire.loss = rig.wire.jitter = rig.wire.duplicates = 0.0
     rig.run(0.3)
+    play.command(DeviceCommandKind.SPEED, 1.0)
     if rig.device.mode == DeviceMode.HOLD:
         rig.run(3.0)
     if rig.device.mode == DeviceMode.HOLD:
@@ -207,9 +258,8 @@ def settle(play: Play) -> None:
     play.check()
     play.finish_track()
     if rig.device.mode == DeviceMode.UNREFERENCED:
-        play.command(DeviceCommandKind.REFERENCE)
-        rig.run(0.5)
-        assert rig.answers[play.tickets].accepted
+        play.revive()
+        assert rig.answers[play.tickets].accepted, rig.answers[play.tickets].reason
         play.quiet_since = len(rig.path)
     assert rig.device.mode == DeviceMode.IDLE
 
