@@ -1,0 +1,131 @@
+"""The compiled model of one arm, put together anew whenever what stands around it or what it holds changes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+from services.planner.link_spheres import cover_shapes, link_shapes
+from services.planner.native.chain import frames_of
+from services.planner.native.library import motion
+from services.planner.native.obstacles import obstacle_of
+from services.planner.shapes import Attachment, Shape
+from services.planner.spheres import BULGE, Cover
+
+Array = NDArray[np.float64]
+
+ATTACHED_SHARE = 1.0 / 40.0  # of an attached thing's longest side may be bulge: it is covered while somebody waits
+OBSTACLES = 64  # the first obstacle's number in a contact: kMaxParts
+ROUNDING = 2e-5  # [m] for every metre of reach: a float has 24 bits, and some fifty operations place a sphere
+
+
+@dataclass(frozen=True)
+class Held:
+    """An attachment and its compiled part."""
+
+    attachment: Attachment
+    part: motion.Part
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One state of the surroundings, and the names that belong to it; never changed."""
+
+    world: motion.World
+    names: tuple[str, ...]  # of the parts: links, then what is attached
+    shapes: tuple[Shape, ...]
+    held: Mapping[str, Held]
+
+    def name_of(self, number: int) -> str:
+        """Of a part or an obstacle, by its number in a contact."""
+        return self.shapes[number - OBSTACLES].name if number >= OBSTACLES else self.names[number]
+
+
+class Assembly:
+    """Everything about the arm that does not change with its surroundings; `covers` are in the links' frames."""
+
+    def __init__(self, arm: Arm, bulge: float) -> None:
+        self.arm = arm
+        shapes = link_shapes(arm)
+        self.covers = {link: cover_shapes(several, bulge) for link, several in shapes.items()}
+        self._frames = frames_of(arm)
+        self._chain = motion.chain(self._frames.links, self._frames.numbers, len(arm.joints))
+        self._links = {link: self._part(link, shapes[link], cover) for link, cover in self.covers.items()}
+
+    def hold(self, attachment: Attachment) -> Held:
+        """The attachment with its spheres; raises ValueError for an unknown link or a shape without an end."""
+        if attachment.link not in self._frames.places:
+            raise ValueError(f'"{attachment.name}": {self.arm.name} has no link "{attachment.link}"')
+        if attachment.name in self._links:
+            raise ValueError(f'"{attachment.name}" is the name of a link; give what is attached another one')
+        cover = cover_shapes(attachment.shapes, _bulge(attachment.shapes))
+        return Held(attachment, self._part(attachment.link, attachment.shapes, cover))
+
+    def setting(self, shapes: Sequence[Shape], held: Mapping[str, Held]) -> Setting:
+        """Links, then what is attached; raises ValueError for two obstacles of one name or an unknown name."""
+        _require_distinct(shapes)
+        parts = [(link, link, part) for link, part in self._links.items()]
+        parts += [(name, one.attachment.link, one.part) for name, one in held.items()]
+        names = tuple(name for name, _, _ in parts)
+        pairs = [
+            (first, second)
+            for first in range(len(parts))
+            for second in range(first + 1, len(parts))
+            if self._is_checked(parts[first][:2], parts[second][:2], held)
+        ]
+        obstacles = [obstacle_of(shape, shape.matrix, touching=_bits(shape, names)) for shape in shapes]
+        both = np.array(pairs, dtype=np.int32).reshape(-1, 2)
+        world = motion.world(self._chain, [part for _, _, part in parts], both, obstacles)
+        return Setting(world, names, tuple(shapes), dict(held))
+
+    def _part(self, link: str, shapes: Sequence[Shape], cover: Cover) -> motion.Part:
+        """A link's solids and their spheres in its frame, larger by what floats lose on an arm of this reach."""
+        frame, pose = self._frames.places[link]
+        spheres = cover.spheres.copy()
+        spheres[:, :3] = spheres[:, :3] @ pose[:3, :3].T + pose[:3, 3]
+        spheres[:, 3] += self._rounding()
+        solids = [obstacle_of(shape, pose @ shape.matrix, self._rounding()) for shape in shapes]
+        return motion.part(frame, np.ascontiguousarray(spheres), solids)
+
+    def _rounding(self) -> float:
+        """[m] at most between where a float and where a real number is."""
+        steps = np.linalg.norm(self._frames.numbers[:, 9:12], axis=1)
+        return ROUNDING * max(1.0, float(steps.sum() + self._frames.numbers[:, 14].sum()))
+
+    def _is_checked(self, one: tuple[str, str], other: tuple[str, str], held: Mapping[str, Held]) -> bool:
+        """(name, link) of two parts that a joint can move apart; an attachment says itself what it touches."""
+        (name, link), (second_name, second_link) = one, other
+        if self._frames.places[link][0] == self._frames.places[second_link][0]:
+            return False
+        for attached, touched in ((name, second_name), (second_name, name)):
+            if attached in held and touched in held[attached].attachment.touching:
+                return False
+        if name in held or second_name in held:
+            return True
+        return not self.arm.collisions_are_disabled(link, second_link)
+
+
+def _require_distinct(shapes: Sequence[Shape]) -> None:
+    names = [shape.name for shape in shapes]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f'the scene has "{name}" twice')
+
+
+def _bits(shape: Shape, names: Sequence[str]) -> int:
+    """A bit for each part that may touch the shape."""
+    for name in shape.touching:
+        if name not in names:
+            raise ValueError(f'"{name}" is neither a link with a collision shape nor attached: {", ".join(names)}')
+    return sum(1 << names.index(name) for name in shape.touching)
+
+
+def _bulge(shapes: Sequence[Shape]) -> float:
+    """[m]: more for what is large."""
+    longest = [max(shape.size, default=0.0) for shape in shapes]
+    longest += [float(np.ptp(shape.mesh.vertices, axis=0).max()) for shape in shapes if shape.mesh is not None]
+    return max(BULGE, ATTACHED_SHARE * max(longest, default=0.0))
