@@ -1,142 +1,145 @@
-// Random streams over a bad link: whatever is lost, repeated, late, held or starved, no step is.
+// The properties of a device that plays random streams, whatever people, links and failing parts do to them.
+//
+// GEMELO_SEED begins elsewhere, GEMELO_STEPS plays more or fewer steps; both are fixed otherwise.
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <deque>
-#include <random>
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 
-#include "motion.h"
+#include "play.h"
 
 using namespace gemelo;
-using namespace rig;
+using namespace property;
 
 namespace {
 
-class BadLink {
-  public:
-    BadLink(uint32_t seed) : random_(seed) {}
-    bool chance(double probability) { return std::uniform_real_distribution<>(0, 1)(random_) < probability; }
-    int between(int low, int high) { return std::uniform_int_distribution<>(low, high)(random_); }
-    // 10 % of the chunks are lost, 20 % arrive twice; returns the last answer, if there is one.
-    std::optional<Ack> send(Rig& rig, const ChunkSpec& chunk) {
-        if (chance(0.1)) return std::nullopt;
-        Ack ack = rig.send(chunk);
-        if (chance(0.2)) {
-            const Ack again = rig.send(chunk);
-            if (ack.code == Code::Ok) {
-                EXPECT_EQ(again.code, Code::Duplicate);
-            }
-        }
-        return ack;
-    }
+uint64_t from_environment(const char* name, uint64_t fallback) {
+    const char* text = std::getenv(name);
+    return text == nullptr ? fallback : std::strtoull(text, nullptr, 10);
+}
 
-  private:
-    std::mt19937 random_;
-};
+uint64_t first_seed() { return from_environment("GEMELO_SEED", 1); }
 
-// A gateway with a simple idea of repair: it sends from next_seq on.
-class Gateway {
-  public:
-    Gateway(const Motion& motion, uint32_t stream, size_t chunk_knots)
-        : motion_(motion), stream_(stream), size_(chunk_knots) {}
+// Under the sanitizers everything takes ten times as long.
+uint64_t share_of(uint64_t plays) { return std::max<uint64_t>(1, plays * GEMELO_PROPERTY_STEPS / 50000000); }
 
-    void work(Rig& rig, BadLink& link) {
-        for (int pipelined = 0; pipelined < 3; ++pipelined) {
-            const size_t begin = seq_ * size_;
-            if (begin >= motion_.knots()) {
-                seq_ = wanted_;
-                return;
-            }
-            const size_t end = std::min(begin + size_, motion_.knots());
-            const std::optional<Ack> ack =
-                link.send(rig, motion_.chunk(begin, end, static_cast<uint32_t>(seq_), stream_));
-            ++seq_;
-            if (!ack) continue;
-            wanted_ = ack->next_seq;
-            ASSERT_TRUE(ack->code == Code::Ok || ack->code == Code::Duplicate || ack->code == Code::Gap ||
-                        ack->code == Code::NoSpace || ack->code == Code::WrongStream)
-                << static_cast<int>(ack->code);
-            if (ack->code != Code::Ok) seq_ = wanted_;
-            if (ack->code == Code::NoSpace) return;
-        }
-    }
+void expect_none(const Findings& findings, Property property) {
+    EXPECT_EQ(findings.count(property), 0u) << "the first: " << findings.first(property);
+}
 
-  private:
-    Motion motion_;
-    uint32_t stream_;
-    size_t size_;
-    size_t seq_ = 0, wanted_ = 0;
-};
-
-// A slot at a time, with everything that must hold at its end.
-struct Inspector {
-    std::vector<double> before;
-
-    void step(Rig& rig) {
-        rig.run_ms(1);
-        const Machine& machine = rig.device.machine();
-        for (uint8_t j = 0; j < 2; ++j) {
-            const int64_t path = machine.present().position_q20[j];
-            ASSERT_EQ(machine.stepper().latched(j), (path + (1 << 19)) >> kFineBits) << "steps = floor(p + 0.5)";
-            const double position = rig.path(j);
-            // 4000 steps/s is 4 steps a slot; where a stream starts, the path may be one step off the pose.
-            ASSERT_LE(std::fabs(position - before[j]), 5.05) << "a jump";
-            before[j] = position;
-        }
-    }
-};
+// Device times of all widths: with and without a wrap of 32 bits, signed or not, on the way.
+uint64_t begin_us(uint64_t seed) {
+    constexpr uint64_t kBegins[] = {0, (1ull << 32) - 7000000, (1ull << 31) - 3000000, (1ull << 53) + 12345};
+    return kBegins[seed % 4];
+}
 
 }  // namespace
 
-class RandomStreams : public testing::TestWithParam<uint32_t> {};
-
-TEST_P(RandomStreams, LoseNoStepWhateverTheLinkDoes) {
-    BadLink link(GetParam());
-    Rig rig;
-    Inspector inspector{{0, 0}};
-    for (uint32_t stream = 1; stream <= 6; ++stream) {
-        const double from0 = rig.steps(0), from1 = rig.steps(1);
-        const std::vector<double> target = {from0 + link.between(-6000, 6000), from1 + link.between(-2000, 2000)};
-        const double dt = link.between(0, 1) ? 0.020 : 0.010;
-        const Motion motion = quintic({from0, from1}, target, dt);
-        Gateway gateway(motion, stream, static_cast<size_t>(link.between(5, 30)));
-        int silence = 0;
-        for (int ms = 0; ms < 60000; ++ms) {
-            if (rig.count_events("finished") == static_cast<int>(stream)) break;
-            if (silence > 0) {
-                --silence;
-            } else if (link.chance(0.002)) {
-                silence = link.between(50, 1500);
-            } else if (ms % 20 == 0) {
-                gateway.work(rig, link);
-            }
-            if (link.chance(0.001)) rig.command(Command::Hold);
-            if (rig.mode() == Mode::Hold && link.chance(0.01)) rig.command(Command::Resume);
-            ASSERT_NO_FATAL_FAILURE(inspector.step(rig));
+// Plays until enough steps were made, and then looks for each property by its name.
+class Plays : public testing::Test {
+  protected:
+    static void SetUpTestSuite() {
+        const uint64_t wanted = from_environment("GEMELO_STEPS", GEMELO_PROPERTY_STEPS);
+        for (uint64_t seed = first_seed(); steps < wanted; ++seed, ++plays) {
+            Play play(PlaySpec{seed, 20, false, begin_us(seed)}, findings);
+            play.run();
+            steps += play.pulses();
         }
-        ASSERT_EQ(rig.mode(), Mode::Idle);
-        ASSERT_EQ(rig.steps(0), static_cast<int32_t>(target[0]));
-        ASSERT_EQ(rig.steps(1), static_cast<int32_t>(target[1]));
+        std::printf("property: %llu steps in %llu plays from seed %llu\n", static_cast<unsigned long long>(steps),
+                    static_cast<unsigned long long>(plays), static_cast<unsigned long long>(first_seed()));
     }
-    EXPECT_LE(rig.device.machine().max_slot_error_q8(), 128u);
+
+    static Findings findings;
+    static uint64_t steps, plays;
+};
+
+Findings Plays::findings;
+uint64_t Plays::steps = 0, Plays::plays = 0;
+
+TEST_F(Plays, AmountToTheStepsThatWereAskedFor) {
+    EXPECT_GE(steps, from_environment("GEMELO_STEPS", GEMELO_PROPERTY_STEPS));
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, RandomStreams, testing::Range(1u, 13u));
+TEST_F(Plays, MakeFloorOfThePathPlusAHalfStepsByEverySlotsEnd) { expect_none(findings, Property::EmittedSteps); }
 
-TEST(Reboot, InTheMiddleOfAStreamMakesEveryOldFrameVoid) {
-    const Motion motion = quintic({0, 0}, {3000, 0});
-    Rig before;
-    before.send(motion.chunk(0, 50, 0));
-    before.run_ms(600);
-    ASSERT_NE(before.steps(0), 0);
+TEST_F(Plays, GiveEveryDriverThePulsesAndTheSetUpOfItsDataSheet) { expect_none(findings, Property::PulseTiming); }
 
-    Rig after(two_joints(), false, 0, kBoot + 1);
-    EXPECT_EQ(after.send(motion.chunk(50, 60, 1)).code, Code::WrongBoot);
-    EXPECT_EQ(after.send_command(build_command(Command::Resume, 1)), Code::WrongBoot);
-    ChunkSpec fresh = motion.chunk(0, 50, 0, 8);
-    fresh.boot_id = kBoot + 1;
-    EXPECT_EQ(after.send(fresh).code, Code::NotReady);
-    after.run_ms(500);
-    EXPECT_EQ(after.steps(0), 0);
-    EXPECT_EQ(after.mode(), Mode::Unreferenced);
+TEST_F(Plays, KeepVelocityAndAccelerationWithinTheLimits) { expect_none(findings, Property::Limits); }
+
+TEST_F(Plays, NeverLeaveTheGeometricPath) { expect_none(findings, Property::OnThePath); }
+
+TEST_F(Plays, AreTakenAsTheProtocolSaysAndComeToTheirEnd) { expect_none(findings, Property::Answers); }
+
+TEST(Idempotence, SayingEveryFrameTwiceChangesNoPinAndNoWord) {
+    Findings findings;
+    for (uint64_t seed = first_seed(); seed < first_seed() + share_of(20); ++seed) {
+        SCOPED_TRACE(seed);
+        Play once(PlaySpec{seed, 10}, findings), twice(PlaySpec{seed, 10, true}, findings);
+        once.run();
+        twice.run();
+        EXPECT_EQ(twice.stand().pins_hash(), once.stand().pins_hash());
+        EXPECT_EQ(twice.stand().words_hash(), once.stand().words_hash());
+    }
+    expect_none(findings, Property::Idempotence);
+}
+
+TEST(Reboot, InTheMiddleOfAStreamMakesEveryOldFrameVoidAndThePlaceUnknown) {
+    Findings findings;
+    uint64_t pulses = 0;
+    for (uint64_t seed = first_seed(); seed < first_seed() + share_of(40); ++seed) {
+        SCOPED_TRACE(seed);
+        Dice dice(seed);
+        const Bench bench = random_bench(dice);
+        Stand before(bench, findings, 0, 1, true, seed);
+        Gateway gateway(before, 1, seed, false);
+        gateway.open_stream();
+        for (int64_t ms = dice.between(300, 2000); ms > 0; --ms) {
+            before.run_to_a_tick();
+            gateway.work();
+            before.run_to_slot_end();
+        }
+        Stand after(bench, findings, 0, 2, false, seed);
+        for (int ms = 0; ms < 500; ++ms) {
+            after.run_to_a_tick();
+            for (const rig::Bytes& frame : gateway.said()) {
+                after.deliver(frame);
+                EXPECT_EQ(after.chunk_answer ? after.chunk_answer->code : *after.command_answer, Code::WrongBoot);
+            }
+            after.run_to_slot_end();
+        }
+        EXPECT_FALSE(gateway.said().empty());
+        pulses += before.scope->pulses();
+        EXPECT_EQ(after.mode(), Mode::Unreferenced);
+        EXPECT_EQ(after.scope->pulses(), 0u);
+    }
+    EXPECT_GT(pulses, 1000u) << "nothing moved before";
+}
+
+TEST(Wrap, OfDeviceTimeMovesNoPin) {
+    Findings findings;
+    for (uint64_t seed = first_seed(); seed < first_seed() + share_of(12); ++seed) {
+        SCOPED_TRACE(seed);
+        Play early(PlaySpec{seed, 10}, findings);
+        early.run();
+        for (uint64_t begin : {(1ull << 32) - 5000000, (1ull << 31) - 5000000, (1ull << 63) - 5000000}) {
+            Play late(PlaySpec{seed, 10, false, begin}, findings);
+            late.run();
+            EXPECT_EQ(late.stand().pins_hash(), early.stand().pins_hash()) << begin;
+        }
+    }
+}
+
+// After 2^32 ticks, a day at 50 kHz.
+TEST(Wrap, OfTheTickCounterMovesNoPinAndNoWord) {
+    for (uint64_t seed = first_seed(); seed < first_seed() + share_of(2); ++seed) {
+        SCOPED_TRACE(seed);
+        Findings findings;
+        Play fresh(PlaySpec{seed, 5}, findings), old(PlaySpec{seed, 5}, findings);
+        old.stand().count_ticks((1ull << 32) - 100000);
+        fresh.run();
+        old.run();
+        EXPECT_EQ(old.stand().pins_hash(), fresh.stand().pins_hash());
+        EXPECT_EQ(old.stand().words_hash(), fresh.stand().words_hash());
+    }
 }
