@@ -35,9 +35,9 @@ def home(session: Session, wanted: Sequence[str], as_json: bool = False) -> Exit
     session.node.subscribe(DEVICE_EVENTS, homing.on_event)
     require_ready(session.arm, view.require_state())
     names = tuple(joint.name for joint in homing.joints)
-    ask(session, DeviceCommandRequest(command=DeviceCommandKind.HOME, name=names))
-    session.node.subscribe(DEVICE_STATE, homing.on_state)
     with two_stage_interrupt() as interrupt:
+        ask(session, DeviceCommandRequest(command=DeviceCommandKind.HOME, name=names))
+        session.node.subscribe(DEVICE_STATE, homing.on_state)
         report = _follow(session, view, homing, interrupt, as_json)
     if as_json:
         print(msgspec.json.encode(report).decode())
