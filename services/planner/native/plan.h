@@ -23,10 +23,25 @@ struct Wish {
     int patience = 30;  // of the shortener
 };
 
+// How finely lines are told apart while searching: a line that comes so near to something is no loss, unless the start
+// or a goal is as near itself.
+inline Tolerances while_searching(const World& world, const Kernel& kernel, const Tolerances& tolerances,
+                                  const Wish& wish) {
+    Tolerances hasty = tolerances;
+    hasty.finest = std::max(tolerances.finest, 1e-3);
+    Tolerances wide = tolerances;
+    wide.margin += 2.0 * hasty.finest;
+    Rake rake(world, kernel, wide);
+    bool has_room = rake.is_free(wish.start.data());
+    for (const Joints& goal : wish.goals) has_room = has_room && rake.is_free(goal.data());
+    return has_room ? hasty : tolerances;
+}
+
 inline Plan plan(const World& world, const Kernel& kernel, const Space& space, const Tolerances& tolerances,
                  const Wish& wish, const Stop& stop) {
     Plan result;
-    Rake rake(world, kernel, tolerances);
+    Rake rake(world, kernel, while_searching(world, kernel, tolerances, wish));
+    Rake last(world, kernel, tolerances);
     Random random(wish.seed);
     std::vector<Joints> goals;
     for (const Joints& goal : wish.goals) {
@@ -51,9 +66,9 @@ inline Plan plan(const World& world, const Kernel& kernel, const Space& space, c
     }
     result.way = Shortener(space, rake, random, stop).shorten(std::move(result.way), wish.patience);
     result.shorten_s = stop.elapsed() - result.search_s;
-    result.control = Smoother(rake, stop).smooth(result.way);
+    result.control = Smoother(last, stop).smooth(result.way);
     result.smooth_s = stop.elapsed() - result.search_s - result.shorten_s;
-    result.checks = rake.checks();
+    result.checks = rake.checks() + last.checks();
     result.outcome = stop.is_cancelled() ? Outcome::kCancelled : Outcome::kFound;
     return result;
 }

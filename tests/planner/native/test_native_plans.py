@@ -206,3 +206,15 @@ def test_a_plan_of_nonsense_is_refused():
         core.plan([0.0, 0.0], [0.0, 0.0, 0.1])
     with pytest.raises(ValueError, match="at least one goal"):
         core.plan([0.0, 0.0, 0.1], np.zeros((0, 3)))
+
+
+def test_an_arm_that_stands_close_to_something_gets_away_from_it():
+    core = MotionCore(load("rm1"))
+    start, goal = [0.3, 0.2, 0.05], [-1.5, 0.4, 0.15]
+    tables = (Shape("table", ShapeKind.HALF_SPACE, (), ((0.0, 0.0, z), UPRIGHT)) for z in np.arange(0.0, 0.06, 0.0002))
+    for table in tables:
+        core.set_scene([table])
+        if core.distance(start) < core.margin + 0.0006:
+            break
+    assert core.margin + 0.0003 < core.distance(start)
+    assert isinstance(core.plan(start, goal, time_limit=5.0), FreePath)
