@@ -25,8 +25,8 @@ size_t write_will(const Credentials& credentials, uint32_t boot_id, JsonWriter* 
 // Without it Nagle's algorithm and delayed acknowledgements cost 20 to 40 ms a frame.
 void send_at_once(esp_transport_handle_t transport) {
     const int on = 1;
-    const int socket = esp_transport_get_socket(transport);
-    if (socket >= 0) setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    const int connection = esp_transport_get_socket(transport);
+    if (connection >= 0) setsockopt(connection, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
 }
 
 }  // namespace
