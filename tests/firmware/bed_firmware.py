@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import queue
@@ -10,8 +11,9 @@ import shutil
 import socket
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from bench_firmware import FIRST, LAST, Row, command, heartbeat, smooth, traj
@@ -103,6 +105,8 @@ class Bed:
                 process.wait()
         self.client.disconnect()
         self.client.loop_stop()
+        if (self.folder / "device.log").exists():
+            print(self.log)  # pytest shows it where a test has failed
 
     def _hear(self, _client: paho.Client, _data: object, message: paho.MQTTMessage) -> None:
         kind = message.topic.removeprefix(self._topic)
@@ -126,6 +130,24 @@ class Bed:
     def beat(self) -> None:
         self._beats += 1
         self.publish("hb", heartbeat(self._beats))
+
+    @contextlib.contextmanager
+    def beating(self) -> Iterator[None]:
+        """Ten beats a second, whatever else is done meanwhile."""
+        over = threading.Event()
+
+        def beat_on() -> None:
+            while not over.wait(0.1):
+                self.beat()
+
+        heart = threading.Thread(target=beat_on)
+        self.beat()
+        heart.start()
+        try:
+            yield
+        finally:
+            over.set()
+            heart.join()
 
     def move(self, goal: int, duration: float, start: int = 0, stream: int = 1) -> bytes:
         """Send a whole move of q1, once the drivers have been energised for long enough; returns the ACK."""
