@@ -1,0 +1,131 @@
+#include <string>
+
+#include "frame.h"
+#include "frames.h"
+#include "play.h"
+
+using namespace gemelo;
+
+namespace fuzz {
+namespace {
+
+Bytes text(const std::string& words) { return Bytes(words.begin(), words.end()); }
+
+Item slots(uint8_t count) { return {Kind::Slots, {count}}; }
+Item silence(uint8_t count) { return {Kind::Silence, {count}}; }
+Item levels(uint8_t bits) { return {Kind::Levels, {bits}}; }
+
+Bytes chunk(uint32_t seq, int32_t from, int32_t to, bool first, bool last, uint32_t stream = 7) {
+    rig::ChunkSpec spec;
+    spec.stream = stream;
+    spec.seq = seq;
+    spec.first = first;
+    spec.last = last;
+    const int32_t middle = from + (to - from) / 2;
+    if (first) spec.rows.push_back({{from, 0}, {0, 0}});
+    spec.rows.push_back({{middle, 0}, {(to - from) * 20, 0}});
+    spec.rows.push_back({{to, 0}, {0, 0}});
+    spec.dt_us = 40000;
+    return rig::build(spec);
+}
+
+Bytes command(Command what, uint32_t id, uint16_t argument = 0, const std::vector<int32_t>& position = {}) {
+    return rig::build_command(what, id, position, rig::kNever, rig::kBoot, 0, argument);
+}
+
+Bytes json_frame(FrameType type, const std::string& words) {
+    Bytes bytes(kHeaderSize);
+    write_header(bytes.data(), type, 0, 0);
+    bytes.insert(bytes.end(), words.begin(), words.end());
+    return rig::seal(bytes);
+}
+
+const char* const kSmall =
+    R"({"name":"x","joints":[{"name":"q1","lower_q8":-9000,"upper_q8":9000,"max_velocity_q8":9000,)"
+    R"("max_acceleration_q8":9000,"step_pin":1,"dir_pin":2,"text_scale_q32":4294967296,"homing":{"input":0,"group":1,)"
+    R"("direction":1,"fast_q8":900,"slow_q8":90,"back_off_q8":10,"position_q8":9005,"max_travel_q8":99999,)"
+    R"("timeout_ms":1000}}],"tick_hz":20000,"queue_capacity":4,"state_hz":1000,"sensor_hz":100,"armed_at_boot":false,)"
+    R"("enable_pin":5,"inputs":[{"name":"h","pin":21,"role":"home","joint":0,"pull":"up","inverted":true}],)"
+    R"("outputs":[{"name":"o","pin":9}],"sensors":[{"name":"s","kind":"analog","pin":8,"scale_q16":65536,)"
+    R"("offset_milli":-5}]})";
+
+}  // namespace
+
+std::vector<std::vector<Item>> seeds() {
+    const Item beat{Kind::Frame, rig::build_heartbeat(1, 1)}, later_beat{Kind::Frame, rig::build_heartbeat(1, 2)};
+    const Item first{Kind::Frame, chunk(0, 0, 25600, true, false)},
+        second{Kind::Frame, chunk(1, 25600, 0, false, true)};
+    std::vector<std::vector<Item>> all = {
+        {beat, first, slots(30), second, slots(60), later_beat, silence(20)},
+        {first,
+         slots(40),
+         {Kind::Frame, command(Command::Hold, 1)},
+         slots(60),
+         {Kind::Frame, command(Command::Resume, 2)},
+         slots(60),
+         {Kind::Frame, command(Command::Stop, 3)},
+         silence(30)},
+        {first,
+         slots(50),
+         levels(1),
+         slots(9),
+         levels(0),
+         {Kind::Frame, command(Command::Reset, 1)},
+         {Kind::Frame, command(Command::Arm, 2)},
+         {Kind::Frame, command(Command::Reference, 3, 0, {0, 0})},
+         {Kind::Frame, chunk(0, 0, 256, true, true, 8)},
+         silence(9)},
+        {{Kind::Frame, command(Command::Home, 1)},
+         slots(50),
+         levels(2),
+         slots(50),
+         levels(0),
+         slots(50),
+         levels(2),
+         silence(20),
+         levels(0),
+         silence(60)},
+        {{Kind::Line, text("<1,0.01,0.02>")},
+         slots(20),
+         {Kind::Line, text("<2,-0.05,0.1>")},
+         slots(40),
+         {Kind::Line, text("<2,-0.05,0.1>")},
+         {Kind::Line, text("<4,0.000000001,+.5>\r")},
+         silence(60)},
+        {{Kind::Frame, command(Command::Disarm, 1)},
+         {Kind::Config, text(kSmall)},
+         slots(5),
+         {Kind::Packet, command(Command::Arm, 2)},
+         slots(5),
+         {Kind::Packet, command(Command::Home, 3)},
+         slots(60)},
+        {{Kind::Frame, command(Command::Output, 1, 1)},
+         {Kind::Frame, command(Command::Speed, 2, 500)},
+         first,
+         slots(63),
+         {Kind::Retained, command(Command::Hold, 3)},
+         {Kind::Frame, rig::build_sync(5)},
+         silence(9)},
+        {{Kind::Packet, rig::build_sync(5)},
+         {Kind::Packet, json_frame(FrameType::Config, kSmall)},
+         {Kind::Packet, json_frame(FrameType::Provision, "{}")},
+         {Kind::Packet, chunk(0, 0, 2560, true, true)},
+         slots(60)},
+        {{Kind::Provision,
+          text(R"({"device":"rm1","wifi_ssid":"n","wifi_password":"s\u00e9cretsecret","mqtt_uri":)"
+               R"("mqtts://h:8883","mqtt_user":"u","mqtt_password":"p","mqtt_ca":"PEM","factory_reset":false})")}},
+        {{Kind::Json, text(kSmall)}},
+        {{Kind::Json, text(R"({"a":[1,-2,{"b":"\ud83d\ude00"}],"c":null,"d":true})")}},
+        {{Kind::Serial, Bytes{0, 2, 0x67, 0, '<', '1', ',', '0', '.', '1', ',', '0', '>', '\n', 0xff, 0, 0}},
+         slots(30)},
+        {{Kind::Frame, command(Command::Disarm, 1)},
+         levels(4),
+         {Kind::Frame, command(Command::Arm, 2)},
+         {Kind::Frame, command(Command::Reference, 3, 0, {256, -256})},
+         {Kind::Line, text("<9,0,0>")},
+         silence(60)},
+    };
+    return all;
+}
+
+}  // namespace fuzz
