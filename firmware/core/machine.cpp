@@ -69,6 +69,8 @@ void Machine::start(uint64_t now_us, const int32_t* steps, bool referenced) {
 void Machine::restart() {
     if (is_armed_) set_armed(false, "configuration");
     begin(*config_, identity_, reporter_.sink());
+    const int64_t nowhere_q20[kMaxJoints] = {};
+    place(nowhere_q20);
     if (config_->joints != 0) mode_ = Mode::Unreferenced;
     event("configured");
     report_status();
