@@ -37,9 +37,7 @@ def measure() -> Figure:
         samples[name] = rates(core, ways)
     best = motion.kernel_names()[0]
     reference = {name: quantile(rate, 0.5) for name, rate in samples.items() if name != best}
-    note = (
-        f"parol6, {len(SCENE)} boxes, {best}, {WAYS} lines of {POINTS} postures; p99 is the fastest; one thread"
-    )
+    note = f"parol6, {len(SCENE)} boxes, {best}, {WAYS} lines of {POINTS} postures; p99 is the fastest; one thread"
     return of_samples(samples[best], UNIT, None, reference, note)
 
 
