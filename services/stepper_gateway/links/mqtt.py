@@ -12,7 +12,7 @@ import socket
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
@@ -96,6 +96,7 @@ class MqttLink:
         with contextlib.suppress(OSError, ValueError):
             client.disconnect()
         client.loop_stop()
+        self._client = None  # a late answer of the broker may have set it once more
         return was_connected
 
     def _new_client(self) -> paho.Client:
@@ -109,6 +110,7 @@ class MqttLink:
         client.connect_timeout = CONNECT_TIMEOUT
         client.on_socket_open = _send_at_once
         client.on_connect = self._on_connect
+        client.on_subscribe = self._on_subscribe
         client.on_disconnect = self._on_disconnect
         client.on_message = self._on_message
         return client
@@ -118,6 +120,14 @@ class MqttLink:
             self._lose(f"the MQTT broker at {self._address[0]}:{self._address[1]} refuses us: {reason}")
             return
         client.subscribe([(self._prefix + kind, _qos(kind)) for kind in FROM_DEVICE])
+
+    def _on_subscribe(
+        self, client: paho.Client, _data: object, _id: int, reasons: Iterable[object], _props: object
+    ) -> None:
+        """Only now nothing that the device answers can be missed."""
+        if any(getattr(reason, "is_failure", False) for reason in reasons):
+            self._lose(f"the MQTT broker at {self._address[0]}:{self._address[1]} lets us hear nothing: see its ACL")
+            return
         self._client = client
         self._wake()
 

@@ -1,0 +1,46 @@
+"""The gateway's parts, and what happens to all of them at once."""
+
+from __future__ import annotations
+
+from services.arm.description import Arm
+from services.stepper_gateway.desk import CommandDesk
+from services.stepper_gateway.goals import Goals
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.mover import Mover
+from services.stepper_gateway.outputs import Outbox
+from services.stepper_gateway.parameters import GatewayParameters
+from services.stepper_gateway.presses import PressDesk
+from services.stepper_gateway.sensors import SensorWatch
+from services.stepper_gateway.streaming import Streaming
+
+
+class Parts:
+    """Everything that moves the arm, or speaks for it, on one mover."""
+
+    def __init__(self, arm: Arm, session_id: int, parameters: GatewayParameters) -> None:
+        self.out = Outbox()
+        self.mover = Mover(arm, session_id, parameters, self.out)
+        self.goals = Goals(self.mover)
+        self.streaming = Streaming(self.mover)
+        self.desk = CommandDesk(self.mover)
+        self.sensors = SensorWatch(self.mover)
+        self.presses = PressDesk(self.mover)
+
+    def fail(self, reason: str, moment: Moment) -> None:
+        """Nothing of what was under way is continued."""
+        if self.goals.is_active:
+            self.goals.abort(reason, moment)
+        self.streaming.interrupt()
+        self.mover.transmission.abandon()
+
+    def lose(self, reason: str, moment: Moment) -> None:
+        """The device cannot be reached: whatever it does now it does by itself."""
+        self.fail(reason, moment)
+        self.desk.give_up(reason)
+        self.mover.lost()
+
+    def begin_anew(self, reason: str, moment: Moment) -> None:
+        """Another boot, or another configuration: what the gateway knew of the arm's steps means nothing."""
+        self.fail(reason, moment)
+        self.desk.give_up(reason)
+        self.mover.begin_anew()

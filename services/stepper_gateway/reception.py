@@ -1,0 +1,124 @@
+"""What the device says, taken in: frames and JSON change what the gateway knows, does and tells."""
+
+from __future__ import annotations
+
+from schemas.device import DeviceMode
+from schemas.topics import DEVICE_SHAFT, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS
+from services.stepper_gateway.event_desk import pass_on
+from services.stepper_gateway.links.frames import Ack, BadFrame, CommandReply, State, SyncReply, decode
+from services.stepper_gateway.links.link import Kind, Received
+from services.stepper_gateway.links.reports import (
+    ConfigAckReport,
+    EventReport,
+    ShaftReport,
+    StatusReport,
+    decode_report,
+    decode_sensors,
+)
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.parts import Parts
+from services.stepper_gateway.path_log import PathPoint
+
+LOST = (DeviceMode.FAULT, DeviceMode.ESTOP, DeviceMode.UNREFERENCED, DeviceMode.HOMING, DeviceMode.BOOT)
+
+
+class Reception:
+    """The device's side of the core."""
+
+    def __init__(self, parts: Parts) -> None:
+        self._parts = parts
+        self._mover = parts.mover
+
+    def take(self, received: Received, moment: Moment) -> None:
+        """One payload; raises `BadFrame` for one that no device says."""
+        payload, arrival = received.payload, received.arrival * 1e-9
+        if received.retained and received.kind != Kind.STATUS:
+            raise BadFrame("it is retained, and only a status may be")
+        match received.kind:
+            case Kind.STATUS:
+                self._on_status(decode_report(StatusReport, payload), moment)
+            case Kind.EVENT:
+                self._on_event(decode_report(EventReport, payload), moment)
+            case Kind.CONFIG_ACK:
+                self._mover.configuration.on_ack(decode_report(ConfigAckReport, payload))
+            case Kind.SENSORS:
+                self._parts.sensors.on_readings(decode_sensors(payload), arrival, moment)
+            case Kind.SHAFT:
+                self._on_shaft(decode_report(ShaftReport, payload), arrival, moment)
+            case _:
+                self._on_frame(received, arrival, moment)
+
+    def _on_frame(self, received: Received, arrival: float, moment: Moment) -> None:
+        frame = decode(received.payload)
+        match received.kind, frame:
+            case Kind.STATE, State():
+                self._on_state(frame, arrival, moment)
+            case Kind.TRAJ_ACK, Ack():
+                if frame.boot_id == self._mover.session.boot_id:
+                    self._mover.on_ack(frame, arrival, moment)
+                    self._parts.goals.on_ack()
+            case Kind.SYNC_R, SyncReply():
+                self._mover.session.on_sync_reply(frame, received.arrival // 1000)
+            case Kind.CMD_ACK, CommandReply():
+                self._parts.desk.on_reply(frame, moment)
+            case _:
+                raise BadFrame(f"a {type(frame).__name__} frame does not belong there")
+
+    def _on_status(self, status: StatusReport, moment: Moment) -> None:
+        mover = self._mover
+        before = mover.configuration.device_crc32
+        mover.session.on_status(status)
+        mover.configuration.on_status()
+        if before and mover.configuration.device_crc32 != before:
+            self._parts.begin_anew("the device has another configuration", moment)
+        known = mover.session.status
+        if known is not None and known.tick_hz:
+            self._parts.goals.use_tick(known.tick_hz)
+
+    def _on_event(self, event: EventReport, moment: Moment) -> None:
+        pass_on(event, self._mover, moment)
+        self._parts.presses.on_event(event)
+
+    def _on_shaft(self, report: ShaftReport, arrival: float, moment: Moment) -> None:
+        clock = self._mover.session.clock
+        measured = min(clock.monotonic(report.t_us), arrival) if clock.is_synchronised else arrival
+        self._mover.out.publish(DEVICE_SHAFT, self._mover.reporter.shaft(report, moment.unix_at(measured)))
+
+    def _on_state(self, state: State, arrival: float, moment: Moment) -> None:
+        mover = self._mover
+        is_news, is_reboot = mover.session.on_state(state, arrival, mover.parameters.state_timeout)
+        if is_reboot:
+            reason = "the device has restarted"
+            mover.event("rebooted", f"{reason}: its position and boot id are read anew", moment)
+            self._parts.begin_anew(reason, moment)
+        if not is_news:
+            return
+        if not mover.session.fits(state):
+            self._parts.fail(mover.hindrance(), moment)
+            self._publish_device(state, moment)
+            return
+        mover.on_state(state, arrival)
+        point = mover.commanded(state)
+        self._publish(state, point, moment)
+        if state.mode == DeviceMode.HOLD and mover.is_followed(state) and not mover.is_held:
+            self._parts.streaming.interrupt()
+            self._parts.goals.on_hold(moment)
+        if state.mode in LOST:
+            self._parts.fail(mover.hindrance(), moment)
+        self._parts.goals.on_ack()
+        self._parts.goals.on_state(state, point, moment)
+
+    def _publish(self, state: State, point: PathPoint, moment: Moment) -> None:
+        reporter = self._mover.reporter
+        stamp = self._publish_device(state, moment)
+        self._mover.out.publish(JOINT_STATES, reporter.joint_state(state, stamp))
+        self._mover.out.publish(JOINT_COMMANDS, reporter.joint_command(point, state, stamp))
+        self._mover.out.publish(STEP_ERRORS, reporter.step_errors(point, state, stamp))
+
+    def _publish_device(self, state: State, moment: Moment) -> int:
+        """The state's stamp [ns]."""
+        session = self._mover.session
+        measured = session.clock.monotonic(state.t_us) if session.clock.is_synchronised else session.state_arrival
+        stamp = moment.unix_at(min(measured, moment.monotonic))
+        self._mover.out.publish(DEVICE_STATE, self._mover.reporter.device_state(state, stamp, session.clock))
+        return stamp
