@@ -5,18 +5,16 @@ from __future__ import annotations
 import ctypes as c
 import json
 from collections.abc import Sequence
-from enum import IntEnum
-from typing import NamedTuple
 
 import msgspec
 
 from firmware.bindings.library import MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
 from firmware.bindings.motor import MotorError, motor_record
+from firmware.bindings.words import OUTPUTS, JsonFrame, Levels, OutFrame, PinChange, Request
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, config_text
 from schemas.robot import Motor
 
-OUTPUTS = ("traj/ack", "cmd/ack", "sync/r", "state", "event", "status", "config/ack", "sensors", "text")
 LARGEST_OUTPUT = 1024
 LARGEST_REQUEST = 8232  # a frame's length
 UNCONFIGURED = DeviceConfig(name="", joints=())
@@ -24,45 +22,6 @@ UNCONFIGURED = DeviceConfig(name="", joints=())
 
 class ConfigError(ValueError):
     """The core refuses this configuration; the message names the part and the reason."""
-
-
-class OutFrame(NamedTuple):
-    """Something the device said: the topic's last part and the bytes."""
-
-    kind: str
-    payload: bytes
-
-
-class JsonFrame(IntEnum):
-    """JSON that travels in a frame and is the platform's own matter."""
-
-    EVENT = 13
-    PROVISION = 14
-    PROVISION_ACK = 15
-    PRESS = 16
-    SHAFT = 17
-
-
-class Request(NamedTuple):
-    """PROVISION or PRESS, as it came over the serial line."""
-
-    kind: JsonFrame
-    text: bytes
-
-
-class PinChange(NamedTuple):
-    """Levels from this tick on; bit j is joint j."""
-
-    tick: int
-    step: int
-    dir: int
-
-
-class Levels(NamedTuple):
-    """What the device's input pins read: bit i is GPIO i, then GPIO 32 + i."""
-
-    low: int
-    high: int
 
 
 class Device:

@@ -9,7 +9,8 @@ import ssl
 import time
 from urllib.parse import urlsplit
 
-from firmware.bindings.device import Device, OutFrame
+from firmware.bindings.device import Device
+from firmware.bindings.words import OutFrame
 from firmware.platform.host.flash import Credentials
 from firmware.platform.host.link import REPORTS, BrokerAddress, DeviceLink, Item
 

@@ -9,9 +9,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from firmware.bindings.device import Device, JsonFrame, Request
+from firmware.bindings.device import Device
 from firmware.bindings.press import PressRefused, press, read_press, within
 from firmware.bindings.provision import ProvisionRefused
+from firmware.bindings.words import JsonFrame, Request
 from firmware.platform.host.board import Board
 from firmware.platform.host.clock import DeviceClock
 from firmware.platform.host.link import Arrived, Connected, Disconnected, Item, SerialBytes, Stop

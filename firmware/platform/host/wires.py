@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import logging
 
-from firmware.bindings.device import Device, JsonFrame, OutFrame
+from firmware.bindings.device import Device
+from firmware.bindings.words import JsonFrame, OutFrame
 from firmware.platform.host.network import Network
 from firmware.platform.host.pty import SerialLine
 

@@ -1,0 +1,47 @@
+"""What goes to and fro between a device and its platform."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+OUTPUTS = ("traj/ack", "cmd/ack", "sync/r", "state", "event", "status", "config/ack", "sensors", "text")
+
+
+class OutFrame(NamedTuple):
+    """Something the device said: the topic's last part and the bytes."""
+
+    kind: str
+    payload: bytes
+
+
+class JsonFrame(IntEnum):
+    """JSON that travels in a frame and is the platform's own matter."""
+
+    EVENT = 13
+    PROVISION = 14
+    PROVISION_ACK = 15
+    PRESS = 16
+    SHAFT = 17
+
+
+class Request(NamedTuple):
+    """PROVISION or PRESS, as it came over the serial line."""
+
+    kind: JsonFrame
+    text: bytes
+
+
+class PinChange(NamedTuple):
+    """Levels from this tick on; bit j is joint j."""
+
+    tick: int
+    step: int
+    dir: int
+
+
+class Levels(NamedTuple):
+    """What the device's input pins read: bit i is GPIO i, then GPIO 32 + i."""
+
+    low: int
+    high: int
