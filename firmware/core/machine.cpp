@@ -175,7 +175,7 @@ void Machine::watch_supply(const Point& point) {
 void Machine::plan_slot() {
     const Point& before = points_[prepared_number_ % kPoints];
     Point& next = points_[(prepared_number_ + 1) % kPoints];
-    next = before;
+    for (uint8_t j = 0; j < rules_.joints; ++j) next.position_q20[j] = before.position_q20[j];
     path_.advance(mode_ == Mode::Hold ? 0 : speed_q30(), &next);
     next.stream = streams_.stream();
     if (is_following_ || mode_ == Mode::Homing) advance_ramps(&next);

@@ -76,6 +76,16 @@ void Path::refresh_ceilings() {
     }
 }
 
+// What of the i-th segment from here is left, in Q20.
+int64_t Path::left_share(uint16_t i, uint64_t left) const {
+    if (i == 0) return segment_.share(left, 20);
+    return static_cast<int64_t>((left << (20 - kTimeBits)) / queue_[i].dt_us);
+}
+
+int64_t Path::per_dt_q32(uint16_t i) const {
+    return i == 0 ? static_cast<int64_t>(segment_.per_dt_q48 >> 16) : UINT32_MAX / queue_[i].dt_us;
+}
+
 // Where the next slot will end at the present scale, on the straight line between the ceilings of the knots there.
 Allowance Path::allowance() const {
     uint64_t at = elapsed_ + ((static_cast<uint64_t>(scale_.value()) * kSlotUs) >> (30 - kTimeBits));
@@ -90,9 +100,9 @@ Allowance Path::allowance() const {
     const uint32_t low = queue_[i].ceiling_q26;
     if (high >= kFullCeiling && low >= kFullCeiling) return Allowance{kFullCeiling, 0};
     const int64_t fall = static_cast<int64_t>(high) - low;
-    const int64_t left_q20 = at < whole ? static_cast<int64_t>(((whole - at) << 20) / whole) : 0;
+    const int64_t left_q20 = at < whole ? left_share(i, whole - at) : 0;
     const int64_t ceiling = low + ((fall * left_q20) >> 20);
-    const int64_t slope_q30 = fall > 0 ? fall * 16 * (kSlotUs / 2) / queue_[i].dt_us : 0;
+    const int64_t slope_q30 = fall > 0 ? fall * 16 * (kSlotUs / 2) * per_dt_q32(i) >> 32 : 0;
     return Allowance{static_cast<uint32_t>(ceiling), static_cast<uint32_t>(slope_q30)};
 }
 
@@ -123,7 +133,7 @@ void Path::advance(uint32_t bound_q30, Point* point) {
     point->is_starved = is_at_last && !ends_;
     point->play_us = from_us_ + (elapsed_ >> kTimeBits);
     if (!is_active_) return;
-    const uint32_t u_q24 = segment_.dt_us == 0 ? 0 : static_cast<uint32_t>((elapsed_ << 9) / segment_.dt_us);
+    const uint32_t u_q24 = segment_.dt_us == 0 ? 0 : segment_.share(elapsed_, kUnitBits);
     for (uint8_t j = 0; j < joints_; ++j) {
         point->position_q20[j] =
             segment_.dt_us == 0 ? static_cast<int64_t>(from_.position[j]) * 4096 : segment_.cubic[j].at(u_q24);

@@ -46,6 +46,8 @@ class Path {
     void load();
     void refresh_ceilings();
     Allowance allowance() const;
+    int64_t left_share(uint16_t i, uint64_t left) const;
+    int64_t per_dt_q32(uint16_t i) const;
     void move(uint64_t step);
     uint64_t segment_left() const { return (static_cast<uint64_t>(segment_.dt_us) << kTimeBits) - elapsed_; }
 

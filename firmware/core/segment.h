@@ -38,9 +38,13 @@ Drift drift_between(int32_t v0_q8, int32_t v1_q8);
 struct Segment {
     Cubic cubic[kMaxJoints];
     Drift drift[kMaxJoints];
+    int64_t own_q16[kMaxJoints];  // change of |velocity| in a slot of the path, Q16 steps/s
     uint32_t dt_us = 0;
+    uint64_t per_dt_q48 = 0;  // 1 / dt, rounded down: divisions are slow on the chip
 
     void load(const Knot& from, const Knot& to, uint8_t joints);
+    // time 2^bits / dt, rounded down; of a time in 2^-15 us that is no longer than dt, and at most 24 bits.
+    uint32_t share(uint64_t time, uint8_t bits) const;
 };
 
 }  // namespace gemelo

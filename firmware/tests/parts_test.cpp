@@ -6,6 +6,7 @@
 #include <random>
 
 #include "crc32.h"
+#include "protocol.h"
 #include "rig.h"
 #include "segment.h"
 #include "time_scale.h"
@@ -50,6 +51,33 @@ TEST(Cubic, KeepsItsWidthAtTheLongestAndFastestSegment) {
     EXPECT_EQ(reversal.at(1u << 23), 3125ll << kFineBits);
 }
 
+TEST(Cubic, CoversWithAVelocityWhatTheFormulaSays) {
+    std::mt19937 random(9);
+    std::uniform_int_distribution<int32_t> velocity(-50000 * 256, 50000 * 256);
+    std::uniform_int_distribution<uint32_t> dt(kMinDtUs, kMaxDtUs);
+    for (int i = 0; i < 100000; ++i) {
+        const int32_t v = velocity(random);
+        const uint32_t dt_us = dt(random);
+        ASSERT_EQ(make_cubic(0, v, 0, 0, dt_us).c1, static_cast<int64_t>(v) * dt_us * 4096 / 1000000);
+    }
+}
+
+TEST(Segment, SharesTimeAsADivisionWould) {
+    std::mt19937_64 random(10);
+    for (uint32_t dt_us : {1000u, 1001u, 19999u, 20000u, 99991u, 250000u}) {
+        Segment segment;
+        Knot from{}, to{};
+        to.dt_us = dt_us;
+        segment.load(from, to, 1);
+        const uint64_t whole = static_cast<uint64_t>(dt_us) << 15;
+        for (int i = 0; i < 20000; ++i) {
+            const uint64_t time = i == 0 ? whole : random() % (whole + 1);
+            ASSERT_EQ(segment.share(time, 24), (time << 9) / dt_us);
+            ASSERT_EQ(segment.share(time, 20), (time << 5) / dt_us);
+        }
+    }
+}
+
 TEST(KnotQueue, GivesBackInOrderAcrossItsSeam) {
     KnotQueue queue;
     queue.begin(kMaxKnots);
@@ -69,10 +97,14 @@ TEST(KnotQueue, GivesBackInOrderAcrossItsSeam) {
 }
 
 TEST(Root, RoundsDown) {
-    for (uint64_t value : {0ull, 1ull, 2ull, 3ull, 4ull, 99ull, 100ull, (1ull << 60) - 1, 1ull << 60}) {
+    std::mt19937_64 random(7);
+    std::vector<uint64_t> values = {0, 1, 2, 3, 4, 99, 100, (1ull << 60) - 1, 1ull << 60, (1ull << 62) - 1};
+    for (int i = 0; i < 20000; ++i) values.push_back(random() >> (2 + i % 62));
+    for (uint64_t i = 1; i < (1ull << 30); i = i * 3 + 1) values.insert(values.end(), {i * i - 1, i * i, i * i + 1});
+    for (uint64_t value : values) {
         const uint64_t result = root(value);
-        EXPECT_LE(result * result, value);
-        EXPECT_GT((result + 1) * (result + 1), value);
+        ASSERT_LE(result * result, value);
+        ASSERT_GT((result + 1) * (result + 1), value);
     }
 }
 

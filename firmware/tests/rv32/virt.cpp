@@ -8,6 +8,7 @@ namespace {
 
 volatile uint8_t* const kUart = reinterpret_cast<volatile uint8_t*>(0x10000000);
 volatile uint32_t* const kFinisher = reinterpret_cast<volatile uint32_t*>(0x00100000);
+using Word [[gnu::may_alias]] = uint32_t;
 constexpr uint32_t kPass = 0x5555, kFail = 0x3333;
 
 }  // namespace
@@ -22,9 +23,14 @@ extern "C" {
     }
 }
 
+// By words where both are aligned, as the C libraries of the chips do.
 void* memcpy(void* to, const void* from, size_t size) {
     char* out = static_cast<char*>(to);
     const char* in = static_cast<const char*>(from);
+    if (((reinterpret_cast<uintptr_t>(to) | reinterpret_cast<uintptr_t>(from)) & 3) == 0) {
+        for (; size >= 4; size -= 4, out += 4, in += 4)
+            *reinterpret_cast<Word*>(out) = *reinterpret_cast<const Word*>(in);
+    }
     while (size-- != 0) *out++ = *in++;
     return to;
 }
