@@ -30,6 +30,9 @@ ALONE = (
     "seed_move_percent",
     "clock_sync_error_us",
     "hold_reaction_ms",
+    "max_step_rate_hz",
+    "step_time_error_us",
+    "estop_reaction_ticks",
     "cli_start_ms",
 )  # before any stack disturbs them
 ON_A_STACK = ("stack_idle_cpu_percent", "stack_rss_mb", "state_to_frame_ms", "move_accept_to_first_step_ms")
