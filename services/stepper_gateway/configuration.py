@@ -6,6 +6,7 @@ from msgspec.structs import replace
 
 from schemas.device import ConfigureResponse, DeviceConfiguration, DeviceMode
 from schemas.device_config import config_crc, config_text
+from schemas.system import LogLevel
 from schemas.topics import DEVICE_CONFIGURATION
 from services.arm.description import Arm
 from services.arm.device_config import device_config
@@ -77,7 +78,9 @@ class Configuration:
         """The device has answered a configuration, perhaps not one of ours."""
         if ack.crc32 != self.crc32:
             self._is_displaced = True
-            return
+            what = f"the device was given another configuration ({ack.crc32:08x})"
+            whose = "a retained one of the broker, or another gateway's; ours is sent again"
+            return self._out.log(LogLevel.WARNING, f"{what}: {whose}")
         about = f"{ack.part}: {ack.reason}" if ack.part else ack.reason
         self._refusal = "" if ack.accepted or self._is_about_mode() else about
         self._refused_by = self._session.boot_id
@@ -105,15 +108,8 @@ class Configuration:
             return False
         if self._is_displaced or self._tickets:
             return True
-        if self._has_nothing():
-            return not self._refusal_of_this_boot()
         is_missing = not self.is_in_force and self._may_take() and not self._refusal_of_this_boot()
         return is_missing and not absence
-
-    def _has_nothing(self) -> bool:
-        """A device that has never been configured may not even say how it is."""
-        report = self._session.newest_report
-        return report is not None and report.online and report.joints == 0 and report.config_crc32 == 0
 
     def _may_take(self) -> bool:
         if self._session.mode == DeviceMode.BOOT:

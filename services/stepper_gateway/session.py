@@ -55,11 +55,6 @@ class DeviceSession:
         """Whether the drivers are energised."""
         return self.latest is not None and bool(self.latest.flags & StateFlag.ARMED)
 
-    @property
-    def newest_report(self) -> StatusReport | None:
-        """What was said last by any boot, perhaps one that is over."""
-        return next(reversed(self._reports.values()), None)
-
     def fits(self, state: State) -> bool:
         """Whether the state has this arm's joints; a device with another configuration has others."""
         return len(state.steps) == self._joints
@@ -78,7 +73,6 @@ class DeviceSession:
             return
         if status.boot_id == self._offline_boot:
             self._offline_boot = 0
-        self._reports.pop(status.boot_id, None)
         self._reports[status.boot_id] = status
         if len(self._reports) > OLD_BOOTS:
             del self._reports[next(boot for boot in self._reports if boot != self.boot_id)]

@@ -11,10 +11,17 @@ from pathlib import Path
 import pytest
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceCommandRequest
+from schemas.device import ConfigureRequest, DeviceCommandKind, DeviceCommandRequest, PressKind, PressRequest
 from schemas.joints import JointState, JointTargets
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from schemas.topics import DEVICE_COMMAND, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, JOINT_TARGETS
+from schemas.topics import (
+    DEVICE_COMMAND,
+    DEVICE_CONFIGURE,
+    DEVICE_PRESS,
+    FOLLOW_JOINT_TRAJECTORY,
+    JOINT_STATES,
+    JOINT_TARGETS,
+)
 from services.runtime.errors import GoalRefused
 from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
@@ -98,3 +105,8 @@ def test_a_client_moves_cancels_streams_and_commands(running: Running) -> None:
     answer = running.client.call(DEVICE_COMMAND, DeviceCommandRequest(command=DeviceCommandKind.REFERENCE), 3.0)
     assert answer.accepted
     running.until(lambda: running.here.position == (0.0, 0.0, 0.0))
+    assert running.client.call(DEVICE_CONFIGURE, ConfigureRequest(), 8.0).accepted
+    pressed = running.client.call(DEVICE_PRESS, PressRequest(press=PressKind.ESTOP), 5.0)
+    assert pressed.accepted, pressed.reason
+    answer = running.client.call(DEVICE_COMMAND, DeviceCommandRequest(command=DeviceCommandKind.RESET), 3.0)
+    assert "release it" in answer.reason
