@@ -30,10 +30,10 @@ class Counter final : public Watch {
         const uint32_t before = instructions();
         overhead_ = instructions() - before;
     }
-    void tick(Machine& machine) override {
+    void tick(Machine& machine, const Levels& levels) override {
         Stepper& stepper = machine.stepper();
         const uint32_t before = instructions();
-        stepper.tick();
+        stepper.tick(levels);
         ticks.add(instructions() - before - overhead_);
     }
     void slot(Machine& machine, uint64_t now_us) override {
@@ -69,6 +69,8 @@ void count(uint8_t joints) {
     player.play(Move{1, joints, kZero, kThere}, kEventful);
     counter.is_plain = true;
     player.play(Move{2, joints, kThere, kBack}, kPlain);
+    counter.is_plain = false;
+    play_safety(player, joints);
     print("tick", joints, ticks);
     print("slot", joints, slots);
 }

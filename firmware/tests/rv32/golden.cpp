@@ -20,8 +20,8 @@ class Tracer final : public Watch {
   public:
     explicit Tracer(uint8_t joints) : joints_(joints) {}
 
-    void tick(Machine& machine) override {
-        machine.stepper().tick();
+    void tick(Machine& machine, const Levels& levels) override {
+        machine.stepper().tick(levels);
         const Pins& pins = machine.stepper().pins();
         ++tick_;
         if (pins.step == pins_.step && pins.dir == pins_.dir) return;
@@ -68,6 +68,7 @@ void trace(uint8_t joints) {
     Player player(joints, tracer);
     player.play(Move{1, joints, kZero, kThere}, kEventful);
     player.play(Move{2, joints, kThere, kBack}, kPlain);
+    play_safety(player, joints);
 }
 
 }  // namespace

@@ -5,7 +5,24 @@
 #include "stream.h"
 
 // What is done at a time of the play.
-enum class Deed : uint8_t { Hold, Resume, StopFeeding, Feed, RepeatChunk, SkipChunk, End };
+enum class Deed : uint8_t {
+    Hold,
+    Resume,
+    StopFeeding,
+    Feed,
+    RepeatChunk,
+    SkipChunk,
+    Home,
+    Reset,
+    Arm,
+    Slow,
+    Full,
+    PressButton,
+    ReleaseButton,
+    CloseLimit,
+    OpenLimit,
+    End,
+};
 
 struct Cue {
     uint32_t at_ms;
@@ -15,7 +32,7 @@ struct Cue {
 // Stands around the device: runs its ticks and slots, and hears what it says.
 class Watch {
   public:
-    virtual void tick(gemelo::Machine& machine) { machine.stepper().tick(); }
+    virtual void tick(gemelo::Machine& machine, const gemelo::Levels& levels) { machine.stepper().tick(levels); }
     virtual void slot(gemelo::Machine& machine, uint64_t now_us) { machine.slot(now_us); }
     virtual void hear(gemelo::Output, const uint8_t*, size_t) {}
     // A millisecond is over.
@@ -30,7 +47,7 @@ class Player {
     // The device stands at zero, referenced.
     Player(uint8_t joints, Watch& watch);
 
-    // Plays one move, from a start in steps, until the script's End.
+    // Plays one move, from a start in steps, until the script's End; without a move for a stream of 0.
     void play(const Move& move, const Cue* script);
 
   private:
@@ -38,6 +55,8 @@ class Player {
     void act(const Move& move, Deed deed);
     void feed(const Move& move);
     void run_ms();
+    void turn_shafts();
+    gemelo::Levels read_pins() const;
     void send(const Wire& wire);
 
     Watch& watch_;
@@ -49,4 +68,8 @@ class Player {
     uint32_t seq_ = 0;
     uint16_t next_knot_ = 0;
     bool is_feeding_ = true;
+    bool is_button_pressed_ = false;
+    bool is_limit_closed_ = false;
+    uint32_t step_ = 0;
+    int32_t shaft_[kMostJoints] = {};
 };

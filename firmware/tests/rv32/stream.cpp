@@ -68,11 +68,11 @@ Wire Move::chunk(uint16_t first, uint32_t seq) const {
     return sealed(wire);
 }
 
-Wire command(Command command, uint32_t id) {
+Wire command(Command command, uint32_t id, uint16_t argument) {
     Wire wire = header(FrameType::Cmd, 0, kBoot);
     add_u32(&wire, id);
     add_u64(&wire, UINT64_MAX);
-    add_u32(&wire, static_cast<uint32_t>(command));
+    add_u32(&wire, static_cast<uint32_t>(command) | static_cast<uint32_t>(argument) << 16);
     return sealed(wire);
 }
 

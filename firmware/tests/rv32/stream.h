@@ -29,5 +29,5 @@ struct Move {
     Wire chunk(uint16_t first, uint32_t seq) const;
 };
 
-Wire command(gemelo::Command command, uint32_t id);
+Wire command(gemelo::Command command, uint32_t id, uint16_t argument = 0);
 Wire heartbeat(uint32_t counter);
