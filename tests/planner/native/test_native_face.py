@@ -1,0 +1,57 @@
+"""The Python face: what the stub promises is there, and what is missing says so."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from services.planner.native import MotionCore, Shape, ShapeKind
+from services.planner.native.library import motion
+from tests.planner.native.conftest import load
+
+STUB = Path(motion.__file__).with_name("_motion.pyi")
+WITHOUT = """
+import sys
+sys.modules["services.planner.native._motion"] = None
+try:
+    import services.planner.native
+except ImportError as error:
+    print(type(error).__name__, error)
+"""
+
+
+def test_the_module_has_all_that_its_stub_promises_and_nothing_else():
+    promised = {
+        node.name for node in ast.parse(STUB.read_text()).body if isinstance(node, ast.FunctionDef | ast.ClassDef)
+    }
+    assert {name for name in dir(motion) if not name.startswith("_")} == promised
+
+
+def test_without_the_compiled_module_the_remedy_is_said():
+    said = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, text=True, timeout=60, check=True)
+    assert said.stdout.startswith("NativeMissing the motion core cannot be loaded")
+    assert "make setup" in said.stdout
+    assert "sudo apt-get install python3-dev" in said.stdout
+
+
+def test_two_hundred_obstacles_are_no_more_than_the_same_asked_one_by_one():
+    core = MotionCore(load("parol6"))
+    rng = np.random.default_rng(2)
+    angles, radii, heights = rng.uniform([0.0, 0.25, 0.0], [6.28, 0.6, 0.6], (200, 3)).T
+    places = np.column_stack((radii * np.cos(angles), radii * np.sin(angles), heights)).tolist()
+    upright = (0.0, 0.0, 0.0, 1.0)
+    size = (0.02, 0.01, 0.03)
+    shapes = [Shape(f"{i}", ShapeKind.BOX, size, ((x, y, z), upright)) for i, (x, y, z) in enumerate(places)]
+    rows = rng.uniform([-2, -2.4, 1.9, -1.8, -1.5, 0], [2, -0.1, 5.0, 1.8, 1.5, 6], (500, 6))
+    core.set_scene(shapes)
+    together = core.free(rows)
+    one_by_one = np.ones(len(rows), dtype=bool)
+    for shape in shapes:
+        core.set_scene([shape])
+        one_by_one &= core.free(rows)
+    assert np.array_equal(together, one_by_one)
+    assert 0 < together.sum() < len(rows)
