@@ -69,6 +69,8 @@ TEST_F(Plays, KeepVelocityAndAccelerationWithinTheLimits) { expect_none(findings
 
 TEST_F(Plays, NeverLeaveTheGeometricPath) { expect_none(findings, Property::OnThePath); }
 
+TEST_F(Plays, AreSilentWithinATickOfTheEStopAndThreeOfASwitch) { expect_none(findings, Property::EStop); }
+
 TEST_F(Plays, AreTakenAsTheProtocolSaysAndComeToTheirEnd) { expect_none(findings, Property::Answers); }
 
 TEST(Idempotence, SayingEveryFrameTwiceChangesNoPinAndNoWord) {

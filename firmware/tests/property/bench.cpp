@@ -16,10 +16,11 @@ constexpr Driver kDrivers[] = {
 
 constexpr uint32_t kTickHz[] = {50000, 80000, 100000, 50000, 20000};
 
-// From a quarter of a second to a few seconds to full speed; up to one pulse in two ticks.
+// From a tenth of a second to a few seconds to full speed; not quite one pulse in two ticks, at which a knot's rounding
+// may ask for more.
 JointConfig random_joint(Dice& dice, const Driver& driver, uint32_t tick_hz) {
     JointConfig joint{};
-    const double fastest = std::min(dice.logarithmic(200, 60000), tick_hz / 2.0);
+    const double fastest = std::min(dice.logarithmic(200, 60000), tick_hz * 63.0 / 128);
     const double harshest = std::clamp(fastest / dice.logarithmic(0.1, 3.0), 1000.0, 200000.0);
     joint.max_velocity_q8 = static_cast<int32_t>(fastest * 256);
     joint.max_acceleration_q8 = static_cast<int32_t>(harshest * 256);

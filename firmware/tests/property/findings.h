@@ -19,7 +19,7 @@ enum class Property : uint8_t {
     Wrap,
     Answers
 };
-constexpr size_t kProperties = 9;
+constexpr size_t kProperties = 7;
 
 class Findings {
   public:
