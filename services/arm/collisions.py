@@ -23,11 +23,11 @@ class SelfCollisions:
     def __init__(self, arm: Arm, model: pin.Model, configuration: Configuration) -> None:
         self._model = model
         self._configuration = configuration
-        self._geometry = _load(arm, model)
+        self._geometry = load_shapes(arm, model)
         self._pairs = _add_pairs(arm, model, self._geometry)
         self._data = model.createData()
         self._geometry_data = self._geometry.createData()
-        self.reach = _reach(arm, model, self._geometry)
+        self.reach = reach_of(arm, model, self._geometry)
 
     @property
     def geometry_count(self) -> int:
@@ -60,7 +60,7 @@ class SelfCollisions:
         pin.computeDistances(self._model, self._data, self._geometry, self._geometry_data, q)
 
 
-def _load(arm: Arm, model: pin.Model) -> pin.GeometryModel:
+def load_shapes(arm: Arm, model: pin.Model) -> pin.GeometryModel:
     """The collision shapes; pinocchio drops what it does not know WITHOUT an error, so they are counted."""
     expected = sum(len(link.collisions) for link in arm.model.links)
     geometry = pin.buildGeomFromUrdf(
@@ -87,7 +87,7 @@ def _add_pairs(arm: Arm, model: pin.Model, geometry: pin.GeometryModel) -> list[
     return pairs
 
 
-def _reach(arm: Arm, model: pin.Model, geometry: pin.GeometryModel) -> Array:
+def reach_of(arm: Arm, model: pin.Model, geometry: pin.GeometryModel) -> Array:
     """(n,) how far at most [m] any point of any shape moves per unit of each joint: [m/rad] or [m/m].
 
     For a turning joint that is the longest way from its axis to the end of the chain, all travel included.

@@ -41,6 +41,21 @@ class Kinematics:
         self._links = {name: self._model.getFrameId(name) for name in arm.model.link_names}
         self.collisions = SelfCollisions(arm, self._model, self._configuration)
 
+    @property
+    def model(self) -> pin.Model:
+        """The arm as pinocchio has it; not to be changed."""
+        return self._model
+
+    @property
+    def configuration(self) -> Configuration:
+        """From the arm's joints to pinocchio's."""
+        return self._configuration
+
+    @property
+    def base(self) -> pin.SE3:
+        """The base frame in pinocchio's world."""
+        return self._base.copy()
+
     def tool(self, positions: Positions) -> Pose:
         """The tool's pose."""
         pin.forwardKinematics(self._model, self._data, self._configuration.to_pinocchio(positions))
