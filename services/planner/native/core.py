@@ -135,10 +135,10 @@ class MotionCore:
         return motion.centres(self._setting.world, self._kernel, self._rows(positions))
 
     def _lower(self) -> list[float]:
-        return [max(joint.lower, -math.pi) if joint.unit == "rad" else joint.lower for joint in self.arm.joints]
+        return [joint.lower if math.isfinite(joint.lower) else -math.pi for joint in self.arm.joints]
 
     def _upper(self) -> list[float]:
-        return [min(joint.upper, math.pi) if joint.unit == "rad" else joint.upper for joint in self.arm.joints]
+        return [joint.upper if math.isfinite(joint.upper) else math.pi for joint in self.arm.joints]
 
     def _rows(self, values: ArrayLike) -> Array:
         rows = np.ascontiguousarray(values, dtype=np.float64)
