@@ -14,12 +14,10 @@ enum class Property : uint8_t {
     Limits,
     OnThePath,
     Idempotence,
-    Reboot,
     EStop,
-    Wrap,
-    Answers
+    Answers,  // the last one
 };
-constexpr size_t kProperties = 7;
+constexpr size_t kProperties = static_cast<size_t>(Property::Answers) + 1;
 
 class Findings {
   public:
