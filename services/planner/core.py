@@ -28,6 +28,7 @@ from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.clearance import CLEARANCE, first_collision, last_free
 from services.planner.goals import Goals, timed_out
+from services.planner.ik import never
 from services.planner.profile import JointLimits, NoProfile, joint_limits, straight_line
 from services.planner.refusals import NoPlan, in_collision, malformed, scaling_refused
 from services.planner.start import resolve_start
@@ -42,11 +43,6 @@ Array = NDArray[np.float64]
 Start = tuple[float, ...]
 
 PATH_POINTS = 100
-
-
-def never() -> bool:
-    """No clock: the search may take as long as it takes."""
-    return False
 
 
 class GoalTouches(Exception):

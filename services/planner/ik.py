@@ -1,13 +1,9 @@
-"""Inverse kinematics for any arm: damped least squares within the joint limits, from many deterministic starts.
-
-One descent is Levenberg and Marquardt's, with the joints that press against a limit left out of the step.
-"""
+"""Inverse kinematics: in closed form where the arm has one, else descents from many deterministic starts."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
@@ -15,54 +11,56 @@ from numpy.typing import NDArray
 
 from services.arm.description import Arm, Joint
 from services.arm.kinematics import Kinematics
+from services.planner.centring import Centring
+from services.planner.closed_form import ClosedForm, closed_form, turns_about
+from services.planner.descent import Attempt, Descent
 from services.planner.targets import Target
 
 Array = NDArray[np.float64]
+Clock = Callable[[], bool]  # whether the allowed time is over
 
 STARTS = 24  # beside the present posture
 BATCH = 4  # starts that are tried together before their solutions are handed out
-ITERATIONS = 40
-STALL = 1e-5  # share of the squared error by which an iteration must improve
-LARGEST_STEP = 0.8  # [rad] or [m] a joint may move in one iteration
+TURNS = 16  # rotations about the axis of a tool that only has to point somewhere
 SAME = 1e-4  # [s] at full speed: solutions nearer than that are one
+SAME_REDUNDANT = 0.1  # [s] the same, where solutions lie in a continuum
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)
 
 
-@dataclass(frozen=True)
-class Attempt:
-    """Where one descent ended: joint values (n,), and how far the tool is from its target."""
-
-    positions: Array
-    error: float  # [m], turns weighted in
-    is_solution: bool
+def never() -> bool:
+    """No clock: the search may take as long as it takes."""
+    return False
 
 
 class InverseKinematics:
     """Joint values for tool targets."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics) -> None:
+    def __init__(self, arm: Arm, kinematics: Kinematics, is_numeric: bool = False) -> None:
         self._kinematics = kinematics
+        self._descent = Descent(arm, kinematics)
+        self._centring = Centring(arm, kinematics, self._descent)
+        self._closed: ClosedForm | None = None if is_numeric else closed_form(arm, kinematics)
         self._lower, self._upper = np.array([_one_turn(joint) for joint in arm.joints]).T
-        self._bounds = np.array([[j.lower for j in arm.joints], [j.upper for j in arm.joints]])
         self._speed = np.array([joint.velocity for joint in arm.joints])
-        self._identity = np.eye(len(arm.joints))
         self._starts = [self._spread(index) for index in range(1, STARTS + 1)]
 
-    def solutions(self, target: Target, near: Array, is_late: Callable[[], bool]) -> Iterator[Array]:
-        """Distinct joint values that meet the target: what `near` leads to, then batches, each nearest first."""
-        first = self.descend(target, near)
-        found = [first.positions] if first.is_solution else []
-        yield from found
-        attempts = self._attempts(target, near, is_late)
-        while batch := list(islice(attempts, BATCH)):
-            new: list[Array] = []
-            for attempt in batch:
-                if attempt.is_solution and all(self.travel(attempt.positions, other) > SAME for other in found):
-                    found.append(attempt.positions)
-                    new.append(attempt.positions)
-            yield from sorted(new, key=lambda positions: self.travel(near, positions))
+    @property
+    def is_closed_form(self) -> bool:
+        """Whether full poses are solved in closed form."""
+        return self._closed is not None
 
-    def nearest(self, target: Target, near: Array, is_late: Callable[[], bool]) -> list[Array]:
+    def solutions(self, target: Target, near: Array, is_late: Clock) -> Iterator[Array]:
+        """Distinct joint values that meet the target: all of the closed form, the nearest first; where that gives none,
+        what `near` leads to, then batches, each nearest first."""
+        found: list[Array] = []
+        for positions in self._closed_form_solutions(target, near):
+            if self._is_new(positions, found, SAME):
+                found.append(positions)
+                yield positions
+        if not found:
+            yield from self._searched(target, near, is_late)
+
+    def nearest(self, target: Target, near: Array, is_late: Clock) -> list[Array]:
         """Postures that bring the tool as near to the target as their start allows, the best one first."""
         attempts = [self.descend(target, near), *self._attempts(target, near, is_late)]
         return [attempt.positions for attempt in sorted(attempts, key=lambda attempt: attempt.error)]
@@ -73,47 +71,51 @@ class InverseKinematics:
 
     def descend(self, target: Target, start: Array) -> Attempt:
         """The nearest local optimum from `start`."""
-        positions = np.clip(start, self._bounds[0], self._bounds[1])
-        error, jacobian = target.error_and_jacobian(self._kinematics, positions)
-        cost, damping = float(error @ error), 1e-6
-        for _ in range(ITERATIONS):
-            if target.is_met(error):
-                break
-            pull = error @ jacobian
-            free = self._is_free(positions, pull)
-            if not free.any() or float(np.abs(pull[free]).max()) < 1e-10:
-                break
-            trial = self._step(positions, jacobian, pull, free, damping)
-            trial_error, trial_jacobian = target.error_and_jacobian(self._kinematics, trial)
-            trial_cost = float(trial_error @ trial_error)
-            if trial_cost < cost:
-                has_stalled = trial_cost > cost * (1.0 - STALL)
-                positions, error, jacobian, cost = trial, trial_error, trial_jacobian, trial_cost
-                damping = max(damping * 0.1, 1e-12)
-                if has_stalled:
-                    break
-            else:
-                damping *= 10.0
-                if damping > 1e4:
-                    break
-        return Attempt(positions, math.sqrt(cost), target.is_met(error))
+        return self._descent.descend(target, start)
 
-    def _is_free(self, positions: Array, pull: Array) -> NDArray[np.bool_]:
-        """The joints that no limit holds back."""
-        above, below = positions > self._bounds[0], positions < self._bounds[1]
-        free: NDArray[np.bool_] = (above | (pull > 0.0)) & (below | (pull < 0.0))
-        return free
+    def _closed_form_solutions(self, target: Target, near: Array) -> Iterator[Array]:
+        """The closed form's postures, each refined until it meets the target; lazily, the nearest first."""
+        postures = self._closed_form_postures(target, near)
+        for positions in sorted(postures, key=lambda positions: self.travel(near, positions)):
+            attempt = self._descent.descend(target, positions)
+            if attempt.is_solution:
+                yield attempt.positions
 
-    def _step(self, positions: Array, jacobian: Array, pull: Array, free: NDArray[np.bool_], damping: float) -> Array:
-        active = jacobian if free.all() else jacobian * free
-        step = np.linalg.solve(active.T @ active + damping * self._identity, pull * free)
-        longest = float(np.abs(step).max())
-        if longest > LARGEST_STEP:
-            step *= LARGEST_STEP / longest
-        trial: Array = np.minimum(np.maximum(positions + step, self._bounds[0]), self._bounds[1])
-        return trial
+    def _closed_form_postures(self, target: Target, near: Array) -> list[Array]:
+        if self._closed is None or not target.has_turn:
+            return []
+        if target.rotation is not None:
+            return self._closed.postures(target.position, target.rotation, near)
+        assert target.pointing is not None
+        present = self._kinematics.tool(near).rotation
+        turns = turns_about(target.pointing.direction, target.pointing.axis, present, TURNS)
+        return [posture for turn in turns for posture in self._closed.postures(target.position, turn, near)]
 
-    def _attempts(self, target: Target, near: Array, is_late: Callable[[], bool]) -> Iterator[Attempt]:
+    def _searched(self, target: Target, near: Array, is_late: Clock) -> Iterator[Array]:
+        first = self.descend(target, near)
+        found = [first.positions] if first.is_solution else []
+        yield from found
+        attempts = self._attempts(target, near, is_late)
+        while batch := list(islice(attempts, BATCH)):
+            new: list[Array] = []
+            for attempt in batch:
+                if attempt.is_solution:
+                    self._collect(target, attempt.positions, found, new)
+            yield from sorted(new, key=lambda positions: self.travel(near, positions))
+
+    def _collect(self, target: Target, positions: Array, found: list[Array], new: list[Array]) -> None:
+        """Puts a solution that is none of those found into both lists; far from `near`, freedom goes to the middles."""
+        is_redundant = self._centring.is_redundant(target, positions)
+        if is_redundant:
+            positions = self._centring.centred(target, positions)
+        if self._is_new(positions, found, SAME_REDUNDANT if is_redundant else SAME):
+            found.append(positions)
+            new.append(positions)
+
+    def _is_new(self, positions: Array, found: list[Array], same: float) -> bool:
+        return all(self.travel(positions, other) > same for other in found)
+
+    def _attempts(self, target: Target, near: Array, is_late: Clock) -> Iterator[Attempt]:
         """Descents from starts spread over the limits; the first few lie around `near`."""
         for index, spread in enumerate(self._starts):
             if is_late():

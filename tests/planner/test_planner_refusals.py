@@ -91,8 +91,8 @@ def test_a_goal_that_says_too_little_or_two_things_is_refused(planner: Planner, 
 def test_an_orientation_is_refused_by_an_arm_that_cannot_choose_it(planner: Planner, home: JointState):
     goal = PoseGoal(position=(0.25, 0.15, 0.1), orientation=(0.0, 0.0, 0.0, 1.0))
     refusal = refused(planner.plan(PlanRequest(goal=goal), home), PlanCode.INVALID_GOAL_CONSTRAINTS)
-    assert "3 joints: it can place its tool, but not choose how the tool is turned" in refusal.message
-    assert "leave the orientation empty" in refusal.remedy
+    assert "rm1 cannot tilt its tool, and its yaw follows from the position: the goal is 180 deg" in refusal.message
+    assert refusal.remedy == "ask for the position, or for the position + yaw"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,79 @@
+"""What an arm can do with its tool, read from its joints: real arms, and arms that lack joints."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from services.arm.description import Arm, load_arm
+from services.arm.kinematics import Kinematics
+from services.planner.abilities import Abilities, abilities
+from services.planner.targets import Pointing, Target
+
+ROOT = Path(__file__).parents[2] / "urdf"
+
+
+def of(arm: Arm) -> Abilities:
+    return abilities(arm, Kinematics(arm))
+
+
+def without(joints: list[str], folder: Path) -> Arm:
+    """parol6, some of whose joints are fixed."""
+    source = ROOT / "parol6"
+    for file in ("robot.urdf", "robot.srdf", "robot.toml"):
+        text = (source / file).read_text()
+        for name in joints:
+            text = re.sub(f'(<joint name="{name}" type=)"revolute"', r'\1"fixed"', text)
+            text = re.sub(f'\\s*<joint name="{name}" value=[^>]*>', "", text)
+        (folder / file).write_text(without_drives(text, joints) if file == "robot.toml" else text)
+    (folder / "meshes").symlink_to(source / "meshes")
+    return load_arm(folder)
+
+
+def without_drives(text: str, joints: list[str]) -> str:
+    """robot.toml without the [[joint]] of these."""
+    tables = re.split(r"(?m)^(?=\[\[joint\]\])", text)
+    return "".join(table for table in tables if not any(f'name = "{name}"' in table for name in joints))
+
+
+def test_rm1_only_yaws_and_that_follows_from_the_position():
+    able = of(load_arm(ROOT / "rm1"))
+    assert np.allclose(np.abs(able.axes), [[0.0, 0.0, 1.0]])
+    assert able.chosen == 0
+    assert able.sentence == "rm1 cannot tilt its tool, and its yaw follows from the position"
+    assert able.remedy == "ask for the position, or for the position + yaw"
+
+
+def test_parol6_can_do_everything():
+    able = of(load_arm(ROOT / "parol6"))
+    assert (len(able.axes), able.chosen, able.is_full) == (3, 3, True)
+
+
+@pytest.mark.parametrize(
+    ("fixed", "chosen", "remedy"),
+    [
+        (["joint_6"], 2, "ask for the position + the direction of one tool axis, or leave an axis free"),
+        (["joint_4", "joint_6"], 1, "ask for the position alone, or give the orientation a tolerance"),
+        (["joint_4", "joint_5", "joint_6"], 0, "ask for the position alone"),
+    ],
+)
+def test_with_fewer_joints_fewer_turns_can_be_chosen(fixed: list[str], chosen: int, remedy: str, tmp_path: Path):
+    able = of(without(fixed, tmp_path))
+    assert (len(able.axes), able.chosen) == (3, chosen)
+    assert f"has {6 - len(fixed)} joints" in able.sentence
+    assert able.remedy == remedy
+
+
+def test_how_much_tilt_is_missing_does_not_depend_on_the_yaw():
+    able = of(load_arm(ROOT / "rm1"))
+    for yaw in (0.0, 1.0, -2.5):
+        turn = pin.exp3(np.array([0.0, 0.0, yaw])) @ pin.exp3(np.array([0.3, 0.0, 0.0])) @ able.rotation
+        assert able.missing_tilt(Target(np.zeros(3), turn)) == pytest.approx(0.3)
+    sideways = Pointing(np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
+    assert able.missing_tilt(Target(np.zeros(3), None, sideways)) == pytest.approx(np.pi / 2.0)
+    across = Pointing(np.array([1.0, 0.0, 0.0]), np.array([0.6, 0.8, 0.0]))
+    assert able.allows(Target(np.zeros(3), None, across))
