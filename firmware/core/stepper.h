@@ -39,7 +39,7 @@ class Stepper {
     void silence();
 
     // The interrupt's side: reads the e-stop and the switches, then steps.
-    void tick(const Levels& levels = Levels{});
+    void tick(const Levels& levels);
     // `count` ticks within a slot in which nothing happens; only allowed while is_quiet(), with pins that do not
     // change.
     void skip(uint32_t count);

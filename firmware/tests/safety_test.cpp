@@ -278,6 +278,25 @@ TEST(Restart, BeginsAnewWithANewConfigurationDisarmedAndUnreferenced) {
     EXPECT_EQ(wired.shaft[1], 200);
 }
 
+// A platform writes its flash only then.
+TEST(Keeping, StillIsSaidOnlyWhereNothingMovesAndNoPulseIsDue) {
+    Wired wired(open_field(), {0, 0}, true);
+    wired.run_ms(5);
+    ASSERT_TRUE(wired.machine.keeps_still());
+    ASSERT_EQ(wired.follow(1500, -700), Code::Ok);
+    uint64_t seen = wired.pulses;
+    for (int n = 0; n < 100000; ++n) {
+        const bool is_still = wired.machine.keeps_still();
+        seen = wired.pulses;
+        wired.tick();
+        if (is_still) {
+            ASSERT_EQ(wired.pulses, seen) << "tick " << n;
+        }
+    }
+    EXPECT_TRUE(wired.machine.keeps_still());
+    EXPECT_EQ(wired.shaft[0], 1500);
+}
+
 TEST(Boot, WithoutAConfigurationSaysSoAndMovesNothing) {
     DeviceConfig config{};
     Wired wired(wired_joints());  // for its frames and ears

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from schemas.message import Vector
 from services.arm.description import Joint
+from services.arm.device_config import WIDEST_Q8
 
 
 class Knot(NamedTuple):
@@ -55,9 +56,9 @@ class StepEncoder:
 
 
 def _bound(joint: Joint, limit: float) -> int:
-    """A position limit on the wire; a continuous joint has none but the wire's own."""
+    """A position limit on the wire; a continuous joint has the device's widest."""
     if math.isinf(limit):
-        return -(2**31) if limit < 0.0 else 2**31 - 1
+        return -WIDEST_Q8 if limit < 0.0 else WIDEST_Q8
     return joint.steps.to_q8(limit)
 
 
