@@ -31,6 +31,7 @@ ALONE = (
     "clock_sync_error_us",
     "hold_reaction_ms",
     "max_step_rate_hz",
+    "parse_mb_per_s",
     "step_time_error_us",
     "estop_reaction_ticks",
     "cli_start_ms",
