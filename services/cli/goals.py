@@ -48,9 +48,14 @@ def refusal_text(refusal: Refusal, goal: Goal, arm: Arm) -> str:
 def as_typed(goal: Goal, values: Sequence[float], arm: Arm) -> str:
     """`values`, in the form of `goal`, as options of `gemelo move`."""
     if isinstance(goal, PoseGoal):
-        return "--to " + " ".join(f"{value:.4f}" for value in values)
+        turn = f" {'--along' if goal.tool_axis else '--quaternion'} {_numbers(values[3:], 6)}" if values[3:] else ""
+        return f"--to {_numbers(values[:3], 4)}{turn}"
     names = goal.name if isinstance(goal, JointGoal) and len(goal.name) == len(values) else arm.joint_names
     return "--joints " + " ".join(_assignment(arm, name, value) for name, value in zip(names, values, strict=False))
+
+
+def _numbers(values: Sequence[float], digits: int) -> str:
+    return " ".join(f"{value:.{digits}f}" for value in values)
 
 
 def _assignment(arm: Arm, name: str, value: float) -> str:

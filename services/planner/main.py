@@ -6,9 +6,10 @@ import msgspec
 
 from schemas.deployment import Deployment
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
-from schemas.topics import JOINT_STATES, PLAN, PLANNED_PATH
+from schemas.topics import FK, IK, JOINT_STATES, PLAN, PLANNED_PATH
 from services.arm.description import load_arm
 from services.planner.core import Planner
+from services.planner.kinematic_requests import KinematicRequests
 from services.planner.start import STALE_AFTER
 from services.runtime.application import service
 from services.runtime.deployment import project_root
@@ -20,6 +21,7 @@ NOT_READY = "no fresh joint_states: is the stepper_gateway running?"
 def run(node: Node, deployment: Deployment) -> None:
     """Serve until the node is stopped; ready while it knows where the arm is."""
     planner = Planner(load_arm(project_root() / deployment.robot))
+    kinematic = KinematicRequests(planner.arm)
     states = node.latest(JOINT_STATES)
     path = node.publisher(PLANNED_PATH)
 
@@ -43,6 +45,8 @@ def run(node: Node, deployment: Deployment) -> None:
 
     # In the worker: a plan may take its whole allowed_time, and readiness keeps beating meanwhile.
     node.serve(PLAN, plan, worker=True)
+    node.serve(IK, lambda request: kinematic.ik(request, states.message, states.age()), worker=True)
+    node.serve(FK, lambda request: kinematic.fk(request, states.message, states.age()), worker=True)
     node.spin(step, rate=10.0)
 
 
