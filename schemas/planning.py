@@ -131,6 +131,7 @@ class Refusal(Message, frozen=True, kw_only=True):
     value: float | None = None
     limit: float | None = None
     nearest: Vector = ()  # the nearest goal that can be reached, in the goal's own form
+    posture: Vector = ()  # [rad] or [m] of all joints, where the arm would touch something
     message: str = ""  # one sentence for a person
     remedy: str = ""
 

@@ -13,6 +13,7 @@ from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.arm.transforms import IDENTITY, Rigid, from_message
 from services.planner.abilities import abilities
+from services.planner.clearance import Checker
 from services.planner.ik import Clock, InverseKinematics
 from services.planner.pose_goals import target_of
 from services.planner.refusals import NoPlan, beyond_limit, malformed, unknown_name
@@ -28,12 +29,13 @@ INVALID = PlanCode.INVALID_GOAL_CONSTRAINTS
 class Goals:
     """Joint values for every kind of goal, nearest to the start first."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics) -> None:
+    def __init__(self, arm: Arm, kinematics: Kinematics, checker: Checker | None = None) -> None:
+        """`checker` says what touches; without one it is the arm alone."""
         self._arm = arm
         self._kinematics = kinematics
         self.abilities = abilities(arm, kinematics)
         self._ik = InverseKinematics(arm, kinematics)
-        self._unreachable = Unreachable(arm, kinematics, self._ik, self.abilities, kinematics.collisions)
+        self._unreachable = Unreachable(arm, kinematics, self._ik, self.abilities, checker or kinematics.collisions)
 
     def travel(self, first: Start, second: Start) -> float:
         """[s] that the slowest joint takes between two postures at full speed."""

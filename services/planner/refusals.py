@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from schemas.message import Vector
 from schemas.planning import PlanCode, Refusal
@@ -127,17 +127,28 @@ def stale_state(age: float | None, limit: float) -> NoPlan:
 
 
 def in_collision(
-    code: PlanCode, where: str, pairs: Sequence[tuple[str, str]], margin: float, nearest: Vector, remedy: str
+    code: PlanCode,
+    where: str,
+    pairs: Sequence[tuple[str, str]],
+    margin: float,
+    nearest: Vector,
+    remedy: str,
+    posture: Vector = (),
+    objects: Mapping[str, str] | None = None,
 ) -> NoPlan:
-    """Two links would touch."""
-    named = " and ".join(f"{first} with {second}" for first, second in pairs)
+    """Two links, or a link and one of the scene's `objects` (their kinds by name), would touch in `posture`."""
+    known = objects or {}
+    shown = [[f"{known[name]} {name}" if name in known else name for name in pair] for pair in pairs]
+    named = " and ".join(f"{first} with {second}" for first, second in shown)
+    is_own = not any(name in known for pair in pairs for name in pair)
     return NoPlan(
         code,
         Refusal(
-            check="self-collision",
+            check="self-collision" if is_own else "collision",
             subject=" / ".join(pairs[0]),
             limit=margin,
             nearest=nearest,
+            posture=posture,
             message=f"{where}, {named} would be nearer than {1000 * margin:g} mm",
             remedy=remedy,
         ),

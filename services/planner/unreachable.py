@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from schemas.message import Vector
 from schemas.planning import PlanCode, PoseGoal, Refusal
-from services.arm.collisions import SelfCollisions
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.arm.transforms import IDENTITY, Rigid, compose, inverse
 from services.planner.abilities import Abilities
-from services.planner.clearance import CLEARANCE, last_free
+from services.planner.clearance import CLEARANCE, Checker, last_free
 from services.planner.ik import Clock, InverseKinematics
 from services.planner.pose_goals import as_goal
 from services.planner.refusals import NoPlan, out_of_reach
@@ -34,7 +33,7 @@ class Unreachable:
     """Refusals of pose goals for one arm."""
 
     def __init__(
-        self, arm: Arm, kinematics: Kinematics, ik: InverseKinematics, able: Abilities, collisions: SelfCollisions
+        self, arm: Arm, kinematics: Kinematics, ik: InverseKinematics, able: Abilities, collisions: Checker
     ) -> None:
         self._arm, self._kinematics, self._ik = arm, kinematics, ik
         self._abilities, self._collisions = able, collisions

@@ -53,6 +53,11 @@ class World:
         return self.scene.version
 
     @property
+    def objects(self) -> dict[str, str]:
+        """What each object of the scene is: "box", "sphere", ... by name."""
+        return {item.name: str(item.shape.__struct_config__.tag) for item in self.scene.objects}
+
+    @property
     def geometry_count(self) -> int:
         """How many shapes there are, of links and of objects; never zero."""
         return int(self._geometry.model.ngeoms)
