@@ -8,10 +8,9 @@ import msgspec
 
 from schemas.joints import JointState
 from schemas.planning import FkRequest, FkResponse, IkRequest, IkResponse, IkSolution, PlanCode
-from services.arm.collisions import SelfCollisions
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
-from services.planner.clearance import CLEARANCE
+from services.planner.clearance import CLEARANCE, Checker
 from services.planner.goals import INVALID, Goals, Start
 from services.planner.ik import Clock, never
 from services.planner.pose_goals import FARTHEST
@@ -35,7 +34,7 @@ class KinematicRequests:
         request: IkRequest,
         present: JointState | None,
         age: float = 0.0,
-        checker: SelfCollisions | None = None,
+        checker: Checker | None = None,
         is_late: Clock = never,
     ) -> IkResponse:
         """The postures for a pose, the nearest first, or why there is none; `checker` says what they must not touch."""
@@ -88,7 +87,7 @@ class KinematicRequests:
         return tuple(given.get(name, value) for name, value in zip(self._arm.joint_names, standing, strict=True))
 
 
-def _free(postures: list[Start], checker: SelfCollisions) -> list[Start]:
+def _free(postures: list[Start], checker: Checker) -> list[Start]:
     """Those that touch nothing; raises `NoPlan` where all do."""
     free = [posture for posture in postures if checker.distance(posture) > CLEARANCE]
     if free:

@@ -10,6 +10,7 @@ from schemas.topics import FK, IK, JOINT_STATES, PLAN, PLANNED_PATH
 from services.arm.description import load_arm
 from services.planner.core import Planner
 from services.planner.kinematic_requests import KinematicRequests
+from services.planner.scene_keeper import SceneKeeper
 from services.planner.start import STALE_AFTER
 from services.runtime.application import service
 from services.runtime.deployment import project_root
@@ -24,6 +25,8 @@ def run(node: Node, deployment: Deployment) -> None:
     kinematic = KinematicRequests(planner.arm)
     states = node.latest(JOINT_STATES)
     path = node.publisher(PLANNED_PATH)
+    folder = project_root() / deployment.paths.run
+    keeper = SceneKeeper(node, planner.arm, states, folder, planner.set_world)
 
     def plan(request: PlanRequest) -> PlanResponse:
         began = node.monotonic()
@@ -38,6 +41,7 @@ def run(node: Node, deployment: Deployment) -> None:
             path.put(planner.planned_path(response.trajectory, node.now()))
         elif response.refusal is not None:
             node.log.info(f"refused: {response.refusal.message}")
+        keeper.heed(response)
         return msgspec.structs.replace(response, planning_time=took)
 
     def step(_now: int) -> None:
@@ -45,7 +49,11 @@ def run(node: Node, deployment: Deployment) -> None:
 
     # In the worker: a plan may take its whole allowed_time, and readiness keeps beating meanwhile.
     node.serve(PLAN, plan, worker=True)
-    node.serve(IK, lambda request: kinematic.ik(request, states.message, states.age()), worker=True)
+    node.serve(
+        IK,
+        lambda request: kinematic.ik(request, states.message, states.age(), planner.surroundings.newest),
+        worker=True,
+    )
     node.serve(FK, lambda request: kinematic.fk(request, states.message, states.age()), worker=True)
     node.spin(step, rate=10.0)
 

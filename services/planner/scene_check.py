@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import msgspec
+
 from schemas.scene import AllowedPair, PlaneShape, PlanningScene, SceneObject
 from services.arm.description import Arm
 from services.arm.errors import suggestion
@@ -70,3 +72,23 @@ def _require_name(arm: Arm, name: str) -> None:
         raise SceneError('"*" stands for any name and cannot be an object\'s; give it another one')
     if name in arm.model.link_names:
         raise SceneError(f'"{name}" is a link of {arm.name}; give the object another name')
+
+
+def usable_part(arm: Arm, scene: PlanningScene, folders: Folders) -> tuple[PlanningScene, list[str]]:
+    """The scene without what cannot be, and why each of that cannot."""
+    kept: dict[str, SceneObject] = {}
+    pairs: list[AllowedPair] = []
+    reasons: list[str] = []
+    for item in scene.objects[:MOST_OBJECTS]:
+        try:
+            require_object(arm, item, folders)
+            kept[item.name] = item
+        except SceneError as error:
+            reasons.append(str(error))
+    for pair in scene.allowed:
+        try:
+            require_pair(arm, pair, kept)
+            pairs.append(pair)
+        except SceneError as error:
+            reasons.append(str(error))
+    return msgspec.structs.replace(scene, objects=tuple(kept.values()), allowed=tuple(pairs)), reasons

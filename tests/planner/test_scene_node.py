@@ -1,0 +1,159 @@
+"""The planner's scene on a bus: edited, latched, kept over a restart, and shown where it is touched."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from schemas.deployment import Deployment, PathsSection
+from schemas.frames import Transform
+from schemas.joints import JointState
+from schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint
+from schemas.scene import BoxShape, PlanningScene, SceneAction, SceneObject, SceneRequest, SceneResponse, SphereShape
+from schemas.topics import CONTACTS, JOINT_STATES, PLAN, SCENE, SCENE_EDIT
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.main import run
+from services.planner.scene_file import load_scene, save_scene
+from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.node import Node
+from services.runtime.stopping import StopRequest
+
+WAIT = 5.0  # [s]
+GOAL = PlanRequest(goal=JointGoal(name=("brazo_joint",), position=(1.2,)), motion=PointToPoint())
+
+
+@contextmanager
+def planning(folder: Path) -> Iterator[Node]:
+    """A node beside a running planner."""
+    network, stop = MemoryNetwork(), StopRequest()
+    deployment = Deployment(paths=PathsSection(run=str(folder)))
+
+    def serve() -> None:
+        with Node("planner", deployment, bus=MemoryBus(network), stop=stop) as node:
+            run(node, deployment)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    try:
+        with Node("asker", deployment, bus=MemoryBus(network), stop=StopRequest()) as node:
+            yield node
+    finally:
+        stop.set()
+        thread.join(WAIT)
+        assert not thread.is_alive()
+
+
+@pytest.fixture
+def asker(tmp_path: Path) -> Iterator[Node]:
+    with planning(tmp_path) as node:
+        yield node
+
+
+def edit(asker: Node, action: SceneAction, name: str = "", item: SceneObject | None = None) -> SceneResponse:
+    return asker.call(SCENE_EDIT, SceneRequest(action=action, name=name, object=item or SceneObject()), timeout=WAIT)
+
+
+def stand(asker: Node, arm: Arm) -> None:
+    """A fresh joint state at rest in the home pose."""
+    states = asker.publisher(JOINT_STATES)
+    for _ in range(3):
+        states.put(JointState(stamp=asker.now(), name=arm.joint_names, position=(0.0,) * len(arm.joints)))
+        asker.wait(0.03)
+
+
+def plan(asker: Node, arm: Arm) -> PlanResponse:
+    stand(asker, arm)
+    return asker.call(PLAN, GOAL, timeout=WAIT)
+
+
+def block(arm: Arm) -> SceneObject:
+    """In the way of the goal."""
+    at = Kinematics(arm).tool((0.6, 0.0, 0.0)).position.tolist()
+    return SceneObject(name="block", shape=BoxShape(size=(0.04, 0.04, 0.04)), pose=Transform(translation=tuple(at)))
+
+
+def test_an_edit_is_answered_latched_and_heeded_by_the_next_plan(asker: Node, rm1: Arm) -> None:
+    assert edit(asker, SceneAction.ADD, item=block(rm1)) == SceneResponse(accepted=True, version=1)
+    scene = asker.latest(SCENE)
+    asker.wait(0.2)
+    assert scene.message is not None
+    assert scene.message.objects == (block(rm1),)
+    refused = plan(asker, rm1)
+    assert refused.refusal is not None
+    assert "box block" in refused.refusal.message
+    assert refused.scene_version == 1
+    assert edit(asker, SceneAction.REMOVE, "block").version == 2
+    assert plan(asker, rm1).code is PlanCode.SUCCESS
+
+
+def test_what_touches_is_shown_until_a_plan_succeeds(asker: Node, rm1: Arm) -> None:
+    contacts = asker.latest(CONTACTS)
+    edit(asker, SceneAction.ADD, item=block(rm1))
+    refused = plan(asker, rm1)
+    asker.wait(0.2)
+    assert contacts.message is not None
+    assert refused.refusal is not None
+    assert contacts.message.name == rm1.joint_names
+    assert contacts.message.position == refused.refusal.posture
+    assert contacts.message.contacts[0].second == "block"
+    assert len(contacts.message.contacts[0].point) == 3
+    edit(asker, SceneAction.CLEAR)
+    plan(asker, rm1)
+    asker.wait(0.2)
+    assert contacts.message.contacts == ()
+
+
+def test_a_bad_edit_is_refused_by_name_and_changes_nothing(asker: Node) -> None:
+    response = edit(asker, SceneAction.REMOVE, "block")
+    assert response == SceneResponse(reason='there is no object "block"; none is known')
+    response = edit(asker, SceneAction.ADD, item=SceneObject(name="ball", shape=SphereShape(radius=0.0)))
+    assert response.reason.startswith('object "ball": radius of the sphere is 0 m')
+    assert response.version == 0
+
+
+def test_attaching_needs_to_know_where_the_arm_is(asker: Node, rm1: Arm) -> None:
+    edit(asker, SceneAction.ADD, item=SceneObject(name="cup", shape=SphereShape(radius=0.01)))
+    attach = SceneObject(frame=rm1.tool_frame)
+    assert "it is not known where the arm is" in edit(asker, SceneAction.ATTACH, "cup", attach).reason
+    stand(asker, rm1)
+    assert edit(asker, SceneAction.ATTACH, "cup", attach).accepted
+
+
+def test_a_restart_has_the_scene_as_it_was(tmp_path: Path, rm1: Arm) -> None:
+    with planning(tmp_path) as asker:
+        edit(asker, SceneAction.ADD, item=block(rm1))
+        before = asker.latest(SCENE)
+        asker.wait(0.2)
+    with planning(tmp_path) as asker:
+        after = asker.latest(SCENE)
+        refused = plan(asker, rm1)
+        assert after.message == before.message
+        assert refused.refusal is not None
+        assert "box block" in refused.refusal.message
+        assert edit(asker, SceneAction.CLEAR).version == 2
+
+
+def test_a_damaged_file_is_kept_aside_and_the_planner_serves(tmp_path: Path, rm1: Arm) -> None:
+    (tmp_path / "scene.json").write_text('{"objects": [')
+    with planning(tmp_path) as asker:
+        assert plan(asker, rm1).code is PlanCode.SUCCESS
+        assert (tmp_path / "scene.json.damaged").read_text() == '{"objects": ['
+        assert edit(asker, SceneAction.ADD, item=block(rm1)).version == 1
+
+
+def test_what_does_not_fit_the_arm_is_left_out_and_the_rest_stays(tmp_path: Path, rm1: Arm) -> None:
+    lost = SceneObject(name="lost", shape=SphereShape(radius=0.1), frame="no_link", attached=True)
+    save_scene(tmp_path / "scene.json", PlanningScene(version=5, objects=(block(rm1), lost)))
+    with planning(tmp_path) as asker:
+        scene = asker.latest(SCENE)
+        assert edit(asker, SceneAction.REMOVE, "lost").reason == 'there is no object "lost"; known are block'
+        asker.wait(0.1)
+        assert scene.message is not None
+        assert scene.message.objects == (block(rm1),)
+        assert (tmp_path / "scene.json.damaged").exists()
+        assert load_scene(tmp_path / "scene.json") == scene.message
