@@ -193,6 +193,10 @@ TEST(Packets, TooLongAFrameOrLineIsDroppedAndTheNextOneHeard) {
     ASSERT_EQ(pieces.size(), 2u);
     EXPECT_EQ(pieces[0].found, Packets::Found::Bad);
     EXPECT_EQ(pieces[1].bytes, bytes_of("<2,1>"));
+    pieces = cut(bytes_of(longest + longest + "\n<3,1>\n"));
+    ASSERT_EQ(pieces.size(), 2u);
+    EXPECT_EQ(pieces[0].found, Packets::Found::Bad);
+    EXPECT_EQ(pieces[1].bytes, bytes_of("<3,1>"));
 }
 
 TEST(Packets, AFrameThatIsCutOffIsBad) {
@@ -289,4 +293,20 @@ TEST(SerialPort, HasRoomForTheLargestReports) {
     EXPECT_GT(line.port.wrap(Output::Event, text.data(), text.size(), out, sizeof out), 0u);
     EXPECT_GT(line.port.wrap(Output::State, state.data(), state.size(), out, sizeof out), 0u);
     EXPECT_EQ(line.port.wrap(Output::Event, text.data(), text.size(), out, sizeof out - 1), 0u);
+}
+
+TEST(SerialPort, FramesWhatIsJsonByItsType) {
+    Line line;
+    uint8_t out[SerialPort::kLargestReport];
+    const Bytes text = bytes_of("{}");
+    const std::pair<Output, FrameType> kinds[] = {{Output::ConfigAck, FrameType::ConfigAck},
+                                                  {Output::Sensors, FrameType::Sensors},
+                                                  {Output::Status, FrameType::Status},
+                                                  {Output::Event, FrameType::Event}};
+    for (const auto& [output, type] : kinds) {
+        const size_t size = line.port.wrap(output, text.data(), text.size(), out, sizeof out);
+        const std::vector<Piece> pieces = cut(Bytes(out, out + size));
+        ASSERT_EQ(pieces.size(), 1u);
+        EXPECT_EQ(pieces[0].bytes[2], static_cast<uint8_t>(type));
+    }
 }
