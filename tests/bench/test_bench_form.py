@@ -14,6 +14,8 @@ ISSUE = (
     "chunk_ack_ms", "state_to_frame_ms", "move_accept_to_first_step_ms", "frame_lookup_us", "plan_ms",
     "stack_idle_cpu_percent", "stack_rss_mb", "cli_start_ms", "lost_of_45000_at_25hz", "ready_s",
     "tick_instructions", "slot_instructions", "core_text_bytes", "core_ram_bytes",
+    "max_step_rate_hz", "step_time_error_us", "parse_mb_per_s", "clock_sync_error_us", "hold_reaction_ms",
+    "estop_reaction_ticks", "seed_move_percent",
 )  # fmt: skip
 
 
