@@ -6,7 +6,14 @@ import os
 import sys
 from collections.abc import Sequence
 
-from services.cli import arm_commands, bus_commands, device_commands, kinematic_commands, system_commands
+from services.cli import (
+    arm_commands,
+    bus_commands,
+    device_commands,
+    kinematic_commands,
+    scene_commands,
+    system_commands,
+)
 from services.cli.exits import CommandError, ExitCode
 from services.cli.parser import Options, Parser, build
 
@@ -14,9 +21,9 @@ ABOUT = "The twin's command line: move the arm, and see everything that is said 
 EPILOG = "The deployment is deploy/local.toml, or the file that $GEMELO_CONFIG names."
 COMMANDS = (
     *arm_commands.COMMANDS, *kinematic_commands.COMMANDS, *device_commands.COMMANDS, *bus_commands.COMMANDS,
-    *system_commands.COMMANDS,
+    *scene_commands.COMMANDS, *system_commands.COMMANDS,
 )  # fmt: skip
-GROUPS = {**device_commands.GROUPS, **bus_commands.GROUPS, **system_commands.GROUPS}
+GROUPS = {**device_commands.GROUPS, **scene_commands.GROUPS, **bus_commands.GROUPS, **system_commands.GROUPS}
 
 
 def parser() -> Parser:

@@ -13,7 +13,7 @@ from services.cli.exits import ExitCode
 from services.cli.names import nearest
 
 Options = argparse.Namespace
-_NEGATIVE_NUMBER = re.compile(r"^-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?$")
+_NEGATIVE_NUMBER = re.compile(r"^-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:deg|rad|mm|m|°)?$")
 
 
 Words = Mapping[str, Iterable[str]]  # what may follow, by the arguments given so far, joined by a blank
@@ -41,7 +41,7 @@ class Command:
 
 
 class Parser(argparse.ArgumentParser):
-    """Says the nearest word where one is wrong, and takes -1e-3 for a number."""
+    """Says the nearest word where one is wrong, and takes -1e-3 and -20mm for numbers."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **settings)

@@ -1,0 +1,82 @@
+"""The words of a `gemelo scene` line as an object: sizes, places and turns with their units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from schemas.frames import Transform
+from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, Shape, SphereShape
+from services.arm.transforms import from_rpy
+from services.cli.exits import usage
+from services.cli.parser import Options
+from services.cli.units import parse_value
+from services.runtime.deployment import project_root
+
+LARGEST_TURN = 2.0 * math.pi  # [rad]
+
+
+def object_of(options: Options) -> SceneObject:
+    """The object that a line of `scene add` describes."""
+    link = options.attach or ""
+    return SceneObject(
+        name=options.name,
+        shape=shape_of(options),
+        pose=pose_of(options.at, options.rpy),
+        frame=link or options.frame,
+        attached=bool(link),
+        touch_links=tuple(options.touch),
+        padding=length(options.padding, "--padding"),
+    )
+
+
+def shape_of(options: Options) -> Shape:
+    """The one shape that is given."""
+    if options.box is not None:
+        return BoxShape(size=lengths(options.box, "--box"))
+    if options.sphere is not None:
+        return SphereShape(radius=length(options.sphere, "--sphere"))
+    if options.cylinder is not None:
+        radius, long = lengths(options.cylinder, "--cylinder")
+        return CylinderShape(radius=radius, length=long)
+    if options.mesh is not None:
+        return mesh_of(Path(options.mesh), options.scale)
+    return PlaneShape()
+
+
+def mesh_of(path: Path, scale: float) -> MeshShape:
+    """By its path where it lies in the project, as every process finds it there; else by its content."""
+    if not path.is_file():
+        raise usage(f'there is no file "{path}"')
+    inside = path.resolve()
+    if inside.is_relative_to(project_root()):
+        return MeshShape(path=str(inside.relative_to(project_root())), scale=(scale,) * 3)
+    try:
+        return MeshShape(data=path.read_bytes(), scale=(scale,) * 3)
+    except OSError as error:
+        raise usage(f'"{path}" cannot be read: {error.strerror}') from error
+
+
+def pose_of(at: Sequence[str], rpy: Sequence[str]) -> Transform:
+    """Position and roll, pitch, yaw about the frame's fixed axes."""
+    x, y, z = lengths(at, "--at")
+    return Transform(translation=(x, y, z), rotation=from_rpy(*(angle(text) for text in rpy)))
+
+
+def lengths(texts: Sequence[str], owner: str) -> tuple[float, ...]:
+    """[m]."""
+    return tuple(length(text, owner) for text in texts)
+
+
+def length(text: str, owner: str) -> float:
+    """[m]."""
+    return parse_value(text, "m", owner)
+
+
+def angle(text: str) -> float:
+    """[rad]; a bare number of more than a turn was meant in degrees."""
+    value = parse_value(text, "rad", "--rpy")
+    if abs(value) > LARGEST_TURN and "deg" not in text and "°" not in text:
+        raise usage(f"--rpy {text} is {value:g} rad, more than a turn: write {text.removesuffix('rad')}deg for degrees")
+    return value
