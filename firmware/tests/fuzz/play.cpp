@@ -86,7 +86,7 @@ class Bench {
     void hear(Output output, const uint8_t* bytes, size_t size) {
         check_output(output, bytes, size, config_.joints);
         check_wrapping(port_, output, bytes, size);
-        (is_refusal(output, bytes, size) ? has_refused_ : has_agreed_) = true;
+        if (!is_refusal(output, bytes, size)) has_agreed_ = true;
     }
     void deliver(const Item& item);
     void serial(const Bytes& bytes) { port_.receive(bytes.data(), bytes.size(), now_us_, now_us_); }
@@ -105,8 +105,7 @@ class Bench {
     Levels levels_;
     uint8_t unsettled_ = 0;  // slots in which every tick is run
     uint64_t now_us_ = 1000000;
-    bool has_refused_ = false;
-    bool has_agreed_ = false;
+    bool has_agreed_ = false;  // to what came last
 };
 
 void Bench::take(const Item& item) {
@@ -115,7 +114,7 @@ void Bench::take(const Item& item) {
     const bool is_talk = item.kind < Kind::Json;
     int32_t before[kMaxJoints];
     for (uint8_t j = 0; j < config_.joints; ++j) before[j] = machine_.stepper().executed(j);
-    has_refused_ = has_agreed_ = false;
+    has_agreed_ = false;
     deliver(item);
     PROMISE(machine_.mode() <= Mode::EStop);
     // What was refused, or not even understood, moves nothing and changes no mode.
