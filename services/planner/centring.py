@@ -52,6 +52,12 @@ class Centring:
             solution = attempt.positions
         return solution
 
+    def drawn(self, target: Target, solution: Array, near: Array) -> Array:
+        """The solution, and what its self-motion, straight as at a singularity, does to come near to `near`."""
+        motions = self._free_motions(target, solution)
+        moved: Array = solution + (motions @ (near - solution)) @ motions
+        return moved
+
     def eccentricity(self, positions: Array) -> float:
         """How far the joints are from their middles: the sum of squares, each 1 at a limit."""
         return float(np.sum(((positions - self._middle) * self._weight) ** 2))

@@ -40,10 +40,10 @@ class ClosedForm:
         self._lower = np.array([joint.lower - ROUNDING for joint in arm.joints])
         self._upper = np.array([joint.upper + ROUNDING for joint in arm.joints])
 
-    def postures(self, position: Array, rotation: Array, near: Array) -> list[Array]:
-        """Every branch and every full turn of its joints within the limits, in no order.
+    def postures(self, position: Array, rotation: Array, near: Array) -> tuple[list[Array], list[Array]]:
+        """The exact ones within the limits, with every full turn, in no order; and what EAIK calls least squares.
 
-        Only where there is no exact one, what EAIK calls least squares: near a singularity those are good starts.
+        Those are out of reach, or, where axes coincide, a solution that lacks one turn.
         """
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = rotation, position
@@ -51,10 +51,11 @@ class ClosedForm:
         branches = np.empty_like(answer.Q)
         branches[:, self._order] = answer.Q
         is_guess = np.array(answer.is_LS, dtype=bool)
-        return self._within(branches[~is_guess], near) or self._within(branches[is_guess], near)
+        return self.within_limits(branches[~is_guess], near), [*branches[is_guess & np.isfinite(branches).all(axis=1)]]
 
-    def _within(self, branches: Array, near: Array) -> list[Array]:
-        """The branches (m, n) turned into the limits, in every way that there is."""
+    def within_limits(self, branches: Array, near: Array) -> list[Array]:
+        """The branches (m, n) or one of them (n,) turned into the limits, in every way that there is."""
+        branches = np.atleast_2d(branches)
         lower = np.where(np.isinf(self._lower), near - math.pi, self._lower)
         upper = np.where(np.isinf(self._upper), near + math.pi, self._upper)
         first = branches + math.tau * np.ceil((lower - branches) / math.tau)

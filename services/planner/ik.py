@@ -13,6 +13,7 @@ from services.arm.description import Arm, Joint
 from services.arm.kinematics import Kinematics
 from services.planner.centring import Centring
 from services.planner.closed_form import ClosedForm, closed_form, turns_about
+from services.planner.coinciding import completed
 from services.planner.descent import Attempt, Descent
 from services.planner.targets import Target
 
@@ -20,7 +21,9 @@ Array = NDArray[np.float64]
 Clock = Callable[[], bool]  # whether the allowed time is over
 
 STARTS = 24  # beside the present posture
+FULL_POSE_JOINTS, MORE_STARTS = 6, 64  # that many where a full pose has to be searched for
 BATCH = 4  # starts that are tried together before their solutions are handed out
+FEW = 4  # starts where the closed form finds nothing, which it has never missed
 TURNS = 16  # rotations about the axis of a tool that only has to point somewhere
 SAME = 1e-4  # [s] at full speed: solutions nearer than that are one
 SAME_REDUNDANT = 0.1  # [s] the same, where solutions lie in a continuum
@@ -42,7 +45,7 @@ class InverseKinematics:
         self._closed: ClosedForm | None = None if is_numeric else closed_form(arm, kinematics)
         self._lower, self._upper = np.array([_one_turn(joint) for joint in arm.joints]).T
         self._speed = np.array([joint.velocity for joint in arm.joints])
-        self._starts = [self._spread(index) for index in range(1, STARTS + 1)]
+        self._starts = [self._spread(index) for index in range(1, self._start_count(arm) + 1)]
 
     @property
     def is_closed_form(self) -> bool:
@@ -58,7 +61,8 @@ class InverseKinematics:
                 found.append(positions)
                 yield positions
         if not found:
-            yield from self._searched(target, near, is_late)
+            is_known = self._closed is not None and target.rotation is not None and not target.is_tolerant
+            yield from self._searched(target, near, is_late, FEW if is_known else len(self._starts))
 
     def nearest(self, target: Target, near: Array, is_late: Clock) -> list[Array]:
         """Postures that bring the tool as near to the target as their start allows, the best one first."""
@@ -82,20 +86,42 @@ class InverseKinematics:
                 yield attempt.positions
 
     def _closed_form_postures(self, target: Target, near: Array) -> list[Array]:
-        if self._closed is None or not target.has_turn:
+        if self._closed is None:
             return []
-        if target.rotation is not None:
-            return self._closed.postures(target.position, target.rotation, near)
-        assert target.pointing is not None
-        present = self._kinematics.tool(near).rotation
-        turns = turns_about(target.pointing.direction, target.pointing.axis, present, TURNS)
-        return [posture for turn in turns for posture in self._closed.postures(target.position, turn, near)]
+        postures: list[Array] = []
+        for rotation in self._rotations(target, near):
+            exact, guesses = self._closed.postures(target.position, rotation, near)
+            postures += exact
+            postures += [
+                posture for guess in guesses for posture in self._from_guess(self._closed, target, guess, near)
+            ]
+        return postures
 
-    def _searched(self, target: Target, near: Array, is_late: Clock) -> Iterator[Array]:
+    def _rotations(self, target: Target, near: Array) -> list[Array]:
+        """The tool's rotations that the target asks for, or some of them where it leaves one turn free."""
+        if target.rotation is not None:
+            return [target.rotation]
+        if target.pointing is None:
+            return []
+        present = self._kinematics.tool(near).rotation
+        return turns_about(target.pointing.direction, target.pointing.axis, present, TURNS)
+
+    def _from_guess(self, closed: ClosedForm, target: Target, guess: Array, near: Array) -> Iterator[Array]:
+        """Where axes coincide, how two joints share one turn is free: as nearly as they can to how they stand now."""
+        alike = completed(target, self._kinematics, guess)
+        for turned in closed.within_limits(np.array(alike), near) if alike else []:
+            attempt = self.descend(target, self._centring.drawn(target, turned, near))
+            if attempt.is_solution:
+                yield attempt.positions
+
+    def _start_count(self, arm: Arm) -> int:
+        return MORE_STARTS if len(arm.joints) >= FULL_POSE_JOINTS and self._closed is None else STARTS
+
+    def _searched(self, target: Target, near: Array, is_late: Clock, starts: int) -> Iterator[Array]:
         first = self.descend(target, near)
         found = [first.positions] if first.is_solution else []
         yield from found
-        attempts = self._attempts(target, near, is_late)
+        attempts = islice(self._attempts(target, near, is_late), starts)
         while batch := list(islice(attempts, BATCH)):
             new: list[Array] = []
             for attempt in batch:

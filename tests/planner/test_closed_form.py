@@ -51,6 +51,16 @@ def test_the_posture_that_a_pose_was_made_of_is_among_the_solutions(goal: tuple[
         assert min(np.abs(solution - goal).max() for solution in solutions) < 1e-5
 
 
+@settings(max_examples=100)
+@given(POSTURES)
+def test_an_arm_with_a_straight_wrist_that_is_there_already_stays_there(posture: tuple[float, ...]):
+    """joint_4 and joint_6 then turn about one axis, and only their sum is given."""
+    here = np.array((*posture[:4], 0.0, posture[5]))
+    pose = KINEMATICS.tool(here)
+    first = next(IK.solutions(Target(pose.position, pose.rotation), here, never))
+    assert IK.travel(here, first) < 1e-4
+
+
 def test_every_full_turn_within_the_limits_is_a_solution_of_its_own():
     arm = with_limits(PAROL6, "joint_6", -2.0 * math.tau, 2.0 * math.tau)
     inverse = InverseKinematics(arm, KINEMATICS)

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from services.arm.description import load_arm
 from services.arm.kinematics import Kinematics
-from services.planner.core import never
-from services.planner.ik import InverseKinematics
+from services.planner.ik import InverseKinematics, never
 from services.planner.targets import Target
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
