@@ -25,6 +25,8 @@ ALONE = (
     "frame_lookup_us",
     "state_check_us",
     "collision_checks_per_s",
+    "ik_ms",
+    "ik_success",
     "plan_ms",
     "lost_of_45000_at_25hz",
     "seed_move_percent",
