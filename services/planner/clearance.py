@@ -1,11 +1,12 @@
-"""How near links may come, and how far along a way the arm can go before they do."""
+"""How near things may come, and how far along a way the arm can go before they do."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
-
-from services.arm.collisions import SelfCollisions
 
 Array = NDArray[np.float64]
 
@@ -14,32 +15,83 @@ ROUNDING = 0.0002  # [m] more, for a posture that is rounded before it is told
 MOST_LOOKS = 50_000
 
 
-def first_collision(collisions: SelfCollisions, positions: Array, margin: float) -> Array | None:
-    """The first posture along the rows of `positions` (m, n) whose links are nearer than `margin` [m], or None."""
-    return _walk(collisions, positions, margin)[1]
+class Checker(Protocol):
+    """Distances of the arm to itself, or to everything around it as well."""
+
+    @property
+    def reach(self) -> Array: ...  # (n,) how far any point moves at most per unit of a joint
+
+    def distance(self, positions: Sequence[float] | Array) -> float: ...
+    def pairs_within(self, positions: Sequence[float] | Array, margin: float = 0.0) -> list[tuple[str, str]]: ...
 
 
-def last_free(collisions: SelfCollisions, start: Array, goal: Array) -> Array:
-    """The last posture (n,) on the straight line from `start` to `goal` before links come nearer than the clearance."""
-    return _walk(collisions, np.vstack((start, goal)), CLEARANCE + ROUNDING)[0]
+def first_collision(checker: Checker, positions: Array, margin: float) -> Array | None:
+    """The first posture along the rows of `positions` (m, n) that does not keep `margin` [m], or None."""
+    return _walk(checker, positions, margin)[1]
 
 
-def _walk(collisions: SelfCollisions, positions: Array, margin: float) -> tuple[Array, Array | None]:
+def last_free(checker: Checker, start: Array, goal: Array) -> Array:
+    """The last posture (n,) on the straight line from `start` to `goal` before anything comes nearer than allowed."""
+    return _walk(checker, np.vstack((start, goal)), CLEARANCE + ROUNDING)[0]
+
+
+def touching_posture(checker: Checker, positions: Array, margin: float) -> Array | None:
+    """Any posture along the rows of `positions` (m, n) at which something is nearer than `margin` [m], or None.
+
+    A look with so much clearance answers for as much movement before it and after it. What is left is looked at in
+    its middle, and pieces in which nothing moves by more than half the margin are not cut any further.
+    """
+    moved = _movement(checker, positions)
+    end = float(moved[-1])
+    least = max(0.5 * margin, end / MOST_LOOKS)
+    waiting = [(0.0, end)]
+    while waiting:
+        low, high = waiting.pop()
+        middle = 0.5 * (low + high)
+        posture = _posture_at(middle, moved, positions)
+        clearance = checker.distance(posture) - margin
+        if clearance <= 0.0:
+            return posture
+        covered = max(clearance, 0.5 * least)
+        if middle - covered > low:
+            waiting.append((low, middle - covered))
+        if middle + covered < high:
+            waiting.append((middle + covered, high))
+    return None
+
+
+def _walk(checker: Checker, positions: Array, margin: float) -> tuple[Array, Array | None]:
     """The last posture that keeps the margin, and the first one after it that does not.
 
     Between two looks no point of the arm moves farther than the clearance just seen, or than half the margin where
     there is none to spare, so that nothing is skipped (conservative advancement).
     """
-    moved = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(positions, axis=0)) @ collisions.reach)))  # [m] at most
+    moved = _movement(checker, positions)
     end = float(moved[-1])
     least = max(0.5 * margin, end / MOST_LOOKS)
     along, last = 0.0, positions[0]
     while True:
-        posture = np.array([np.interp(along, moved, column) for column in positions.T])
-        clearance = collisions.distance(posture) - margin
+        posture = _posture_at(along, moved, positions)
+        clearance = checker.distance(posture) - margin
         if clearance <= 0.0:
             return last, posture
         if along >= end:
             return posture, None
         last = posture
         along = min(end, along + max(clearance, least))
+
+
+def _movement(checker: Checker, positions: Array) -> Array:
+    """(m,) [m] that any point of the arm has moved at most since the first row."""
+    return np.concatenate(([0.0], np.cumsum(np.abs(np.diff(positions, axis=0)) @ checker.reach)))
+
+
+def _posture_at(along: float, moved: Array, positions: Array) -> Array:
+    """The posture (n,) after so much movement [m], on the line between two rows."""
+    row = min(max(int(np.searchsorted(moved, along, side="right")) - 1, 0), len(moved) - 2) if len(moved) > 1 else 0
+    if len(moved) == 1:
+        return np.asarray(positions[0])
+    step = float(moved[row + 1] - moved[row])
+    share = min(1.0, (along - float(moved[row])) / step) if step > 0.0 else 1.0
+    posture: Array = positions[row] + share * (positions[row + 1] - positions[row])
+    return posture

@@ -2,83 +2,74 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import cached_property
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from schemas.joints import JointState
-from schemas.message import Vector
 from schemas.motion import JointTrajectory
-from schemas.planning import (
-    FreeMotion,
-    Goal,
-    JointGoal,
-    NamedGoal,
-    PlanCode,
-    PlannedPath,
-    PlanRequest,
-    PlanResponse,
-    PointToPoint,
-    PoseGoal,
-    Refusal,
-    Timing,
-    WaypointGoal,
-)
+from schemas.planning import FreeMotion, PlanCode, PlannedPath, PlanRequest, PlanResponse, PointToPoint
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
-from services.planner.clearance import CLEARANCE, ROUNDING, first_collision, last_free
+from services.planner.blockade import Blockade
+from services.planner.clearance import CLEARANCE, first_collision
+from services.planner.finish import Finished, Finisher, Touching
 from services.planner.goals import Goals, timed_out
-from services.planner.ik import never
-from services.planner.profile import JointLimits, NoProfile, joint_limits, straight_line
-from services.planner.refusals import NoPlan, in_collision, malformed, scaling_refused
+from services.planner.profile import JointLimits, joint_limits
+from services.planner.refusals import NoPlan, malformed, no_way_around, scaling_refused
+from services.planner.search import Search, require_known
 from services.planner.start import resolve_start
 from services.planner.surroundings import Surroundings
-from services.planner.verify import (
-    BadTrajectory,
-    require_ends,
-    require_within_limits,
-    sample,
-)
+from services.planner.times import Stopwatch
+from services.planner.verify import sample
+from services.planner.way import Deadline, NoWay, Start, endless
 from services.planner.world import World
 
 Array = NDArray[np.float64]
-Start = tuple[float, ...]
 
 PATH_POINTS = 100
-
-
-class GoalTouches(Exception):
-    """A posture at which links are nearer than the clearance."""
+MOST_GOALS = 8  # postures of one goal that are tried
+ATTEMPTS = 3  # searches, where the finished way fails its verification
+STRAIGHT = "straight"  # the planner_id of the joint line, which no search is needed for
 
 
 class Planner:
-    """Plans straight lines of the joints from rest to rest for one arm."""
+    """Plans from rest to rest for one arm: the straight line of the joints, or a way around."""
 
     def __init__(self, arm: Arm, kinematics: Kinematics | None = None) -> None:
         self.arm = arm
         self.kinematics = kinematics or Kinematics(arm)
         self.surroundings = Surroundings(World(arm, self.kinematics))
         self._goals = Goals(arm, self.kinematics, self.surroundings)
+        self._blockade = Blockade(arm, self._goals, self.surroundings)
 
     def set_world(self, world: World) -> None:
         """What later plans heed; a plan that is being made is held against it at its end."""
         self.surroundings.newest = world
+
+    def prepare(self) -> None:
+        """Does now what the first search would wait for: seconds, in which the links are filled with spheres."""
+        self._search.heed(self.surroundings.newest)
 
     def plan(
         self,
         request: PlanRequest,
         present: JointState | None,
         age: float = 0.0,
-        is_late: Callable[[], bool] = never,
+        clock: Callable[[], float] = endless,
     ) -> PlanResponse:
-        """The answer; `age` [s] is how old `present` is, `is_late` says when the allowed time is over."""
+        """The answer; `age` [s] is how old `present` is, `clock` [s] says how the allowed time goes by."""
         self.surroundings.begin()
+        watch, deadline = Stopwatch(clock), Deadline(clock, request.allowed_time, clock())
         try:
-            return self._plan(request, present, age, is_late)
+            response = self._plan(request, present, age, deadline, watch)
         except NoPlan as no_plan:
-            version = self.surroundings.world.version
-            return PlanResponse(code=no_plan.code, refusal=no_plan.refusal, scene_version=version)
+            response = PlanResponse(code=no_plan.code, refusal=no_plan.refusal)
+        version = self.surroundings.world.version
+        return msgspec.structs.replace(response, times=watch.times, scene_version=version)
 
     def planned_path(self, trajectory: JointTrajectory, stamp: int) -> PlannedPath:
         """The way of the tool, for eyes; `stamp` [ns] UNIX."""
@@ -87,36 +78,100 @@ class Planner:
         points = (self.kinematics.tool(rows[index].positions).position.tolist() for index in sorted(chosen))
         return PlannedPath(stamp=stamp, frame=self.arm.base_frame, points=tuple((x, y, z) for x, y, z in points))
 
+    @cached_property
+    def _search(self) -> Search:
+        return Search(self.arm, self.surroundings.world)
+
     def _plan(
-        self, request: PlanRequest, present: JointState | None, age: float, is_late: Callable[[], bool]
+        self, request: PlanRequest, present: JointState | None, age: float, deadline: Deadline, watch: Stopwatch
     ) -> PlanResponse:
         _require_known(request)
         limits = self._limits(request)
         start = resolve_start(self.arm, request.start, present, age)
         margin = self._start_margin(start)
-        refusal: NoPlan | None = None
-        for goal in self._goals.candidates(request.goal, start, is_late):
-            try:
-                trajectory = self._to(goal, start, limits, margin)
-            except GoalTouches:
-                refusal = refusal or self._goal_refused(request.goal, goal, start, is_late)
-            except NoPlan as no_plan:
-                refusal = refusal or no_plan
-            else:
-                return self._success(trajectory, goal)
-            if is_late():
-                break
-        raise refusal or timed_out()
-
-    def _success(self, trajectory: JointTrajectory, goal: Start) -> PlanResponse:
-        self._hold_against_newest(trajectory)
+        finisher = Finisher(self.arm, self.surroundings, request, limits, margin, watch)
+        finished, planner_id = self._found(request, start, margin, finisher, deadline, watch)
+        self._hold_against_newest(finished.trajectory)
         return PlanResponse(
             code=PlanCode.SUCCESS,
-            trajectory=trajectory,
-            duration=trajectory.points[-1].time_from_start,
-            tool_goal=tuple(self.kinematics.tool(goal).position.tolist()),
-            scene_version=self.surroundings.world.version,
+            trajectory=finished.trajectory,
+            duration=finished.trajectory.points[-1].time_from_start,
+            tool_goal=tuple(self.kinematics.tool(finished.trajectory.points[-1].positions).position.tolist()),
+            margins=finished.margins,
+            slowed=finished.slowed,
+            planner_id=planner_id,
         )
+
+    def _found(
+        self,
+        request: PlanRequest,
+        start: Start,
+        margin: float,
+        finisher: Finisher,
+        deadline: Deadline,
+        watch: Stopwatch,
+    ) -> tuple[Finished, str]:
+        """The straight line to the first posture to which there is one, or else a way around to any."""
+        touching: list[Start] = []
+        goals: list[Start] = []
+        for goal in self._postures(request, start, deadline, watch):
+            if self.surroundings.distance(goal) <= CLEARANCE:
+                touching.append(goal)
+            else:
+                try:
+                    return finisher.line(start, goal), STRAIGHT
+                except Touching:
+                    goals.append(goal)
+            if deadline.is_late() or len(goals) == MOST_GOALS:
+                break
+        if goals:
+            if isinstance(request.motion, FreeMotion):
+                return self._around(request.motion, start, np.array(goals), margin, finisher, deadline, watch)
+            raise self._blockade.line(start, goals[0], margin)
+        if touching:
+            raise self._blockade.goal(request.goal, touching[0], start, deadline.is_late)
+        raise timed_out()
+
+    def _postures(self, request: PlanRequest, start: Start, deadline: Deadline, watch: Stopwatch) -> Iterator[Start]:
+        """The goal's postures, nearest first, on the clock of the kinematics."""
+        with watch.phase("ik"):
+            postures = self._goals.candidates(request.goal, start, deadline.is_late)
+        while True:
+            with watch.phase("ik"):
+                posture = next(postures, None)
+            if posture is None:
+                return
+            yield posture
+
+    def _around(
+        self,
+        motion: FreeMotion,
+        start: Start,
+        goals: Array,
+        margin: float,
+        finisher: Finisher,
+        deadline: Deadline,
+        watch: Stopwatch,
+    ) -> tuple[Finished, str]:
+        """A way around what is on the straight one; another one, where the finished trajectory touches."""
+        self._search.heed(self.surroundings.world)
+        refusal: NoPlan | None = None
+        for attempt in range(ATTEMPTS):
+            try:
+                with watch.phase("search"):
+                    way = self._search.find(
+                        np.array(start), goals, margin, motion.planner_id, motion.seed + attempt, deadline, watch
+                    )
+                return finisher.way(way), way.planner_id
+            except NoWay as no_way:
+                raise no_way_around(
+                    no_way.why, self._blockade.line(start, tuple(goals[0].tolist()), margin)
+                ) from no_way
+            except Touching as touching:
+                refusal = self._blockade.way(touching.posture, margin)
+            if deadline.is_late():
+                break
+        raise refusal or timed_out()
 
     def _hold_against_newest(self, trajectory: JointTrajectory) -> None:
         """Raises `NoPlan` where the scene has changed since the plan was begun and is in its way now."""
@@ -126,9 +181,8 @@ class Planner:
         margin = self._start_margin(trajectory.points[0].positions)
         touching = first_collision(world, sample(trajectory).positions, margin)
         if touching is not None:
-            raise self._touching(
-                PlanCode.PLANNING_FAILED, "in the scene as it has become meanwhile", touching, margin, (), "plan again"
-            )
+            where = "in the scene as it has become meanwhile"
+            raise self._blockade.refusal(PlanCode.PLANNING_FAILED, where, touching, margin, (), "plan again")
 
     def _limits(self, request: PlanRequest) -> JointLimits:
         for name in ("velocity_scaling", "acceleration_scaling"):
@@ -141,88 +195,21 @@ class Planner:
         """[m] to keep on the way: an arm that already stands nearer than the clearance may come away from there."""
         distance = self.surroundings.distance(start)
         if distance <= 0.0:
-            raise self._touching(
-                PlanCode.START_STATE_IN_COLLISION,
-                "where the arm stands",
-                np.array(start),
-                0.0,
-                (),
-                self._way_out(start),
-            )
+            raise self._blockade.start(start)
         return min(CLEARANCE, 0.9 * distance)
-
-    def _to(self, goal: Start, start: Start, limits: JointLimits, margin: float) -> JointTrajectory:
-        """The timed straight line to one posture, verified; raises `GoalTouches` or `NoPlan`."""
-        if self.surroundings.distance(goal) <= CLEARANCE:
-            raise GoalTouches
-        try:
-            trajectory = straight_line(self.arm.joint_names, start, goal, limits)
-            samples = sample(trajectory)
-            require_ends(trajectory, start, goal)
-            require_within_limits(self.arm, samples, limits)
-        except (NoProfile, BadTrajectory) as error:
-            raise NoPlan(
-                PlanCode.PLANNING_FAILED,
-                Refusal(
-                    check="verification",
-                    message=f"the timed trajectory did not pass its verification: {error}",
-                    remedy="a larger scaling or a goal farther away; if it stays, report this as a defect",
-                ),
-            ) from error
-        touching = first_collision(self.surroundings, samples.positions, margin)
-        if touching is not None:
-            raise self._way_refused(touching, margin)
-        return trajectory
-
-    def _goal_refused(self, asked: Goal, goal: Start, start: Start, is_late: Callable[[], bool]) -> NoPlan:
-        """The refusal of a goal at which links touch, with the last free posture on the way, in the goal's own form."""
-        last = last_free(self.surroundings, np.array(start), np.array(goal))
-        values = dict(zip(self.arm.joint_names, (round(value, 4) for value in last.tolist()), strict=True))
-        named = ", ".join(f"{joint.name} {values[joint.name]:g} {joint.unit}" for joint in self.arm.joints)
-        match asked:
-            case PoseGoal():
-                nearest = self._goals.shown_point(asked, start, last, is_late)
-            case JointGoal():
-                nearest = tuple(values[name] for name in asked.name)
-            case NamedGoal() | WaypointGoal():
-                nearest = tuple(values.values())
-        remedy = f"the farthest it can go on the straight way there: {named}"
-        return self._touching(PlanCode.GOAL_IN_COLLISION, "at the goal", np.array(goal), CLEARANCE, nearest, remedy)
-
-    def _way_refused(self, touching: Array, margin: float) -> NoPlan:
-        named = ", ".join(self.arm.named_states)
-        remedy = f"go by way of another posture, for example a named one ({named})"
-        return self._touching(PlanCode.PLANNING_FAILED, "on the straight way to the goal", touching, margin, (), remedy)
-
-    def _touching(
-        self, code: PlanCode, where: str, posture: Array, margin: float, nearest: Vector, remedy: str
-    ) -> NoPlan:
-        """The refusal of a posture in which the plan's world touches the arm, with the names of both."""
-        world = self.surroundings.world
-        pairs = world.pairs_within(posture, margin + ROUNDING) or [("?", "?")]
-        standing = tuple(posture.tolist())
-        return in_collision(code, where, pairs, margin, nearest, remedy, standing, world.objects)
-
-    def _way_out(self, start: Start) -> str:
-        """What a person can do for an arm that touches something."""
-        world = self.surroundings.world
-        touched = [name for pair in world.pairs_within(start) for name in pair if name in world.objects]
-        if touched:
-            return (
-                f"move or remove {touched[0]} (`gemelo scene remove {touched[0]}`), allow the pair, or move the arm "
-                "free by hand, then `gemelo reference`"
-            )
-        return "move the arm free by hand, then `gemelo reference`; or check the reference: the arm may be elsewhere"
 
 
 def _require_known(request: PlanRequest) -> None:
     """Raises `NoPlan` for what this planner cannot do."""
-    is_known_way = isinstance(request.motion, PointToPoint) or request.motion == FreeMotion()
-    if is_known_way and request.timing is Timing.JERK_LIMITED:
-        return
-    raise malformed(
-        PlanCode.INVALID_GOAL_CONSTRAINTS,
-        "motion",
-        "this planner makes straight joint lines, jerk-limited",
-        "leave motion and timing at their defaults",
-    )
+    match request.motion:
+        case FreeMotion(planner_id=planner_id):
+            require_known(planner_id)
+        case PointToPoint():
+            pass
+        case _:
+            raise malformed(
+                PlanCode.INVALID_GOAL_CONSTRAINTS,
+                "motion",
+                "this planner goes straight in the joints, or any way that is free",
+                "leave the motion at its default",
+            )

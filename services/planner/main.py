@@ -34,7 +34,7 @@ def run(node: Node, deployment: Deployment) -> None:
             request,
             states.message,
             states.age(),
-            is_late=lambda: node.monotonic() - began > request.allowed_time,
+            clock=node.monotonic,
         )
         took = node.monotonic() - began
         if response.code is PlanCode.SUCCESS:

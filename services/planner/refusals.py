@@ -8,6 +8,7 @@ from schemas.message import Vector
 from schemas.planning import PlanCode, Refusal
 from services.arm.description import Arm, Joint
 from services.arm.errors import nearest_name, suggestion
+from services.planner.way import Why
 
 Point = Sequence[float]
 
@@ -151,6 +152,45 @@ def in_collision(
             posture=posture,
             message=f"{where}, {named} would be nearer than {1000 * margin:g} mm",
             remedy=remedy,
+        ),
+    )
+
+
+def no_way_around(why: Why, blocked: NoPlan) -> NoPlan:
+    """No search has found a way around what is on the straight one."""
+    told, subject, posture = f"{blocked.refusal.message}; and", blocked.refusal.subject, blocked.refusal.posture
+    if why is Why.TIMED_OUT:
+        return NoPlan(
+            PlanCode.TIMED_OUT,
+            Refusal(
+                check="allowed time",
+                subject=subject,
+                posture=posture,
+                message=f"{told} no way around it was found within the time allowed",
+                remedy="allow more time, go by way of another posture, or make room",
+            ),
+        )
+    where = "the start" if why is Why.START_TOUCHES else "every posture of the goal"
+    return NoPlan(
+        PlanCode.PLANNING_FAILED,
+        Refusal(
+            check="clearance",
+            subject=subject,
+            posture=posture,
+            message=f"{told} {where} is too near to something for the compiled core, which is cautious",
+            remedy='ask for planner_id "RRTConnect", which looks at the exact shapes',
+        ),
+    )
+
+
+def not_verified(why: str) -> NoPlan:
+    """A trajectory was made, and may not be executed."""
+    return NoPlan(
+        PlanCode.PLANNING_FAILED,
+        Refusal(
+            check="verification",
+            message=f"the timed trajectory did not pass its verification: {why}",
+            remedy="a larger scaling or a goal farther away; if it stays, report this as a defect",
         ),
     )
 

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 DENSITY = 10  # samples between two points
 ROUNDING = 1e-9  # [rad] or [m], and a share of limits: what floating point may add
 
+LOOSE_JERK = 1.01  # share of the limit: third differences of neighbouring points have few digits left
+
 
 class BadTrajectory(ValueError):
     """A trajectory that must not be executed; the text names the joint, the value and the limit."""
@@ -23,12 +25,13 @@ class BadTrajectory(ValueError):
 
 @dataclass(frozen=True)
 class Samples:
-    """Rows in time: `times` (m,) [s] and positions, velocities, accelerations (m, n)."""
+    """Rows in time: `times` (m,) [s] and positions, velocities, accelerations, jerks (m, n)."""
 
     times: Array
     positions: Array
     velocities: Array
     accelerations: Array
+    jerks: Array
 
 
 def sample(trajectory: JointTrajectory, density: int = DENSITY) -> Samples:
@@ -62,7 +65,16 @@ def _evaluate(trajectory: JointTrajectory, times: Array, index: NDArray[np.int64
     positions = p0 + u * (v0 + u * (a0 / 2 + u * (third + u * (fourth + u * fifth))))
     velocities = (v0 + u * (a0 + u * (3 * third + u * (4 * fourth + u * 5 * fifth)))) / dt
     accelerations = (a0 + u * (6 * third + u * (12 * fourth + u * 20 * fifth))) / dt**2
-    return Samples(times, positions, velocities, accelerations)
+    jerks = (6 * third + u * (24 * fourth + u * 60 * fifth)) / dt**3
+    return Samples(times, positions, velocities, accelerations, jerks)
+
+
+def limit_shares(samples: Samples, limits: JointLimits) -> tuple[float, float, float]:
+    """The largest share of any joint's velocity, acceleration and jerk limits."""
+    velocity = np.abs(samples.velocities) / limits.velocity
+    acceleration = np.abs(samples.accelerations) / limits.acceleration
+    jerk = np.abs(samples.jerks) / limits.jerk
+    return float(velocity.max()), float(acceleration.max()), float(jerk.max())
 
 
 def require_within_limits(arm: Arm, samples: Samples, limits: JointLimits) -> None:
@@ -81,6 +93,15 @@ def require_within_limits(arm: Arm, samples: Samples, limits: JointLimits) -> No
             value, over = values[row, column], excess[row, column]
             name, t = arm.joint_names[int(column)], samples.times[row]
             raise BadTrajectory(f'{what} of "{name}" is {value:.6g} at {t:.3f} s, {over:.2g} beyond its limit')
+
+
+def require_jerk(arm: Arm, samples: Samples, limits: JointLimits) -> None:
+    """Of every sample of a jerk-limited trajectory; raises `BadTrajectory`."""
+    share = np.abs(samples.jerks) / limits.jerk
+    if float(share.max()) > LOOSE_JERK:
+        row, column = np.unravel_index(int(share.argmax()), share.shape)
+        name, t = arm.joint_names[int(column)], samples.times[row]
+        raise BadTrajectory(f'jerk of "{name}" is {share[row, column]:.3g} times its limit at {t:.3f} s')
 
 
 def require_ends(trajectory: JointTrajectory, start: tuple[float, ...], goal: tuple[float, ...]) -> None:

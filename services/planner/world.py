@@ -37,7 +37,7 @@ class World:
     ) -> None:
         """Mesh files are looked for in `folders`; raises `SceneError` for a scene that cannot be."""
         self.arm = arm
-        self.scene = scene or PlanningScene()
+        self.scene, self.folders = scene or PlanningScene(), tuple(folders)
         self._kinematics = kinematics
         self._geometry = WorldGeometry(arm, kinematics, self.scene, folders)
         self._bounds = LowerBounds(self._geometry)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.joints import JointState
-from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PlanResponse, PoseGoal, Refusal
+from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, PoseGoal, Refusal
 from services.arm.description import Arm, load_arm
 from services.planner.core import Planner
 
@@ -139,7 +140,7 @@ def test_a_way_through_itself_names_the_pair(planner: Planner, rm1: Arm):
     """From above the upper arm to beside the base: the straight way sinks into the arm before it is out."""
     start, goal = (0.0, 2.92, 0.2), (0.0, 2.66, 0.0)
     response = planner.plan(
-        PlanRequest(goal=JointGoal(name=rm1.joint_names, position=goal)),
+        PlanRequest(goal=JointGoal(name=rm1.joint_names, position=goal), motion=PointToPoint()),
         JointState(name=rm1.joint_names, position=start),
     )
     refusal = refused(response, PlanCode.PLANNING_FAILED)
@@ -189,7 +190,7 @@ def test_a_scaling_that_would_take_days_is_refused(planner: Planner, home: Joint
 
 def test_a_search_without_time_is_timed_out(planner: Planner, home: JointState):
     request = PlanRequest(goal=PoseGoal(position=(0.6, 0.0, 0.1)))
-    refusal = refused(planner.plan(request, home, is_late=lambda: True), PlanCode.TIMED_OUT)
+    refusal = refused(planner.plan(request, home, clock=itertools.count().__next__), PlanCode.TIMED_OUT)
     assert refusal.subject == "allowed_time"
 
 

@@ -76,6 +76,11 @@ class MotionCore:
         del held[name]
         self._setting = self._assembly.setting(self._setting.shapes, held)
 
+    @property
+    def attached(self) -> tuple[str, ...]:
+        """The names of what is attached."""
+        return tuple(self._setting.held)
+
     def free(self, positions: ArrayLike) -> NDArray[np.bool_]:
         """(rows,) whether each row of `positions` (rows, n) keeps the margin to itself and everything else."""
         return motion.are_free(self._setting.world, self._kernel, self._rows(positions), self.margin)

@@ -1,0 +1,79 @@
+"""Refusals of what touches: which two, where, and what a person can do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.message import Vector
+from schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
+from services.arm.description import Arm
+from services.planner.clearance import CLEARANCE, ROUNDING, first_collision, last_free
+from services.planner.goals import Goals
+from services.planner.refusals import NoPlan, in_collision
+from services.planner.surroundings import Surroundings
+from services.planner.way import Start
+
+Array = NDArray[np.float64]
+
+
+class Blockade:
+    """Says of one arm, in the world of the plan at hand, what is in the way."""
+
+    def __init__(self, arm: Arm, goals: Goals, surroundings: Surroundings) -> None:
+        self._arm, self._goals, self._surroundings = arm, goals, surroundings
+
+    def goal(self, asked: Goal, goal: Start, start: Start, is_late: Callable[[], bool]) -> NoPlan:
+        """The refusal of a goal at which links touch, with the last free posture on the way, in the goal's own form."""
+        last = last_free(self._surroundings, np.array(start), np.array(goal))
+        values = dict(zip(self._arm.joint_names, (round(value, 4) for value in last.tolist()), strict=True))
+        named = ", ".join(f"{joint.name} {values[joint.name]:g} {joint.unit}" for joint in self._arm.joints)
+        match asked:
+            case PoseGoal():
+                nearest = self._goals.shown_point(asked, start, last, is_late)
+            case JointGoal():
+                nearest = tuple(values[name] for name in asked.name)
+            case NamedGoal() | WaypointGoal():
+                nearest = tuple(values.values())
+        remedy = f"the farthest it can go on the straight way there: {named}"
+        return self.refusal(PlanCode.GOAL_IN_COLLISION, "at the goal", np.array(goal), CLEARANCE, nearest, remedy)
+
+    def start(self, start: Start) -> NoPlan:
+        """The refusal of a start in which something touches."""
+        remedy = self._way_out(start)
+        return self.refusal(PlanCode.START_STATE_IN_COLLISION, "where the arm stands", np.array(start), 0.0, (), remedy)
+
+    def line(self, start: Start, goal: Start, margin: float) -> NoPlan:
+        """The refusal of a straight line on which something touches, where it does so first."""
+        found = first_collision(self._surroundings, np.array((start, goal)), margin)
+        touching = np.array(goal) if found is None else found
+        named = ", ".join(self._arm.named_states)
+        remedy = f"go by way of another posture, for example a named one ({named})"
+        return self.refusal(PlanCode.PLANNING_FAILED, "on the straight way to the goal", touching, margin, (), remedy)
+
+    def way(self, touching: Array, margin: float) -> NoPlan:
+        """The refusal of the ways that were found and came too near to something once they had their time."""
+        remedy = "ask with another seed or planner_id; if it stays, report this as a defect"
+        return self.refusal(PlanCode.PLANNING_FAILED, "on the way that was found", touching, margin, (), remedy)
+
+    def refusal(
+        self, code: PlanCode, where: str, posture: Array, margin: float, nearest: Vector, remedy: str
+    ) -> NoPlan:
+        """The refusal of a posture in which the plan's world touches the arm, with the names of both."""
+        world = self._surroundings.world
+        pairs = world.pairs_within(posture, margin + ROUNDING) or [("?", "?")]
+        standing = tuple(posture.tolist())
+        return in_collision(code, where, pairs, margin, nearest, remedy, standing, world.objects)
+
+    def _way_out(self, start: Start) -> str:
+        """What a person can do for an arm that touches something."""
+        world = self._surroundings.world
+        touched = [name for pair in world.pairs_within(start) for name in pair if name in world.objects]
+        if touched:
+            return (
+                f"move or remove {touched[0]} (`gemelo scene remove {touched[0]}`), allow the pair, or move the arm "
+                "free by hand, then `gemelo reference`"
+            )
+        return "move the arm free by hand, then `gemelo reference`; or check the reference: the arm may be elsewhere"

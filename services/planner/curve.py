@@ -1,0 +1,146 @@
+"""A way without corners, by its length: a uniform cubic B-spline as cubic pieces, with derivatives by arc length.
+
+Lengths are times at full speed: joint values are divided by the joints' speed limits, and what is left is measured as
+in space, so that the length of a way is smooth and a unit of it takes about a second at least.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+PARTS = 8  # of a piece, within which its length is integrated and looked up
+NEWTON = 4  # steps from the look-up to the parameter
+SMALLEST = 1e-12  # of a way's whole length: a piece that is shorter is none
+CORNER = 1e-6  # between two unit tangents: beyond it the way has a corner
+SLOWEST = 1e-3  # of the mean speed in the parameter: below it a piece turns on the spot
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
+NODES, WEIGHTS = 0.5 * (NODES + 1.0), 0.5 * WEIGHTS
+BLENDING = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6.0  # B-spline to powers of u
+
+
+class TurnsOnTheSpot(ValueError):
+    """A curve that comes to rest in its parameter where it has no corner."""
+
+
+class Derivatives(NamedTuple):
+    """(m, n) each: the value, and its derivatives by the length."""
+
+    value: Array
+    first: Array
+    second: Array
+    third: Array
+
+
+def spline_rows(control: Array, rows: int) -> Array:
+    """(m, n) postures along the uniform cubic B-spline of `control` (k, n), `rows` in each span, ends included."""
+    powers = _powers(control)
+    u = np.linspace(0.0, 1.0, rows, endpoint=False)
+    values = np.stack((np.ones_like(u), u, u * u, u**3), axis=1)
+    inner = np.einsum("ru,kun->krn", values, powers).reshape(-1, control.shape[1])
+    return np.vstack((control[:1], inner[1:], control[-1:]))
+
+
+def smooth_runs(control: Array, scale: Array) -> list[Curve]:
+    """The parts of the curve between its corners, at which it has to stop; values are divided by `scale` (n,)."""
+    pieces = _straightened(control / scale)
+    lengths = np.linalg.norm(pieces[:, 1:].sum(axis=1), axis=1)
+    pieces = pieces[lengths > SMALLEST * max(float(lengths.sum()), 1.0)]
+    runs, first = [], 0
+    for index in range(1, len(pieces) + 1):
+        if index == len(pieces) or _is_corner(pieces[index - 1], pieces[index]):
+            runs.append(Curve(pieces[first:index]))
+            first = index
+    return runs
+
+
+class Curve:
+    """A smooth run of cubic pieces (k, 4, n) in powers of u from 0 to 1, by its length."""
+
+    def __init__(self, pieces: Array) -> None:
+        self._pieces = pieces
+        starts = np.linspace(0.0, 1.0, PARTS, endpoint=False)
+        self._part_u = np.tile(starts, len(pieces))
+        self._part_piece = np.repeat(np.arange(len(pieces)), PARTS)
+        width = np.full(len(self._part_u), 1.0 / PARTS)
+        steps = self._integral(self._part_piece, self._part_u, width)
+        if float(steps.min()) < SLOWEST * float(steps.mean()) / len(pieces):
+            raise TurnsOnTheSpot("the curve turns on the spot")
+        self._part_length = np.concatenate(([0.0], np.cumsum(steps)))
+        self.length = float(self._part_length[-1])
+
+    @property
+    def knots(self) -> Array:
+        """(k + 1,) lengths at which pieces begin and end."""
+        return self._part_length[::PARTS]
+
+    def at(self, lengths: Array) -> Derivatives:
+        """At `lengths` (m,) from the run's start."""
+        piece, u = self._locate(np.clip(lengths, 0.0, self.length))
+        return self._derivatives(piece, u)
+
+    def _locate(self, lengths: Array) -> tuple[Indices, Array]:
+        """Piece and parameter, by Newton from the table."""
+        row = np.clip(np.searchsorted(self._part_length, lengths, side="right") - 1, 0, len(self._part_u) - 1)
+        piece, begin = self._part_piece[row], self._part_u[row]
+        wanted = lengths - self._part_length[row]
+        width = wanted / (self._part_length[row + 1] - self._part_length[row]) / PARTS
+        for _ in range(NEWTON):
+            missing = wanted - self._integral(piece, begin, width)
+            width = np.clip(width + missing / self._speed(piece, begin + width), 0.0, 1.0 / PARTS)
+        return piece, begin + width
+
+    def _integral(self, piece: Indices, begin: Array, width: Array) -> Array:
+        """(m,) lengths from `begin` over `width` of the parameter."""
+        at = begin[:, None] + width[:, None] * NODES
+        speeds = self._speed(np.repeat(piece, len(NODES)), at.reshape(-1)).reshape(at.shape)
+        result: Array = (speeds @ WEIGHTS) * width
+        return result
+
+    def _speed(self, piece: Indices, u: Array) -> Array:
+        _, c1, c2, c3 = np.moveaxis(self._pieces[piece], 1, 0)
+        u = u[:, None]
+        return np.asarray(np.linalg.norm(c1 + u * (2.0 * c2 + u * 3.0 * c3), axis=1))
+
+    def _derivatives(self, piece: Indices, u: Array) -> Derivatives:
+        """By the chain rule; r is the speed in the parameter, a dash after it a derivative by the parameter."""
+        c0, c1, c2, c3 = np.moveaxis(self._pieces[piece], 1, 0)
+        u = u[:, None]
+        value = c0 + u * (c1 + u * (c2 + u * c3))
+        y1, y2, y3 = c1 + u * (2.0 * c2 + u * 3.0 * c3), 2.0 * c2 + u * 6.0 * c3, 6.0 * c3
+        r = np.linalg.norm(y1, axis=1)[:, None]
+        r1 = (y1 * y2).sum(axis=1)[:, None] / r
+        r2 = ((y2 * y2 + y1 * y3).sum(axis=1)[:, None] - r1 * r1) / r
+        first = y1 / r
+        second = (y2 - first * r1) / r**2
+        third = ((y3 - second * r * r1 - first * r2) / r**2 - 2.0 * r1 * second / r) / r
+        return Derivatives(value, first, second, third)
+
+
+def _powers(control: Array) -> Array:
+    """(k - 3, 4, n) each span in powers of its parameter."""
+    windows = np.stack([control[i : len(control) - 3 + i] for i in range(4)], axis=1)
+    powers: Array = np.einsum("uc,kcn->kun", BLENDING, windows)
+    return powers
+
+
+def _straightened(control: Array) -> Array:
+    """As `_powers`; a span that rests at one of its ends is a straight line, so it is given an even speed."""
+    pieces = _powers(control)
+    same = (np.diff(control, axis=0) == 0.0).all(axis=1)
+    resting = (same[:-2] & same[1:-1]) | (same[1:-1] & same[2:])
+    ends = pieces[resting].sum(axis=1)
+    pieces[resting, 1] = ends - pieces[resting, 0]
+    pieces[resting, 2:] = 0.0
+    return pieces
+
+
+def _is_corner(one: Array, other: Array) -> bool:
+    leaving, coming = one[1] + 2.0 * one[2] + 3.0 * one[3], other[1]
+    turn = leaving / np.linalg.norm(leaving) - coming / np.linalg.norm(coming)
+    return float(np.linalg.norm(turn)) > CORNER

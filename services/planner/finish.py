@@ -1,0 +1,115 @@
+"""From a way to a trajectory that may be executed: timed, within what the steppers can do, and looked at densely."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.motion import JointTrajectory
+from schemas.planning import PlanRequest, StepMargin, StepPolicy, Timing
+from services.arm.description import Arm
+from services.planner.clearance import Checker, touching_posture
+from services.planner.curve import TurnsOnTheSpot
+from services.planner.feasibility import feasible_scale, require_feasible, slowed
+from services.planner.profile import JointLimits, NoProfile, straight_line
+from services.planner.refusals import NoPlan, not_verified
+from services.planner.smoothing import stopping
+from services.planner.times import Stopwatch
+from services.planner.timing import timed_way
+from services.planner.verify import BadTrajectory, require_ends, require_jerk, require_within_limits, sample
+from services.planner.way import Array, Start, Way
+
+
+class Touching(Exception):
+    """The finished trajectory comes too near to something, in `posture` (n,)."""
+
+    def __init__(self, posture: Array) -> None:
+        super().__init__("the trajectory touches")
+        self.posture = posture
+
+
+@dataclass(frozen=True)
+class Finished:
+    """What may be executed."""
+
+    trajectory: JointTrajectory
+    margins: tuple[StepMargin, ...]
+    slowed: float  # 1: not at all
+
+
+class Finisher:
+    """For one request: its limits, its policy, and what must be kept clear of."""
+
+    def __init__(
+        self, arm: Arm, checker: Checker, request: PlanRequest, limits: JointLimits, margin: float, watch: Stopwatch
+    ) -> None:
+        self._arm, self._checker, self._request = arm, checker, request
+        self._limits, self._margin, self._watch = limits, margin, watch
+
+    def line(self, start: Start, goal: Start) -> Finished:
+        """The straight line of the joints; raises `Touching` or `NoPlan`."""
+        with self._watch.phase("verification"):
+            self._require_free(np.array((start, goal)))
+        if self._request.timing is Timing.TIME_OPTIMAL:
+            return self.curve(stopping(np.array((start, goal))))
+        with self._watch.phase("timing"):
+            trajectory = _timed(lambda: straight_line(self._arm.joint_names, start, goal, self._limits))
+        return self.finish(trajectory, start, goal)
+
+    def way(self, way: Way) -> Finished:
+        """The curve, or, where that fails, the polyline with a stop at every corner; raises `Touching` or `NoPlan`."""
+        try:
+            return self.curve(way.control)
+        except (Touching, TurnsOnTheSpot):
+            return self.curve(stopping(way.corners))
+
+    def curve(self, control: Array) -> Finished:
+        """The uniform cubic B-spline of `control`, timed as asked; raises `Touching`, `TurnsOnTheSpot` or `NoPlan`."""
+        names = self._arm.joint_names
+        with self._watch.phase("timing"):
+            if self._request.timing is Timing.TIME_OPTIMAL:
+                from services.planner.time_optimal import time_optimal_way
+
+                trajectory = _timed(lambda: time_optimal_way(names, control, self._limits))
+            else:
+                trajectory = _timed(lambda: timed_way(names, control, self._limits))
+        return self.finish(trajectory, tuple(control[0].tolist()), tuple(control[-1].tolist()))
+
+    def finish(self, trajectory: JointTrajectory, start: Start, goal: Start) -> Finished:
+        """Slower where the steppers cannot, then verified as it will be played; raises `Touching` or `NoPlan`."""
+        with self._watch.phase("verification"):
+            trajectory, margins, scale = self._feasible(trajectory)
+            samples = sample(trajectory)
+            try:
+                require_ends(trajectory, start, goal)
+                require_within_limits(self._arm, samples, self._limits)
+                if self._request.timing is Timing.JERK_LIMITED:
+                    require_jerk(self._arm, samples, self._limits)
+            except BadTrajectory as error:
+                raise not_verified(str(error)) from error
+            self._require_free(samples.positions)
+        return Finished(trajectory, margins, scale)
+
+    def _require_free(self, rows: Array) -> None:
+        touching = touching_posture(self._checker, rows, self._margin)
+        if touching is not None:
+            raise Touching(touching)
+
+    def _feasible(self, trajectory: JointTrajectory) -> tuple[JointTrajectory, tuple[StepMargin, ...], float]:
+        try:
+            return trajectory, require_feasible(self._arm, trajectory), 1.0
+        except NoPlan:
+            if self._request.step_policy is StepPolicy.REFUSE:
+                raise
+        scale = feasible_scale(self._arm, trajectory)
+        slower = slowed(trajectory, scale) if scale else trajectory
+        return slower, require_feasible(self._arm, slower), scale
+
+
+def _timed(time: Callable[[], JointTrajectory]) -> JointTrajectory:
+    try:
+        return time()
+    except NoProfile as error:
+        raise not_verified(str(error)) from error

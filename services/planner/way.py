@@ -1,0 +1,70 @@
+"""What a search ends with, and how much time it has."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Start = tuple[float, ...]
+
+
+class Why(StrEnum):
+    """Why there is no way."""
+
+    TIMED_OUT = "timed out"
+    START_TOUCHES = "start touches"
+    GOAL_TOUCHES = "goal touches"
+    NOT_FOUND = "not found"
+
+
+class NoWay(Exception):
+    """None was found."""
+
+    def __init__(self, why: Why) -> None:
+        super().__init__(why.value)
+        self.why = why
+
+
+@dataclass(frozen=True)
+class Way:
+    """A free way: the polyline of `corners` (m, n), and the uniform cubic B-spline of `control` (k, n) in its place.
+
+    Both ends of the curve are there three times, so that it begins and ends exactly there.
+    """
+
+    corners: Array
+    control: Array
+    planner_id: str
+
+    @property
+    def goal(self) -> Start:
+        """Where it ends, to the bit."""
+        return tuple(self.control[-1].tolist())
+
+
+def endless() -> float:
+    """A clock that stands, so that nothing is ever late."""
+    return 0.0
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """`clock` in s; what began at `began` may take `allowed`."""
+
+    clock: Callable[[], float] = endless
+    allowed: float = math.inf
+    began: float = 0.0
+
+    @property
+    def left(self) -> float:
+        """[s], at least 0."""
+        return max(0.0, self.allowed - (self.clock() - self.began))
+
+    def is_late(self) -> bool:
+        return self.left <= 0.0
