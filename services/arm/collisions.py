@@ -46,6 +46,16 @@ class SelfCollisions:
         self._update(positions)
         return float(min(result.min_distance for result in self._geometry_data.distanceResults))
 
+    def distances(self, positions: Sequence[float] | Array) -> dict[LinkPair, float]:
+        """[m] between the links of every pair that is checked."""
+        if not self._pairs:
+            return {}
+        self._update(positions)
+        nearest: dict[LinkPair, float] = {}
+        for pair, result in zip(self._pairs, self._geometry_data.distanceResults, strict=True):
+            nearest[pair] = min(nearest.get(pair, math.inf), float(result.min_distance))
+        return nearest
+
     def pairs_within(self, positions: Sequence[float] | Array, margin: float = 0.0) -> list[LinkPair]:
         """The pairs of links nearer than `margin` [m], each once."""
         if not self._pairs:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from services.cli import (
     arm_commands,
     bus_commands,
+    collision_commands,
     device_commands,
     kinematic_commands,
     scene_commands,
@@ -21,9 +22,15 @@ ABOUT = "The twin's command line: move the arm, and see everything that is said 
 EPILOG = "The deployment is deploy/local.toml, or the file that $GEMELO_CONFIG names."
 COMMANDS = (
     *arm_commands.COMMANDS, *kinematic_commands.COMMANDS, *device_commands.COMMANDS, *bus_commands.COMMANDS,
-    *scene_commands.COMMANDS, *system_commands.COMMANDS,
+    *scene_commands.COMMANDS, *collision_commands.COMMANDS, *system_commands.COMMANDS,
 )  # fmt: skip
-GROUPS = {**device_commands.GROUPS, **scene_commands.GROUPS, **bus_commands.GROUPS, **system_commands.GROUPS}
+GROUPS = {
+    **device_commands.GROUPS,
+    **scene_commands.GROUPS,
+    **collision_commands.GROUPS,
+    **bus_commands.GROUPS,
+    **system_commands.GROUPS,
+}
 
 
 def parser() -> Parser:

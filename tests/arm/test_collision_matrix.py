@@ -1,0 +1,90 @@
+"""Which pairs of links need no check, and how the SRDF's text takes that up."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from services.arm.collision_matrix import Reason, are_adjacent, collision_matrix
+from services.arm.collisions import SelfCollisions
+from services.arm.description import load_arm
+from services.arm.kinematics import Kinematics
+from services.arm.srdf_edit import entries, with_pairs
+
+TEXT = """<robot name="r">
+  <!-- <disable_collisions link1="a" link2="z" reason="Never"/> is what a person thought once -->
+  <group name="arm"/>
+  <!-- neighbours -->
+  <disable_collisions link1="a" link2="b" reason="Adjacent"/>
+  <disable_collisions link2='c' link1='b' reason='Never'></disable_collisions>
+
+  <!-- the end -->
+</robot>
+"""
+
+
+@pytest.mark.parametrize("robot", ["rm1", "parol6"])
+def test_the_shipped_matrix_is_what_sampling_finds(rm1_folder: Path, robot: str) -> None:
+    arm = load_arm(rm1_folder.parent / robot)
+    found = {frozenset(verdict.pair): verdict.reason for verdict in collision_matrix(arm, samples=1500)}
+    shipped = {entry.pair: entry.reason for entry in entries(arm.srdf_path.read_text())}
+    assert {pair: str(reason) for pair, reason in found.items() if reason is not None} == shipped
+
+
+def test_the_matrix_is_the_same_every_time(rm1_folder: Path) -> None:
+    arm = load_arm(rm1_folder)
+    assert collision_matrix(arm, samples=50) == collision_matrix(arm, samples=50)
+
+
+def test_distances_name_every_pair_with_its_nearest_shapes(rm1_folder: Path) -> None:
+    arm = load_arm(rm1_folder.parent / "parol6")
+    kinematics = Kinematics(arm)
+    checker = SelfCollisions(arm, kinematics.model, kinematics.configuration)
+    for posture in arm.named_states.values():
+        distances = checker.distances(posture)
+        assert tuple(distances) == checker.pairs
+        assert min(distances.values()) == pytest.approx(checker.distance(posture), abs=2e-6)
+
+
+def test_links_without_a_shape_do_not_keep_neighbours_apart(tmp_path: Path, rm1_folder: Path) -> None:
+    shutil.copytree(rm1_folder, tmp_path / "rm1")
+    urdf = tmp_path / "rm1" / "robot.urdf"
+    text = urdf.read_text()
+    start = text.index('<link name="antebrazo_link"')
+    first, last = text.index("<collision>", start), text.index("</link>", start)
+    end = text.rindex("</collision>", first, last) + len("</collision>")
+    urdf.write_text(text[:first] + text[end:])
+    arm = load_arm(tmp_path / "rm1")
+    assert are_adjacent(arm, "efector_link", "brazo_link")
+    assert not are_adjacent(arm, "efector_link", "base_link")
+
+
+def test_only_elements_that_count_are_read() -> None:
+    assert [(set(entry.pair), entry.reason) for entry in entries(TEXT)] == [
+        ({"a", "b"}, "Adjacent"),
+        ({"b", "c"}, "Never"),
+    ]
+
+
+def test_nothing_to_change_changes_no_byte() -> None:
+    assert with_pairs(TEXT, {("b", "a"): "Adjacent", ("b", "c"): "Never"}) == TEXT
+
+
+def test_changes_leave_everything_else_as_it_was() -> None:
+    changed = with_pairs(TEXT, {("a", "b"): "Adjacent", ("a", "c"): "Always"})
+    assert changed == TEXT.replace(
+        "  <disable_collisions link2='c' link1='b' reason='Never'></disable_collisions>\n",
+        '  <disable_collisions link1="a" link2="c" reason="Always"/>\n',
+    )
+    empty = with_pairs(TEXT, {})
+    assert entries(empty) == []
+    assert "<!-- neighbours -->" in empty
+    again = with_pairs(empty, {("a", "b"): str(Reason.ADJACENT)})
+    assert again.endswith('  <disable_collisions link1="a" link2="b" reason="Adjacent"/>\n</robot>\n')
+
+
+def test_a_text_without_an_end_is_refused() -> None:
+    with pytest.raises(ValueError, match="no </robot>"):
+        with_pairs("<robot>", {("a", "b"): "Never"})

@@ -1,0 +1,64 @@
+"""`gemelo collision fit` and `gemelo collision matrix` on robots' folders."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from services.arm.srdf_edit import entries
+from services.cli.exits import ExitCode
+from services.cli.main import run
+
+
+@pytest.fixture
+def folder(tmp_path: Path, rm1_folder: Path) -> Path:
+    """A robot that may be changed."""
+    shutil.copytree(rm1_folder, tmp_path / "rm1")
+    return tmp_path / "rm1"
+
+
+def test_the_shipped_robot_needs_no_change(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = (folder / "robot.srdf").read_bytes()
+    assert run(["collision", "matrix", str(folder), "--write"]) is ExitCode.OK
+    assert "nothing to change" in capsys.readouterr().out
+    assert (folder / "robot.srdf").read_bytes() == before
+
+
+def test_what_is_missing_or_wrong_is_said_and_written_only_when_asked(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    srdf = folder / "robot.srdf"
+    text = srdf.read_text()
+    wrong = text.replace('link1="base_link" link2="brazo_link"', 'link1="base_link" link2="efector_link"')
+    wrong = wrong.replace('link2="antebrazo_link" reason="Never"', 'link2="antebrazo_link" reason="A person\'s"')
+    srdf.write_text(wrong)
+    assert run(["collision", "matrix", str(folder)]) is ExitCode.OK
+    said = capsys.readouterr().out
+    assert "remove base_link and efector_link (Adjacent): they come as near as -" in said
+    assert "add base_link and brazo_link (Adjacent)" in said
+    assert srdf.read_text() == wrong
+    assert run(["collision", "matrix", str(folder), "--write"]) is ExitCode.OK
+    changed = srdf.read_text()
+    reasons = {entry.pair: entry.reason for entry in entries(changed)}
+    assert reasons[frozenset(("base_link", "brazo_link"))] == "Adjacent"
+    assert reasons[frozenset(("base_link", "antebrazo_link"))] == "A person's"
+    assert frozenset(("base_link", "efector_link")) not in reasons
+    assert changed.count("<!--") == text.count("<!--")
+
+
+def test_fit_says_spheres_and_bulge_of_every_link(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["collision", "fit", str(folder), "--bulge", "8"]) is ExitCode.OK
+    heading, *rows, last = capfd.readouterr().out.splitlines()
+    assert heading.split() == ["link", "shapes", "spheres", "bulge", "[mm]"]
+    assert [row.split()[0] for row in rows] == ["base_link", "brazo_link", "antebrazo_link", "efector_link"]
+    assert all(int(row.split()[2]) > 0 and 0.0 <= float(row.split()[3]) <= 8.0 for row in rows)
+    assert int(last.split()[1]) == sum(int(row.split()[2]) for row in rows)
+
+
+def test_a_folder_that_is_no_robot_is_one_sentence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["collision", "matrix", str(tmp_path)]) is ExitCode.USAGE
+    assert "robot.toml" in capfd.readouterr().err
+    assert run(["collision", "fit", str(tmp_path)]) is ExitCode.FAILED
+    assert "robot.toml" in capfd.readouterr().err
