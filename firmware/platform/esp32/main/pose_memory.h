@@ -10,8 +10,9 @@ namespace gemelo {
 struct Pose {
     int32_t steps[kMaxJoints];
     uint32_t config_crc32;  // the steps mean nothing under another configuration
-    bool is_referenced;
-    bool is_moving;  // the steps are as of the motion's begin
+    // No bools: after power-on the memory is anything.
+    uint8_t is_referenced;
+    uint8_t is_moving;  // the steps are as of the motion's begin
 
     bool operator==(const Pose& other) const;
 };
