@@ -9,9 +9,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from schemas.planning import PoseGoal
 from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics
 from services.planner.abilities import Abilities, abilities
+from services.planner.goals import Goals
+from services.planner.ik import never
+from services.planner.refusals import NoPlan
 from services.planner.targets import Pointing, Target
 
 ROOT = Path(__file__).parents[2] / "urdf"
@@ -66,6 +70,27 @@ def test_with_fewer_joints_fewer_turns_can_be_chosen(fixed: list[str], chosen: i
     assert (len(able.axes), able.chosen) == (3, chosen)
     assert f"has {6 - len(fixed)} joints" in able.sentence
     assert able.remedy == remedy
+
+
+def test_an_arm_of_five_joints_points_its_tool_and_says_what_it_cannot_do(tmp_path: Path):
+    arm = without(["joint_6"], tmp_path)
+    kinematics = Kinematics(arm)
+    goals = Goals(arm, kinematics)
+    start = tuple(0.5 * (joint.lower + joint.upper) for joint in arm.joints)
+    for posture in np.random.default_rng(2).uniform(-0.3, 0.3, (10, 5)) + start:
+        pose = kinematics.tool(posture)
+        x, y, z = pose.position.tolist()
+        direction = (pose.rotation @ [0.0, 0.0, 1.0]).tolist()
+        goal = PoseGoal(position=(x, y, z), tool_axis=(0.0, 0.0, 1.0), direction=tuple(direction))
+        got = kinematics.tool(next(goals.candidates(goal, start, never)))
+        assert np.allclose(got.position, pose.position, atol=1e-6)
+        assert np.allclose(got.rotation[:, 2], direction, atol=1e-5)
+    turn = pin.Quaternion(pin.exp3(pose.rotation @ [0.0, 0.0, 0.5]) @ pose.rotation)
+    goal = PoseGoal(position=(x, y, z), orientation=(turn.x, turn.y, turn.z, turn.w))
+    with pytest.raises(NoPlan) as caught:
+        next(goals.candidates(goal, start, never))
+    assert "has 5 joints: beside a position it can choose 2 of 3 turns" in caught.value.refusal.message
+    assert "the direction of one tool axis" in caught.value.refusal.remedy
 
 
 def test_how_much_tilt_is_missing_does_not_depend_on_the_yaw():

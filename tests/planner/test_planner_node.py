@@ -10,8 +10,8 @@ import pytest
 
 from schemas.deployment import Deployment, PathsSection
 from schemas.joints import JointState
-from schemas.planning import NamedGoal, PlanCode, PlanRequest, PoseGoal
-from schemas.topics import JOINT_STATES, PLAN, PLANNED_PATH
+from schemas.planning import FkRequest, IkRequest, NamedGoal, PlanCode, PlanRequest, PoseGoal
+from schemas.topics import FK, IK, JOINT_STATES, PLAN, PLANNED_PATH
 from services.arm.description import Arm
 from services.planner.main import run
 from services.runtime.memory_bus import MemoryBus, MemoryNetwork
@@ -64,3 +64,13 @@ def test_without_joint_states_it_is_not_ready_and_says_why(asker: Node, tmp_path
     response = asker.call(PLAN, PlanRequest(goal=NamedGoal(name="ready")), timeout=5.0)
     assert response.code is PlanCode.ROBOT_STATE_STALE
     assert not (tmp_path / "planner.ready").exists()
+
+
+def test_it_answers_ik_and_fk_from_the_newest_joint_state(asker: Node, rm1: Arm):
+    tell(asker, rm1)
+    found = asker.call(IK, IkRequest(goal=PoseGoal(position=(0.25, 0.15, 0.10)), solutions=4), timeout=5.0)
+    assert found.code is PlanCode.SUCCESS
+    assert len(found.solutions) == 2
+    back = asker.call(FK, FkRequest(name=found.name, position=found.solutions[0].position), timeout=5.0)
+    assert back.poses[0].translation == pytest.approx((0.25, 0.15, 0.10), abs=1e-6)
+    assert asker.call(FK, FkRequest(), timeout=5.0).code is PlanCode.SUCCESS

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from schemas.joints import JointState
 from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
 from services.arm.description import Joint, load_arm
-from services.planner.core import Planner, never
-from services.planner.ik import InverseKinematics
+from services.planner.core import Planner
+from services.planner.ik import InverseKinematics, never
 from services.planner.profile import joint_limits
 from services.planner.targets import Target
 from services.planner.verify import require_within_limits, sample
