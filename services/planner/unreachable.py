@@ -66,12 +66,12 @@ class Unreachable:
     def _nearest_turned(self, target: Target, place: Target, fallback: Array, near: Array, is_late: Clock) -> Array:
         """At the place, the posture that turns the tool as nearly as it can be, and touches nothing."""
         light = replace(target, metres_per_radian=LIGHT, rotation_tolerance=0.0)
-        turned = [fallback]
+        turned: list[Array] = []
         for posture in self._ik.nearest(place, near, is_late)[:NEAREST_TRIED]:
             attempt = self._ik.descend(place, self._ik.descend(light, posture).positions)
             if attempt.is_solution and self._collisions.distance(attempt.positions) > CLEARANCE:
                 turned.append(attempt.positions)
-        return min(turned, key=lambda q: target.misses(self._kinematics.tool(q))[1])
+        return min(turned, key=lambda q: target.misses(self._kinematics.tool(q))[1], default=fallback)
 
     def _tilt_refused(self, goal: PoseGoal, target: Target, frame: Rigid, best: Array) -> NoPlan:
         missing = self._abilities.missing_tilt(target)
@@ -93,14 +93,6 @@ class Unreachable:
         missing = target.misses(pose)[1]
         nearest = as_goal(goal, pose, frame)
         what, shown = ("direction" if goal.tool_axis else "orientation"), " ".join(f"{v:.6f}" for v in nearest[3:])
-        held = self._held(best)
-        why = (
-            f", held by {', '.join(held)}"
-            if held
-            else ""
-            if self._abilities.is_full
-            else f"; {self._abilities.sentence}"
-        )
         remedies = [f"the nearest {what} there is {shown}"]
         if not self._abilities.is_full:
             remedies.append(self._abilities.remedy)
@@ -115,10 +107,17 @@ class Unreachable:
                 limit=target.rotation_tolerance,
                 nearest=nearest,
                 message=f"{self._arm.tool_frame} can be at this point, but not turned like that:"
-                f" {math.degrees(missing):.4g} deg are missing{why}",
+                f" {math.degrees(missing):.4g} deg are missing{self._why(best)}",
                 remedy="; or ".join(remedies),
             ),
         )
+
+    def _why(self, posture: Array) -> str:
+        """What keeps the tool from turning further."""
+        held = self._held(posture)
+        if held:
+            return f", held by {', '.join(held)}"
+        return "" if self._abilities.is_full else f"; {self._abilities.sentence}"
 
     def _printable(self, point: Array, posture: Array, frame: Rigid, is_late: Clock) -> Vector:
         """The nearest point to `point` that has few decimals in the goal's frame and can be reached like that."""
