@@ -6,6 +6,7 @@ import math
 from itertools import islice
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -212,6 +213,29 @@ def slightly_out_of_reach(position_tolerance: float, orientation_tolerance: floa
         position_tolerance=position_tolerance,
         orientation_tolerance=orientation_tolerance,
     )
+
+
+@pytest.mark.parametrize("name", BENCHES)
+@settings(max_examples=15)
+@given(shares(), st.tuples(*[st.floats(-1.0, 1.0)] * 4), st.booleans())
+def test_the_nearest_pose_of_a_refusal_can_be_asked_for(
+    name: str, where: list[float], turn: tuple[float, ...], is_pointing: bool
+):
+    assume(math.hypot(*turn) > 0.1 and math.hypot(*turn[:3]) > 0.1)
+    bench = BENCHES[name]
+    position = tuple(bench.kinematics.tool(posture_of(bench, where)).position.tolist())
+    asked = PoseGoal(position=position, orientation=tuple(value / math.hypot(*turn) for value in turn))
+    if is_pointing:
+        asked = PoseGoal(position=position, tool_axis=(0.0, 0.0, 1.0), direction=turn[:3])
+    try:
+        bench.postures(asked, most=1)
+        return
+    except NoPlan as no_plan:
+        nearest = no_plan.refusal.nearest
+    again = msgspec.structs.replace(asked, position=nearest[:3], orientation=nearest[3:])
+    if is_pointing:
+        again = msgspec.structs.replace(asked, position=nearest[:3], direction=nearest[3:])
+    assert bench.postures(again, most=1)
 
 
 def test_where_exact_can_be_had_a_tolerance_does_not_make_it_worse():
