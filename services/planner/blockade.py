@@ -58,6 +58,11 @@ class Blockade:
         remedy = "ask with another seed or planner_id; if it stays, report this as a defect"
         return self.refusal(PlanCode.PLANNING_FAILED, "on the way that was found", touching, margin, (), remedy)
 
+    def by(self, touching: Array, margin: float) -> NoPlan:
+        """The refusal of the straight lines from waypoint to waypoint."""
+        remedy = "give waypoints that lead around it, or ask for a free motion"
+        return self.refusal(PlanCode.PLANNING_FAILED, "on the way by the waypoints", touching, margin, (), remedy)
+
     def refusal(
         self, code: PlanCode, where: str, posture: Array, margin: float, nearest: Vector, remedy: str
     ) -> NoPlan:

@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 
 from schemas.joints import JointState
 from schemas.motion import JointTrajectory
-from schemas.planning import FreeMotion, PlanCode, PlannedPath, PlanRequest, PlanResponse, PointToPoint
+from schemas.planning import (
+    CircularMotion,
+    FreeMotion,
+    LinearMotion,
+    PlanCode,
+    PlannedPath,
+    PlanRequest,
+    PlanResponse,
+    WaypointGoal,
+)
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.blockade import Blockade
@@ -19,21 +28,24 @@ from services.planner.clearance import CLEARANCE, first_collision
 from services.planner.finish import Finished, Finisher, Touching
 from services.planner.goals import Goals, timed_out
 from services.planner.profile import JointLimits, joint_limits
-from services.planner.refusals import NoPlan, malformed, no_way_around, scaling_refused
+from services.planner.refusals import NoPlan, no_way_around, scaling_refused
 from services.planner.search import Search, require_known
 from services.planner.start import resolve_start
 from services.planner.surroundings import Surroundings
 from services.planner.times import Stopwatch
+from services.planner.tool_motions import ToolMotions
 from services.planner.verify import sample
-from services.planner.way import Deadline, NoWay, Start, endless
+from services.planner.via import Errand, Via
+from services.planner.way import STRAIGHT, Deadline, NoWay, Start, endless
 from services.planner.world import World
 
 Array = NDArray[np.float64]
 
 PATH_POINTS = 100
 MOST_GOALS = 8  # postures of one goal that are tried
+LONGEST = 120.0  # [s] that may be allowed
 ATTEMPTS = 3  # searches, where the finished way fails its verification
-STRAIGHT = "straight"  # the planner_id of the joint line, which no search is needed for
+TOOL = "tool"  # the planner_id of lines and arcs of the tool
 
 
 class Planner:
@@ -45,6 +57,8 @@ class Planner:
         self.surroundings = Surroundings(World(arm, self.kinematics))
         self._goals = Goals(arm, self.kinematics, self.surroundings)
         self._blockade = Blockade(arm, self._goals, self.surroundings)
+        self._tool_motions = ToolMotions(arm, self.kinematics, self._goals, self.surroundings)
+        self._via = Via(arm, self._goals, self.surroundings, self._blockade)
 
     def set_world(self, world: World) -> None:
         """What later plans heed; a plan that is being made is held against it at its end."""
@@ -52,7 +66,7 @@ class Planner:
 
     def prepare(self) -> None:
         """Does now what the first search would wait for: seconds, in which the links are filled with spheres."""
-        self._search.heed(self.surroundings.newest)
+        _ = self._search
 
     def plan(
         self,
@@ -63,7 +77,7 @@ class Planner:
     ) -> PlanResponse:
         """The answer; `age` [s] is how old `present` is, `clock` [s] says how the allowed time goes by."""
         self.surroundings.begin()
-        watch, deadline = Stopwatch(clock), Deadline(clock, request.allowed_time, clock())
+        watch, deadline = Stopwatch(clock), Deadline(clock, min(request.allowed_time, LONGEST), clock())
         try:
             response = self._plan(request, present, age, deadline, watch)
         except NoPlan as no_plan:
@@ -82,6 +96,11 @@ class Planner:
     def _search(self) -> Search:
         return Search(self.arm, self.surroundings.world)
 
+    def _heeding(self) -> Search:
+        """The search, in the world of the plan at hand."""
+        self._search.heed(self.surroundings.world)
+        return self._search
+
     def _plan(
         self, request: PlanRequest, present: JointState | None, age: float, deadline: Deadline, watch: Stopwatch
     ) -> PlanResponse:
@@ -90,7 +109,17 @@ class Planner:
         start = resolve_start(self.arm, request.start, present, age)
         margin = self._start_margin(start)
         finisher = Finisher(self.arm, self.surroundings, request, limits, margin, watch)
-        finished, planner_id = self._found(request, start, margin, finisher, deadline, watch)
+        fraction, stopped_by = 1.0, None
+        if isinstance(request.motion, LinearMotion | CircularMotion):
+            with watch.phase("search"):
+                way = self._tool_motions.plan(request, start, limits, margin, deadline.is_late)
+            finished, planner_id = self._verified(way.trajectory, start, way.end, finisher, margin), TOOL
+            fraction, stopped_by = way.fraction, way.stopped_by
+        elif isinstance(request.goal, WaypointGoal):
+            errand = Errand(request.motion, start, limits, margin, finisher, deadline, watch)
+            finished, planner_id = self._via.plan(request.goal, errand, self._heeding)
+        else:
+            finished, planner_id = self._found(request, start, margin, finisher, deadline, watch)
         self._hold_against_newest(finished.trajectory)
         return PlanResponse(
             code=PlanCode.SUCCESS,
@@ -100,7 +129,17 @@ class Planner:
             margins=finished.margins,
             slowed=finished.slowed,
             planner_id=planner_id,
+            fraction=fraction,
+            stopped_by=stopped_by,
         )
+
+    def _verified(
+        self, trajectory: JointTrajectory, start: Start, end: Start, finisher: Finisher, margin: float
+    ) -> Finished:
+        try:
+            return finisher.finish(trajectory, start, end)
+        except Touching as touching:
+            raise self._blockade.way(touching.posture, margin) from touching
 
     def _found(
         self,
@@ -201,15 +240,5 @@ class Planner:
 
 def _require_known(request: PlanRequest) -> None:
     """Raises `NoPlan` for what this planner cannot do."""
-    match request.motion:
-        case FreeMotion(planner_id=planner_id):
-            require_known(planner_id)
-        case PointToPoint():
-            pass
-        case _:
-            raise malformed(
-                PlanCode.INVALID_GOAL_CONSTRAINTS,
-                "motion",
-                "this planner goes straight in the joints, or any way that is free",
-                "leave the motion at its default",
-            )
+    if isinstance(request.motion, FreeMotion):
+        require_known(request.motion.planner_id)

@@ -82,7 +82,7 @@ class Goals:
                 raise beyond_limit(self._arm, joint, position, nearest)
 
     def _poses(self, goal: PoseGoal, start: Start, is_late: Clock) -> Iterator[Start]:
-        frame = self._frame(goal, start)
+        frame = self.frame(goal, start)
         target = target_of(goal, frame)
         near = np.array(start)
         if not self.abilities.allows(target):
@@ -97,7 +97,7 @@ class Goals:
             raise timed_out()
         raise self._unreachable.refusal(goal, target, frame, near, is_late)
 
-    def _frame(self, goal: PoseGoal, start: Start) -> Rigid:
+    def frame(self, goal: PoseGoal, start: Start) -> Rigid:
         """The goal's frame in the base."""
         if goal.frame in ("", self._arm.base_frame):
             return IDENTITY
@@ -108,7 +108,7 @@ class Goals:
 
     def shown_point(self, goal: PoseGoal, start: Start, posture: Array, is_late: Clock) -> Vector:
         """Where the tool is in `posture`, in the goal's form; a mere point is reachable as printed."""
-        return self._unreachable.shown(goal, posture, self._frame(goal, start), is_late)
+        return self._unreachable.shown(goal, posture, self.frame(goal, start), is_late)
 
 
 def timed_out() -> NoPlan:

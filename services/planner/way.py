@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Start = tuple[float, ...]
 
+STRAIGHT = "straight"  # the planner_id of joint lines, which no search is needed for
+
 
 class Why(StrEnum):
     """Why there is no way."""
@@ -20,7 +22,6 @@ class Why(StrEnum):
     TIMED_OUT = "timed out"
     START_TOUCHES = "start touches"
     GOAL_TOUCHES = "goal touches"
-    NOT_FOUND = "not found"
 
 
 class NoWay(Exception):
