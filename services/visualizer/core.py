@@ -19,6 +19,7 @@ from services.visualizer.journal import Journal, bounded
 from services.visualizer.model import Joint, Model
 from services.visualizer.panel import LOST, Facts, panel, shaft_errors
 from services.visualizer.rotations import Array
+from services.visualizer.scene import Loader, SceneView, no_mesh
 from services.visualizer.thinning import Thinned
 from services.visualizer.updates import Panel, Poses, Scalars, State, Strip, Times, Tint, Update
 
@@ -29,8 +30,10 @@ BAND = 0.5  # [steps] rounding to whole steps alone gives as much
 class Visualizer:
     """The newest state of one arm, and the samples that have not been shown yet."""
 
-    def __init__(self, model: Model, robot: str, tool: str) -> None:
+    def __init__(self, model: Model, robot: str, tool: str, load: Loader = no_mesh) -> None:
+        """`load` reads the mesh files of the scene."""
         self.model = model
+        self.scene = SceneView(model, load)
         self._tool = tool
         self._names = [joint.name for joint in model.moving]
         width = len(self._names)
@@ -90,11 +93,12 @@ class Visualizer:
     def step(self, now: int) -> list[Update]:
         """Everything new; `now` in ns UNIX."""
         return [*self._measured(), *self._ghost(), *self._step_errors(), *self._shafts(), *self._planned(),
-                *self._device(now), *self.journal.take()]  # fmt: skip
+                *self.scene.take(now), *self._device(now), *self.journal.take()]  # fmt: skip
 
     def restart(self) -> None:
         """Say the lasting things again: the viewer is a new one."""
         self._path_is_new = self._path is not None
+        self.scene.restart()
         self._shown, self._tip, self._panel_at = ("", ""), None, 0
 
     def _row(self, names: Sequence[str], values: Sequence[float], before: Thinned) -> list[float]:

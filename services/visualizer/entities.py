@@ -7,9 +7,26 @@ MEASURED = f"{WORLD}/measured"
 COMMANDED = f"{WORLD}/commanded"
 PATH = f"{WORLD}/planned_path"
 TRAIL = f"{WORLD}/tool_trail"
+SCENE = f"{WORLD}/scene"
+REFUSED = f"{WORLD}/refused"
+CONTACTS = f"{REFUSED}/contacts"
 MODE = "device/mode"
 PANEL = "device/panel"
 LOG = "log"
+
+
+def carried(root: str, link: str) -> str:
+    """What a link of the arm under `root` carries; `link` as in `Model.paths`."""
+    return f"{root}/{link}/carried"
+
+
+def part(name: str) -> str:
+    """Any text as one part of an entity's path, as Rerun escapes it."""
+    return "".join(letter if letter.isalnum() or letter in "-_." else _escaped(letter) for letter in name)
+
+
+def _escaped(letter: str) -> str:
+    return f"\\{letter}" if letter.isascii() and letter.isprintable() else f"\\u{{{ord(letter):04X}}}"
 
 
 def position(joint: str) -> str:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from schemas.deployment import Deployment
 from schemas.frames import RobotDescription
+from schemas.scene import MeshShape
 from schemas.topics import (
+    CONTACTS,
     DESCRIPTION,
     DEVICE_EVENTS,
     DEVICE_SHAFT,
@@ -14,6 +18,7 @@ from schemas.topics import (
     JOINT_STATES,
     LOG,
     PLANNED_PATH,
+    SCENE,
     SENSORS,
     STEP_ERRORS,
 )
@@ -24,6 +29,8 @@ from services.visualizer.core import Visualizer
 from services.visualizer.meshes import missing_meshes
 from services.visualizer.outputs import Outputs
 from services.visualizer.parameters import VisualizerParameters
+from services.visualizer.scene_meshes import scene_mesh
+from services.visualizer.shapes import Mesh
 from services.visualizer.tool import tool_link
 from services.visualizer.urdf import parse_urdf
 
@@ -40,7 +47,7 @@ def run(node: Node, deployment: Deployment) -> None:
         nonlocal visualizer
         if visualizer is None:
             try:
-                visualizer = _visualizer(node, message)
+                visualizer = _visualizer(node, message, (root, root / deployment.robot))
             except ValueError as error:
                 node.log.error(f"the description of {message.robot} cannot be drawn: {error}")
                 return
@@ -59,10 +66,14 @@ def run(node: Node, deployment: Deployment) -> None:
     outputs.close()
 
 
-def _visualizer(node: Node, message: RobotDescription) -> Visualizer:
-    """The core for the arm that was described, fed from the bus."""
+def _visualizer(node: Node, message: RobotDescription, folders: tuple[Path, ...]) -> Visualizer:
+    """The core for the arm that was described, fed from the bus; the scene's mesh files are in `folders`."""
     model = parse_urdf(message.urdf)
-    core = Visualizer(model, message.robot, tool_link(model, message.robot_toml))
+
+    def load(shape: MeshShape) -> Mesh | None:
+        return scene_mesh(shape, folders, node.log.warning)
+
+    core = Visualizer(model, message.robot, tool_link(model, message.robot_toml), load)
     node.subscribe(JOINT_STATES, core.on_joint_state, batch=1 / BATCH_RATE)
     node.subscribe(JOINT_COMMANDS, core.on_joint_command, batch=1 / BATCH_RATE)
     node.subscribe(STEP_ERRORS, core.on_step_errors, batch=1 / BATCH_RATE)
@@ -72,6 +83,8 @@ def _visualizer(node: Node, message: RobotDescription) -> Visualizer:
     node.subscribe(SENSORS, core.on_sensors)
     node.subscribe(DEVICE_SHAFT, core.on_shaft, batch=1 / BATCH_RATE)
     node.subscribe(PLANNED_PATH, core.on_planned_path)
+    node.subscribe(SCENE, core.scene.on_scene)
+    node.subscribe(CONTACTS, core.scene.on_contacts)
     node.subscribe(LOG, core.journal.on_log, own=True)
     return core
 

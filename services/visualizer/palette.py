@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 Color = tuple[int, int, int]
+Rgba = tuple[int, int, int, int]
 
 ARM = (198, 202, 208)  # links whose URDF names no colour
 GHOST = (86, 156, 255, 60)
@@ -13,6 +14,11 @@ BAND = (240, 190, 60)
 PATH = (122, 180, 255)
 TRAIL = (255, 122, 48)
 SHAFT = (186, 130, 250)
+OBJECT = (156, 150, 128, 150)
+CARRIED = (120, 200, 170, 190)
+TOUCHING = (235, 60, 60, 190)
+SHADOW = (210, 214, 222, 45)  # the arm where a plan was refused
+LABEL = (255, 120, 110)
 GRID = (140, 148, 160, 50)
 BACKGROUND = (22, 25, 30)
 

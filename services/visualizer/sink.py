@@ -12,8 +12,22 @@ from services.visualizer import entities, palette
 from services.visualizer.layout import TIMELINE, blueprint
 from services.visualizer.meshes import mesh_path
 from services.visualizer.model import Joint, Model, Visual
-from services.visualizer.shapes import mesh_of
-from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip, Times, Tint, Update
+from services.visualizer.shapes import Mesh, mesh_of
+from services.visualizer.updates import (
+    Gone,
+    Labels,
+    LogLines,
+    Panel,
+    Poses,
+    Scalars,
+    Shadow,
+    State,
+    Strip,
+    Thing,
+    Times,
+    Tint,
+    Update,
+)
 
 APPLICATION = "gemelo"
 GHOST_MARGIN = 0.0015  # [m] the ghost is a skin around the arm, or the two would flicker
@@ -57,6 +71,16 @@ class Sink:
                 self._send(entity, _once(time), rr.StateChange.columns(state=[state]))
             case Tint(root, time, mode):
                 self._tint(root, time, palette.TINTS.get(mode))
+            case Thing(entity, time, mesh, translation, rotation, color):
+                pose = rr.Transform3D(translation=translation, quaternion=rotation)
+                self._log(entity, time, pose, _solid(mesh, color))
+            case Gone(entity, time):
+                self._log(entity, time, rr.Clear(recursive=True))
+            case Labels(entity, time, points, texts):
+                dots = rr.Points3D(points, labels=texts, colors=[palette.LABEL], radii=[0.006], show_labels=True)
+                self._log(entity, time, dots)
+            case Shadow(root, time, touching):
+                self._shadow(root, time, touching)
             case LogLines(entity, times, texts, levels):
                 self._send(entity, times, rr.TextLog.columns(text=list(texts), level=[_level(name) for name in levels]))
 
@@ -67,6 +91,26 @@ class Sink:
             color = tint or _own_color(visual)
             columns = kind.columns(albedo_factor=[color] if color else []).partition([1 if color else 0])
             self._send(entity, _once(time), columns)
+
+    def _shadow(self, root: str, time: int, touching: frozenset[str]) -> None:
+        """The arm once more, to be taken away again: nothing of it is static but the fixed joints' poses."""
+        for joint in self._model.joints:
+            if not joint.is_moving:
+                pose = rr.Transform3D(translation=joint.translation, quaternion=joint.rotation)
+                self._log(f"{root}/{self._model.paths[joint.child]}", time, pose)
+        red = {f"{root}/{self._model.paths[link]}/" for link in touching if link in self._model.paths}
+        for entity, visual in self._visuals(root):
+            is_red = entity.rpartition("/")[0] + "/" in red
+            drawn = self._drawn(visual, palette.TOUCHING if is_red else palette.SHADOW)
+            if drawn is not None:
+                pose = rr.Transform3D(translation=visual.translation, quaternion=visual.rotation)
+                self._log(entity, time, pose, drawn)
+
+    def _log(self, entity: str, time: int, *components: rr.AsComponents) -> None:
+        self._stream.set_time(TIMELINE, timestamp=np.datetime64(time, "ns"))
+        for component in components:
+            self._stream.log(entity, component)
+        self._stream.reset_time()
 
     def _send(self, entity: str, times: Times, columns: rr.ComponentColumnList) -> None:
         index = rr.TimeColumn(TIMELINE, timestamp=times.astype("datetime64[ns]"))
@@ -91,7 +135,7 @@ class Sink:
             self._stream.log(f"{root}/{self._model.paths[joint.child]}", pose, static=not joint.is_moving)
         for entity, visual in self._visuals(root):
             pose = rr.Transform3D(translation=visual.translation, quaternion=visual.rotation)
-            drawn = self._drawn(visual, is_ghost)
+            drawn = self._drawn(visual, palette.GHOST if is_ghost else None)
             if drawn is not None:
                 self._stream.log(entity, pose, drawn, static=True)
 
@@ -101,20 +145,15 @@ class Sink:
             for index, visual in enumerate(visuals):
                 yield f"{root}/{self._model.paths[link]}/visual_{index}", visual
 
-    def _drawn(self, visual: Visual, is_ghost: bool) -> rr.Mesh3D | rr.Asset3D | None:
-        """The visual; None where its file is missing, which is not worth the whole view.
+    def _drawn(self, visual: Visual, color: palette.Rgba | None) -> rr.Mesh3D | rr.Asset3D | None:
+        """The visual, a skin around it where `color` is given; None where its file is missing.
 
-        The measured arm has its colours from `Tint`, since what is static cannot change.
+        That is not worth the whole view. The measured arm has its colours from `Tint`: what is static cannot change.
         """
-        color = palette.GHOST if is_ghost else None
         if visual.shape.kind == "mesh":
             path = mesh_path(self._folder, visual.shape.file)
             return rr.Asset3D(path=path, albedo_factor=color) if path.is_file() else None
-        mesh = mesh_of(visual.shape, GHOST_MARGIN if is_ghost else 0.0)
-        return rr.Mesh3D(
-            vertex_positions=mesh.vertices, vertex_normals=mesh.normals, triangle_indices=mesh.triangles,
-            albedo_factor=color,
-        )  # fmt: skip
+        return _solid(mesh_of(visual.shape, GHOST_MARGIN if color else 0.0), color)
 
     def _send_styles(self, joint: Joint) -> None:
         self._style(entities.commanded(joint.name), [("commanded", palette.COMMANDED, 4.0)])
@@ -126,6 +165,13 @@ class Sink:
     def _style(self, entity: str, series: list[tuple[str, palette.Color, float]]) -> None:
         names, colors, widths = zip(*series, strict=True)
         self._stream.log(entity, rr.SeriesLines(colors=colors, widths=widths, names=names), static=True)
+
+
+def _solid(mesh: Mesh, color: palette.Rgba | None) -> rr.Mesh3D:
+    return rr.Mesh3D(
+        vertex_positions=mesh.vertices, vertex_normals=mesh.normals, triangle_indices=mesh.triangles,
+        albedo_factor=color,
+    )  # fmt: skip
 
 
 def _own_color(visual: Visual) -> palette.Color | None:

@@ -8,7 +8,10 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from schemas.message import Vector
+from services.visualizer.palette import Rgba
 from services.visualizer.rotations import Array
+from services.visualizer.shapes import Mesh
 
 Times = npt.NDArray[np.int64]
 
@@ -78,4 +81,43 @@ class Tint:
     mode: str
 
 
-Update: TypeAlias = Scalars | Poses | Strip | Panel | LogLines | State | Tint
+@dataclass(frozen=True)
+class Thing:
+    """A solid at a pose in its parent entity: (3,) [m] and quaternion (4,) x y z w; its colour with alpha."""
+
+    entity: str
+    time: int
+    mesh: Mesh
+    translation: Vector
+    rotation: Vector
+    color: Rgba
+
+
+@dataclass(frozen=True)
+class Gone:
+    """An entity and all below it that are no longer there."""
+
+    entity: str
+    time: int
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Texts at points (n, 3) [m] in the root frame."""
+
+    entity: str
+    time: int
+    points: Array
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Shadow:
+    """A pale arm under `entity`, with the links `touching` in red; `Poses` say its posture."""
+
+    entity: str
+    time: int
+    touching: frozenset[str]
+
+
+Update: TypeAlias = Scalars | Poses | Strip | Panel | LogLines | State | Tint | Thing | Gone | Labels | Shadow

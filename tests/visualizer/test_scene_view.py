@@ -1,0 +1,170 @@
+"""The planning scene on the screen: objects, what is carried, and what touches where a plan was refused."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun as rr
+
+from schemas.frames import Transform
+from schemas.scene import (
+    BoxShape,
+    Contact,
+    Contacts,
+    CylinderShape,
+    MeshShape,
+    PlaneShape,
+    PlanningScene,
+    SceneObject,
+    Shape,
+    SphereShape,
+)
+from services.visualizer import entities, palette
+from services.visualizer.binary import rerun_binary
+from services.visualizer.core import Visualizer
+from services.visualizer.model import Model
+from services.visualizer.scene import SceneView
+from services.visualizer.scene_meshes import scene_mesh
+from services.visualizer.sink import APPLICATION, Sink
+from services.visualizer.updates import Gone, Labels, Poses, Shadow, Thing
+
+NOW = 1_795_000_000_000_000_000
+NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")
+TOOL = "base_link/brazo_link/antebrazo_link/efector_link"
+TRIANGLE = b"solid a\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n"
+
+TABLE = SceneObject(name="table", shape=BoxShape(size=(0.6, 0.4, 0.02)), pose=Transform(translation=(0.3, 0.0, -0.01)))
+CUP = SceneObject(name="cup", shape=CylinderShape(radius=0.03, length=0.08), frame="efector_link", attached=True)
+
+
+@pytest.fixture
+def view(model: Model) -> SceneView:
+    return SceneView(model, lambda shape: scene_mesh(shape, (), lambda text: None))
+
+
+def touching(*pairs: tuple[str, str]) -> Contacts:
+    contacts = tuple(Contact(first=a, second=b, distance=-0.001, point=(0.1, 0.2, 0.3)) for a, b in pairs)
+    return Contacts(stamp=NOW, name=NAMES, position=(0.5, 0.2, 0.01), contacts=contacts)
+
+
+def things(view: SceneView) -> dict[str, Thing]:
+    return {update.entity: update for update in view.take(NOW) if isinstance(update, Thing)}
+
+
+def test_what_stands_is_in_the_world_and_what_is_carried_moves_with_its_link(view):
+    view.on_scene(PlanningScene(objects=(TABLE, CUP)))
+    shown = things(view)
+    assert list(shown) == ["world/scene/table", f"world/measured/{TOOL}/carried/cup"]
+    table = shown["world/scene/table"]
+    assert table.translation == (0.3, 0.0, -0.01)
+    assert np.ptp(table.mesh.vertices, axis=0).tolist() == pytest.approx([0.6, 0.4, 0.02])
+    assert view.take(NOW) == []
+
+
+def test_only_what_changes_is_told_again(view):
+    view.on_scene(PlanningScene(objects=(TABLE, CUP)))
+    view.take(NOW)
+    moved = SceneObject(name="table", shape=TABLE.shape, pose=Transform(translation=(0.4, 0.0, 0.0)))
+    view.on_scene(PlanningScene(objects=(moved, CUP)))
+    assert list(things(view)) == ["world/scene/table"]
+    view.restart()
+    assert len(things(view)) == 2
+
+
+def test_what_is_taken_away_or_let_go_is_gone_from_where_it_was(view):
+    view.on_scene(PlanningScene(objects=(TABLE, CUP)))
+    view.take(NOW)
+    free = SceneObject(name="cup", shape=CUP.shape)
+    view.on_scene(PlanningScene(objects=(free,)))
+    updates = view.take(NOW)
+    gone = [update.entity for update in updates if isinstance(update, Gone)]
+    assert gone[:2] == ["world/scene/table", f"world/measured/{TOOL}/carried/cup"]
+    assert [update.entity for update in updates if isinstance(update, Thing)] == ["world/scene/cup"]
+
+
+@pytest.mark.parametrize(
+    ("shape", "extent"),
+    [
+        (SphereShape(radius=0.1), (0.2, 0.2, 0.2)),
+        (CylinderShape(radius=0.1, length=0.5), (0.2, 0.2, 0.5)),
+        (PlaneShape(), (2.0, 2.0, 0.004)),
+        (MeshShape(data=TRIANGLE, scale=(0.5, 0.2, 1.0)), (0.5, 0.2, 0.0)),
+    ],
+)
+def test_every_shape_is_drawn_at_its_size(view, shape: Shape, extent):
+    view.on_scene(PlanningScene(objects=(SceneObject(name="thing", shape=shape),)))
+    mesh = things(view)["world/scene/thing"].mesh
+    assert np.ptp(mesh.vertices, axis=0).tolist() == pytest.approx(extent, abs=1e-2)
+    assert np.linalg.norm(mesh.normals, axis=1) == pytest.approx(1.0)
+    if isinstance(shape, PlaneShape):
+        assert mesh.vertices[:, 2].max() == 0.0
+
+
+def test_padding_is_drawn_too(view):
+    view.on_scene(PlanningScene(objects=(SceneObject(name="ball", shape=SphereShape(radius=0.1), padding=0.05),)))
+    assert np.ptp(things(view)["world/scene/ball"].mesh.vertices[:, 2]) == pytest.approx(0.3)
+
+
+def test_a_mesh_that_cannot_be_read_is_said_once_and_left_out(model):
+    said: list[str] = []
+    view = SceneView(model, lambda shape: scene_mesh(shape, (Path("nowhere"),), said.append))
+    view.on_scene(PlanningScene(objects=(SceneObject(name="m", shape=MeshShape(path="m.stl")), TABLE)))
+    assert list(things(view)) == ["world/scene/table"]
+    view.restart()
+    view.take(NOW)
+    assert len(said) == 1
+    assert '"m.stl"' in said[0]
+
+
+def test_a_refused_posture_shows_what_touches_in_red_with_its_names(view):
+    view.on_scene(PlanningScene(objects=(TABLE, CUP)))
+    view.take(NOW)
+    view.on_contacts(touching(("efector_link", "table"), ("cup", "table")))
+    updates = view.take(NOW)
+    red = {update.entity for update in updates if isinstance(update, Thing) and update.color == palette.TOUCHING}
+    assert red == {"world/scene/table", f"world/refused/{TOOL}/carried/cup"}
+    [shadow] = [update for update in updates if isinstance(update, Shadow)]
+    assert "efector_link" in shadow.touching
+    poses = [update.entity for update in updates if isinstance(update, Poses)]
+    assert f"world/refused/{TOOL}" in poses
+    [labels] = [update for update in updates if isinstance(update, Labels)]
+    assert labels.texts == ("efector_link - table: -1.0 mm\ncup - table: -1.0 mm", "")
+
+
+def test_when_nothing_touches_any_more_the_shadow_goes_and_the_red_too(view):
+    view.on_scene(PlanningScene(objects=(TABLE,)))
+    view.on_contacts(touching(("efector_link", "table")))
+    view.take(NOW)
+    view.on_contacts(Contacts(stamp=NOW))
+    updates = view.take(NOW)
+    [table] = [update for update in updates if isinstance(update, Thing)]
+    assert table.color == palette.OBJECT
+    assert [update.entity for update in updates if isinstance(update, Gone)] == [entities.REFUSED]
+    assert not any(isinstance(update, Shadow | Labels) for update in updates)
+
+
+@pytest.mark.parametrize("name", ["table", "box 1", "a/b", "..", "größe", "a_b-c.d", "ö*", 'say "x"'])
+def test_any_name_is_one_part_of_an_entity_path_as_rerun_has_it(name):
+    assert entities.part(name) == rr.escape_entity_path_part(name)
+
+
+def test_scene_and_contacts_reach_the_recording(model, tmp_path):
+    path = tmp_path / "scene.rrd"
+    stream = rr.RecordingStream(APPLICATION, recording_id="scene")
+    stream.save(str(path))
+    core = Visualizer(model, "rm1", "efector_link")
+    sink = Sink(stream, model, tmp_path, window=20.0, trail=20.0)
+    core.scene.on_scene(PlanningScene(objects=(TABLE, CUP, SceneObject(name="box 1", shape=SphereShape(radius=0.1)))))
+    core.scene.on_contacts(touching(("efector_link", "table")))
+    sink.write(core.step(NOW))
+    sink.close()
+    printed = subprocess.run([rerun_binary(), "rrd", "print", path], capture_output=True, text=True, check=True).stdout
+    expected = [
+        "/world/scene/table", "/world/scene/box\\ 1", f"/world/measured/{TOOL}/carried/cup",
+        f"/world/refused/{TOOL}/visual_0", f"/world/refused/{TOOL}/carried/cup", "/world/refused/contacts",
+    ]  # fmt: skip
+    for entity in expected:
+        assert entity in printed
