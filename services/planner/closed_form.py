@@ -84,7 +84,7 @@ def closed_form(arm: Arm, kinematics: Kinematics) -> ClosedForm | None:
     except ImportError as error:
         log.warning(f"no inverse kinematics in closed form, it is searched for instead: {error}")
         return None
-    order = _order(arm)
+    order = chain_order(arm)
     pose, jacobian = kinematics.tool_and_jacobian(np.zeros(JOINTS))
     axes = jacobian[3:, order].T
     if not np.allclose(np.linalg.norm(axes, axis=1), 1.0, atol=AGREEMENT):
@@ -115,7 +115,7 @@ def turns_about(direction: Array, axis: Array, rotation: Array, count: int) -> l
     return [np.column_stack((direction, first, np.cross(direction, first))) @ tool.T for first in firsts]
 
 
-def _order(arm: Arm) -> list[int]:
+def chain_order(arm: Arm) -> list[int]:
     """The arm's joints as they follow one another from the base to the tool."""
     by_child = {joint.child: joint for joint in arm.model.joints}
     link, names = arm.tool_frame, []

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from services.arm.description import Arm, Joint
 from services.arm.kinematics import Kinematics
 from services.planner.centring import Centring
-from services.planner.closed_form import ClosedForm, closed_form, turns_about
+from services.planner.closed_form import ClosedForm, chain_order, closed_form, turns_about
 from services.planner.coinciding import completed
 from services.planner.descent import Attempt, Descent
 from services.planner.targets import Target
@@ -45,6 +45,8 @@ class InverseKinematics:
         self._closed: ClosedForm | None = None if is_numeric else closed_form(arm, kinematics)
         self._lower, self._upper = np.array([_one_turn(joint) for joint in arm.joints]).T
         self._speed = np.array([joint.velocity for joint in arm.joints])
+        # The first joint of the chain turns the whole arm as it is: its mirror image is no other posture.
+        self._mirrored = [index for index in chain_order(arm)[1:] if arm.joints[index].unit == "rad"]
         self._starts = [self._spread(index) for index in range(1, self._start_count(arm) + 1)]
 
     @property
@@ -54,7 +56,7 @@ class InverseKinematics:
 
     def solutions(self, target: Target, near: Array, is_late: Clock) -> Iterator[Array]:
         """Distinct joint values that meet the target: all of the closed form, the nearest first; where that gives none,
-        what `near` leads to, then batches, each nearest first."""
+        what `near` leads to and its mirror images, then batches, each nearest first."""
         found: list[Array] = []
         for positions in self._closed_form_solutions(target, near):
             if self._is_new(positions, found, SAME):
@@ -118,9 +120,8 @@ class InverseKinematics:
         return MORE_STARTS if len(arm.joints) >= FULL_POSE_JOINTS and self._closed is None else STARTS
 
     def _searched(self, target: Target, near: Array, is_late: Clock, starts: int) -> Iterator[Array]:
-        first = self.descend(target, near)
-        found = [first.positions] if first.is_solution else []
-        yield from found
+        found = self._first(target, near)
+        yield from list(found)
         attempts = islice(self._attempts(target, near, is_late), starts)
         while batch := list(islice(attempts, BATCH)):
             new: list[Array] = []
@@ -128,6 +129,21 @@ class InverseKinematics:
                 if attempt.is_solution:
                     self._collect(target, attempt.positions, found, new)
             yield from sorted(new, key=lambda positions: self.travel(near, positions))
+
+    def _first(self, target: Target, near: Array) -> list[Array]:
+        """What `near` leads to and, for an arm of few joints, its mirror image in each elbow; nearest first."""
+        first = self.descend(target, near)
+        if not first.is_solution:
+            return []
+        found = [first.positions]
+        if len(near) < FULL_POSE_JOINTS and not self._centring.is_redundant(target, first.positions):
+            for joint in self._mirrored:
+                start = first.positions.copy()
+                start[joint] = self._lower[joint] + self._upper[joint] - start[joint]
+                attempt = self.descend(target, start)
+                if attempt.is_solution and self._is_new(attempt.positions, found, SAME):
+                    found.append(attempt.positions)
+        return sorted(found, key=lambda positions: self.travel(near, positions))
 
     def _collect(self, target: Target, positions: Array, found: list[Array], new: list[Array]) -> None:
         """Puts a solution that is none of those found into both lists; far from `near`, freedom goes to the middles."""

@@ -39,6 +39,15 @@ def test_both_elbows_are_found_and_the_nearer_one_comes_first():
         assert np.sign(second[1]) == -side
 
 
+@settings(max_examples=100)
+@given(POSTURES, POSTURES)
+def test_the_nearest_comes_first_of_all_that_are_found(goal: tuple[float, ...], near: tuple[float, ...]):
+    start, target = np.array(near), Target(KINEMATICS.tool(goal).position)
+    if IK.descend(target, start).is_solution:  # else the arm is stuck there, and comes from elsewhere
+        travels = [IK.travel(start, solution) for solution in IK.solutions(target, start, never)]
+        assert travels[0] <= min(travels) + 0.02  # the stretched arm's two elbows are one
+
+
 def test_it_is_deterministic():
     target, near = Target(np.array([0.1, -0.25, 0.05])), np.zeros(3)
     again = [list(IK.solutions(target, near, never)) for _ in range(2)]
