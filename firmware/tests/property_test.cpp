@@ -73,6 +73,44 @@ TEST_F(Plays, AreSilentWithinATickOfTheEStopAndThreeOfASwitch) { expect_none(fin
 
 TEST_F(Plays, AreTakenAsTheProtocolSaysAndComeToTheirEnd) { expect_none(findings, Property::Answers); }
 
+// Straight into the interrupt's side: whatever a slot asks for, reversals at full speed among it.
+TEST(Stepper, MakesAnyIncrementsWithinTheDriversTimesAndOwesNothingInTheEnd) {
+    Findings findings;
+    for (uint64_t seed = first_seed(); seed < first_seed() + 40; ++seed) {
+        SCOPED_TRACE(seed);
+        Dice dice(seed);
+        Bench bench = random_bench(dice);
+        bench.config.inputs = 0;
+        Stepper stepper;
+        stepper.begin(bench.config);
+        const int64_t zero[kMaxJoints] = {};
+        stepper.place(zero);
+        Oscilloscope scope(bench, stepper.pins(), findings);
+        const uint32_t ticks = ticks_per_slot(bench.config);
+        const int64_t most = (static_cast<int64_t>(ticks) << kFineBits) * 63 / 128;
+        std::vector<int64_t> place(bench.config.joints);
+        for (int slot = 0; slot < 2000; ++slot) {
+            int32_t increment[kMaxJoints] = {};
+            for (size_t j = 0; j < place.size() && slot < 1990; ++j) {
+                increment[j] = static_cast<int32_t>(dice.between(-most, most));
+                place[j] += increment[j];
+            }
+            for (uint32_t tick = 0; tick < ticks; ++tick) {
+                stepper.tick(Levels{});
+                scope.see(stepper.pins());
+                if (tick == 0) stepper.offer(increment);
+            }
+        }
+        for (uint8_t j = 0; j < place.size(); ++j) {
+            const int64_t wanted = (place[j] + kFineStep / 2) >> kFineBits;
+            EXPECT_EQ(scope.count(j), wanted);
+            EXPECT_EQ(stepper.executed(j), wanted);
+        }
+        EXPECT_TRUE(stepper.is_quiet());
+    }
+    expect_none(findings, Property::PulseTiming);
+}
+
 TEST(Idempotence, SayingEveryFrameTwiceChangesNoPinAndNoWord) {
     Findings findings;
     for (uint64_t seed = first_seed(); seed < first_seed() + share_of(20); ++seed) {
