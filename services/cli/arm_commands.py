@@ -3,36 +3,16 @@
 from __future__ import annotations
 
 from services.cli.exits import ExitCode
+from services.cli.move_options import move_options
 from services.cli.parser import Command, Options, Parser, Words, finite_number, json_option
-
-MOVE_EXAMPLES = """examples:
-  gemelo move --to 0.25 0.15 0.10
-  gemelo move --joints brazo_joint=30deg antebrazo_joint=-45deg efector_joint=40mm
-  gemelo move --named ready --speed 0.5"""
-
-
-def move_options(parser: Parser) -> None:
-    parser.epilog = MOVE_EXAMPLES
-    goal = parser.add_mutually_exclusive_group(required=True)
-    goal.add_argument(
-        "--to", nargs=3, type=finite_number, metavar=("X", "Y", "Z"), help="tool position in the base frame [m]"
-    )
-    goal.add_argument(
-        "--joints", nargs="+", metavar="JOINT=VALUE", help="30deg, 0.5rad, 40mm, 0.04m; a bare number is rad or m"
-    )
-    goal.add_argument("--named", metavar="STATE", help="a named state of the SRDF")
-    parser.add_argument("--speed", type=finite_number, default=1.0, help="share of the velocity limits, in (0, 1]")
-    parser.add_argument("--plan-only", action="store_true", help="plan, and do not move")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of a line")
 
 
 def move(options: Options) -> ExitCode:
-    from services.cli.goals import goal_of, request_of
     from services.cli.move import move
+    from services.cli.move_options import request_from
     from services.cli.session import connect, load
 
-    _, arm = load()
-    request = request_of(goal_of(arm, options.to, options.joints or (), options.named), options.speed)
+    request = request_from(options, load()[1])
     with connect() as session:
         return move(session, request, options.plan_only, options.json)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from msgspec.structs import replace
+
 from schemas.actions import GoalStatusCode
 from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
 from schemas.planning import PlanRequest, PlanResponse
@@ -29,6 +31,8 @@ def move(session: Session, request: PlanRequest, plan_only: bool, as_json: bool)
         report = MoveReport(robot=session.arm.name, planned_ms=plan.planning_time * 1e3, duration_s=plan.duration)
     else:
         report = follow(session, plan, quiet=as_json)
+    if plan.stopped_by is not None:
+        report = replace(report, fraction=plan.fraction, stopped_by=plan.stopped_by.message)
     print(report.as_json() if as_json else summary(report, plan_only))
     return report.exit_code
 

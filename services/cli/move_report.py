@@ -30,6 +30,8 @@ class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
     final_error_steps: dict[str, float] = {}
     max_following_error_steps: dict[str, float] = {}
     stopped_at: dict[str, str] = {}
+    fraction: float = 1.0  # of a line, of which less will do
+    stopped_by: str = ""  # why it is no more
 
     @property
     def exit_code(self) -> ExitCode:
@@ -44,6 +46,8 @@ class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
 def summary(report: MoveReport, plan_only: bool = False) -> str:
     """The one line that a person reads."""
     planned = f"planned in {report.planned_ms:.1f} ms"
+    if report.stopped_by:
+        planned = f"{planned} {report.fraction:.1%} of the way ({report.stopped_by})"
     if plan_only:
         return f"{planned}, would take {report.duration_s:.2f} s"
     where = ", ".join(f"{name} {position}" for name, position in report.stopped_at.items())

@@ -1,0 +1,118 @@
+"""From the words of `gemelo move` to the planner's request."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from schemas.planning import (
+    CircularMotion,
+    FreeMotion,
+    JointGoal,
+    LinearMotion,
+    NamedGoal,
+    PlanRequest,
+    PointToPoint,
+    PoseGoal,
+    WaypointGoal,
+)
+from services.arm.description import load_arm
+from services.arm.transforms import from_rpy
+from services.cli.exits import CommandError
+from services.cli.main import parser
+from services.cli.move_options import EXAMPLES, request_from
+from services.cli.move_report import MoveReport, summary
+
+ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
+
+
+def request(words: str) -> PlanRequest:
+    return request_from(parser().parse_args(["move", *words.split()]), ARM)
+
+
+def test_without_a_way_any_will_do():
+    assert request("--named ready") == PlanRequest(goal=NamedGoal(name="ready"))
+
+
+def test_a_line_has_the_tools_speed_in_metres():
+    asked = request("--to 0.2 0.1 0.1 --line --tool-speed 50 --tool-acceleration 200 --fraction 0.5")
+    assert asked.goal == PoseGoal(position=(0.2, 0.1, 0.1))
+    assert asked.motion == LinearMotion(speed=0.05, acceleration=0.2, least_fraction=0.5)
+
+
+def test_an_arc_has_a_point_or_a_centre():
+    assert request("--to 0.2 0.1 0.1 --arc 0.2 0 0.1").motion == CircularMotion(interim=(0.2, 0.0, 0.1))
+    assert request("--to 0.2 0.1 0.1 --center 0.2 0 0.1").motion == CircularMotion(center=(0.2, 0.0, 0.1))
+
+
+def test_points_before_the_goal_are_turned_as_it_is():
+    asked = request("--via 0.1 0 0.1 --via 0.1 0.1 0.1 --to 0.2 0.1 0.1 --rpy 180 0 90 --blend 10 --ptp")
+    turn = from_rpy(math.pi, 0.0, math.pi / 2)
+    places = ((0.1, 0.0, 0.1), (0.1, 0.1, 0.1), (0.2, 0.1, 0.1))
+    assert asked.goal == WaypointGoal(
+        points=tuple(PoseGoal(position=place, orientation=turn) for place in places), blend=0.01
+    )
+    assert asked.motion == PointToPoint()
+
+
+def test_points_may_lie_before_joints_too():
+    asked = request("--via 0.1 0 0.1 --joints brazo_joint=0.5")
+    goal = JointGoal(name=("brazo_joint",), position=(0.5,))
+    assert asked.goal == WaypointGoal(points=(PoseGoal(position=(0.1, 0.0, 0.1)), goal))
+
+
+def test_the_tool_points_along_a_direction():
+    asked = request("--to 0.2 0.1 0.1 --along 0 0 -1 --frame brazo_link")
+    assert asked.goal == PoseGoal(
+        position=(0.2, 0.1, 0.1), tool_axis=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0), frame="brazo_link"
+    )
+
+
+def test_a_free_motion_names_its_planner_and_seed():
+    asked = request("--named left --planner RRTstar --seed 7 --time 3")
+    assert asked.motion == FreeMotion(planner_id="RRTstar", seed=7)
+    assert asked.allowed_time == 3.0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--named left --rpy 0 0 0", "--rpy goes with --to"),
+        ("--to 0.2 0.1 0.1 --blend 10", "--blend goes with --via"),
+        ("--to 0.2 0.1 0.1 --tool-speed 10", "--tool-speed goes with --line"),
+        ("--to 0.2 0.1 0.1 --arc 0.2 0 0.1 --fraction 0.5", "--fraction goes with --line"),
+        ("--to 0.2 0.1 0.1 --line --planner PRM", "--planner goes with a free motion"),
+        ("--to 0.2 0.1 0.1 --line --tool-speed 0", "--tool-speed 0 is not above 0"),
+        ("--via 0.1 0 0.1 --to 0.2 0.1 0.1 --blend -3", "--blend -3 is not above 0"),
+        ("--via 0.1 0 0.1 --to 0.2 0.1 0.1 --arc 0.2 0 0.1", "--via does not go with --arc"),
+        ("--named left --time 0", "--time 0 is not in"),
+    ],
+)
+def test_what_does_not_go_together_is_refused_by_name(words: str, said: str):
+    with pytest.raises(CommandError, match=said):
+        request(words)
+
+
+@pytest.mark.parametrize(
+    "words", ["--to 1 2 3 --line --ptp", "--to 1 2 nan --line", "--to 1 2 3 --tool-speed inf --line"]
+)
+def test_two_ways_at_once_and_what_is_no_number_end_with_two(words: str):
+    with pytest.raises(SystemExit) as ended:
+        parser().parse_args(["move", *words.split()])
+    assert ended.value.code == 2
+
+
+def test_every_example_of_the_help_can_be_typed():
+    lines = [line.split("gemelo move ")[1] for line in EXAMPLES.splitlines()[1:]]
+    assert len(lines) == 7
+    for line in lines:
+        assert request(line).velocity_scaling > 0.0
+
+
+def test_a_line_that_stops_short_says_so():
+    report = MoveReport(
+        robot="rm1", planned_ms=5.0, duration_s=2.0, fraction=0.5, stopped_by="at 0.1 m of 0.2 m, the crate"
+    )
+    assert summary(report, plan_only=True) == (
+        "planned in 5.0 ms 50.0% of the way (at 0.1 m of 0.2 m, the crate), would take 2.00 s"
+    )
