@@ -180,6 +180,9 @@ class PlannedPath(Message, frozen=True, kw_only=True):
     stamp: int = 0  # [ns] UNIX time
     frame: str = ""
     points: tuple[tuple[float, float, float], ...] = ()  # [m]
+    name: tuple[str, ...] = ()  # joints
+    positions: tuple[Vector, ...] = ()  # [rad] or [m] a row for every point
+    times: Vector = ()  # [s] from the start, of every point
 
 
 class IkRequest(Message, frozen=True, kw_only=True):

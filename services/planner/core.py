@@ -89,8 +89,16 @@ class Planner:
         """The way of the tool, for eyes; `stamp` [ns] UNIX."""
         rows = trajectory.points
         chosen = {round(index * (len(rows) - 1) / (PATH_POINTS - 1)) for index in range(PATH_POINTS)}
-        points = (self.kinematics.tool(rows[index].positions).position.tolist() for index in sorted(chosen))
-        return PlannedPath(stamp=stamp, frame=self.arm.base_frame, points=tuple((x, y, z) for x, y, z in points))
+        shown = [rows[index] for index in sorted(chosen)]
+        points = (self.kinematics.tool(row.positions).position.tolist() for row in shown)
+        return PlannedPath(
+            stamp=stamp,
+            frame=self.arm.base_frame,
+            points=tuple((x, y, z) for x, y, z in points),
+            name=trajectory.joint_names,
+            positions=tuple(row.positions for row in shown),
+            times=tuple(row.time_from_start for row in shown),
+        )
 
     @cached_property
     def _search(self) -> Search:

@@ -29,7 +29,10 @@ OnWorld = Callable[[World], None]
 
 
 class SceneKeeper:
-    """Holds the scene of one arm; `on_world` is told of the first world and of every later one."""
+    """Holds the scene of one arm; `on_world` is told of the first world and of every later one.
+
+    `world` is for the node's thread of logic alone.
+    """
 
     def __init__(self, node: Node, arm: Arm, states: Latest[JointState], folder: Path, on_world: OnWorld) -> None:
         self._node, self._arm, self._states, self._on_world = node, arm, states, on_world
@@ -39,7 +42,8 @@ class SceneKeeper:
         self._scene, self._contacts = node.publisher(SCENE), node.publisher(CONTACTS)
         self._store = SceneStore(arm, self._folders, self._restored())
         self._is_touching = False
-        self.world = self._show(self._built(self._store.scene))
+        self.world = self._built(self._store.scene)
+        self._show()
         node.serve(SCENE_EDIT, self._edit)
 
     def heed(self, response: PlanResponse) -> None:
@@ -67,16 +71,17 @@ class SceneKeeper:
         except (SceneError, ValueError) as error:
             self._store.scene = before
             return SceneResponse(reason=str(error), version=before.version)
-        self.world = self._show(world)
+        self.world = world
+        self._show()
         return msgspec.structs.replace(response, reason=self._save(world.scene))
 
     def _built(self, scene: PlanningScene) -> World:
         return World(self._arm, self._kinematics, scene, self._folders)
 
-    def _show(self, world: World) -> World:
-        self._on_world(world)
-        self._scene.put(world.scene)
-        return world
+    def _show(self) -> None:
+        """Tells the planner and the bus; a world is no thing for two threads, so the planner has one of its own."""
+        self._on_world(self._built(self.world.scene))
+        self._scene.put(self.world.scene)
 
     def _links(self) -> Mapping[str, Transform] | None:
         """Where the links are, or None without a fresh joint state of all joints."""

@@ -18,6 +18,7 @@ from services.visualizer import entities
 from services.visualizer.journal import Journal, bounded
 from services.visualizer.model import Joint, Model
 from services.visualizer.panel import LOST, Facts, panel, shaft_errors
+from services.visualizer.preview import Preview
 from services.visualizer.rotations import Array
 from services.visualizer.scene import Loader, SceneView, no_mesh
 from services.visualizer.thinning import Thinned
@@ -34,6 +35,7 @@ class Visualizer:
         """`load` reads the mesh files of the scene."""
         self.model = model
         self.scene = SceneView(model, load)
+        self._preview = Preview(model)
         self._tool = tool
         self._names = [joint.name for joint in model.moving]
         width = len(self._names)
@@ -51,6 +53,7 @@ class Visualizer:
     def on_joint_state(self, message: JointState) -> None:
         """What the arm did."""
         self._facts = replace(self._facts, joints=message)
+        self._preview.on_joint_state(message)
         self._executed.add(message.stamp, self._row(message.name, message.position, self._executed))
 
     def on_joint_command(self, message: JointState) -> None:
@@ -89,16 +92,18 @@ class Visualizer:
     def on_planned_path(self, message: PlannedPath) -> None:
         """The way the tool will take."""
         self._path, self._path_is_new = message, True
+        self._preview.on_planned_path(message)
 
     def step(self, now: int) -> list[Update]:
         """Everything new; `now` in ns UNIX."""
         return [*self._measured(), *self._ghost(), *self._step_errors(), *self._shafts(), *self._planned(),
-                *self.scene.take(now), *self._device(now), *self.journal.take()]  # fmt: skip
+                *self._preview.take(now), *self.scene.take(now), *self._device(now), *self.journal.take()]  # fmt: skip
 
     def restart(self) -> None:
         """Say the lasting things again: the viewer is a new one."""
         self._path_is_new = self._path is not None
         self.scene.restart()
+        self._preview.restart()
         self._shown, self._tip, self._panel_at = ("", ""), None, 0
 
     def _row(self, names: Sequence[str], values: Sequence[float], before: Thinned) -> list[float]:

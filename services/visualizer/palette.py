@@ -18,6 +18,7 @@ OBJECT = (156, 150, 128, 150)
 CARRIED = (120, 200, 170, 190)
 TOUCHING = (235, 60, 60, 190)
 SHADOW = (210, 214, 222, 45)  # the arm where a plan was refused
+PLANNED = (130, 220, 255, 80)  # the arm as it would go
 LABEL = (255, 120, 110)
 GRID = (140, 148, 160, 50)
 BACKGROUND = (22, 25, 30)

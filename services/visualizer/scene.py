@@ -21,8 +21,9 @@ from schemas.scene import (
 from services.visualizer import entities, palette
 from services.visualizer.journal import bounded
 from services.visualizer.model import Model, Shape
+from services.visualizer.preview import arm_at
 from services.visualizer.shapes import Mesh, mesh_of
-from services.visualizer.updates import Gone, Labels, Poses, Shadow, Thing, Update
+from services.visualizer.updates import Gone, Labels, Shadow, Thing, Update
 
 PLANE = Shape("box", (2.0, 2.0, 0.004))  # [m] as much of a plane as is drawn
 Loader = Callable[[MeshShape], Mesh | None]
@@ -108,12 +109,8 @@ class SceneView:
         if not self._contacts.contacts or any(name not in posture for name in names):
             return updates
         touching = self._touching()
-        updates.append(Shadow(entities.REFUSED, now, touching))
-        rows, times = np.array([[posture[name] for name in names]]), np.array([now], dtype=np.int64)
-        for joint in self._model.joints:
-            if joint.is_moving:
-                poses = joint.poses(self._model.positions(joint, rows, names))
-                updates.append(Poses(f"{entities.REFUSED}/{self._model.paths[joint.child]}", times, *poses))
+        updates.append(Shadow(entities.REFUSED, now, touching, palette.SHADOW))
+        updates += arm_at(self._model, entities.REFUSED, now, np.array([posture[name] for name in names]))
         for item in self._scene.objects:
             if item.attached and self._has_place(item):
                 root = entities.carried(entities.REFUSED, self._model.paths[item.frame])

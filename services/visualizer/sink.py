@@ -79,8 +79,8 @@ class Sink:
             case Labels(entity, time, points, texts):
                 dots = rr.Points3D(points, labels=texts, colors=[palette.LABEL], radii=[0.006], show_labels=True)
                 self._log(entity, time, dots)
-            case Shadow(root, time, touching):
-                self._shadow(root, time, touching)
+            case Shadow(root, time, touching, color):
+                self._shadow(root, time, touching, color)
             case LogLines(entity, times, texts, levels):
                 self._send(entity, times, rr.TextLog.columns(text=list(texts), level=[_level(name) for name in levels]))
 
@@ -92,7 +92,7 @@ class Sink:
             columns = kind.columns(albedo_factor=[color] if color else []).partition([1 if color else 0])
             self._send(entity, _once(time), columns)
 
-    def _shadow(self, root: str, time: int, touching: frozenset[str]) -> None:
+    def _shadow(self, root: str, time: int, touching: frozenset[str], color: palette.Rgba) -> None:
         """The arm once more, to be taken away again: nothing of it is static but the fixed joints' poses."""
         for joint in self._model.joints:
             if not joint.is_moving:
@@ -101,7 +101,7 @@ class Sink:
         red = {f"{root}/{self._model.paths[link]}/" for link in touching if link in self._model.paths}
         for entity, visual in self._visuals(root):
             is_red = entity.rpartition("/")[0] + "/" in red
-            drawn = self._drawn(visual, palette.TOUCHING if is_red else palette.SHADOW)
+            drawn = self._drawn(visual, palette.TOUCHING if is_red else color)
             if drawn is not None:
                 pose = rr.Transform3D(translation=visual.translation, quaternion=visual.rotation)
                 self._log(entity, time, pose, drawn)

@@ -113,11 +113,12 @@ class Labels:
 
 @dataclass(frozen=True)
 class Shadow:
-    """A pale arm under `entity`, with the links `touching` in red; `Poses` say its posture."""
+    """A translucent arm under `entity`, with the links `touching` in red; `Poses` say its posture."""
 
     entity: str
     time: int
     touching: frozenset[str]
+    color: Rgba
 
 
 Update: TypeAlias = Scalars | Poses | Strip | Panel | LogLines | State | Tint | Thing | Gone | Labels | Shadow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,6 +25,7 @@ from services.runtime.node import Node
 from services.runtime.stopping import StopRequest
 
 WAIT = 5.0  # [s]
+LONG_WAIT = 60.0  # [s]
 GOAL = PlanRequest(goal=JointGoal(name=("brazo_joint",), position=(1.2,)), motion=PointToPoint())
 
 
@@ -44,7 +46,7 @@ def planning(folder: Path) -> Iterator[Node]:
             yield node
     finally:
         stop.set()
-        thread.join(WAIT)
+        thread.join(LONG_WAIT)
         assert not thread.is_alive()
 
 
@@ -63,12 +65,24 @@ def stand(asker: Node, arm: Arm) -> None:
     states = asker.publisher(JOINT_STATES)
     for _ in range(3):
         states.put(JointState(stamp=asker.now(), name=arm.joint_names, position=(0.0,) * len(arm.joints)))
-        asker.wait(0.03)
+        time.sleep(0.03)
 
 
 def plan(asker: Node, arm: Arm) -> PlanResponse:
-    stand(asker, arm)
-    return asker.call(PLAN, GOAL, timeout=WAIT)
+    """With joint states all the while: the planner's worker may have to start first."""
+    stop = threading.Event()
+
+    def keep_standing() -> None:
+        while not stop.is_set():
+            stand(asker, arm)
+
+    thread = threading.Thread(target=keep_standing)
+    thread.start()
+    try:
+        return asker.call(PLAN, GOAL, timeout=LONG_WAIT)
+    finally:
+        stop.set()
+        thread.join(WAIT)
 
 
 def block(arm: Arm) -> SceneObject:
@@ -132,6 +146,7 @@ def test_a_restart_has_the_scene_as_it_was(tmp_path: Path, rm1: Arm) -> None:
     with planning(tmp_path) as asker:
         after = asker.latest(SCENE)
         refused = plan(asker, rm1)
+        asker.wait(0.2)
         assert after.message == before.message
         assert refused.refusal is not None
         assert "box block" in refused.refusal.message

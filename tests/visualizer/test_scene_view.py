@@ -128,6 +128,7 @@ def test_a_refused_posture_shows_what_touches_in_red_with_its_names(view):
     assert red == {"world/scene/table", f"world/refused/{TOOL}/carried/cup"}
     [shadow] = [update for update in updates if isinstance(update, Shadow)]
     assert "efector_link" in shadow.touching
+    assert shadow.color == palette.SHADOW
     poses = [update.entity for update in updates if isinstance(update, Poses)]
     assert f"world/refused/{TOOL}" in poses
     [labels] = [update for update in updates if isinstance(update, Labels)]
