@@ -39,7 +39,7 @@ void Homing::begin_group() {
         if (((open_ >> j) & 1) == 0 || homing(j).group != lowest) continue;
         group_ = static_cast<uint16_t>(group_ | 1u << j);
         own_inputs_ |= 1u << homing(j).input;
-        trip_[j] = Trip{};
+        way_[j] = Way{};
         approach(j);
     }
 }
@@ -58,9 +58,9 @@ Mishap Homing::advance() {
 }
 
 FaultCode Homing::advance(uint8_t joint) {
-    Trip& trip = trip_[joint];
-    if (++trip.slots > homing(joint).timeout_ms * (kSlotHz / 1000)) return FaultCode::HomingTimeout;
-    switch (trip.phase) {
+    Way& way = way_[joint];
+    if (++way.slots > homing(joint).timeout_ms * (kSlotHz / 1000)) return FaultCode::HomingTimeout;
+    switch (way.phase) {
         case Phase::Releasing:
             if (!is_active(joint)) {
                 approach(joint);
@@ -71,7 +71,7 @@ FaultCode Homing::advance(uint8_t joint) {
         case Phase::Fast:
         case Phase::Slow:
             if (stepper_->has_closed(homing(joint).input)) {
-                leave_switch(joint, trip.phase == Phase::Fast ? Phase::BackingOff : Phase::Leaving);
+                leave_switch(joint, way.phase == Phase::Fast ? Phase::BackingOff : Phase::Leaving);
             } else if (has_travelled(joint)) {
                 return FaultCode::SwitchNotFound;
             }
@@ -80,7 +80,7 @@ FaultCode Homing::advance(uint8_t joint) {
         case Phase::Leaving:
             if (!stands(joint)) break;
             if (is_active(joint)) return FaultCode::SwitchStuck;
-            if (trip.phase == Phase::BackingOff) {
+            if (way.phase == Phase::BackingOff) {
                 approach(joint);
             } else {
                 arrived_ = static_cast<uint16_t>(arrived_ | 1u << joint);
@@ -99,7 +99,7 @@ void Homing::approach(uint8_t joint) {
     stepper_->forget(own.input);
     // Farther than it may travel, so that it does not slow down before.
     const int64_t far = 4 * fine(own.max_travel_q8);
-    if (trip_[joint].phase == Phase::BackingOff) {
+    if (way_[joint].phase == Phase::BackingOff) {
         enter(joint, Phase::Slow, own.direction, far, own.slow_q8);
     } else if (is_active(joint)) {
         enter(joint, Phase::Releasing, -own.direction, far, own.fast_q8);
@@ -109,34 +109,34 @@ void Homing::approach(uint8_t joint) {
 }
 
 void Homing::enter(uint8_t joint, Phase phase, int32_t direction, int64_t distance_q20, int32_t speed_q8) {
-    Trip& trip = trip_[joint];
-    trip.phase = phase;
-    trip.still = 0;
-    trip.began_q20 = ramp_[joint].position_q20();
+    Way& way = way_[joint];
+    way.phase = phase;
+    way.still = 0;
+    way.began_q20 = ramp_[joint].position_q20();
     ramp_[joint].set_speed(speed_q8);
-    ramp_[joint].go(trip.began_q20 + direction * distance_q20);
+    ramp_[joint].go(way.began_q20 + direction * distance_q20);
 }
 
 void Homing::leave_switch(uint8_t joint, Phase phase) {
     const HomingConfig& own = homing(joint);
-    trip_[joint].closed_at = stepper_->closed_at(own.input);
+    way_[joint].closed_at = stepper_->closed_at(own.input);
     enter(joint, phase, 0, 0, own.fast_q8);
-    ramp_[joint].go(trip_[joint].closed_at * kFineStep - own.direction * fine(own.back_off_q8));
+    ramp_[joint].go(way_[joint].closed_at * kFineStep - own.direction * fine(own.back_off_q8));
 }
 
 bool Homing::has_travelled(uint8_t joint) const {
-    const int64_t way = ramp_[joint].position_q20() - trip_[joint].began_q20;
-    return (way < 0 ? -way : way) >= fine(homing(joint).max_travel_q8);
+    const int64_t travelled = ramp_[joint].position_q20() - way_[joint].began_q20;
+    return (travelled < 0 ? -travelled : travelled) >= fine(homing(joint).max_travel_q8);
 }
 
 bool Homing::stands(uint8_t joint) {
     if (!ramp_[joint].is_there()) return false;
-    return ++trip_[joint].still >= kSettled;
+    return ++way_[joint].still >= kSettled;
 }
 
 int32_t Homing::correction(uint8_t joint) const {
     const int32_t position = (homing(joint).position_q8 + 128) >> 8;
-    return position - trip_[joint].closed_at;
+    return position - way_[joint].closed_at;
 }
 
 }  // namespace gemelo

@@ -37,7 +37,7 @@ class Homing {
 
   private:
     enum class Phase : uint8_t { Waiting, Releasing, Fast, BackingOff, Slow, Leaving };
-    struct Trip {
+    struct Way {
         Phase phase;
         uint8_t still;      // slots that the ramp has stood
         uint32_t slots;     // since its group began
@@ -62,7 +62,7 @@ class Homing {
     uint16_t group_ = 0;  // those of them that move
     uint16_t arrived_ = 0;
     uint32_t own_inputs_ = 0;
-    Trip trip_[kMaxJoints];
+    Way way_[kMaxJoints];
 };
 
 }  // namespace gemelo
