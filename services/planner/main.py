@@ -12,9 +12,11 @@ from services.planner.core import Planner
 from services.planner.kinematic_requests import KinematicRequests
 from services.planner.scene_keeper import SceneKeeper
 from services.planner.start import STALE_AFTER
+from services.planner.workers import Workers
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
+from services.runtime.requests import Pending
 
 NOT_READY = "no fresh joint_states: is the stepper_gateway running?"
 
@@ -28,34 +30,36 @@ def run(node: Node, deployment: Deployment) -> None:
     folder = project_root() / deployment.paths.run
     keeper = SceneKeeper(node, planner.arm, states, folder, planner.set_world)
 
-    def plan(request: PlanRequest) -> PlanResponse:
+    workers = Workers(
+        planner.arm.folder, project_root(), lambda: (states.message, states.age()), lambda: keeper.world.scene
+    )
+
+    def plan(request: PlanRequest, pending: Pending[PlanResponse]) -> None:
         began = node.monotonic()
-        response = planner.plan(
-            request,
-            states.message,
-            states.age(),
-            clock=node.monotonic,
-        )
-        took = node.monotonic() - began
+        workers.plan(request, lambda response: node.post(lambda: answer(response, pending, began)))
+
+    def answer(response: PlanResponse, pending: Pending[PlanResponse], began: float) -> None:
         if response.code is PlanCode.SUCCESS:
             path.put(planner.planned_path(response.trajectory, node.now()))
         elif response.refusal is not None:
             node.log.info(f"refused: {response.refusal.message}")
         keeper.heed(response)
-        return msgspec.structs.replace(response, planning_time=took)
+        pending.reply(msgspec.structs.replace(response, planning_time=node.monotonic() - began))
 
     def step(_now: int) -> None:
         node.set_ready(states.age() < STALE_AFTER, "" if states.age() < STALE_AFTER else NOT_READY)
 
-    # In the worker: a plan may take its whole allowed_time, and readiness keeps beating meanwhile.
-    node.serve(PLAN, plan, worker=True)
+    node.serve_later(PLAN, plan)
     node.serve(
         IK,
         lambda request: kinematic.ik(request, states.message, states.age(), planner.surroundings.newest),
         worker=True,
     )
     node.serve(FK, lambda request: kinematic.fk(request, states.message, states.age()), worker=True)
-    node.spin(step, rate=10.0)
+    try:
+        node.spin(step, rate=10.0)
+    finally:
+        workers.close()
 
 
 def main() -> None:

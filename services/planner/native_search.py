@@ -8,8 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.description import Arm
-from services.planner.native.paths import NoPath
-from services.planner.native.paths import Why as NativeWhy
 from services.planner.shapes import Attachment, Shape
 from services.planner.way import Deadline, NoWay, Way, Why
 
@@ -19,12 +17,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 NATIVE = "native"
-REASONS = {
-    NativeWhy.START_TOUCHES: Why.START_TOUCHES,
-    NativeWhy.GOAL_TOUCHES: Why.GOAL_TOUCHES,
-    NativeWhy.TIMED_OUT: Why.TIMED_OUT,
-    NativeWhy.CANCELLED: Why.TIMED_OUT,
-}
+REASONS = {"START_TOUCHES": Why.START_TOUCHES, "GOAL_TOUCHES": Why.GOAL_TOUCHES}
 
 
 def native_core(arm: Arm) -> MotionCore | None:
@@ -48,7 +41,9 @@ def show_scene(core: MotionCore, around: list[Shape], carried: list[Attachment])
 
 def native_way(core: MotionCore, start: Array, goals: Array, seed: int, deadline: Deadline) -> Way:
     """From `start` (n,) to one of `goals` (m, n), searched, shortened and smoothed by the core; raises `NoWay`."""
+    from services.planner.native import NoPath
+
     path = core.plan(start, goals, seed=seed, time_limit=deadline.left)
     if isinstance(path, NoPath):
-        raise NoWay(REASONS[path.why])
+        raise NoWay(REASONS.get(path.why.name, Why.TIMED_OUT))
     return Way(path.corners, path.control, NATIVE)

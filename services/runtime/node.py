@@ -126,6 +126,10 @@ class Node:
         """
         self._serve(request, lambda question, pending: pending.reply(handler(question)), worker)
 
+    def serve_later(self, request: Request[Q, R], handler: Callable[[Q, Pending[R]], None]) -> None:
+        """As `serve`; the handler keeps the `Pending` and answers when it can, from any thread."""
+        self._serve(request, handler)
+
     def call(self, request: Request[Q, R], question: Q, timeout: float = 2.0) -> R:
         """Asks and blocks; raises `Refused`, or `NoAnswer` after `timeout` [s] at most."""
         return requests.call(self._bus, request, question, timeout)
@@ -210,6 +214,14 @@ class Node:
     def wait(self, seconds: float) -> None:
         """Handles the inbox for so long: for scripts that do not spin."""
         self._loop.wait(seconds)
+
+    def every(self, period: float, task: Callable[[], None]) -> None:
+        """`task` runs every `period` [s] in the thread of logic, beside the step, until `forget`."""
+        self._loop.every(period, task)
+
+    def forget(self, task: Callable[[], None]) -> None:
+        """Ends an `every`."""
+        self._loop.forget(task)
 
     def post(self, task: Callable[[], None]) -> None:
         """`task` runs in the thread of logic; from any thread, for what a library's own threads hear."""

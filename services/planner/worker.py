@@ -1,0 +1,48 @@
+"""A worker: plans what comes on its standard input, answers on its standard output, ends with whoever started it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+from queue import SimpleQueue
+from typing import IO
+
+from services.arm.description import load_arm
+from services.planner.core import Planner
+from services.planner.jobs import Job, Ready, receive, send
+from services.planner.world import World
+
+
+def main() -> None:
+    """`python -m services.planner.worker ROBOT_FOLDER PROJECT_FOLDER`."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the planner, which closes this one's input
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a library prints is no answer
+    folder, project = Path(sys.argv[1]), Path(sys.argv[2])
+    jobs: SimpleQueue[Job] = SimpleQueue()
+    threading.Thread(target=_read, args=(sys.stdin.buffer, jobs), daemon=True).start()
+    planner = Planner(load_arm(folder))
+    planner.prepare()
+    send(answers, Ready())
+    while True:
+        job = jobs.get()
+        if job.scene is not None:
+            planner.set_world(World(planner.arm, planner.kinematics, job.scene, (project, folder)))
+        send(answers, planner.plan(job.request, job.present, job.age, time.monotonic))
+
+
+def _read(pipe: IO[bytes], jobs: SimpleQueue[Job]) -> None:
+    """Ends the process at the end of its input, whatever it is planning."""
+    try:
+        while True:
+            jobs.put(receive(pipe, Job))
+    finally:
+        os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,134 @@
+"""Planning in processes of their own: several at a time, stopped in time, replaced when they die."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from queue import SimpleQueue
+
+import psutil
+import pytest
+
+from schemas.joints import JointState
+from schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse
+from schemas.scene import BoxShape, PlanningScene, SceneObject
+from services.planner import workers as module
+from services.planner.workers import Workers
+
+PROJECT = Path(__file__).parents[2]
+HOME = JointState(name=("brazo_joint", "antebrazo_joint", "efector_joint"), position=(0.0, 0.0, 0.0))
+EASY = PlanRequest(goal=NamedGoal(name="ready"), start=HOME)
+PATIENCE = 60.0  # [s]
+
+
+class Stack:
+    """Workers, and the scene that they are told."""
+
+    def __init__(self) -> None:
+        self.scene = PlanningScene(version=1)
+        self.workers = Workers(PROJECT / "urdf/rm1", PROJECT, lambda: (HOME, 0.0), lambda: self.scene)
+        self.answers: SimpleQueue[PlanResponse] = SimpleQueue()
+
+    def ask(self, request: PlanRequest) -> None:
+        self.workers.plan(request, self.answers.put)
+
+    def answer(self) -> PlanResponse:
+        return self.answers.get(timeout=PATIENCE)
+
+
+@pytest.fixture
+def stack() -> Iterator[Stack]:
+    stack = Stack()
+    try:
+        yield stack
+    finally:
+        stack.workers.close()
+        assert planning_processes() == []
+
+
+def planning_processes(of: int | None = None) -> list[psutil.Process]:
+    children = psutil.Process(of).children()
+    return [child for child in children if child.is_running() and child.status() != psutil.STATUS_ZOMBIE]
+
+
+def test_a_plan_comes_out_of_a_process_and_tells_where_its_time_went(stack: Stack):
+    stack.ask(EASY)
+    response = stack.answer()
+    assert response.code is PlanCode.SUCCESS
+    assert response.times.verification > 0.0
+    assert response.times.timing > 0.0
+    assert response.scene_version == 1
+    assert len(planning_processes()) == 1
+
+
+def test_a_change_of_the_scene_reaches_the_process(stack: Stack):
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    stack.scene = PlanningScene(version=2, objects=(SceneObject(name="room", shape=BoxShape(size=(3.0, 3.0, 3.0))),))
+    stack.ask(EASY)
+    response = stack.answer()
+    assert response.code is PlanCode.START_STATE_IN_COLLISION
+    assert response.scene_version == 2
+
+
+def test_a_process_that_does_not_come_back_is_killed_and_replaced(stack: Stack, monkeypatch: pytest.MonkeyPatch):
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    (process,) = planning_processes()
+    process.suspend()
+    began = time.monotonic()
+    stack.ask(PlanRequest(goal=NamedGoal(name="ready"), start=HOME, allowed_time=0.2))
+    assert stack.answer().code is PlanCode.TIMED_OUT
+    assert time.monotonic() - began < 0.2 + module.GRACE + 5.0
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    assert not process.is_running()
+
+
+def test_a_process_that_dies_is_said_and_replaced(stack: Stack):
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    planning_processes()[0].kill()
+    stack.ask(EASY)
+    response = stack.answer()
+    assert response.code is PlanCode.FAILURE
+    assert response.refusal is not None
+    assert response.refusal.remedy.startswith("plan again")
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+
+
+def test_one_client_does_not_block_another(stack: Stack):
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    (first,) = planning_processes()
+    first.suspend()
+    stack.ask(PlanRequest(goal=NamedGoal(name="ready"), start=HOME, allowed_time=30.0))
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    assert len(planning_processes()) == 2
+    first.resume()
+    assert stack.answer().code is PlanCode.SUCCESS
+
+
+def test_nothing_is_left_of_a_planner_that_is_killed_while_it_plans():
+    code = (
+        "import time; from pathlib import Path; from schemas.planning import *; from schemas.joints import JointState;"
+        "from schemas.scene import PlanningScene; from services.planner.workers import Workers;"
+        f"scene = PlanningScene(); project = Path({str(PROJECT)!r});"
+        "w = Workers(project / 'urdf/rm1', project, lambda: (None, 0.0), lambda: scene);"
+        f"home = JointState(name={HOME.name!r}, position=(0.0, 0.0, 0.0));"
+        "w.plan(PlanRequest(goal=NamedGoal(name='ready'), start=home), lambda r: print('planned', flush=True));"
+        "time.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], cwd=PROJECT, stdout=subprocess.PIPE) as planner:
+        assert planner.stdout is not None
+        assert planner.stdout.readline() == b"planned\n"
+        (worker,) = planning_processes(planner.pid)
+        os.kill(planner.pid, signal.SIGKILL)
+        assert psutil.wait_procs([worker], timeout=10.0)[1] == []
