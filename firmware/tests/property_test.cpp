@@ -170,6 +170,25 @@ TEST(Wrap, OfDeviceTimeMovesNoPin) {
     }
 }
 
+TEST(Wrap, OfTheHeartbeatCounterIsNoSilence) {
+    Findings findings;
+    for (uint64_t seed = first_seed(); seed < first_seed() + share_of(10); ++seed) {
+        SCOPED_TRACE(seed);
+        Dice dice(seed);
+        Stand stand(random_bench(dice), findings, 0, 1, true, seed);
+        Gateway gateway(stand, 1, seed, false);
+        gateway.open_stream();
+        // At most 50 beats of 0.2 s before the counter wraps.
+        for (int ms = 0; ms < 12000; ++ms) {
+            stand.run_to_a_tick();
+            gateway.work();
+            stand.run_to_slot_end();
+        }
+        EXPECT_EQ(stand.mode(), Mode::Run);
+        EXPECT_EQ(stand.events("hold"), 0);
+    }
+}
+
 // After 2^32 ticks, a day at 50 kHz.
 TEST(Wrap, OfTheTickCounterMovesNoPinAndNoWord) {
     for (uint64_t seed = first_seed(); seed < first_seed() + share_of(2); ++seed) {

@@ -106,6 +106,7 @@ void Gateway::hear(const ChunkAnswer& answer) {
                 PlayedPath path;
                 path.begin(chunks_[0]);
                 stand_.inspector->expect_stream(stream_, path);
+                stand_.watch_first_pulse();
             } else {
                 stand_.inspector->path().add(chunks_[answer.seq]);
             }

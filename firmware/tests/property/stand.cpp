@@ -42,6 +42,7 @@ void Stand::tick() {
         mix(pins_hash_, (static_cast<uint64_t>(pins.step) << 32) | pins.dir);
         pins_ = pins;
     }
+    if (!first_pulse_us_ && scope->pulses() != pulses_before_) first_pulse_us_ = now_us();
     if (tick_++ == slot_task_tick_) machine.slot(slot_us_);
 }
 
@@ -106,6 +107,15 @@ void Stand::said(void* self, Output output, const uint8_t* bytes, size_t size) {
     static_cast<Stand*>(self)->hear(output, bytes, size);
 }
 
+// To a tick, and to the us that both times are cut to.
+void Stand::check_start(const std::string& event) {
+    const uint64_t told_us = std::stoull(event.substr(event.find("\"t_us\": ") + 8));
+    const int64_t away = static_cast<int64_t>(told_us - first_pulse_us_.value_or(0));
+    const int64_t tick_us = static_cast<int64_t>(kSlotUs / ticks_per_slot_) + 1;
+    if (!first_pulse_us_ || away > tick_us || away < -tick_us)
+        findings.add(Property::Answers, "the first pulse is told ", away, " us late");
+}
+
 void Stand::hear(Output output, const uint8_t* bytes, size_t size) {
     if (output == Output::TrajAck) {
         chunk_answer =
@@ -117,6 +127,7 @@ void Stand::hear(Output output, const uint8_t* bytes, size_t size) {
         const size_t begin = text.find(": \"") + 3;
         const std::string name = text.substr(begin, text.find('"', begin) - begin);
         ++events_[name];
+        if (name == "started") check_start(text);
         if (name == "homed") {
             const uint8_t joint = static_cast<uint8_t>(text[text.find("\"detail\": \"q") + 12] - '1');
             inspector->recount(joint, *scope);

@@ -37,6 +37,8 @@ class Stand {
     void hang(uint32_t slots);
     // Somebody presses an input, or lets go of it; otherwise a switch is closed by the shaft.
     void press(uint8_t input, bool is_pressed) { is_pressed_[input] = is_pressed; }
+    // A stream was opened: its first pulse is to be told by `started`.
+    void watch_first_pulse() { first_pulse_us_.reset(), pulses_before_ = scope->pulses(); }
     // A few slots that nobody inspects, for what stops the pulses dead.
     void run_uninspected(uint32_t slots);
     // Where the motor truly is, in whole steps; it was at 0 when the device started at 0.
@@ -79,6 +81,9 @@ class Stand {
     uint64_t pins_hash_ = 14695981039346656037ull, words_hash_ = pins_hash_;
     gemelo::Pins pins_;
     bool is_pressed_[gemelo::kMaxInputs] = {};
+    void check_start(const std::string& event);
+    uint64_t pulses_before_ = 0;
+    std::optional<uint64_t> first_pulse_us_;
     bool is_inspected_ = true;
     std::map<std::string, int> events_;
 };
