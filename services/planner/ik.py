@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm, Joint
+from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.centring import Centring
 from services.planner.closed_form import ClosedForm, chain_order, closed_form, turns_about
 from services.planner.coinciding import completed
 from services.planner.descent import Attempt, Descent
+from services.planner.starts import one_turn, spread
 from services.planner.targets import Target
 
 Array = NDArray[np.float64]
@@ -27,7 +27,6 @@ FEW = 4  # starts where the closed form finds nothing, which it has never missed
 TURNS = 16  # rotations about the axis of a tool that only has to point somewhere
 SAME = 1e-4  # [s] at full speed: solutions nearer than that are one
 SAME_REDUNDANT = 0.1  # [s] the same, where solutions lie in a continuum
-_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)
 
 
 def never() -> bool:
@@ -43,11 +42,11 @@ class InverseKinematics:
         self._descent = Descent(arm, kinematics)
         self._centring = Centring(arm, kinematics, self._descent)
         self._closed: ClosedForm | None = None if is_numeric else closed_form(arm, kinematics)
-        self._lower, self._upper = np.array([_one_turn(joint) for joint in arm.joints]).T
+        self._lower, self._upper = one_turn(arm)
         self._speed = np.array([joint.velocity for joint in arm.joints])
         # The first joint of the chain turns the whole arm as it is: its mirror image is no other posture.
         self._mirrored = [index for index in chain_order(arm)[1:] if arm.joints[index].unit == "rad"]
-        self._starts = [self._spread(index) for index in range(1, self._start_count(arm) + 1)]
+        self._starts = spread(arm, self._start_count(arm))
 
     @property
     def is_closed_form(self) -> bool:
@@ -159,32 +158,8 @@ class InverseKinematics:
 
     def _attempts(self, target: Target, near: Array, is_late: Clock) -> Iterator[Attempt]:
         """Descents from starts spread over the limits; the first few lie around `near`."""
-        for index, spread in enumerate(self._starts):
+        for index, point in enumerate(self._starts):
             if is_late():
                 return
-            start = near + 0.25 * (spread - 0.5 * (self._lower + self._upper)) if index < 4 else spread
+            start = near + 0.25 * (point - 0.5 * (self._lower + self._upper)) if index < 4 else point
             yield self.descend(target, start)
-
-    def _spread(self, index: int) -> Array:
-        """The index-th point of Halton's sequence within the limits."""
-        share = np.array([_radical_inverse(index, _PRIMES[i % len(_PRIMES)]) for i in range(len(self._lower))])
-        point: Array = self._lower + share * (self._upper - self._lower)
-        return point
-
-
-def _one_turn(joint: Joint) -> tuple[float, float]:
-    """Where starts are spread [rad] or [m]: the limits, or the turn nearest to zero within wider ones."""
-    if joint.upper - joint.lower <= math.tau:
-        return joint.lower, joint.upper
-    middle = min(max(0.0, joint.lower + math.pi), joint.upper - math.pi)
-    return middle - math.pi, middle + math.pi
-
-
-def _radical_inverse(index: int, base: int) -> float:
-    """The digits of `index` in `base`, mirrored at the point (van der Corput)."""
-    value, weight = 0.0, 1.0 / base
-    while index:
-        index, digit = divmod(index, base)
-        value += digit * weight
-        weight /= base
-    return value
