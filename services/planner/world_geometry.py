@@ -39,11 +39,13 @@ class WorldGeometry:
             self.meshes.append(shape.mesh)
             paddings.append(shape.padding)
         self._require_all(len(links) + len(scene.objects))
-        self.pairs, self.direct = self._checked(len(links))
+        self._links = len(links)
+        self._joints = [int(shape.parentJoint) for shape in self.model.geometryObjects]
+        self.pairs, self.direct = self._checked()
         self.names: list[LinkPair] = [(self.shape_names[one], self.shape_names[other]) for one, other in self.pairs]
         self.padding = [paddings[one] + paddings[other] for one, other in self.pairs]
         self.boxes = np.array([_box(shape.geometry) for shape in self.model.geometryObjects])
-        self.moving = [index for index, shape in enumerate(self.model.geometryObjects) if shape.parentJoint != 0]
+        self.moving = [index for index, joint in enumerate(self._joints) if joint != 0]
         self.reach: Array = reach_of(arm, kinematics.model, self.model)
 
     def _placed(self, item: SceneObject, shape: Shape) -> pin.GeometryObject:
@@ -66,7 +68,7 @@ class WorldGeometry:
         if self.model.ngeoms != expected:
             raise SceneError(f"the checker has {self.model.ngeoms} of {expected} shapes; are two objects of one name?")
 
-    def _checked(self, links: int) -> tuple[list[tuple[int, int]], int]:
+    def _checked(self) -> tuple[list[tuple[int, int]], int]:
         """The pairs that a joint can move apart and that nothing allows to touch, known to the model as well.
 
         The first of them, as many as the second result says, are worth looking at in every posture: links among
@@ -76,8 +78,8 @@ class WorldGeometry:
         pairs = [
             (one, other) for one in range(count) for other in range(one + 1, count) if self._is_checked(one, other)
         ]
-        own = [pair for pair in pairs if pair[1] < links]
-        others = [pair for pair in pairs if pair[1] >= links]
+        own = [pair for pair in pairs if pair[1] < self._links]
+        others = [pair for pair in pairs if pair[1] >= self._links]
         meshes = [(one, other) for one, other in others if self.meshes[one] or self.meshes[other]]
         solids = [(one, other) for one, other in others if not (self.meshes[one] or self.meshes[other])]
         for one, other in own + solids + meshes:
@@ -87,21 +89,19 @@ class WorldGeometry:
     def _is_checked(self, one: int, other: int) -> bool:
         """Two links as the SRDF has it; an attached object is no part of its link for the SRDF."""
         first, second = self.shape_names[one], self.shape_names[other]
-        links = self.model.ngeoms - len(self._scene.objects)
+        links = self._links
+        if other >= links and self._joints[one] == self._joints[other]:
+            return False
         if allows(self._scene.allowed, first, second):
             return False
         if other < links:
             return first != second and not self._arm.collisions_are_disabled(first, second)
-        joints = [int(self.model.geometryObjects[index].parentJoint) for index in (one, other)]
-        if joints[0] == joints[1]:
-            return False
         return second not in self._touched(one) and first not in self._touched(other)
 
     def _touched(self, index: int) -> tuple[str, ...]:
-        links = self.model.ngeoms - len(self._scene.objects)
-        if index < links:
+        if index < self._links:
             return ()
-        item = self._scene.objects[index - links]
+        item = self._scene.objects[index - self._links]
         return (item.frame, *item.touch_links) if item.attached else ()
 
 
