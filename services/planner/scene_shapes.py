@@ -87,7 +87,7 @@ def _mesh(name: str, shape: MeshShape, folders: Folders) -> Mesh:
         raise SceneError(f'object "{name}": {what} is no usable STL file: {error}') from None
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _triangles(content: bytes, scale: tuple[float, float, float]) -> Mesh:
     """Of equal content the same mesh, so that what is built of it is built once."""
     triangles = read_stl(content)

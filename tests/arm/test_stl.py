@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -64,7 +65,5 @@ def test_what_is_no_mesh_says_why(content: bytes, reason: str) -> None:
 
 @given(st.one_of(st.binary(max_size=300), st.binary(max_size=100).map(lambda tail: b"solid " + tail)))
 def test_no_bytes_bring_it_down(content: bytes) -> None:
-    try:
+    with suppress(BadMesh):
         assert len(read_stl(content).faces) > 0
-    except BadMesh as error:
-        assert str(error)
