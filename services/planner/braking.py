@@ -1,0 +1,71 @@
+"""How fast velocities of all joints may change together, and where the arm comes to rest from them.
+
+Braking is as gentle as the gateway's jerk limit: a joint slows by `speed / (d'(speed) + dt)` at most, where d is its
+jerk-limited way to rest. Then the place where it would come to rest never moves back from one period to the next.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+
+Array = NDArray[np.float64]
+
+# The gateway tracks a target at the full acceleration: what asks for a little less is followed, not chased.
+ACCELERATION_SHARE = 0.8
+LAST = 0.05  # of the rate that the jerk limit reaches in a period
+PIECES = 16  # of the integral over the speeds between now and rest
+
+
+class Braking:
+    """The limits of one arm, in periods of `dt` [s]; velocities are (n,) [rad/s] or [m/s]."""
+
+    def __init__(self, arm: Arm, dt: float) -> None:
+        self.dt = dt
+        self.velocity: Array = np.array([joint.velocity for joint in arm.joints])
+        self.acceleration: Array = ACCELERATION_SHARE * np.array([joint.acceleration for joint in arm.joints])
+        self.lower: Array = np.array([joint.lower for joint in arm.joints])
+        self.upper: Array = np.array([joint.upper for joint in arm.joints])
+        self._full = np.array([joint.acceleration for joint in arm.joints])
+        self._jerk = np.array([joint.jerk for joint in arm.joints])
+        self._shares = np.arange(1, PIECES + 1)[:, None] / PIECES
+
+    def towards(self, present: Array, wanted: Array) -> Array:
+        """The velocity after a period on the straight way from `present` to `wanted`.
+
+        All joints change in proportion, so that braking keeps the direction of the motion.
+        """
+        change = wanted - present
+        rates = np.where(change * present < 0.0, self._braking_rates(np.abs(present)), self.acceleration)
+        needed = float(np.max(np.abs(change) / rates)) / self.dt
+        return wanted.copy() if needed <= 1.0 else present + change / needed
+
+    def together(self, velocity: Array) -> Array:
+        """(n,) [rad] or [m] that braking with `towards` takes at most, all joints at rest at one time.
+
+        With v the share of the velocity that is left and t its time constant, dv/dt = -v/t: the way is the integral of
+        t over v from 0 to 1, summed from above.
+        """
+        constants = np.max(self._time_constants(self._shares * np.abs(velocity)), axis=1)
+        return float(np.mean(constants)) * velocity
+
+    def alone(self, velocity: Array) -> Array:
+        """(n,) [rad] or [m] until each joint has come to rest as fast as it can: never farther than `together`."""
+        speed = np.abs(velocity)
+        fast = 0.5 * (speed / self._full + self._full / self._jerk)
+        times: Array = np.where(speed > self._full**2 / self._jerk, fast, np.sqrt(speed / self._jerk))
+        return times * velocity
+
+    def _time_constants(self, speed: Array) -> Array:
+        """[s] each: speed through the rate at which a joint slows."""
+        fast = speed / self._full + 0.5 * self._full / self._jerk
+        gentle = np.where(speed > self._full**2 / self._jerk, fast, 1.5 * np.sqrt(speed / self._jerk))
+        constants: Array = np.maximum(gentle, speed / self.acceleration) + self.dt
+        return constants
+
+    def _braking_rates(self, speed: Array) -> Array:
+        """[rad/s^2] or [m/s^2]; the last trace of speed is given up at once."""
+        rates: Array = np.maximum(speed / self._time_constants(speed), LAST * self._jerk * self.dt)
+        return rates
