@@ -9,6 +9,7 @@ from schemas.planning import PlanCode, PlanRequest, PlanResponse
 from schemas.topics import FK, IK, JOINT_STATES, PLAN, PLANNED_PATH
 from services.arm.description import load_arm
 from services.planner.core import Planner
+from services.planner.jog_service import JogService
 from services.planner.kinematic_requests import KinematicRequests
 from services.planner.scene_keeper import SceneKeeper
 from services.planner.start import STALE_AFTER
@@ -29,6 +30,7 @@ def run(node: Node, deployment: Deployment) -> None:
     path = node.publisher(PLANNED_PATH)
     folder = project_root() / deployment.paths.run
     keeper = SceneKeeper(node, planner.arm, states, folder, planner.set_world)
+    JogService(node, planner.arm, states, lambda: keeper.world)
 
     workers = Workers(
         planner.arm.folder, project_root(), lambda: (states.message, states.age()), lambda: keeper.world.scene
