@@ -11,6 +11,7 @@ from services.cli import (
     bus_commands,
     collision_commands,
     device_commands,
+    jog_commands,
     kinematic_commands,
     scene_commands,
     system_commands,
@@ -21,8 +22,8 @@ from services.cli.parser import Options, Parser, build
 ABOUT = "The twin's command line: move the arm, and see everything that is said about it."
 EPILOG = "The deployment is deploy/local.toml, or the file that $GEMELO_CONFIG names."
 COMMANDS = (
-    *arm_commands.COMMANDS, *kinematic_commands.COMMANDS, *device_commands.COMMANDS, *bus_commands.COMMANDS,
-    *scene_commands.COMMANDS, *collision_commands.COMMANDS, *system_commands.COMMANDS,
+    *arm_commands.COMMANDS, *jog_commands.COMMANDS, *kinematic_commands.COMMANDS, *device_commands.COMMANDS,
+    *bus_commands.COMMANDS, *scene_commands.COMMANDS, *collision_commands.COMMANDS, *system_commands.COMMANDS,
 )  # fmt: skip
 GROUPS = {
     **device_commands.GROUPS,

@@ -1,0 +1,92 @@
+"""What the keys of `gemelo jog` mean: pressed, held by the terminal's own repetition, let go by its silence."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Protocol
+
+from schemas.planning import JogCommand
+from services.cli.units import NamedJoint
+
+HELD = 0.15  # [s] after which a key that does not repeat has been let go
+FASTER = 1.25
+SLOWEST = 0.01
+FIRST_SPEED = 0.2
+TOOL_SPEED = 0.25  # [m/s] at full speed
+TURN_SPEED = 1.0  # [rad/s] at full speed
+AXES = {"w": (0, 1.0), "s": (0, -1.0), "a": (1, 1.0), "d": (1, -1.0), "q": (2, 1.0), "e": (2, -1.0)}
+TURNS = {"i": (0, 1.0), "k": (0, -1.0), "j": (1, 1.0), "l": (1, -1.0), "u": (2, 1.0), "o": (2, -1.0)}
+ARROWS = {"\x1b[A": 1.0, "\x1b[C": 1.0, "\x1b[B": -1.0, "\x1b[D": -1.0}
+LEAVE = ("x", "\x1b", "\x03", "\x04")
+HELP = """w/s x, a/d y, q/e z of the tool    i/k j/l u/o turn it    t base or tool frame
+1-9 choose a joint, arrows move it    +/- speed    space stop    x leave"""
+
+_KEYS = re.compile(r"\x1b[\[O][A-Z]|\x1b\[[0-9;]*[~A-Za-z]|.", re.DOTALL)
+
+
+class SpeedyJoint(NamedJoint, Protocol):
+    """A joint with its velocity limit [rad/s] or [m/s]."""
+
+    @property
+    def velocity(self) -> float: ...
+
+
+class JogKeys:
+    """Turns keys into the command that holds now; times are [s] of one clock."""
+
+    def __init__(self, joints: Sequence[SpeedyJoint], tool_frame: str) -> None:
+        self._joints, self._tool_frame = joints, tool_frame
+        self._motion: JogCommand | None = None
+        self._pressed = -1.0e9
+        self.speed = FIRST_SPEED  # share of the limits
+        self.joint = 0
+        self.frame = ""
+        self.wants_to_leave = False
+
+    def press(self, text: str, now: float) -> None:
+        """What the terminal gave, perhaps several keys; the last one counts."""
+        for key in _KEYS.findall(text):
+            self._press("\x1b[" + key[2] if key.startswith("\x1bO") else key, now)
+
+    def command(self, now: float) -> JogCommand | None:
+        """What to say now; None while no key is held."""
+        return self._motion if now - self._pressed <= HELD else None
+
+    @property
+    def line(self) -> str:
+        """The choices that were made, as a person reads them."""
+        frame = "tool" if self.frame else "base"
+        return (
+            f"speed {self.speed * 100.0:.0f} %, frame {frame}, joint {self.joint + 1} {self._joints[self.joint].name}"
+        )
+
+    def _press(self, key: str, now: float) -> None:
+        self._motion = None
+        if key in LEAVE:
+            self.wants_to_leave = True
+        elif key in "+=":
+            self.speed = min(1.0, self.speed * FASTER)
+        elif key in "-_":
+            self.speed = max(SLOWEST, self.speed / FASTER)
+        elif key == "t":
+            self.frame = "" if self.frame else self._tool_frame
+        elif key.isdigit() and 1 <= int(key) <= len(self._joints):
+            self.joint = int(key) - 1
+        else:
+            self._motion, self._pressed = self._moving(key.lower() if len(key) == 1 else key), now
+
+    def _moving(self, key: str) -> JogCommand | None:
+        """The motion that a key stands for; None, which is a stop, for any other."""
+        if key in AXES:
+            return JogCommand(linear=_along(*AXES[key], self.speed * TOOL_SPEED), frame=self.frame)
+        if key in TURNS:
+            return JogCommand(angular=_along(*TURNS[key], self.speed * TURN_SPEED), frame=self.frame)
+        if key in ARROWS:
+            joint = self._joints[self.joint]
+            return JogCommand(name=(joint.name,), velocity=(ARROWS[key] * self.speed * joint.velocity,))
+        return None
+
+
+def _along(axis: int, sign: float, speed: float) -> tuple[float, ...]:
+    return tuple(sign * speed if index == axis else 0.0 for index in range(3))
