@@ -21,6 +21,8 @@ void InputWatch::begin(const DeviceConfig& config) {
         if (input.is_inverted != 0) *word_of(&expected_, input.pin) |= bit;
         *word_of(&mask, input.pin) |= bit;
     }
+    // From here on the interrupt sees the inputs, and must find the rest done.
+    __atomic_signal_fence(__ATOMIC_SEQ_CST);
     mask_ = mask;
 }
 

@@ -65,13 +65,15 @@ void Machine::start(uint64_t now_us, const int32_t* steps, bool referenced) {
     if (is_armed_) event("armed", "boot");
 }
 
-// The streams and commands of this boot stay known.
+// The streams and commands of this boot stay known. An e-stop stays too: only a reset leaves it.
 void Machine::restart() {
+    const bool is_stopped = mode_ == Mode::EStop;
     if (is_armed_) set_armed(false, "configuration");
     begin(*config_, identity_, reporter_.sink());
     const int64_t nowhere_q20[kMaxJoints] = {};
     place(nowhere_q20);
     if (config_->joints != 0) mode_ = Mode::Unreferenced;
+    if (is_stopped) enter_estop();
     event("configured");
     report_status();
 }
@@ -168,7 +170,7 @@ void Machine::watch_supply(const Point& point) {
         event("underrun");
     } else if (!point.is_starved && is_dry_) {
         is_dry_ = false;
-        event("resumed", "underrun");
+        if (mode_ == Mode::Run) event("resumed", "underrun");
     }
 }
 
@@ -179,6 +181,8 @@ void Machine::plan_slot() {
     path_.advance(mode_ == Mode::Hold ? 0 : speed_q30(), &next);
     next.stream = streams_.stream();
     if (is_following_ || mode_ == Mode::Homing) advance_ramps(&next);
+    const uint8_t limit = find_limit_ahead(before, next);
+    if (limit != kNone) return fail(FaultCode::LimitSwitch, config_->input[limit].name, config_->input[limit].joint);
     if (!offer(before, next)) fail(FaultCode::Internal, "more than a step in a tick");
 }
 

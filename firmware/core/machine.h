@@ -133,7 +133,9 @@ class Machine {
     void watch_trips();
     void watch_heartbeat();
     void guard_switches();
+    uint8_t find_limit_ahead(const Point& before, const Point& next) const;
     void press_estop();
+    void enter_estop();
     void fail(FaultCode fault, const char* detail, uint8_t joint = kNoJoint, bool was_moving = false);
     void stop_dead(bool was_moving);
     void set_armed(bool armed, const char* cause);

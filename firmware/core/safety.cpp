@@ -24,14 +24,18 @@ void Machine::watch_trips() {
 
 void Machine::press_estop() {
     stop_dead(true);
+    enter_estop();
+    event("estop", config_->input[stepper_.trip_input()].name);
+    if (is_armed_) set_armed(false, "estop");
+    report_status();
+}
+
+void Machine::enter_estop() {
     fault_ = FaultCode::EmergencyStop;
     fault_joint_ = kNoJoint;
     mode_ = Mode::EStop;
     for (uint8_t i = 0; i < config_->outputs; ++i)
         if (config_->output[i].is_off_at_estop != 0) outputs_ = static_cast<uint16_t>(outputs_ & ~(1u << i));
-    event("estop", config_->input[stepper_.trip_input()].name);
-    if (is_armed_) set_armed(false, "estop");
-    report_status();
 }
 
 void Machine::fail(FaultCode fault, const char* detail, uint8_t joint, bool was_moving) {
@@ -62,6 +66,19 @@ void Machine::guard_switches() {
     const bool is_guarded = mode_ != Mode::Fault && mode_ != Mode::EStop;
     if (!is_guarded || stepper_.latched_number() < kSlotsToKnowInputs) return stepper_.guard(0);
     stepper_.guard(mode_ == Mode::Homing ? limits_ & ~homing_.own_inputs() : limits_);
+}
+
+// The switch that a joint is on and would be driven further into, or kNone: it may only move off it.
+uint8_t Machine::find_limit_ahead(const Point& before, const Point& next) const {
+    uint32_t active = stepper_.active_inputs() & limits_;
+    if (mode_ == Mode::Homing) active &= ~homing_.own_inputs();
+    for (uint8_t i = 0; active != 0; ++i, active >>= 1) {
+        if ((active & 1) == 0) continue;
+        const InputConfig& input = config_->input[i];
+        const int64_t by_q20 = next.position_q20[input.joint] - before.position_q20[input.joint];
+        if (input.role == InputRole::LimitLower ? by_q20 < 0 : by_q20 > 0) return i;
+    }
+    return kNone;
 }
 
 // In text mode a joint goes to the last target that it was given, and that is all.
@@ -105,6 +122,8 @@ Code Machine::disarm() {
 Code Machine::reset() {
     if (mode_ != Mode::Fault && mode_ != Mode::EStop) return Code::Ok;
     if (!is_at_rest()) return Code::NotReady;
+    // Pressed in this slot, perhaps released already: the next slot takes note of it.
+    if (stepper_.trip() == Trip::EStop && mode_ != Mode::EStop) return Code::EstopPressed;
     stepper_.release();
     if (stepper_.trip() == Trip::EStop) return Code::EstopPressed;
     fault_ = FaultCode::None;

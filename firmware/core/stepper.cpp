@@ -72,7 +72,7 @@ void Stepper::place(const int64_t* position_q20) {
 
 void Stepper::shift(uint8_t joint, int32_t steps) {
     axis_[joint].executed += steps;
-    axis_[joint].latched += steps;
+    axis_[joint].latched = axis_[joint].executed;
 }
 
 void Stepper::offer(const int32_t* increment_q20) {
@@ -185,11 +185,9 @@ void Stepper::inspect(const Levels& levels) {
 }
 
 void Stepper::trip(Trip trip, uint32_t inputs) {
-    if (trip_ == Trip::None) {
-        was_moving_ = is_turning() || busy_ != 0;
-        trip_input_ = 0;
-        while (((inputs >> trip_input_) & 1) == 0) ++trip_input_;
-    }
+    if (trip_ == Trip::None) was_moving_ = is_turning() || busy_ != 0;
+    trip_input_ = 0;
+    while (((inputs >> trip_input_) & 1) == 0) ++trip_input_;
     trip_ = trip;
     due_ = 0;
     for (uint8_t j = 0; j < joints_; ++j) {

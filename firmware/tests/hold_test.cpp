@@ -117,6 +117,27 @@ TEST(Starvation, SlowsAlongThePathAndEndsExactlyOnTheLastKnot) {
     }
 }
 
+TEST(Starvation, ThatIsHeldEndsWithTheHoldAndIsNotSaidToBeOverBefore) {
+    Rig rig;
+    Watch watch{kLong};
+    ASSERT_EQ(rig.send(kLong.chunk(0, 40, 0)).code, Code::Ok);
+    play(rig, nullptr, watch, 3000);
+    ASSERT_EQ(rig.count_events("underrun"), 1);
+    const int32_t stood = rig.steps(0);
+    EXPECT_EQ(rig.command(Command::Hold), Code::Ok);
+    ASSERT_EQ(rig.send(kLong.chunk(40, kLong.knots(), 1)).code, Code::Ok);
+    play(rig, nullptr, watch, 1000);
+    EXPECT_EQ(rig.mode(), Mode::Hold);
+    EXPECT_EQ(rig.steps(0), stood);
+    EXPECT_EQ(rig.count_events("resumed"), 0);
+    EXPECT_EQ(rig.command(Command::Resume), Code::Ok);
+    play(rig, nullptr, watch, 6000);
+    EXPECT_EQ(rig.mode(), Mode::Idle);
+    EXPECT_EQ(rig.steps(0), 6000);
+    EXPECT_EQ(rig.count_events("resumed"), 1);
+    watch.expect_good(rig);
+}
+
 TEST(Starvation, DoesNotSlowAStreamThatIsFedFarEnoughAhead) {
     Rig rig;
     Watch watch{kLong};

@@ -119,6 +119,46 @@ TEST(EStop, ComesOnTopOfAFault) {
     wired.press(kButton);
     wired.run_ms(2);
     EXPECT_EQ(wired.machine.mode(), Mode::EStop);
+    EXPECT_EQ(wired.count_events("stop_button"), 1) << "not the switch of the fault before";
+}
+
+TEST(EStop, ThatIsOnlyTappedIsNotLostInTheResetOfAFault) {
+    Wired wired(open_field(), {0, 0}, true);
+    wired.run_ms(5);
+    wired.press(kUpper1);
+    wired.run_ms(5);
+    ASSERT_EQ(wired.machine.mode(), Mode::Fault);
+    for (int n = 0; n < 10; ++n) wired.tick();
+    wired.press(kButton);
+    wired.tick();
+    wired.press(kButton, Finger::Off);
+    for (int n = 0; n < 10; ++n) wired.tick();
+    EXPECT_EQ(wired.command(Command::Reset), Code::EstopPressed);
+    for (int n = 0; n < 50; ++n) wired.tick();
+    EXPECT_EQ(wired.machine.mode(), Mode::EStop);
+    EXPECT_FALSE(wired.machine.is_enabled());
+}
+
+TEST(EStop, OfADisarmedDeviceOutlivesANewConfiguration) {
+    for (bool is_held : {true, false}) {
+        Wired wired(open_field());
+        wired.run_ms(5);
+        EXPECT_EQ(wired.command(Command::Disarm), Code::Ok);
+        wired.press(kButton);
+        wired.run_ms(2);
+        ASSERT_EQ(wired.machine.mode(), Mode::EStop);
+        if (!is_held) wired.press(kButton, Finger::Off);
+        wired.run_ms(2);
+        ASSERT_TRUE(wired.machine.takes_config());
+        wired.machine.restart();
+        EXPECT_EQ(wired.machine.outputs(), 0u) << "the laser is on at boot, and off at an e-stop";
+        wired.run_ms(25);
+        EXPECT_EQ(wired.machine.mode(), Mode::EStop);
+        EXPECT_EQ(wired.state[17], static_cast<uint8_t>(FaultCode::EmergencyStop));
+        EXPECT_EQ(wired.command(Command::Arm), is_held ? Code::EstopPressed : Code::NotReady);
+        EXPECT_EQ(wired.command(Command::Reset), is_held ? Code::EstopPressed : Code::Ok);
+        EXPECT_EQ(wired.machine.mode(), is_held ? Mode::EStop : Mode::Unreferenced);
+    }
 }
 
 TEST(EStop, SwitchesOffTheOutputsThatItShall) {
@@ -177,7 +217,8 @@ TEST(LimitSwitch, ThatIsActiveAlreadyIsPassedOverUntilItIsReleased) {
         wired.run_ms(10);
         EXPECT_EQ(wired.machine.mode(), at_start ? Mode::Idle : Mode::Fault);
         EXPECT_EQ(wired.command(Command::Reset), Code::Ok);
-        move(wired);
+        ASSERT_EQ(wired.follow(-20000, -20000), Code::Ok);
+        wired.run_ms(900);
         wired.press(kUpper1, Finger::Off);
         wired.run_ms(10);
         EXPECT_EQ(wired.machine.mode(), Mode::Run);
@@ -185,6 +226,28 @@ TEST(LimitSwitch, ThatIsActiveAlreadyIsPassedOverUntilItIsReleased) {
         wired.run_ms(2);
         EXPECT_EQ(wired.machine.mode(), Mode::Fault);
     }
+}
+
+TEST(LimitSwitch, ThatIsActiveAlreadyLetsItsJointOffItOnly) {
+    Wired wired(open_field(), {0, 0}, true);
+    wired.press(kUpper1);
+    wired.run_ms(10);
+    for (int attempt = 0; attempt < 2; ++attempt) {
+        ASSERT_EQ(wired.follow(20000, 0), Code::Ok);
+        wired.run_ms(30);
+        EXPECT_EQ(wired.machine.mode(), Mode::Fault);
+        EXPECT_EQ(wired.state[17], static_cast<uint8_t>(FaultCode::LimitSwitch));
+        EXPECT_EQ(wired.state[53], 0u);
+        EXPECT_EQ(wired.pulses, 0u) << "not one step further into it";
+        ASSERT_EQ(wired.command(Command::Reset), Code::Ok);
+        EXPECT_EQ(wired.machine.mode(), Mode::Idle) << "nothing has moved, so nothing is lost";
+    }
+    ASSERT_EQ(wired.follow(0, 5000), Code::Ok);
+    ASSERT_TRUE(wired.run_until(Mode::Idle)) << "the other joint is free";
+    ASSERT_EQ(wired.follow(-300, 5000), Code::Ok);
+    ASSERT_TRUE(wired.run_until(Mode::Idle));
+    EXPECT_EQ(wired.shaft[0], -300);
+    EXPECT_EQ(wired.shaft[1], 5000);
 }
 
 TEST(HomeSwitch, IsNoLimit) {
@@ -276,6 +339,20 @@ TEST(Restart, BeginsAnewWithANewConfigurationDisarmedAndUnreferenced) {
     ASSERT_TRUE(wired.run_until(Mode::Idle));
     EXPECT_EQ(wired.shaft[0], 100);
     EXPECT_EQ(wired.shaft[1], 200);
+}
+
+TEST(Restart, RemembersWhatWasCommandedInThisBoot) {
+    Wired wired(open_field(), {0, 0}, true);
+    wired.run_ms(5);
+    const Bytes output = build_command(Command::Output, 900, {}, kNever, kBoot, 0, 1);
+    wired.give(output);
+    EXPECT_EQ(wired.machine.outputs(), 3u);
+    EXPECT_EQ(wired.command(Command::Disarm), Code::Ok);
+    wired.machine.restart();
+    wired.run_ms(5);
+    EXPECT_EQ(wired.machine.outputs(), 2u);
+    wired.give(output);
+    EXPECT_EQ(wired.machine.outputs(), 2u) << "a repeated command is not done again";
 }
 
 // A platform writes its flash only then.
