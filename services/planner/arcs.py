@@ -29,7 +29,7 @@ def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
     sine = float(np.linalg.norm(normal)) / float(np.linalg.norm(to_interim) * np.linalg.norm(to_end))
     if sine < STRAIGHT:
         raise _refused("interim", sine, STRAIGHT, "start, interim and goal are on one line", "go there by a line (LIN)")
-    squares = float(to_end @ to_end) * to_interim - float(to_interim @ to_interim) * to_end
+    squares = float(to_interim @ to_interim) * to_end - float(to_end @ to_end) * to_interim
     centre = start.position + np.cross(squares, normal) / (2.0 * float(normal @ normal))
     normal = normal / float(np.linalg.norm(normal))
     return _arc(start, end, centre, normal, _angle(start.position - centre, end.position - centre, normal))
@@ -37,18 +37,18 @@ def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
 
 def arc_about(start: Pose, centre: Array, end: Pose) -> Arc:
     """The shorter one about `centre` (3,); raises `NoPlan`."""
-    _require_way("centre", centre, start.position, end.position)
+    _require_way("center", centre, start.position, end.position)
     first, last = start.position - centre, end.position - centre
     radii = float(np.linalg.norm(first)), float(np.linalg.norm(last))
     if abs(radii[0] - radii[1]) > SAME_RADIUS:
         message = f"the centre is {radii[0]:.6g} m from the start and {radii[1]:.6g} m from the goal"
         remedy = "give a centre as far from both, or a point on the arc (interim)"
-        raise _refused("centre", abs(radii[0] - radii[1]), SAME_RADIUS, message, remedy)
+        raise _refused("center", abs(radii[0] - radii[1]), SAME_RADIUS, message, remedy)
     normal = np.cross(first, last)
     sine = float(np.linalg.norm(normal)) / (radii[0] * radii[1])
     if sine < STRAIGHT:
         message = "start, centre and goal are on one line: there are many arcs"
-        raise _refused("centre", sine, STRAIGHT, message, "give a point on the arc (interim)")
+        raise _refused("center", sine, STRAIGHT, message, "give a point on the arc (interim)")
     chord = end.position - start.position
     centre = centre - chord * float((centre - 0.5 * (start.position + end.position)) @ chord) / float(chord @ chord)
     normal = normal / float(np.linalg.norm(normal))
