@@ -16,11 +16,11 @@ from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.clearance import Checker
 from services.planner.continuation import FINEST, Continuation, Followed, Stop
-from services.planner.path_points import Run, between, trajectory_along
+from services.planner.feasibility import slowed
+from services.planner.path_points import Run, between, normalised, trajectory_along
 from services.planner.path_timing import demand_of, time_law
 from services.planner.profile import JointLimits, NoProfile
 from services.planner.refusals import NoPlan, not_verified
-from services.planner.timing import at_speed, normalised
 from services.planner.tool_path import ToolPath
 from services.planner.way import Start
 
@@ -153,7 +153,7 @@ class CartesianPlanner:
             float(np.linalg.norm(self._kinematics.jacobian(q)[:3] @ v))
             for q, v in zip(rows.positions, rows.velocities, strict=True)
         )
-        return trajectory if fastest <= tool.speed else at_speed(trajectory, 0.999 * tool.speed / fastest)
+        return trajectory if fastest <= tool.speed else slowed(trajectory, 0.999 * tool.speed / fastest)
 
     def _touches(self, posture: Array, margin: float) -> Stop:
         pairs = self._checker.pairs_within(posture, DEEPER * margin + 1e-9) or [("?", "?")]

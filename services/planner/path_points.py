@@ -11,10 +11,11 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory, TrajectoryPoint
+from services.planner.feasibility import slowed
 from services.planner.path_curve import PathCurve
 from services.planner.path_timing import TimeLaw
-from services.planner.profile import SHORTEST
-from services.planner.verify import Samples, sample
+from services.planner.profile import MARGIN, SHORTEST, JointLimits
+from services.planner.verify import Samples, limit_shares, sample
 
 Array = NDArray[np.float64]
 Error = Callable[[float, Array], float]  # [m] that the posture (n,) at a length is off the way
@@ -44,6 +45,13 @@ def trajectory_along(names: Sequence[str], runs: Sequence[Run]) -> JointTrajecto
         later = [replace(p, time_from_start=begin + p.time_from_start) for p in _near_enough(names, run)]
         points = points[:-1] + later
     return JointTrajectory(joint_names=tuple(names), points=tuple(points))
+
+
+def normalised(trajectory: JointTrajectory, limits: JointLimits) -> JointTrajectory:
+    """The same way in the time in which the joint that is asked most of is just within its limits."""
+    velocity, acceleration, jerk = limit_shares(sample(trajectory), limits)
+    asked = max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0))
+    return trajectory if asked == 0.0 else slowed(trajectory, MARGIN / asked)
 
 
 def _near_enough(names: Sequence[str], run: Run) -> list[TrajectoryPoint]:

@@ -13,17 +13,16 @@ from schemas.motion import JointTrajectory
 from schemas.planning import FreeMotion, Motion, WaypointGoal
 from services.arm.description import Arm
 from services.planner.blockade import Blockade
-from services.planner.clearance import CLEARANCE, Checker, touching_posture
+from services.planner.clearance import CLEARANCE, Sweeper
 from services.planner.finish import Finished, Finisher, Touching
 from services.planner.goals import Goals, timed_out
 from services.planner.path_curve import RoundedLines, rounded_runs
-from services.planner.path_points import Run, trajectory_along
+from services.planner.path_points import Run, normalised, trajectory_along
 from services.planner.path_timing import demand_of, time_law
 from services.planner.profile import JointLimits, NoProfile, straight_line
 from services.planner.refusals import NoPlan, no_way_around, not_verified
 from services.planner.search import Search
 from services.planner.times import Stopwatch
-from services.planner.timing import normalised
 from services.planner.tool_motions import points_of
 from services.planner.way import STRAIGHT, Deadline, NoWay, Start
 
@@ -48,7 +47,7 @@ class Errand:
 class Via:
     """Ways by waypoints for one arm."""
 
-    def __init__(self, arm: Arm, goals: Goals, checker: Checker, blockade: Blockade) -> None:
+    def __init__(self, arm: Arm, goals: Goals, checker: Sweeper, blockade: Blockade) -> None:
         self._arm, self._goals, self._checker, self._blockade = arm, goals, checker, blockade
 
     def plan(self, goal: WaypointGoal, errand: Errand, search: Callable[[], Search]) -> tuple[Finished, str]:
@@ -91,7 +90,7 @@ class Via:
         rows, planner_id = [np.array(postures[:1])], STRAIGHT
         for begin, end in pairwise(postures):
             leg = np.array((begin, end))
-            if touching_posture(self._checker, leg, errand.margin) is None:
+            if self._checker.touching(leg, errand.margin) is None:
                 rows.append(leg[1:])
                 continue
             try:
