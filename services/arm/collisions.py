@@ -105,30 +105,38 @@ def reach_of(arm: Arm, model: pin.Model, geometry: pin.GeometryModel) -> Array:
     fold = np.array([_joint_reach(arm, model, geometry, joint) for joint in range(1, model.njoints)])
     reach = np.zeros(len(arm.joints))
     for index, bound in enumerate(fold, start=1):
-        joint = arm.model.joint(model.names[index])
-        scale = 1.0
-        while joint.mimic is not None:
-            scale *= abs(joint.mimic.multiplier)
-            joint = arm.model.joint(joint.mimic.joint)
-        reach[arm.joint_names.index(joint.name)] += scale * bound
+        source, scale = driver_of(arm, model, index)
+        reach[source] += scale * bound
     return reach
+
+
+def driver_of(arm: Arm, model: pin.Model, index: int) -> tuple[int, float]:
+    """The arm's joint that moves pinocchio's joint `index`, and how much for each of its units, through mimics."""
+    joint, scale = arm.model.joint(model.names[index]), 1.0
+    while joint.mimic is not None:
+        scale *= abs(joint.mimic.multiplier)
+        joint = arm.model.joint(joint.mimic.joint)
+    return arm.joint_names.index(joint.name), scale
 
 
 def _joint_reach(arm: Arm, model: pin.Model, geometry: pin.GeometryModel, joint: int) -> float:
     if model.joints[joint].shortname().startswith("JointModelP"):
         return 1.0
-    farthest = 0.0
-    for shape in geometry.geometryObjects:
-        if joint not in model.supports[shape.parentJoint]:
-            continue
-        shape.geometry.computeLocalAABB()
-        length = float(np.linalg.norm(shape.placement.translation)) + _radius(shape)
-        link = int(shape.parentJoint)
-        while link != joint:
-            length += float(np.linalg.norm(model.jointPlacements[link].translation)) + _travel(arm, model, link)
-            link = int(model.parents[link])
-        farthest = max(farthest, length)
-    return farthest
+    moved = (shape for shape in geometry.geometryObjects if joint in model.supports[shape.parentJoint])
+    return max((shape_reach(arm, model, shape, joint) for shape in moved), default=0.0)
+
+
+def shape_reach(arm: Arm, model: pin.Model, shape: pin.GeometryObject, joint: int) -> float:
+    """How far at most [m] any point of a shape moves per unit of pinocchio's `joint`, which carries it."""
+    if model.joints[joint].shortname().startswith("JointModelP"):
+        return 1.0
+    shape.geometry.computeLocalAABB()
+    length = float(np.linalg.norm(shape.placement.translation)) + _radius(shape)
+    link = int(shape.parentJoint)
+    while link != joint:
+        length += float(np.linalg.norm(model.jointPlacements[link].translation)) + _travel(arm, model, link)
+        link = int(model.parents[link])
+    return length
 
 
 def _radius(shape: pin.GeometryObject) -> float:

@@ -25,6 +25,12 @@ class Checker(Protocol):
     def pairs_within(self, positions: Sequence[float] | Array, margin: float = 0.0) -> list[tuple[str, str]]: ...
 
 
+class Sweeper(Checker, Protocol):
+    """And of whole ways, pair by pair."""
+
+    def touching(self, positions: Array, margin: float) -> Array | None: ...
+
+
 def first_collision(checker: Checker, positions: Array, margin: float) -> Array | None:
     """The first posture along the rows of `positions` (m, n) that does not keep `margin` [m], or None."""
     return _walk(checker, positions, margin)[1]
@@ -33,31 +39,6 @@ def first_collision(checker: Checker, positions: Array, margin: float) -> Array 
 def last_free(checker: Checker, start: Array, goal: Array) -> Array:
     """The last posture (n,) on the straight line from `start` to `goal` before anything comes nearer than allowed."""
     return _walk(checker, np.vstack((start, goal)), CLEARANCE + ROUNDING)[0]
-
-
-def touching_posture(checker: Checker, positions: Array, margin: float) -> Array | None:
-    """Any posture along the rows of `positions` (m, n) at which something is nearer than `margin` [m], or None.
-
-    A look with so much clearance answers for as much movement before it and after it. What is left is looked at in
-    its middle, and pieces in which nothing moves by more than half the margin are not cut any further.
-    """
-    moved = _movement(checker, positions)
-    end = float(moved[-1])
-    least = max(0.5 * margin, end / MOST_LOOKS)
-    waiting = [(0.0, end)]
-    while waiting:
-        low, high = waiting.pop()
-        middle = 0.5 * (low + high)
-        posture = _posture_at(middle, moved, positions)
-        clearance = checker.distance(posture) - margin
-        if clearance <= 0.0:
-            return posture
-        covered = max(clearance, 0.5 * least)
-        if middle - covered > low:
-            waiting.append((low, middle - covered))
-        if middle + covered < high:
-            waiting.append((middle + covered, high))
-    return None
 
 
 def _walk(checker: Checker, positions: Array, margin: float) -> tuple[Array, Array | None]:

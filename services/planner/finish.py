@@ -10,7 +10,7 @@ import numpy as np
 from schemas.motion import JointTrajectory
 from schemas.planning import PlanRequest, StepMargin, StepPolicy, Timing
 from services.arm.description import Arm
-from services.planner.clearance import Checker, touching_posture
+from services.planner.clearance import Sweeper
 from services.planner.curve import TurnsOnTheSpot
 from services.planner.feasibility import feasible_scale, require_feasible, slowed
 from services.planner.profile import JointLimits, NoProfile, straight_line
@@ -43,15 +43,13 @@ class Finisher:
     """For one request: its limits, its policy, and what must be kept clear of."""
 
     def __init__(
-        self, arm: Arm, checker: Checker, request: PlanRequest, limits: JointLimits, margin: float, watch: Stopwatch
+        self, arm: Arm, checker: Sweeper, request: PlanRequest, limits: JointLimits, margin: float, watch: Stopwatch
     ) -> None:
         self._arm, self._checker, self._request = arm, checker, request
         self._limits, self._margin, self._watch = limits, margin, watch
 
     def line(self, start: Start, goal: Start) -> Finished:
         """The straight line of the joints; raises `Touching` or `NoPlan`."""
-        with self._watch.phase("verification"):
-            self._require_free(np.array((start, goal)))
         if self._request.timing is Timing.TIME_OPTIMAL:
             return self.curve(stopping(np.array((start, goal))))
         with self._watch.phase("timing"):
@@ -80,8 +78,12 @@ class Finisher:
     def finish(self, trajectory: JointTrajectory, start: Start, goal: Start) -> Finished:
         """Slower where the steppers cannot, then verified as it will be played; raises `Touching` or `NoPlan`."""
         with self._watch.phase("verification"):
-            trajectory, margins, scale = self._feasible(trajectory)
             samples = sample(trajectory)
+            self._require_free(samples.positions)
+            trajectory, margins, scale = self._feasible(trajectory)
+            if scale < 1.0:
+                samples = sample(trajectory)
+                self._require_free(samples.positions)
             try:
                 require_ends(trajectory, start, goal)
                 require_within_limits(self._arm, samples, self._limits)
@@ -89,11 +91,10 @@ class Finisher:
                     require_jerk(self._arm, samples, self._limits)
             except BadTrajectory as error:
                 raise not_verified(str(error)) from error
-            self._require_free(samples.positions)
         return Finished(trajectory, margins, scale)
 
     def _require_free(self, rows: Array) -> None:
-        touching = touching_posture(self._checker, rows, self._margin)
+        touching = self._checker.touching(rows, self._margin)
         if touching is not None:
             raise Touching(touching)
 

@@ -35,6 +35,10 @@ class Surroundings:
         """[m], as `World.distance`."""
         return self.world.distance(positions)
 
+    def touching(self, positions: Array, margin: float) -> Array | None:
+        """As `World.touching`."""
+        return self.world.touching(positions, margin)
+
     def pairs_within(self, positions: Positions, margin: float = 0.0) -> list[LinkPair]:
         """As `World.pairs_within`."""
         return self.world.pairs_within(positions, margin)

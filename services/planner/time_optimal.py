@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from schemas.motion import JointTrajectory
 from services.planner.curve import Curve
 from services.planner.profile import JointLimits, NoProfile
-from services.planner.timing import States, along_runs, normalised, states_along
+from services.planner.timing import States, along_runs, states_along
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ MOST = 4000
 
 def time_optimal_way(names: Sequence[str], control: Array, limits: JointLimits) -> JointTrajectory:
     """As `timing.timed_way`, as fast as velocities and accelerations allow; raises `NoProfile`."""
-    return normalised(along_runs(names, control, limits, _run_states), limits, with_jerk=False)
+    return along_runs(names, control, limits, _run_states, with_jerk=False)
 
 
 def _run_states(run: Curve, limits: JointLimits) -> States:

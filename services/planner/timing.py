@@ -8,6 +8,7 @@ the speed is steady. At last all is sped up or slowed down evenly until one join
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,7 +21,7 @@ from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from services.planner.curve import Curve, smooth_runs
 from services.planner.profile import MARGIN, JointLimits, NoProfile, straight_line
-from services.planner.verify import limit_shares, sample
+from services.planner.verify import Samples, limit_shares, sample, sample_between
 
 Array = NDArray[np.float64]
 
@@ -70,13 +71,17 @@ def timed_way(names: Sequence[str], control: Array, limits: JointLimits) -> Join
 
     At corners it stops. Raises `TurnsOnTheSpot` where the curve does so without a corner.
     """
-    return normalised(along_runs(names, control, limits, _run_states), limits)
+    return along_runs(names, control, limits, _run_states)
 
 
 def along_runs(
-    names: Sequence[str], control: Array, limits: JointLimits, timed: Callable[[Curve, JointLimits], States]
+    names: Sequence[str],
+    control: Array,
+    limits: JointLimits,
+    timed: Callable[[Curve, JointLimits], States],
+    with_jerk: bool = True,
 ) -> JointTrajectory:
-    """Every smooth run of the curve, timed from rest to rest, one after the other."""
+    """Every smooth run of the curve, timed from rest to rest, one after the other, as fast as the limits allow."""
     runs: list[States] = []
     clock = 0.0
     for run in smooth_runs(control, limits.velocity):
@@ -87,26 +92,16 @@ def along_runs(
         return straight_line(names, control[0].tolist(), control[-1].tolist(), limits)
     whole = States(*(np.concatenate(columns) for columns in zip(*runs, strict=True)))
     kept = np.concatenate(([True], np.diff(whole.times) > 0.0))
-    return _trajectory(names, control, States(*(column[kept] for column in whole)))
-
-
-def _trajectory(names: Sequence[str], control: Array, states: States) -> JointTrajectory:
-    """Points from rest to rest, with both ends exact to the bit."""
+    states = States(*(column[kept] for column in whole))
     states.positions[0], states.positions[-1] = control[0], control[-1]
     states.velocities[[0, -1]] = states.accelerations[[0, -1]] = 0.0
-    rows = zip(*(column.tolist() for column in states), strict=True)
-    points = [
-        TrajectoryPoint(positions=tuple(p), velocities=tuple(v), accelerations=tuple(a), time_from_start=t)
-        for t, p, v, a in rows
-    ]
-    return JointTrajectory(joint_names=tuple(names), points=tuple(points))
+    return _trajectory(names, _at_limits(states, limits, with_jerk))
 
 
-def normalised(trajectory: JointTrajectory, limits: JointLimits, with_jerk: bool = True) -> JointTrajectory:
+def normalised(trajectory: JointTrajectory, limits: JointLimits) -> JointTrajectory:
     """The same way in the time in which the joint that is asked most of is just within its limits."""
-    velocity, acceleration, jerk = limit_shares(sample(trajectory), limits)
-    slower = max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0) if with_jerk else 0.0)
-    return trajectory if slower == 0.0 else at_speed(trajectory, MARGIN / slower)
+    fastest = _fastest(sample(trajectory), limits)
+    return trajectory if fastest == math.inf else at_speed(trajectory, fastest)
 
 
 def at_speed(trajectory: JointTrajectory, scale: float) -> JointTrajectory:
@@ -121,6 +116,29 @@ def at_speed(trajectory: JointTrajectory, scale: float) -> JointTrajectory:
         for point in trajectory.points
     )
     return JointTrajectory(stamp=trajectory.stamp, joint_names=trajectory.joint_names, points=points)
+
+
+def _fastest(samples: Samples, limits: JointLimits, with_jerk: bool = True) -> float:
+    """The scale of the speed at which one joint is just within one of its limits; infinite at rest."""
+    velocity, acceleration, jerk = limit_shares(samples, limits)
+    most = max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0) if with_jerk else 0.0)
+    return MARGIN / most if most > 0.0 else math.inf
+
+
+def _at_limits(states: States, limits: JointLimits, with_jerk: bool) -> States:
+    """As `normalised`."""
+    scale = _fastest(sample_between(*states), limits, with_jerk)
+    times, positions, velocities, accelerations = states
+    return States(times / scale, positions, velocities * scale, accelerations * scale * scale)
+
+
+def _trajectory(names: Sequence[str], states: States) -> JointTrajectory:
+    rows = zip(*(column.tolist() for column in states), strict=True)
+    points = [
+        TrajectoryPoint(positions=tuple(p), velocities=tuple(v), accelerations=tuple(a), time_from_start=t)
+        for t, p, v, a in rows
+    ]
+    return JointTrajectory(joint_names=tuple(names), points=tuple(points))
 
 
 def _run_states(run: Curve, limits: JointLimits) -> States:

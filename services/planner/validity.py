@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.clearance import Checker, touching_posture
+from services.planner.clearance import Sweeper
 from services.planner.curve import spline_rows
 
 if TYPE_CHECKING:
@@ -29,17 +29,17 @@ class Validity(Protocol):
 class CoalValidity:
     """On the exact shapes: slow, and free as soon as the margin [m] is kept."""
 
-    def __init__(self, checker: Checker, margin: float) -> None:
+    def __init__(self, checker: Sweeper, margin: float) -> None:
         self._checker, self._margin = checker, margin
 
     def is_free(self, posture: Array) -> bool:
         return self._checker.distance(posture) > self._margin
 
     def is_line_free(self, start: Array, goal: Array) -> bool:
-        return touching_posture(self._checker, np.vstack((start, goal)), self._margin) is None
+        return self._checker.touching(np.vstack((start, goal)), self._margin) is None
 
     def is_curve_free(self, control: Array) -> bool:
-        return touching_posture(self._checker, spline_rows(control, ROWS), self._margin) is None
+        return self._checker.touching(spline_rows(control, ROWS), self._margin) is None
 
 
 class NativeValidity:

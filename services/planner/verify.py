@@ -36,24 +36,35 @@ class Samples:
 
 def sample(trajectory: JointTrajectory, density: int = DENSITY) -> Samples:
     """The quintic through the points at `density` instants a segment, all at once, with both ends of every segment."""
-    stamps = np.array([point.time_from_start for point in trajectory.points])
+    return sample_between(*_columns(trajectory), density)
+
+
+def sample_between(stamps: Array, p: Array, v: Array, a: Array, density: int = DENSITY) -> Samples:
+    """As `sample`, through positions, velocities and accelerations (m, n) at `stamps` (m,) [s]."""
     shares = np.linspace(0.0, 1.0, density + 1)
     times = (stamps[:-1, None] + shares * np.diff(stamps)[:, None]).reshape(-1)
-    return _evaluate(trajectory, times, np.repeat(np.arange(len(stamps) - 1), density + 1))
+    return _evaluate((stamps, p, v, a), times, np.repeat(np.arange(len(stamps) - 1), density + 1))
 
 
 def at_times(trajectory: JointTrajectory, times: Array) -> Samples:
     """The quintic through the points at `times` (m,) [s], which lie within the trajectory."""
     stamps = np.array([point.time_from_start for point in trajectory.points])
-    return _evaluate(trajectory, times, np.clip(np.searchsorted(stamps, times, side="right") - 1, 0, len(stamps) - 2))
+    index = np.clip(np.searchsorted(stamps, times, side="right") - 1, 0, len(stamps) - 2)
+    return _evaluate(_columns(trajectory), times, index)
 
 
-def _evaluate(trajectory: JointTrajectory, times: Array, index: NDArray[np.int64]) -> Samples:
-    """At `times` (m,) [s], each in the segment `index` (m,) (Biagiotti and Melchiorri 2008, section 2.1)."""
+def _columns(trajectory: JointTrajectory) -> tuple[Array, Array, Array, Array]:
+    """Stamps (m,) [s], positions, velocities and accelerations (m, n)."""
     stamps = np.array([point.time_from_start for point in trajectory.points])
     p = np.array([point.positions for point in trajectory.points])
     v = np.array([point.velocities for point in trajectory.points])
     a = np.array([point.accelerations for point in trajectory.points])
+    return stamps, p, v, a
+
+
+def _evaluate(columns: tuple[Array, Array, Array, Array], times: Array, index: NDArray[np.int64]) -> Samples:
+    """At `times` (m,) [s], each in the segment `index` (m,) (Biagiotti and Melchiorri 2008, section 2.1)."""
+    stamps, p, v, a = columns
     dt = np.diff(stamps)[index][:, None]
     u = (times - stamps[index])[:, None] / dt
     p0, v0, a0 = p[index], v[index] * dt, a[index] * dt * dt

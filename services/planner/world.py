@@ -18,6 +18,7 @@ from services.arm.collisions import LinkPair
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.solid_geometry import is_inside
+from services.planner.sweep import Sweep
 from services.planner.world_bounds import LowerBounds
 from services.planner.world_geometry import WorldGeometry
 
@@ -46,6 +47,7 @@ class World:
         for index in self._bounds.pairs:
             self._placed.deactivateCollisionPair(index)
         self.reach: Array = self._geometry.reach
+        self._sweep = Sweep(arm, kinematics, self._geometry, self._distance_at)
 
     @property
     def version(self) -> int:
@@ -78,6 +80,10 @@ class World:
             nearest = min(nearest, self._exact(self._bounds.pairs[place]))
         return nearest - padding
 
+    def touching(self, positions: Array, margin: float) -> Array | None:
+        """Any posture along the rows of `positions` (m, n) at which something is nearer than `margin` [m], or None."""
+        return self._sweep.touching(positions, margin)
+
     def pairs_within(self, positions: Positions, margin: float = 0.0) -> list[LinkPair]:
         """The pairs of names nearer than `margin` [m], each once."""
         near = (self._geometry.names[index] for index, _ in self._near(positions, margin))
@@ -97,6 +103,12 @@ class World:
         q = self._kinematics.configuration.to_pinocchio(positions)
         pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
         pin.computeDistances(self._geometry.model, self._placed)
+
+    def _distance_at(self, positions: Array, pairs: Sequence[int]) -> Array:
+        """(k,) [m] between the shapes of these pairs alone."""
+        q = self._kinematics.configuration.to_pinocchio(positions)
+        pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
+        return np.array([self._exact(index) for index in pairs])
 
     def _direct(self) -> Iterator[tuple[int, float]]:
         """Number and distance [m] of the pairs that `_place` has looked at."""

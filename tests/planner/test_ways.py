@@ -1,0 +1,215 @@
+"""Ways around things: found by every planner, timed within all limits, free by another checker, and repeatable."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from functools import cache
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from schemas.frames import Transform
+from schemas.joints import JointState
+from schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, Timing
+from schemas.scene import PlanningScene, SceneObject
+from services.arm.description import load_arm
+from services.bench.plan_scenes import SCENES, box
+from services.planner.core import Planner
+from services.planner.native_scene import native_scene
+from services.planner.profile import joint_limits
+from services.planner.search import KNOWN
+from services.planner.verify import limit_shares, require_ends, sample
+from services.planner.world import World
+from tests.planner.native.coal_truth import Truth
+
+ARMS = ("rm1", "parol6")
+DENSER = 100  # samples between two points: ten times as many as the planner looks at
+START = {"rm1": (0.0, 0.3, 0.05), "parol6": (-0.7, -1.2, 3.1, 0.0, 0.0, 3.14)}
+GOAL = {"rm1": (1.2, 0.3, 0.05), "parol6": (0.7, -1.2, 3.1, 0.0, 0.0, 3.14)}
+
+
+@cache
+def planner_of(name: str) -> Planner:
+    return Planner(load_arm(Path(__file__).parents[2] / "urdf" / name))
+
+
+@pytest.fixture(params=ARMS)
+def planner(request: pytest.FixtureRequest) -> Planner:
+    return planner_of(request.param)
+
+
+def show(planner: Planner, scene: PlanningScene) -> None:
+    planner.set_world(World(planner.arm, planner.kinematics, scene))
+
+
+def asked(planner: Planner, start: np.ndarray, goal: np.ndarray, **options: object) -> PlanRequest:
+    names = planner.arm.joint_names
+    whole = {"allowed_time": 20.0, **options}
+    return PlanRequest(
+        start=JointState(name=names, position=tuple(start)), goal=JointGoal(name=names, position=tuple(goal)), **whole
+    )
+
+
+def turned(board: SceneObject, angle: float) -> SceneObject:
+    """The same, turned about the vertical."""
+    quaternion = (0.0, 0.0, float(np.sin(angle / 2)), float(np.cos(angle / 2)))
+    return msgspec.structs.replace(board, pose=Transform(translation=board.pose.translation, rotation=quaternion))
+
+
+def between(planner: Planner) -> PlanRequest:
+    """A box stands where the tool is in the middle of the straight way."""
+    start, goal = START[planner.arm.name], GOAL[planner.arm.name]
+    tool = planner.kinematics.tool(0.5 * np.add(start, goal)).position.tolist()
+    show(planner, PlanningScene(version=5, objects=(box("post", (0.05, 0.05, 0.05), tuple(tool)),)))
+    return asked(planner, start, goal)
+
+
+def require_sound(planner: Planner, request: PlanRequest, response: PlanResponse) -> None:
+    """What must hold for every trajectory that is returned, seen ten times as finely as the planner does."""
+    assert response.code is PlanCode.SUCCESS, response.refusal
+    limits = joint_limits(planner.arm, request.velocity_scaling, request.acceleration_scaling)
+    samples = sample(response.trajectory, DENSER)
+    velocity, acceleration, jerk = limit_shares(samples, limits)
+    assert velocity <= 1.0 + 1e-9
+    assert acceleration <= 1.0 + 1e-9
+    assert request.timing is Timing.TIME_OPTIMAL or jerk <= 1.01
+    for column, joint in zip(samples.positions.T, planner.arm.joints, strict=True):
+        assert joint.lower - 1e-9 <= column.min()
+        assert column.max() <= joint.upper + 1e-9
+    assert isinstance(request.goal, JointGoal)
+    assert request.start is not None
+    require_ends(response.trajectory, request.start.position, request.goal.position)
+    truth = Truth(planner.arm, native_scene(planner.arm, planner.surroundings.world.scene)[0])
+    rows = samples.positions[:: max(1, len(samples.positions) // 1500)]
+    assert min(truth.distance(row) for row in rows) > 0.0
+
+
+@pytest.mark.parametrize("planner_id", ["", *KNOWN])
+def test_a_box_between_start_and_goal_is_gone_around_the_same_way_every_time(planner: Planner, planner_id: str):
+    request = between(planner)
+    straight = planner.plan(asked(planner, request.start.position, request.goal.position, motion=PointToPoint()), None)
+    assert straight.code is PlanCode.PLANNING_FAILED
+    assert straight.refusal.subject.endswith("post")
+    around = asked(
+        planner, request.start.position, request.goal.position, motion=FreeMotion(planner_id=planner_id, seed=3)
+    )
+    first, second = planner.plan(around, None), planner.plan(around, None)
+    require_sound(planner, around, first)
+    assert first.planner_id in ({planner_id} if planner_id else {"native", "RRTConnect"})
+    assert first.trajectory == second.trajectory
+    assert first.scene_version == 5
+    assert len(first.margins) == len(planner.arm.joints)
+
+
+def random_requests(planner: Planner, count: int, seed: int, **options: object) -> list[PlanRequest]:
+    """Between random free postures in the present scene."""
+    random, world = np.random.default_rng(seed), planner.surroundings.newest
+    lower = [max(joint.lower, -3.1) for joint in planner.arm.joints]
+    upper = [min(joint.upper, 3.1) for joint in planner.arm.joints]
+    postures = (random.uniform(lower, upper) for _ in itertools.count())
+    free = (posture for posture in postures if world.distance(posture) > 0.006)
+    return [asked(planner, next(free), next(free), **{"allowed_time": 2.0, **options}) for _ in range(count)]
+
+
+@pytest.mark.parametrize("name", list(SCENES))
+def test_whatever_is_returned_is_within_all_limits_and_touches_nothing(planner: Planner, name: str):
+    show(planner, SCENES[name])
+    found = 0
+    for request in random_requests(planner, 8, seed=11):
+        response = planner.plan(request, None, clock=time.monotonic)
+        if response.code is PlanCode.SUCCESS:
+            require_sound(planner, request, response)
+            found += 1
+        else:
+            assert response.trajectory.points == ()
+            assert response.code is PlanCode.TIMED_OUT
+    assert found >= 4
+
+
+def test_a_wall_with_a_window_is_gone_through_or_around(planner: Planner):
+    """Boards below, above and beyond the middle of the straight way of the tool."""
+    request = between(planner)
+    x, y, z = planner.kinematics.tool(0.5 * np.add(request.start.position, request.goal.position)).position.tolist()
+    angle = np.arctan2(y, x)
+    boards = [
+        turned(box(name, size, (x + out * np.cos(angle), y + out * np.sin(angle), z + up)), angle)
+        for name, out, up, size in (
+            ("sill", 0.0, -0.16, (0.36, 0.02, 0.04)),
+            ("lintel", 0.0, 0.16 if planner.arm.name == "parol6" else 0.34, (0.36, 0.02, 0.04)),
+            ("far jamb", 0.17, 0.0, (0.02, 0.02, 0.36)),
+        )
+    ]
+    show(planner, PlanningScene(version=6, objects=tuple(boards)))
+    response = planner.plan(request, None, clock=time.monotonic)
+    require_sound(planner, request, response)
+
+
+@pytest.mark.parametrize("timing", list(Timing))
+def test_scaling_halves_the_speed(planner: Planner, timing: Timing):
+    request = between(planner)
+    ends = (request.start.position, request.goal.position)
+    half = asked(planner, *ends, velocity_scaling=0.5, acceleration_scaling=0.25, timing=timing)
+    whole, slow = (planner.plan(each, None) for each in (asked(planner, *ends, timing=timing), half))
+    require_sound(planner, half, slow)
+    peaks = [limit_shares(sample(response.trajectory), joint_limits(planner.arm))[0] for response in (whole, slow)]
+    assert peaks[1] <= 0.5
+    if timing is Timing.TIME_OPTIMAL:  # a jerk limit has a say of its own: it would have to be an eighth
+        assert peaks[1] == pytest.approx(0.5 * peaks[0], rel=0.02)
+    assert slow.duration > 1.5 * whole.duration
+
+
+def test_the_time_optimal_way_is_not_slower_and_within_its_limits(planner: Planner):
+    request = between(planner)
+    fast = asked(planner, request.start.position, request.goal.position, timing=Timing.TIME_OPTIMAL)
+    response = planner.plan(fast, None)
+    require_sound(planner, fast, response)
+    assert response.duration <= 1.02 * planner.plan(request, None).duration
+
+
+def test_where_there_is_no_way_the_search_ends_in_time_and_says_what_is_in_the_way():
+    """Two walls from the column outwards, one on each side: the arm cannot turn past either."""
+    planner = planner_of("rm1")
+    walls = [
+        turned(box(name, (0.9, 0.02, 3.0), (0.55 * np.cos(angle), 0.55 * np.sin(angle), 0.0)), angle)
+        for name, angle in (("left wall", 0.6), ("right wall", -1.6))
+    ]
+    show(planner, PlanningScene(version=8, objects=tuple(walls)))
+    began = time.monotonic()
+    for planner_id in ("", "RRTConnect", "PRM"):
+        request = asked(
+            planner,
+            np.array(START["rm1"]),
+            np.array(GOAL["rm1"]),
+            allowed_time=0.4,
+            motion=FreeMotion(planner_id=planner_id),
+        )
+        response = planner.plan(request, None, clock=time.monotonic)
+        assert response.code is PlanCode.TIMED_OUT
+        assert response.refusal is not None
+        assert "left wall" in response.refusal.message
+        assert response.trajectory.points == ()
+    assert time.monotonic() - began < 3 * 0.4 + 10.0
+
+
+def test_an_unknown_planner_is_refused_with_the_known_ones(planner: Planner):
+    request = asked(
+        planner,
+        START[planner.arm.name],
+        GOAL[planner.arm.name],
+        motion=FreeMotion(planner_id="RRTConect"),
+    )
+    response = planner.plan(request, None)
+    assert response.code is PlanCode.INVALID_GOAL_CONSTRAINTS
+    assert response.refusal is not None
+    assert response.refusal.remedy == 'use "RRTConnect"'
+
+
+def test_an_arm_at_rest_stays_where_it_is_whatever_it_is_asked_with(planner: Planner):
+    show(planner, SCENES["empty"])
+    posture = START[planner.arm.name]
+    for timing in Timing:
+        request = asked(planner, posture, posture, timing=timing)
+        require_sound(planner, request, planner.plan(request, None))
