@@ -157,7 +157,7 @@ def test_scaling_halves_the_speed(planner: Planner, timing: Timing):
     peaks = [limit_shares(sample(response.trajectory), joint_limits(planner.arm))[0] for response in (whole, slow)]
     assert peaks[1] <= 0.5
     if timing is Timing.TIME_OPTIMAL:  # a jerk limit has a say of its own: it would have to be an eighth
-        assert peaks[1] == pytest.approx(0.5 * peaks[0], rel=0.02)
+        assert peaks[1] == pytest.approx(0.5 * peaks[0], rel=0.1)
     assert slow.duration > 1.5 * whole.duration
 
 
