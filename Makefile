@@ -1,6 +1,6 @@
 # What a person does with gemelo. Everything here needs only `deploy/bootstrap`, which `make setup` runs.
 .DEFAULT_GOAL := help
-.PHONY: help setup up down test check format demo bench lock clean
+.PHONY: help setup up down test check coverage format demo bench lock clean
 MAKEFLAGS += --no-print-directory
 bin := .venv/bin
 
@@ -34,6 +34,9 @@ format: setup ## let ruff and clang-format write
 
 demo: setup ## a sine and a tour, without a display: out/demo.json, recording, picture
 	@$(bin)/python -m services.demo
+
+coverage: setup ## lines of the firmware core that its tests reach, and why not the others
+	@deploy/coverage
 
 bench: setup ## the figures: out/bench.json
 	@$(bin)/python -m services.bench

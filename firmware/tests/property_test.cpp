@@ -1,6 +1,8 @@
 // The properties of a device that plays random streams, whatever people, links and failing parts do to them.
 //
-// GEMELO_SEED begins elsewhere, GEMELO_STEPS plays more or fewer steps; both are fixed otherwise.
+// GEMELO_SEED begins elsewhere, GEMELO_STEPS plays more or fewer steps; both are fixed otherwise. README.md has the
+// changes of the core that these tests were seen to catch, such as a dropped step, a ceiling off by a slot and a hold
+// that creeps.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -72,6 +74,45 @@ TEST_F(Plays, NeverLeaveTheGeometricPath) { expect_none(findings, Property::OnTh
 TEST_F(Plays, AreSilentWithinATickOfTheEStopAndThreeOfASwitch) { expect_none(findings, Property::EStop); }
 
 TEST_F(Plays, AreTakenAsTheProtocolSaysAndComeToTheirEnd) { expect_none(findings, Property::Answers); }
+
+// In a time step of a quarter of a second a joint brakes, turns and speeds up: a resumption may take from both.
+TEST(Resumption, ThroughAReversalKeepsTheAccelerationWhereverItStood) {
+    Findings findings;
+    for (int64_t hold_ms = 300; hold_ms < 1300; hold_ms += 20) {
+        findings.context = "held at " + std::to_string(hold_ms) + " ms";
+        Dice dice(5);
+        Bench bench = random_bench(dice);
+        bench.config.joints = 1;
+        bench.config.inputs = 0;
+        bench.config.joint[0].max_velocity_q8 = bench.config.joint[0].max_acceleration_q8 = 2000 * 256;
+        bench.config.joint[0].lower_q8 = -(bench.config.joint[0].upper_q8 = 1000 * 256);
+        Stand stand(bench, findings, 0, 1, true, 5);
+        rig::ChunkSpec chunk;
+        chunk.boot_id = 1;
+        chunk.dt_us = 250000;
+        chunk.first = chunk.last = true;
+        int32_t place_q8 = 0, before = 0;
+        for (int32_t v : {0, -500, -700, -250, 250, 700, 500, 0}) {
+            place_q8 += (before + v) * 256 / 8;
+            chunk.rows.push_back(rig::Row{{place_q8}, {v * 256}});
+            before = v;
+        }
+        stand.deliver(rig::build(chunk));
+        ASSERT_EQ(stand.chunk_answer->code, Code::Ok);
+        PlayedPath path;
+        path.begin(chunk);
+        stand.inspector->expect_stream(chunk.stream, path);
+        for (int64_t ms = 0; ms < 5000; ++ms) {
+            if (ms % 200 == 0) stand.beat();
+            if (ms == hold_ms) stand.deliver(rig::build_command(Command::Hold, 1, {}, rig::kNever, 1));
+            if (ms == hold_ms + 1000) stand.deliver(rig::build_command(Command::Resume, 2, {}, rig::kNever, 1));
+            stand.run_slot();
+        }
+        EXPECT_EQ(stand.mode(), Mode::Idle);
+    }
+    expect_none(findings, Property::Limits);
+    expect_none(findings, Property::OnThePath);
+}
 
 // Straight into the interrupt's side: whatever a slot asks for, reversals at full speed among it.
 TEST(Stepper, MakesAnyIncrementsWithinTheDriversTimesAndOwesNothingInTheEnd) {
