@@ -30,6 +30,7 @@ DEEPER = 1.06  # share of the margin that the way keeps, so that samples taken e
 LEAST_LOOK = 0.1  # share of the margin by which the arm moves on at least from one look to the next
 SHORTEST_WAY = 1e-4  # of length: less is no way
 MOST_ROWS = 4000
+SPEED_LOOKS = 4  # in a segment, at which the tool's speed is measured
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,7 @@ class CartesianPlanner:
             trajectory = even
         if not tool.speed:
             return trajectory
-        rows = between(trajectory)
+        rows = between(trajectory, SPEED_LOOKS)
         fastest = max(
             float(np.linalg.norm(self._kinematics.jacobian(q)[:3] @ v))
             for q, v in zip(rows.positions, rows.velocities, strict=True)

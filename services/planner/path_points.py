@@ -23,7 +23,6 @@ Error = Callable[[float, Array], float]  # [m] that the posture (n,) at a length
 SPACING = 0.04  # [s] between points, before it is halved
 HALVINGS = 4
 OFF = 5e-5  # [m] by which the finished motion may leave the way
-LOOKS = (0.25, 0.5, 0.75)  # shares of a segment at which that is measured
 
 
 @dataclass(frozen=True)
@@ -67,17 +66,17 @@ def _near_enough(names: Sequence[str], run: Run) -> list[TrajectoryPoint]:
 
 def _farthest(names: Sequence[str], run: Run, points: list[TrajectoryPoint]) -> float:
     assert run.error is not None
-    rows = between(JointTrajectory(joint_names=tuple(names), points=tuple(points)))
+    # Two quintics that agree in position, velocity and acceleration at both ends are farthest apart in the middle.
+    rows = between(JointTrajectory(joint_names=tuple(names), points=tuple(points)), 2)
     lengths = [run.law.at(time)[0] for time in rows.times.tolist()]
     return max(run.error(length, row) for length, row in zip(lengths, rows.positions, strict=True))
 
 
-def between(trajectory: JointTrajectory) -> Samples:
-    """Rows inside every segment."""
-    density = len(LOOKS) + 1
-    samples = sample(trajectory, density)
-    row = np.arange(len(samples.times)) % (density + 1)
-    inside = (row > 0) & (row < density)
+def between(trajectory: JointTrajectory, parts: int) -> Samples:
+    """Rows inside every segment, where its `parts` meet."""
+    samples = sample(trajectory, parts)
+    row = np.arange(len(samples.times)) % (parts + 1)
+    inside = (row > 0) & (row < parts)
     return Samples(*(getattr(samples, field.name)[inside] for field in fields(samples)))
 
 

@@ -103,7 +103,9 @@ def demand_of(curve: PathCurve, limits: JointLimits, tool: tuple[float, float], 
 
 def time_law(demand: Demand) -> TimeLaw:
     """The fastest of several divisions into stretches; raises `NoProfile`."""
-    laws = [_law(demand, edges, share) for edges in _divisions(demand) for share in SHARES]
+    whole, *finer = _divisions(demand)
+    tries = [(whole, share) for share in SHARES] + [(edges, share) for edges in finer for share in SHARES[:2]]
+    laws = [_law(demand, edges, share) for edges, share in tries]
     found = [law for law in laws if law is not None]
     if not found:
         raise NoProfile(f"no jerk-limited profile for a way of {float(demand.along[-1]):.3g}")
@@ -117,7 +119,7 @@ def _divisions(demand: Demand) -> list[Array]:
     if len(marks) == 2:
         return even
     finer = np.unique(np.concatenate([np.linspace(low, high, PARTS + 1) for low, high in pairwise(marks.tolist())]))
-    return [marks, finer, *even[:1]]
+    return [even[0], marks, finer]
 
 
 def _law(demand: Demand, edges: Array, share: float) -> TimeLaw | None:
