@@ -53,9 +53,8 @@ class _Problem:
         space = base.RealVectorStateSpace(len(arm.joints))
         bounds = base.RealVectorBounds(len(arm.joints))
         for index, joint in enumerate(arm.joints):
-            turns = joint.unit == "rad"
-            bounds.setLow(index, (max(joint.lower, -CIRCLE) if turns else joint.lower) / joint.velocity)
-            bounds.setHigh(index, (min(joint.upper, CIRCLE) if turns else joint.upper) / joint.velocity)
+            bounds.setLow(index, (joint.lower if math.isfinite(joint.lower) else -CIRCLE) / joint.velocity)
+            bounds.setHigh(index, (joint.upper if math.isfinite(joint.upper) else CIRCLE) / joint.velocity)
         space.setBounds(bounds)
         self.information: Any = base.SpaceInformation(space)
         self.information.setStateValidityChecker(_states(validity, self._scale))

@@ -104,11 +104,23 @@ def test_a_box_between_start_and_goal_is_gone_around_the_same_way_every_time(pla
     assert len(first.margins) == len(planner.arm.joints)
 
 
+@pytest.mark.parametrize("planner_id", ["", *KNOWN])
+def test_joints_that_turn_beyond_half_a_turn_are_searched_there_too(planner_id: str):
+    """joint_3 of parol6 goes up to 288 degrees, and joint_6 from 0 to 360."""
+    planner = planner_of("parol6")
+    start, goal = (-0.7, -1.4, 3.4, 0.3, 0.2, 5.5), (0.7, -1.4, 3.4, -0.3, 0.2, 4.0)
+    tool = planner.kinematics.tool(0.5 * np.add(start, goal)).position.tolist()
+    show(planner, PlanningScene(version=5, objects=(box("post", (0.05, 0.05, 0.05), tuple(tool)),)))
+    request = asked(planner, start, goal, motion=FreeMotion(planner_id=planner_id))
+    response = planner.plan(request, None)
+    require_sound(planner, request, response)
+    assert response.planner_id != "straight"
+
+
 def random_requests(planner: Planner, count: int, seed: int, **options: object) -> list[PlanRequest]:
     """Between random free postures in the present scene."""
     random, world = np.random.default_rng(seed), planner.surroundings.newest
-    lower = [max(joint.lower, -3.1) for joint in planner.arm.joints]
-    upper = [min(joint.upper, 3.1) for joint in planner.arm.joints]
+    lower, upper = np.array([(joint.lower, joint.upper) for joint in planner.arm.joints]).T
     postures = (random.uniform(lower, upper) for _ in itertools.count())
     free = (posture for posture in postures if world.distance(posture) > 0.006)
     return [asked(planner, next(free), next(free), **{"allowed_time": 2.0, **options}) for _ in range(count)]
