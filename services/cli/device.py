@@ -78,7 +78,8 @@ def ask(session: Session, request: DeviceCommandRequest, what: str = "") -> Devi
     answer = session.node.call(DEVICE_COMMAND, request, timeout=TIMEOUT)
     if not answer.accepted:
         what = what or request.command.name.lower()
-        raise CommandError(f"{what} refused: {answer.reason} (device mode {answer.mode.name})")
+        mode = f" (device mode {answer.mode.name})" if f"mode {answer.mode.name}" not in answer.reason else ""
+        raise CommandError(f"{what} refused: {answer.reason}{mode}")
     return answer
 
 

@@ -62,7 +62,7 @@ def press_options(parser: Parser) -> None:
     from services.cli.device_press import listing
 
     parser.add_argument("what", metavar="WHAT", help="see below")
-    parser.add_argument("rest", metavar="VALUE", nargs="*", help="what it is done to, and how much")
+    parser.add_argument("rest", metavar="VALUE", nargs="*", default=[], help="what it is done to, and how much")
     parser.epilog = f"what:\n{listing()}\n\n{parser.epilog}"
 
 

@@ -100,7 +100,7 @@ def home_text(name: str, steps_off: int | None) -> str:
     if steps_off is None:
         return f"{name}: home"
     if abs(steps_off) <= 1:
-        return f"{name}: home; its counter was right to {abs(steps_off)} steps"
+        return f"{name}: home; its counter was right{' to a step' if steps_off else ''}"
     return f"{name}: home; its counter was {steps_off:+d} steps off (steps were lost, or it was moved by hand)"
 
 

@@ -51,10 +51,12 @@ class Parser(argparse.ArgumentParser):
         if message.endswith("required: COMMAND"):
             self.print_help()
             self.exit(ExitCode.USAGE)
-        wrong = re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)
+        wrong = re.search(r"(?:argument (\S+): )?invalid choice: '([^']*)' \(choose from (.*)\)", message)
         if wrong is not None:
-            guess = nearest(wrong[1], re.findall(r"[\w-]+", wrong[2]))
-            message = f'no command "{wrong[1]}": ' + (f'did you mean "{guess}"?' if guess else f"there is {wrong[2]}")
+            what, said, choices = (wrong[1] or "COMMAND").lower(), wrong[2], re.findall(r"[\w-]+", wrong[3])
+            guess = nearest(said, choices)
+            hint = f'did you mean "{guess}"?' if guess else f"there is {', '.join(choices)}"
+            message = f'no {what} "{said}": {hint}'
         self.exit(ExitCode.USAGE, f"{self.prog}: {message}\n")
 
 

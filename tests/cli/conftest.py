@@ -47,6 +47,7 @@ class PretendGateway:
         self.refusal = ""
         self.commands: list[DeviceCommandRequest] = []
         self.mode = DeviceMode.IDLE
+        self.command_refusal = "the arm moves"  # in Run
         self._node, self._arm = node, arm
         self._goal: tuple[str, float] | None = None
         self._server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self._on_goal, self._on_cancel)
@@ -90,7 +91,7 @@ class PretendGateway:
     def _on_command(self, request: DeviceCommandRequest) -> DeviceCommandResponse:
         self.commands.append(request)
         if self.mode is DeviceMode.RUN:
-            return DeviceCommandResponse(accepted=False, reason="the arm moves", mode=self.mode)
+            return DeviceCommandResponse(accepted=False, reason=self.command_refusal, mode=self.mode)
         return DeviceCommandResponse(accepted=True, mode=self.mode)
 
 

@@ -73,6 +73,12 @@ def test_a_mistyped_command_is_answered_with_the_nearest(capsys):
     assert 'did you mean "echo"' in capsys.readouterr().err
 
 
+def test_a_wrong_argument_is_called_what_it_is(capsys):
+    with pytest.raises(SystemExit):
+        run(["output", "avanzar", "maybe"])
+    assert 'no state "maybe": there is on, off' in capsys.readouterr().err
+
+
 def test_a_message_is_written_as_json():
     message = message_of(JOINT_TARGETS.message, '{"name": ["q1"], "position": [0.5]}')
     assert message.name == ("q1",)

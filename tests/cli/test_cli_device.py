@@ -51,12 +51,13 @@ def test_homing_tells_the_way_of_every_joint_and_ends_with_zero(session, rm1_dev
 
 
 def test_homing_says_how_many_steps_were_lost(session, rm1_device, capsys):
-    rm1_device.steps_off = {"brazo_joint": -37, "antebrazo_joint": 0}
-    assert home(session, ["q1", "antebrazo_joint"]) is ExitCode.OK
+    rm1_device.steps_off = {"brazo_joint": -37, "antebrazo_joint": 0, "efector_joint": 1}
+    assert home(session, ["q1", "antebrazo_joint", "q3"]) is ExitCode.OK
     text = capsys.readouterr().out
     assert "brazo_joint: home; its counter was -37 steps off (steps were lost, or it was moved by hand)\n" in text
-    assert "antebrazo_joint: home; its counter was right to 0 steps\n" in text
-    assert rm1_device.asked[-1].name == ("brazo_joint", "antebrazo_joint")
+    assert "antebrazo_joint: home; its counter was right\n" in text
+    assert "efector_joint: home; its counter was right to a step\n" in text
+    assert rm1_device.asked[-1].name == ("brazo_joint", "antebrazo_joint", "efector_joint")
 
 
 def test_homing_as_json_is_one_object(session, rm1_device, capsys):

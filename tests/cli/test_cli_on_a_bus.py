@@ -165,6 +165,12 @@ def test_a_device_command_is_done_or_refused_in_the_devices_words(session, stack
         device.command(session, kind)
 
 
+def test_a_refusal_that_names_the_mode_is_not_followed_by_it(session, stack):
+    stack.mode, stack.command_refusal = DeviceMode.RUN, "the device refuses RESUME in mode RUN"
+    with pytest.raises(CommandError, match=r"in mode RUN$"):
+        device.command(session, DeviceCommandKind.RESUME)
+
+
 def test_a_reference_says_where_the_joints_are_now(session, stack, capsys):
     assert device.reference(session, ["q3=40mm"]) is ExitCode.OK
     assert "efector_joint is at 40.000 mm" in capsys.readouterr().out
