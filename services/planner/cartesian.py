@@ -212,4 +212,4 @@ def _too_little(stop: Refusal, fraction: float, least: float) -> Refusal:
 
 
 def _code(stop: Refusal) -> PlanCode:
-    return PlanCode.NO_IK_SOLUTION if stop.check in ("joint limit", "singularity") else PlanCode.PLANNING_FAILED
+    return PlanCode.NO_IK_SOLUTION if stop.check in ("joint limit", "singularity", "jump") else PlanCode.PLANNING_FAILED

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -22,7 +23,7 @@ SPACING = 0.02  # of length between postures; halved until the spline between th
 LEAST_POSTURES = 12
 FINEST = 2e-5  # of length: nearer postures are not tried, and a place is not told more exactly
 MOST_POSTURES = 5000
-JUMP = 0.3  # [rad] or [m] a joint may move between two postures
+JUMP = 0.3  # [rad] or [m] a joint may move between two postures, before shorter steps are tried
 EXACT = 1e-11  # [m] at which the tool is where it should be; as much for its turn
 CLOSE = 1e-5  # [m] by which the spline between postures may be off the way
 ROUNDING = 1e-9  # [rad] or [m] beyond a limit that is put back onto it
@@ -72,7 +73,7 @@ class Continuation:
         spacing = min(max_step or SPACING, path.length / LEAST_POSTURES)
         if path.length / spacing > MOST_POSTURES:
             return Stop("max_step", "max_step", max_step, path.length / MOST_POSTURES, TOO_FINE, "leave it at 0")
-        lengths, postures, stop = self._march(path, start, spacing, jump or JUMP, is_late)
+        lengths, postures, stop = self._march(path, start, spacing, jump, is_late)
         if stop is not None and lengths[-1] < 4 * FINEST:
             return stop
         if len(lengths) < 4:
@@ -125,15 +126,15 @@ class Continuation:
             mark = next(mark for mark in marks if mark > lengths[-1] + FINEST or mark == path.length)
             ahead = mark if ahead > mark - 0.1 * step else ahead
             guess = postures[-1] if len(lengths) < 2 else _extrapolated(lengths, postures, ahead)
-            found = self._next(path.at(ahead), postures[-1], guess, jump)
+            found = self._next(path.at(ahead), postures[-1], guess, jump or math.inf)
             if not isinstance(found, Stop) and len(lengths) < MOST_POSTURES:
                 lengths.append(ahead)
                 postures.append(found)
                 step = min(2.0 * step, spacing)
-            elif step > FINEST and len(lengths) < MOST_POSTURES:
+            elif step > FINEST and len(lengths) < MOST_POSTURES and not _is_jump(found):
                 step *= 0.5
             else:
-                return lengths, postures, found if isinstance(found, Stop) else self._jump(postures[-1], found, jump)
+                return lengths, postures, found if isinstance(found, Stop) else self._lost(postures[-1])
         return lengths, postures, None
 
     def _next(self, pose: Pose, last: Array, guess: Array, jump: float) -> Array | Stop:
@@ -144,9 +145,10 @@ class Continuation:
         worst = int(np.argmax(excess))
         if excess[worst] > ROUNDING:
             return self._beyond(worst, float(found[worst]))
-        if float(np.abs(found - last).max()) > jump:
-            return self._jump(last, found, jump)
-        return self._clipped(found)
+        farthest = float(np.abs(found - last).max())
+        if farthest > jump:
+            return self._jump("jump", last, found, jump)
+        return self._jump("singularity", last, found, JUMP) if farthest > JUMP else self._clipped(found)
 
     def _newton(self, pose: Pose, posture: Array) -> tuple[Array, float]:
         """The step of the joints, and what is missing [m]; the turn that is not held is followed as far as it may."""
@@ -220,7 +222,7 @@ class Continuation:
         remedy = "keep away from there, or go there freely instead of on a given way"
         return Stop("singularity", self._arm.tool_frame, value, 0.0, what, remedy)
 
-    def _jump(self, last: Array, found: Array, jump: float) -> Stop:
+    def _jump(self, check: str, last: Array, found: Array, jump: float) -> Stop:
         index = int(np.argmax(np.abs(found - last)))
         joint, value = self._arm.joints[index], float(abs(found[index] - last[index]))
         what = (
@@ -228,7 +230,7 @@ class Continuation:
             f" (singularity, manipulability {self.manipulability(last):.2g})"
         )
         remedy = "keep away from the singularity, or go there freely instead of on a given way"
-        return Stop("singularity", joint.name, value, jump, what, remedy)
+        return Stop(check, joint.name, value, jump, what, remedy)
 
 
 def _damped(jacobian: Array, missing: Array, damping: float) -> Array:
@@ -237,6 +239,11 @@ def _damped(jacobian: Array, missing: Array, damping: float) -> Array:
     square[np.diag_indices_from(square)] += damping
     step: Array = jacobian.T @ np.linalg.solve(square, missing)
     return step
+
+
+def _is_jump(found: Array | Stop) -> bool:
+    """Beyond the threshold that was asked for: shorter steps would only hide it."""
+    return isinstance(found, Stop) and found.check == "jump"
 
 
 def _extrapolated(lengths: list[float], postures: list[Array], ahead: float) -> Array:

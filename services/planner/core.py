@@ -19,6 +19,7 @@ from schemas.planning import (
     PlannedPath,
     PlanRequest,
     PlanResponse,
+    Timing,
     WaypointGoal,
 )
 from services.arm.description import Arm
@@ -28,7 +29,7 @@ from services.planner.clearance import CLEARANCE, first_collision
 from services.planner.finish import Finished, Finisher, Touching
 from services.planner.goals import Goals, timed_out
 from services.planner.profile import JointLimits, joint_limits
-from services.planner.refusals import NoPlan, no_way_around, scaling_refused
+from services.planner.refusals import NoPlan, malformed, no_way_around, scaling_refused
 from services.planner.search import Search, require_known
 from services.planner.start import resolve_start
 from services.planner.surroundings import Surroundings
@@ -250,3 +251,7 @@ def _require_known(request: PlanRequest) -> None:
     """Raises `NoPlan` for what this planner cannot do."""
     if isinstance(request.motion, FreeMotion):
         require_known(request.motion.planner_id)
+    is_given = isinstance(request.motion, LinearMotion | CircularMotion) or isinstance(request.goal, WaypointGoal)
+    if is_given and request.timing is not Timing.JERK_LIMITED:
+        message = "lines, arcs and ways by waypoints are timed jerk-limited only"
+        raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, "timing", message, "leave timing at its default")

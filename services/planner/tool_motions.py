@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from schemas.message import Vector
-from schemas.planning import CircularMotion, Goal, LinearMotion, PlanCode, PlanRequest, PoseGoal, Timing, WaypointGoal
+from schemas.planning import CircularMotion, Goal, LinearMotion, PlanCode, PlanRequest, PoseGoal, WaypointGoal
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics, Pose
 from services.arm.transforms import IDENTITY, compose
@@ -43,9 +43,6 @@ class ToolMotions:
         self, request: PlanRequest, start: Start, limits: JointLimits, margin: float, is_late: Callable[[], bool]
     ) -> CartesianWay:
         """The timed way, to be verified; raises `NoPlan`."""
-        if request.timing is not Timing.JERK_LIMITED:
-            remedy = "leave timing at its default"
-            raise malformed(INVALID, "timing", "lines and arcs of the tool are timed jerk-limited only", remedy)
         tool = _tool_limits(request.motion)
         require_tool_limits(tool)
         try:

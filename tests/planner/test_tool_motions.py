@@ -202,6 +202,20 @@ def test_a_line_in_a_wrists_plane_passes_its_singularity():
 
 
 @ARMS
+def test_a_joint_that_moves_more_than_the_jump_threshold_ends_the_line(name: str):
+    planner = PLANNERS[name]
+    start = planner.arm.named_states["ready"]
+    end = np.add(planner.kinematics.tool(start).position, (0.0, -0.05, -0.02))
+    goal = PoseGoal(position=tuple(end.tolist()))
+    assert plan(planner, goal, LinearMotion(max_step=0.005, jump_threshold=0.3), start).code is PlanCode.SUCCESS
+    refused = plan(planner, goal, LinearMotion(max_step=0.005, jump_threshold=0.003), start)
+    assert refused.code is PlanCode.NO_IK_SOLUTION
+    assert refused.refusal is not None
+    assert (refused.refusal.check, refused.refusal.limit) == ("jump", 0.003)
+    assert refused.refusal.subject in planner.arm.joint_names
+
+
+@ARMS
 def test_blended_waypoints_stay_near_their_corners_and_do_not_stop(name: str):
     planner = PLANNERS[name]
     start = planner.arm.named_states["ready"]
@@ -308,12 +322,16 @@ def test_what_is_not_a_number_is_no_message():
         LinearMotion(speed=float("nan"))
 
 
-def test_a_line_is_not_timed_without_a_jerk_limit():
+def test_lines_and_waypoints_are_not_timed_without_a_jerk_limit():
     planner = PLANNERS["rm1"]
     start = planner.arm.named_states["ready"]
-    response = plan(planner, NamedGoal(name="home"), LinearMotion(), start, timing=Timing.TIME_OPTIMAL)
-    assert response.refusal is not None
-    assert response.refusal.subject == "timing"
+    for goal, motion in (
+        (NamedGoal(name="home"), LinearMotion()),
+        (WaypointGoal(points=(NamedGoal(name="home"), NamedGoal(name="left"))), FreeMotion()),
+    ):
+        response = plan(planner, goal, motion, start, timing=Timing.TIME_OPTIMAL)
+        assert response.refusal is not None
+        assert response.refusal.subject == "timing"
 
 
 def test_a_line_to_where_the_tool_is_stands():
