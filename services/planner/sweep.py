@@ -36,21 +36,20 @@ class Sweep:
         """Any posture along the rows of `positions` (m, n) at which a pair is nearer than `margin` [m], or None."""
         moved = self._movement(positions)
         finest = max(FINEST * margin, float(moved[-1].max(initial=0.0)) / MOST_LOOKS)
-        waiting = [(0.0, float(len(positions) - 1), np.arange(len(self._reach)))]
+        waiting = [(0.0, float(len(positions) - 1), np.arange(len(self._reach)), moved[0], moved[-1])]
         while waiting:
-            low, high, pairs = waiting.pop()
+            low, high, pairs, left, right = waiting.pop()
             middle = 0.5 * (low + high)
             posture = _at(middle, positions)
             spare = self._look(posture, pairs.tolist()) - margin
             if spare.size and float(spare.min()) <= 0.0:
                 return posture
             reached, known = _at(middle, moved)[pairs], np.maximum(spare, finest)
-            before = pairs[reached - _at(low, moved)[pairs] > known]
-            after = pairs[_at(high, moved)[pairs] - reached > known]
-            if before.size:
-                waiting.append((low, middle, before))
-            if after.size:
-                waiting.append((middle, high, after))
+            before, after = reached - left > known, right - reached > known
+            if before.any():
+                waiting.append((low, middle, pairs[before], left[before], reached[before]))
+            if after.any():
+                waiting.append((middle, high, pairs[after], reached[after], right[after]))
         return None
 
     def _movement(self, positions: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import select
 import subprocess
 import sys
@@ -149,7 +150,11 @@ class _Worker:
 
     def _started(self) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", CHILD, *self._folders]
-        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=self._folders[1])
+        alone = {
+            **os.environ,
+            "OPENBLAS_NUM_THREADS": "1",
+        }  # its matrices are small, and threads cost more than they do
+        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=self._folders[1], env=alone)
 
     @contextmanager
     def _replaced_where_it_fails(self) -> Iterator[None]:
