@@ -21,6 +21,7 @@ from services.planner.path_points import Run, between, normalised, trajectory_al
 from services.planner.path_timing import demand_of, time_law
 from services.planner.profile import JointLimits, NoProfile
 from services.planner.refusals import NoPlan, not_verified
+from services.planner.tool_limits import ToolLimits
 from services.planner.tool_path import ToolPath
 from services.planner.way import Start
 
@@ -31,17 +32,6 @@ LEAST_LOOK = 0.1  # share of the margin by which the arm moves on at least from 
 SHORTEST_WAY = 1e-4  # of length: less is no way
 MOST_ROWS = 4000
 SPEED_LOOKS = 4  # in a segment, at which the tool's speed is measured
-
-
-@dataclass(frozen=True)
-class ToolLimits:
-    """Of the tool, 0 for none; and how the way is walked."""
-
-    speed: float = 0.0  # [m/s]
-    acceleration: float = 0.0  # [m/s^2]
-    max_step: float = 0.0  # [m]
-    jump: float = 0.0  # [rad] or [m]
-    least_fraction: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -138,7 +128,7 @@ class CartesianPlanner:
             law,
             followed.postures[0],
             followed.postures[-1],
-            lambda length, posture: self._continuation.error(path.at(length), posture),
+            lambda length, posture: self._continuation.solver.error(path.at(length), posture),
         )
 
     def _within(self, trajectory: JointTrajectory, limits: JointLimits, tool: ToolLimits) -> JointTrajectory:
@@ -162,33 +152,6 @@ class CartesianPlanner:
         what = f"{named} would be nearer than {1000 * margin:g} mm"
         distance = self._checker.distance(posture)
         return Stop("collision", " / ".join(pairs[0]), distance, margin, what, "move what is in the way, or go around")
-
-
-def require_tool_limits(tool: ToolLimits) -> None:
-    """Raises `NoPlan` for what is no limit."""
-    for name, value in (
-        ("speed", tool.speed),
-        ("acceleration", tool.acceleration),
-        ("max_step", tool.max_step),
-        ("jump_threshold", tool.jump),
-    ):
-        if not 0.0 <= value < math.inf:
-            raise _no_limit(name, value, 0.0, f"{name} is {value:g}: it must be above 0, or 0 for none of its own")
-    if not 0.0 <= tool.least_fraction <= 1.0:
-        message = f"least_fraction is {tool.least_fraction:g}: it must be in [0, 1]"
-        raise _no_limit("least_fraction", tool.least_fraction, 1.0, message)
-
-
-def _no_limit(name: str, value: float, limit: float, message: str) -> NoPlan:
-    refusal = Refusal(
-        check="tool limit",
-        subject=name,
-        value=value,
-        limit=limit,
-        message=message,
-        remedy=f"leave {name} at its default",
-    )
-    return NoPlan(PlanCode.INVALID_GOAL_CONSTRAINTS, refusal)
 
 
 def _stopped(stop: Stop, gone: float, metres: float, fraction: float) -> Refusal:

@@ -7,14 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics, Pose
 from services.planner.goals import timed_out
 from services.planner.path_curve import CubicSpline
-from services.planner.tool_path import METRES_PER_RADIAN, ToolPath
+from services.planner.tool_path import ToolPath
+from services.planner.tool_solver import ToolSolver
 
 Array = NDArray[np.float64]
 Clock = Callable[[], bool]
@@ -24,12 +24,8 @@ LEAST_POSTURES = 12
 FINEST = 2e-5  # of length: nearer postures are not tried, and a place is not told more exactly
 MOST_POSTURES = 5000
 JUMP = 0.3  # [rad] or [m] a joint may move between two postures, before shorter steps are tried
-EXACT = 1e-11  # [m] at which the tool is where it should be; as much for its turn
 CLOSE = 1e-5  # [m] by which the spline between postures may be off the way
 ROUNDING = 1e-9  # [rad] or [m] beyond a limit that is put back onto it
-ITERATIONS = 16
-DAMPING = 1e-12
-NULL_DAMPING = 1e-6
 ROUNDS = 8
 TOO_FINE = f"max_step is so fine that the way would have more than {MOST_POSTURES} postures"
 
@@ -61,7 +57,8 @@ class Continuation:
     """Follows ways of the tool with one arm; of an arm that cannot turn its tool freely only the position is held."""
 
     def __init__(self, arm: Arm, kinematics: Kinematics, holds_turn: bool) -> None:
-        self._arm, self._kinematics, self._holds_turn = arm, kinematics, holds_turn
+        self._arm, self._kinematics = arm, kinematics
+        self.solver = ToolSolver(kinematics, holds_turn)
         self._lower = np.array([joint.lower for joint in arm.joints])
         self._upper = np.array([joint.upper for joint in arm.joints])
 
@@ -84,36 +81,12 @@ class Continuation:
         """The way up to `length`, because of `stop`."""
         kept = int(np.searchsorted(followed.lengths, length - FINEST))
         guess = followed.curve.at(np.array([length])).value[0, : followed.postures.shape[1]]
-        last = self.solve(path.at(length), guess)
+        last = self.solver.solve(path.at(length), guess)
         lengths = [*followed.lengths[:kept].tolist(), length]
         postures = [*followed.postures[:kept], self._clipped(guess if last is None else last)]
         if len(lengths) < 4:
             lengths, postures = self._four(path, lengths, postures)
         return self._refined(path, lengths, postures, stop)
-
-    def solve(self, pose: Pose, guess: Array) -> Array | None:
-        """The posture near `guess` that has the tool there, limits apart; None where there is none."""
-        posture = guess
-        for _ in range(ITERATIONS):
-            step, missing = self._newton(pose, posture)
-            if missing < EXACT:
-                return posture
-            posture = posture + step * min(1.0, JUMP / max(float(np.abs(step).max()), JUMP))
-        return None
-
-    def manipulability(self, posture: Array) -> float:
-        """The smallest singular value of what is held of the tool, turns counted as the path counts them."""
-        jacobian = self._kinematics.jacobian(posture)
-        held = np.vstack((jacobian[:3], METRES_PER_RADIAN * jacobian[3:])) if self._holds_turn else jacobian[:3]
-        return float(np.linalg.svd(held, compute_uv=False)[-1])
-
-    def error(self, pose: Pose, posture: Array) -> float:
-        """[m] that the tool is off; turns counted as the path counts them, where they are held."""
-        now = self._kinematics.tool(posture)
-        missing = float(np.linalg.norm(pose.position - now.position))
-        if not self._holds_turn:
-            return missing
-        return max(missing, METRES_PER_RADIAN * float(np.linalg.norm(pin.log3(pose.rotation @ now.rotation.T))))
 
     def _march(
         self, path: ToolPath, start: Array, spacing: float, jump: float, is_late: Clock
@@ -138,7 +111,7 @@ class Continuation:
         return lengths, postures, None
 
     def _next(self, pose: Pose, last: Array, guess: Array, jump: float) -> Array | Stop:
-        found = self.solve(pose, guess)
+        found = self.solver.solve(pose, guess)
         if found is None:
             return self._lost(last)
         excess = np.maximum(found - self._upper, self._lower - found)
@@ -150,27 +123,13 @@ class Continuation:
             return self._jump("jump", last, found, jump)
         return self._jump("singularity", last, found, JUMP) if farthest > JUMP else self._clipped(found)
 
-    def _newton(self, pose: Pose, posture: Array) -> tuple[Array, float]:
-        """The step of the joints, and what is missing [m]; the turn that is not held is followed as far as it may."""
-        now, jacobian = self._kinematics.tool_and_jacobian(posture)
-        missing = pose.position - now.position
-        turn = pin.log3(pose.rotation @ now.rotation.T)
-        if self._holds_turn:
-            missing = np.concatenate((missing, METRES_PER_RADIAN * turn))
-            held = np.vstack((jacobian[:3], METRES_PER_RADIAN * jacobian[3:]))
-            return _damped(held, missing, DAMPING), float(np.linalg.norm(missing))
-        step = _damped(jacobian[:3], missing, DAMPING)
-        if len(posture) > 3:
-            free = np.eye(len(posture)) - np.linalg.pinv(jacobian[:3]) @ jacobian[:3]
-            left = jacobian[3:] @ free
-            step = step + free @ _damped(left, turn - jacobian[3:] @ step, NULL_DAMPING)
-        return step, float(np.linalg.norm(missing))
-
     def _four(self, path: ToolPath, lengths: list[float], postures: list[Array]) -> tuple[list[float], list[Array]]:
         """What a cubic spline needs."""
         wanted = np.linspace(0.0, lengths[-1], 4).tolist()
         guesses = np.array([np.interp(wanted, lengths, column) for column in np.array(postures).T]).T
-        between = [self.solve(path.at(along), guess) for along, guess in zip(wanted[1:3], guesses[1:3], strict=True)]
+        between = [
+            self.solver.solve(path.at(along), guess) for along, guess in zip(wanted[1:3], guesses[1:3], strict=True)
+        ]
         found = [guess if row is None else self._clipped(row) for row, guess in zip(between, guesses[1:3], strict=True)]
         return wanted, [postures[0], *found, postures[-1]]
 
@@ -185,7 +144,7 @@ class Continuation:
                 return Followed(np.array(lengths), np.array(postures), curve, stop)
             # The spline may have strayed to where another branch is nearer; a mean of the neighbours has not.
             guesses = np.array([np.interp(middles, lengths, column) for column in np.array(postures).T]).T
-            solved = [self.solve(path.at(middle), guess) for middle, guess in zip(middles, guesses, strict=True)]
+            solved = [self.solver.solve(path.at(middle), guess) for middle, guess in zip(middles, guesses, strict=True)]
             new = {middle: self._clipped(row) for middle, row in zip(middles, solved, strict=True) if row is not None}
             merged = dict(zip(lengths, postures, strict=True)) | new
             lengths = sorted(merged)
@@ -199,7 +158,7 @@ class Continuation:
         middles = 0.5 * (curve.knots[:-1] + curve.knots[1:])
         rows = curve.at(middles).value[:, : len(self._lower)]
         pairs = zip(middles.tolist(), rows, strict=True)
-        return [middle for middle, row in pairs if self.error(path.at(middle), row) > CLOSE]
+        return [middle for middle, row in pairs if self.solver.error(path.at(middle), row) > CLOSE]
 
     def _spline(self, lengths: list[float], postures: list[Array]) -> CubicSpline:
         tools = [self._kinematics.tool(posture).position for posture in postures]
@@ -217,7 +176,7 @@ class Continuation:
         return Stop("joint limit", joint.name, value, limit, what, "go around by another posture, or end before it")
 
     def _lost(self, last: Array) -> Stop:
-        value = self.manipulability(last)
+        value = self.solver.manipulability(last)
         what = f"the arm is stretched out or its axes line up (singularity, manipulability {value:.2g})"
         remedy = "keep away from there, or go there freely instead of on a given way"
         return Stop("singularity", self._arm.tool_frame, value, 0.0, what, remedy)
@@ -227,18 +186,10 @@ class Continuation:
         joint, value = self._arm.joints[index], float(abs(found[index] - last[index]))
         what = (
             f'joint "{joint.name}" would jump by {value:.3g} {joint.unit}, more than {jump:g}'
-            f" (singularity, manipulability {self.manipulability(last):.2g})"
+            f" (singularity, manipulability {self.solver.manipulability(last):.2g})"
         )
         remedy = "keep away from the singularity, or go there freely instead of on a given way"
         return Stop(check, joint.name, value, jump, what, remedy)
-
-
-def _damped(jacobian: Array, missing: Array, damping: float) -> Array:
-    """The least-squares step, the shortest where there are many (Nakamura and Hanafusa 1986)."""
-    square = jacobian @ jacobian.T
-    square[np.diag_indices_from(square)] += damping
-    step: Array = jacobian.T @ np.linalg.solve(square, missing)
-    return step
 
 
 def _is_jump(found: Array | Stop) -> bool:

@@ -15,13 +15,14 @@ from services.arm.kinematics import Kinematics, Pose
 from services.arm.transforms import IDENTITY, compose
 from services.planner.abilities import Abilities
 from services.planner.arcs import arc_about, arc_through
-from services.planner.cartesian import CartesianPlanner, CartesianWay, ToolLimits, require_tool_limits
+from services.planner.cartesian import CartesianPlanner, CartesianWay
 from services.planner.clearance import Checker
 from services.planner.goals import Goals
 from services.planner.pose_goals import target_of
 from services.planner.profile import JointLimits, straight_line
 from services.planner.refusals import NoPlan, malformed
 from services.planner.targets import ROTATION_TOLERANCE, Target, turn_between
+from services.planner.tool_limits import ToolLimits, require_tool_limits
 from services.planner.tool_path import ToolPath, polyline
 from services.planner.way import Start
 
