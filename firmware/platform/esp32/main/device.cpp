@@ -103,16 +103,17 @@ void Device::take(const Record& record) {
 
 void Device::dispatch(const Record& record) {
     const Arrival arrival{record.bytes, record.size, (record.flags & kRetained) != 0, record.time_us};
+    const uint64_t now_us = clock_us();  // not the slot's start: a record may be younger
     switch (static_cast<Inbound>(record.kind)) {
         case Inbound::Frame:
             serial_.yield_to_mqtt(arrival);
-            return machine_.receive(arrival, now_us_);
+            return machine_.receive(arrival, now_us);
         case Inbound::Config:
-            return machine_.receive_config(arrival, now_us_);
+            return machine_.receive_config(arrival, now_us);
         case Inbound::Connected:
             return machine_.report_status();
         case Inbound::Bytes:
-            return serial_.receive(record.bytes, record.size, record.time_us, now_us_);
+            return serial_.receive(record.bytes, record.size, record.time_us, now_us);
         case Inbound::Sensor: {
             int32_t raw = 0;
             memcpy(&raw, record.bytes, sizeof raw);

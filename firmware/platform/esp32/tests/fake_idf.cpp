@@ -95,6 +95,7 @@ void pass_time() {
         passed_us += step_us;
         if (timer.is_running) tick();
     }
+    chip.now_us += chip.waking_us;
 }
 
 }  // namespace

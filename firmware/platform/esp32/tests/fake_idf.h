@@ -22,6 +22,7 @@ struct Ended {};      // thrown where the task would wait for ever
 
 struct Chip {
     uint64_t now_us = 0;
+    uint64_t waking_us = 0;       // from the interrupt that wakes the task until it runs
     uint64_t inputs = 0;          // levels, bit i: GPIO i
     uint64_t outputs = 0;         // levels
     uint64_t is_output = 0;       // bit i: GPIO i is set up as an output

@@ -161,6 +161,22 @@ TEST(Esp32Layer, EveryStepOfAStreamComesOutOfItsPin) {
     EXPECT_TRUE(has(running->said(Output::Event), "finished"));
 }
 
+TEST(Esp32Layer, AQuestionThatComesWithinASlotIsAnsweredWithTimesInTheirOrder) {
+    auto running = ready();
+    chip.waking_us = 300;
+    running->pass_ms(3);
+    // The next slot begins in 1000 us, and is looked at 300 us later.
+    const uint64_t asked_us = chip.now_us + 1150, answered_us = chip.now_us + 1300;
+    const rig::Bytes question = rig::build_sync(5);
+    board.from_mqtt.push(static_cast<uint8_t>(Inbound::Frame), 0, asked_us, question.data(), question.size());
+    running->pass_ms(1);
+    const std::string answer = running->said(Output::SyncReply);
+    ASSERT_GE(answer.size(), 32u);
+    const uint8_t* bytes = reinterpret_cast<const uint8_t*>(answer.data());
+    EXPECT_EQ(load_u64(bytes + 16), asked_us);
+    EXPECT_EQ(load_u64(bytes + 24), answered_us);
+}
+
 TEST(Esp32Layer, TheEstopSilencesThePinsAndTakesTheDriversPower) {
     auto running = ready();
     running->pass_ms(250);
