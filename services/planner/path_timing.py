@@ -19,6 +19,7 @@ from services.planner.profile import JointLimits, NoProfile
 
 Array = NDArray[np.float64]
 
+NEAR = 1e-4  # share of the length: marks that are nearer to one another are one
 ASIDE = 1e-6  # share of the length from a mark at which the way is that of one side
 ROWS = 512  # of length at which limits are looked at, besides the knots and the marks
 COUNTS = (1, 4, 16)  # of even stretches that are tried; they divide ROWS
@@ -82,10 +83,11 @@ def demand_of(curve: PathCurve, limits: JointLimits, tool: tuple[float, float], 
     `tool` is its speed [m/s] and acceleration [m/s^2], 0 for no limit.
     """
     end, joints = float(curve.knots[-1]), len(limits.velocity)
-    aside = ASIDE * end
+    aside, marks = ASIDE * end, _apart(marks, NEAR * end)
+    inside = [np.linspace(low, high, 4 * PARTS + 1) for low, high in pairwise(marks.tolist())]
     middles = 0.5 * (curve.knots[:-1] + curve.knots[1:])
     rows = (np.linspace(0.0, end, ROWS + 1), curve.knots, middles, marks[:-1] + aside, marks[1:] - aside)
-    along = np.unique(np.concatenate(rows))
+    along = np.unique(np.concatenate((*rows, *inside)))
     _, *derivatives = curve.at(along)
     first, second, third = [np.hstack((np.abs(part[:, :joints]), _norms(part[:, joints:]))) for part in derivatives]
     speed, most = (value if value > 0.0 else math.inf for value in tool)
@@ -110,6 +112,15 @@ def time_law(demand: Demand) -> TimeLaw:
     if not found:
         raise NoProfile(f"no jerk-limited profile for a way of {float(demand.along[-1]):.3g}")
     return min(found, key=lambda law: law.duration)
+
+
+def _apart(marks: Array, least: float) -> Array:
+    """Both ends, and those between that are `least` from one another."""
+    kept = [float(marks[0])]
+    for mark in marks[1:-1].tolist():
+        if mark - kept[-1] > least and float(marks[-1]) - mark > least:
+            kept.append(mark)
+    return np.array([*kept, float(marks[-1])])
 
 
 def _divisions(demand: Demand) -> list[Array]:

@@ -263,6 +263,19 @@ def test_joints_go_by_their_waypoints(name: str, motion: Motion):
 
 
 @ARMS
+@pytest.mark.parametrize("motion", [PointToPoint(), LinearMotion()])
+def test_corners_whose_blends_meet_are_one_after_the_other(name: str, motion: Motion):
+    planner = PLANNERS[name]
+    start = planner.arm.named_states["ready"]
+    begin = planner.kinematics.tool(start).position
+    ways = ((0.0, 0.02, 0.0), (0.0, 0.02, 0.02), (0.0, 0.0, 0.02), (0.0, -0.02, 0.02))
+    points = tuple(PoseGoal(position=tuple(np.add(begin, way).tolist())) for way in ways)
+    response = plan(planner, WaypointGoal(points=points, blend=0.5), motion, start)
+    assert response.code is PlanCode.SUCCESS
+    require_sound(planner, response, start)
+
+
+@ARMS
 def test_a_line_to_a_joint_goal_ends_at_its_pose(name: str):
     planner = PLANNERS[name]
     start = planner.arm.named_states["ready"]
