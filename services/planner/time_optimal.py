@@ -68,7 +68,7 @@ class _Law:
 
 def _speeds(run: Curve, limits: JointLimits) -> tuple[Array, Array]:
     """Lengths and the speeds there [1], from toppra."""
-    toppra = _toppra()
+    toppra = load_toppra()
     most = DERATED * np.ones_like(limits.velocity)
     bends = DERATED * limits.acceleration / limits.velocity
     constraints = [
@@ -85,7 +85,7 @@ def _speeds(run: Curve, limits: JointLimits) -> tuple[Array, Array]:
 
 
 @cache
-def _toppra() -> Any:
+def load_toppra() -> Any:
     """Imported where it is needed: it takes seconds, and its sources have strings that Python warns about."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

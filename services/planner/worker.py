@@ -11,9 +11,11 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import IO
 
+from schemas.planning import Timing
 from services.arm.description import load_arm
 from services.planner.core import Planner
 from services.planner.jobs import Job, Ready, receive, send
+from services.planner.time_optimal import load_toppra
 from services.planner.world import World
 
 
@@ -32,6 +34,8 @@ def main() -> None:
         job = jobs.get()
         if job.scene is not None:
             planner.set_world(World(planner.arm, planner.kinematics, job.scene, (project, folder)))
+        if job.request.timing is Timing.TIME_OPTIMAL:
+            load_toppra()  # seconds, the first time, which are not the plan's
         send(answers, planner.plan(job.request, job.present, job.age, time.monotonic))
 
 

@@ -14,7 +14,7 @@ from queue import SimpleQueue
 from typing import IO
 
 from schemas.joints import JointState
-from schemas.planning import PlanCode, PlanRequest, PlanResponse, Refusal
+from schemas.planning import PlanCode, PlanRequest, PlanResponse, Refusal, Timing
 from schemas.scene import PlanningScene
 from services.planner.core import LONGEST
 from services.planner.goals import timed_out
@@ -22,7 +22,7 @@ from services.planner.jobs import Job, Ready, receive, send
 
 MOST = 2  # processes: as many as small computers have cores for it
 GRACE = 1.0  # [s] beyond the allowed time in which a worker ends its plan by itself
-START = 60.0  # [s] in which a worker must have started
+START = 60.0  # [s] in which a worker must have started, or have imported toppra for the first time
 PATIENCE = 5.0  # [s] for a thread to see that its process is gone
 AGAIN = 3  # plans of one request, where the scene changes meanwhile
 CHILD = "services.planner.worker"
@@ -108,7 +108,7 @@ class _Worker:
     def __init__(self, folder: Path, project: Path) -> None:
         self._folders = (str(folder), str(project))
         self._told: PlanningScene | None = None
-        self._is_ready = self._is_over = False
+        self._is_ready = self._has_toppra = self._is_over = False
         self._process = self._started()
 
     def plan(self, job: Job, scene: PlanningScene) -> PlanResponse:
@@ -116,7 +116,10 @@ class _Worker:
         with self._replaced_where_it_fails():
             send(_pipe(self._process.stdin), job if self._told is scene else _with_scene(job, scene))
             self._told = scene
-            self._wait(min(job.request.allowed_time, LONGEST) + GRACE)
+            needs_toppra = job.request.timing is Timing.TIME_OPTIMAL
+            importing = START if needs_toppra and not self._has_toppra else 0.0
+            self._wait(min(job.request.allowed_time, LONGEST) + GRACE + importing)
+            self._has_toppra = self._has_toppra or needs_toppra
             return receive(_pipe(self._process.stdout), PlanResponse)
 
     def be_ready(self) -> None:
@@ -145,7 +148,8 @@ class _Worker:
         code = self._process.wait()
         self.close()
         if not self._is_over:
-            self._process, self._told, self._is_ready = self._started(), None, False
+            self._process, self._told = self._started(), None
+            self._is_ready = self._has_toppra = False
         return code
 
     def _started(self) -> subprocess.Popen[bytes]:

@@ -15,7 +15,7 @@ import psutil
 import pytest
 
 from schemas.joints import JointState
-from schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse
+from schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Timing
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.planner import workers as module
 from services.planner.workers import Workers
@@ -132,3 +132,8 @@ def test_nothing_is_left_of_a_planner_that_is_killed_while_it_plans():
         (worker,) = planning_processes(planner.pid)
         os.kill(planner.pid, signal.SIGKILL)
         assert psutil.wait_procs([worker], timeout=10.0)[1] == []
+
+
+def test_the_first_time_optimal_plan_is_not_stopped_while_its_library_loads(stack: Stack):
+    stack.ask(PlanRequest(goal=NamedGoal(name="ready"), start=HOME, timing=Timing.TIME_OPTIMAL))
+    assert stack.answer().code is PlanCode.SUCCESS
