@@ -145,7 +145,7 @@ class Machine {
     void begin_outputs();
     void report_due();
     void report_state(const Point& point);
-    void report_sensors() const;
+    void report_sensors();
     void event(const char* name, const char* detail = "");
     bool is_at_rest() const { return is_still_ && stepper_.is_quiet(); }
     uint16_t all_joints() const { return static_cast<uint16_t>((1u << rules_.joints) - 1); }
@@ -199,6 +199,7 @@ class Machine {
     int64_t max_error_q20_ = 0;
     uint16_t heard_ = 0;  // sensors that have a reading
     int32_t sensor_milli_[kMaxSensors];
+    uint8_t sensor_tellings_[kMaxSensors];  // left for the reading
 };
 
 }  // namespace gemelo

@@ -5,6 +5,9 @@
 namespace gemelo {
 namespace {
 
+// So often a reading is told if no other one comes: a sensor that is unplugged falls silent.
+constexpr uint8_t kTellings = 3;
+
 int32_t as_q8(int64_t q20) { return static_cast<int32_t>((q20 + 2048) >> 12); }
 
 int32_t saturate(int64_t value) {
@@ -59,10 +62,15 @@ void Machine::set_sensor(uint8_t index, int32_t raw) {
     const SensorConfig& sensor = config_->sensor[index];
     const int64_t scaled = (static_cast<int64_t>(raw) * sensor.scale_q16) >> 16;
     sensor_milli_[index] = saturate(scaled + sensor.offset_milli);
+    sensor_tellings_[index] = kTellings;
     heard_ = static_cast<uint16_t>(heard_ | 1u << index);
 }
 
-void Machine::report_sensors() const { reporter_.sensors(SensorReport{config_, now_us_, heard_, sensor_milli_}); }
+void Machine::report_sensors() {
+    reporter_.sensors(SensorReport{config_, now_us_, heard_, sensor_milli_});
+    for (uint8_t i = 0; i < config_->sensors; ++i)
+        if (((heard_ >> i) & 1) != 0 && --sensor_tellings_[i] == 0) heard_ = static_cast<uint16_t>(heard_ & ~(1u << i));
+}
 
 void Machine::report_text_lost(uint32_t lines) { event("text_lost", Sentence().add(lines).text()); }
 

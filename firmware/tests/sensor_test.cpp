@@ -27,8 +27,10 @@ TEST(Sensors, AreToldByNameAndScaledAtARateOfTheirOwn) {
     Wired wired(with_sensors());
     wired.run_ms(100);
     EXPECT_TRUE(wired.sensors.empty()) << "nothing was read yet";
-    wired.machine.set_sensor(0, 735);
-    wired.run_ms(1000);
+    for (int n = 0; n < 20; ++n) {
+        wired.machine.set_sensor(0, 735);
+        wired.run_ms(50);
+    }
     EXPECT_EQ(wired.sensors.size(), 20u);
     EXPECT_NE(wired.sensors.back().find("\"ultra\": 12.495"), std::string::npos) << wired.sensors.back();
     EXPECT_EQ(wired.sensors.back().find("bateria"), std::string::npos);
@@ -37,6 +39,26 @@ TEST(Sensors, AreToldByNameAndScaledAtARateOfTheirOwn) {
     wired.run_ms(100);
     EXPECT_NE(wired.sensors.back().find("\"bateria\": -0.450"), std::string::npos) << wired.sensors.back();
     EXPECT_NE(wired.sensors.back().find("\"boot_id\": 305419896"), std::string::npos);
+}
+
+TEST(Sensors, ThatFallSilentAreLeftOutAndComeBack) {
+    Wired wired(with_sensors());
+    const auto run = [&wired](bool first, bool second) {
+        wired.sensors.clear();
+        for (int n = 0; n < 20; ++n) {
+            if (first) wired.machine.set_sensor(0, 735);
+            if (second) wired.machine.set_sensor(1, 100);
+            wired.run_ms(50);
+        }
+        return std::count_if(wired.sensors.begin(), wired.sensors.end(),
+                             [](const std::string& said) { return said.find("\"ultra\"") != std::string::npos; });
+    };
+    EXPECT_EQ(run(true, true), 20);
+    EXPECT_EQ(run(false, true), 2) << "its last reading is told thrice in all";
+    EXPECT_EQ(wired.sensors.size(), 20u) << "the other one goes on";
+    EXPECT_EQ(run(false, false), 0);
+    EXPECT_EQ(wired.sensors.size(), 2u);
+    EXPECT_EQ(run(true, false), 20);
 }
 
 TEST(Sensors, ThatReadNonsenseDoNotWrap) {
