@@ -249,6 +249,9 @@ class Planner:
 
 def _require_known(request: PlanRequest) -> None:
     """Raises `NoPlan` for what this planner cannot do."""
+    if request.allowed_time <= 0.0:
+        message = f"allowed_time is {request.allowed_time:g} s: it must be above 0"
+        raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, "allowed_time", message, "allow 1 s, which is the default")
     if isinstance(request.motion, FreeMotion):
         require_known(request.motion.planner_id)
     is_given = isinstance(request.motion, LinearMotion | CircularMotion) or isinstance(request.goal, WaypointGoal)

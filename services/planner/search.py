@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 DEFAULT = "RRTConnect"  # where the compiled core is not built, or is too cautious
 KNOWN = (NATIVE, *PLANNERS)
+SEEDS = 2**32  # that are told apart; the generators take none below 0
 
 
 class Search:
@@ -59,6 +60,7 @@ class Search:
     ) -> Way:
         """A smooth way from `start` (n,) to one of `goals` (m, n) that keeps `margin` [m]; raises `NoWay`, `NoPlan`."""
         require_known(planner_id)
+        seed %= SEEDS
         if planner_id == NATIVE:
             return self._native(start, goals, margin, seed, deadline)
         if planner_id == "" and self._core is not None:

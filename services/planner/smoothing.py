@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,10 @@ LEAST = 1.0 / 64.0
 
 
 def shorten(corners: Array, validity: Validity, seed: int, is_late: Callable[[], bool]) -> Array:
-    """The polyline (m, n) with straight cuts between random places on it, for as long as there is time."""
+    """The polyline (m, n) with straight cuts between random places on it, for as long as there is time.
+
+    At last it loses the corners that it can do without: two that nearly coincide let the arm creep around them.
+    """
     random = np.random.default_rng(seed)
     fruitless = 0
     for _ in range(CUTS):
@@ -28,7 +32,7 @@ def shorten(corners: Array, validity: Validity, seed: int, is_late: Callable[[],
         cut = _cut(corners, low, high, validity)
         fruitless = fruitless + 1 if cut is None else 0
         corners = corners if cut is None else cut
-    return corners
+    return _needed(corners, validity, is_late)
 
 
 def smooth(corners: Array, validity: Validity, is_late: Callable[[], bool]) -> Array:
@@ -55,6 +59,15 @@ def smooth(corners: Array, validity: Validity, is_late: Callable[[], bool]) -> A
 def stopping(corners: Array) -> Array:
     """As `smooth`, stopping at every corner: the polyline itself."""
     return np.repeat(corners, 3, axis=0)
+
+
+def _needed(corners: Array, validity: Validity, is_late: Callable[[], bool]) -> Array:
+    """The polyline without each corner that a straight line may pass by."""
+    kept = [corners[0]]
+    for corner, after in pairwise(corners[1:]):
+        if is_late() or not validity.is_line_free(kept[-1], after):
+            kept.append(corner)
+    return np.array([*kept, corners[-1]])
 
 
 def _cut(corners: Array, low: float, high: float, validity: Validity) -> Array | None:

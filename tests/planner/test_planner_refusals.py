@@ -11,7 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.joints import JointState
-from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, PoseGoal, Refusal
+from schemas.planning import (
+    FreeMotion,
+    JointGoal,
+    LinearMotion,
+    Motion,
+    NamedGoal,
+    PlanCode,
+    PlanRequest,
+    PlanResponse,
+    PointToPoint,
+    PoseGoal,
+    Refusal,
+)
 from services.arm.description import Arm, load_arm
 from services.planner.core import Planner
 
@@ -186,6 +198,14 @@ def test_a_start_outside_the_limits_is_refused(planner: Planner, rm1: Arm):
 def test_a_scaling_that_would_take_days_is_refused(planner: Planner, home: JointState):
     request = PlanRequest(goal=NamedGoal(name="ready"), velocity_scaling=1e-9)
     assert "86400 s is the most" in refused(planner.plan(request, home), PlanCode.PLANNING_FAILED).message
+
+
+@pytest.mark.parametrize("allowed", [0.0, -1.0, -1e300])
+@pytest.mark.parametrize("motion", [FreeMotion(), PointToPoint(), LinearMotion()])
+def test_no_time_at_all_is_refused(planner: Planner, home: JointState, motion: Motion, allowed: float):
+    request = PlanRequest(goal=NamedGoal(name="ready"), motion=motion, allowed_time=allowed)
+    refusal = refused(planner.plan(request, home), PlanCode.INVALID_GOAL_CONSTRAINTS)
+    assert refusal.subject == "allowed_time"
 
 
 def test_a_search_without_time_is_timed_out(planner: Planner, home: JointState):

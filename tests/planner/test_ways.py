@@ -117,6 +117,16 @@ def test_joints_that_turn_beyond_half_a_turn_are_searched_there_too(planner_id: 
     assert response.planner_id != "straight"
 
 
+@pytest.mark.parametrize("planner_id", ["", *KNOWN])
+@pytest.mark.parametrize("seed", [-1, -(2**63), 2**63 - 1, 2**64 - 1])
+def test_any_seed_will_do(planner_id: str, seed: int):
+    planner = planner_of("rm1")
+    request = between(planner)
+    response = planner.plan(msgspec.structs.replace(request, motion=FreeMotion(planner_id=planner_id, seed=seed)), None)
+    require_sound(planner, request, response)
+    assert response.duration < 60.0  # a way around one post, with corners that nearly coincide or without
+
+
 def random_requests(planner: Planner, count: int, seed: int, **options: object) -> list[PlanRequest]:
     """Between random free postures in the present scene."""
     random, world = np.random.default_rng(seed), planner.surroundings.newest
