@@ -16,7 +16,7 @@ from services.cli.session import Session
 from services.cli.units import show
 
 PERIOD = 0.02  # [s] between two commands
-ANSWER = 1.0  # [s] that the planner may take to its first word
+ANSWER = 3.0  # [s] that the planner may take to its first word
 REST = 5.0  # [s] that the arm may take to come to rest
 DRAWN = 0.1  # [s]
 

@@ -32,6 +32,9 @@ SILENCE = 0.6  # [s] without a command after which an interrupted jog may begin 
 FOLLOW = 0.6  # [s] that the arm may be behind its targets, with the gateway's lead and the states' way back
 GRACE = 0.2  # [s] that it may be elsewhere
 STEPS_ASTRAY = 3.0  # [steps] that are no straying
+FADING = 1.0  # [s] in which a tool brakes on its line
+LAST = 0.02  # of the twist, that is given up off the line
+MOST_SAID = 100  # different complaints about commands; more is a client gone mad
 ARRIVAL = 1.5  # [s] that the target is repeated at most until the arm has come to rest there
 NEVER = -1.0e9  # [s]
 
@@ -60,7 +63,8 @@ class Jog:
         self._trail: deque[tuple[float, Array]] = deque()
         self._positions: Array | None = None  # commanded, where the jog leads; None: it leads nothing
         self._velocity: Array = np.zeros(len(arm.joints))
-        self._scale, self._limited_by = 1.0, ""
+        self._scale = 1.0
+        self._wanted_now, self._allowed_now = Wanted(self._velocity), Allowed(self._velocity)
 
     @property
     def is_busy(self) -> bool:
@@ -91,7 +95,7 @@ class Jog:
         try:
             if self._positions is None:
                 self._begin(present, age, goal_is_active, now)
-            said = self._lead()
+            said = self._lead(now)
             self._require_followed(present, age, goal_is_active, now)
         except JogRefused as refused:
             return self._end(str(refused), now, stamp)
@@ -107,16 +111,17 @@ class Jog:
         self._trail.clear()
         self._rested = self._on_way = now
 
-    def _lead(self) -> str:
+    def _lead(self, now: float) -> str:
         """Takes the next velocity; gives what there is to say about the command."""
         assert self._positions is not None
-        wanted, said = self._wanted(self._positions) if self._is_heard else (Wanted(np.zeros(len(self._velocity))), "")
+        there = self._positions + 0.5 * PERIOD * self._velocity  # halfway: the tool's line bends less
+        wanted, said = self._wanted(there) if self._is_heard else (self._fading(there, now), "")
         is_regular = partial(self._interpreter.twists.stays_regular, self._positions) if wanted.is_twist else None
         allowed = self._room.allowed(self._positions, self._velocity, wanted.velocity, is_regular)
         self._velocity = allowed.velocity
         self._positions = self._positions + PERIOD * allowed.velocity
         self._scale = wanted.scale * allowed.share
-        self._limited_by = "; ".join(dict.fromkeys((*wanted.limited_by, *self._obstacles(allowed))))
+        self._wanted_now, self._allowed_now = wanted, allowed
         return said
 
     def _wanted(self, positions: Array) -> tuple[Wanted, str]:
@@ -124,9 +129,24 @@ class Jog:
         try:
             return self._interpreter.wanted(self._command, positions), ""
         except BadJog as error:
-            said = "" if str(error) in self._known else str(error)
-            self._known.add(str(error))
+            said = "" if str(error) in self._known or len(self._known) >= MOST_SAID else str(error)
+            self._known |= {said} - {""}
             return Wanted(np.zeros(len(positions)), 0.0, (str(error),)), said
+
+    def _fading(self, positions: Array, now: float) -> Wanted:
+        """Less of the last twist, so that the tool brakes on its line; of joints, and after a while, nothing."""
+        standing = Wanted(np.zeros(len(positions)))
+        if now - self._heard > DEAD_MAN + FADING:
+            return standing
+        wanted, _ = self._wanted(positions)
+        size = float(wanted.velocity @ wanted.velocity)
+        if not wanted.is_twist or size == 0.0:
+            return standing
+        braked = self._braking.towards(self._velocity, standing.velocity)
+        share = float(braked @ wanted.velocity) / size
+        if share < LAST:
+            return standing
+        return Wanted(min(1.0, share) * wanted.velocity, is_twist=True)
 
     def _obstacles(self, allowed: Allowed) -> tuple[str, ...]:
         limits = (allowed.limited_by,) if allowed.limited_by else ()
@@ -196,7 +216,7 @@ class Jog:
             stamp=stamp,
             active=True,
             scale=self._scale,
-            limited_by=self._limited_by,
+            limited_by="; ".join(dict.fromkeys((*self._wanted_now.limited_by, *self._obstacles(self._allowed_now)))),
             manipulability=self._interpreter.twists.manipulability(self._positions),
         )
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from schemas.joints import JointState
-from schemas.planning import JogCommand
+from schemas.planning import JogCommand, JogStatus
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY, JOG, JOG_STATUS, JOINT_TARGETS
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.jog import PERIOD, Jog
+from services.planner.scene_shapes import SceneError
 from services.planner.world import World
 from services.runtime.action_keys import status_topic
 from services.runtime.deployment import project_root
@@ -31,17 +32,24 @@ class JogService:
         self._kinematics: Kinematics | None = None
         self._seen: World | None = None  # the planner's world that ours is made after
         self._jog: Jog | None = None
+        self._damage = ""  # why there is no jog
         self._is_ticking = False
         node.subscribe(JOG, self._on_command)
 
     def _on_command(self, command: JogCommand) -> None:
-        self._made().on_command(command, self._node.monotonic())
+        jog = self._made()
+        if jog is None:
+            self._status.put(JogStatus(stamp=self._node.now(), scale=0.0, limited_by=self._damage))
+            return
+        jog.on_command(command, self._node.monotonic())
         if not self._is_ticking:
             self._is_ticking = True
             self._node.every(PERIOD, self._tick)
 
     def _tick(self) -> None:
         node, jog = self._node, self._made()
+        if jog is None:
+            return self._rest()
         output = jog.step(node.monotonic(), node.now(), self._states.message, self._states.age(), self._goal_is_active)
         if output.targets is not None:
             self._targets.put(output.targets)
@@ -50,24 +58,33 @@ class JogService:
         if output.said:
             node.log.warning(f"jog: {output.said}")
         if not jog.is_busy:
-            self._is_ticking = False
-            node.forget(self._tick)
+            self._rest()
+
+    def _rest(self) -> None:
+        self._is_ticking = False
+        self._node.forget(self._tick)
 
     @property
     def _goal_is_active(self) -> bool:
         goals = self._goals.message
         return goals is not None and any(not goal.status.is_terminal for goal in goals.goals)
 
-    def _made(self) -> Jog:
-        """The jog, in the newest world."""
+    def _made(self) -> Jog | None:
+        """The jog, in the newest world; None while the scene cannot be made, where the arm stops at its last target."""
         newest = self._newest()
-        if self._jog is not None and newest is self._seen:
-            return self._jog
+        if newest is not self._seen:
+            self._seen, self._jog = newest, self._in_world_of(newest)
+        return self._jog
+
+    def _in_world_of(self, newest: World) -> Jog | None:
         self._kinematics = self._kinematics or Kinematics(self._arm)
-        world = World(self._arm, self._kinematics, newest.scene, (project_root(), self._arm.folder))
-        self._seen = newest
+        try:
+            world = World(self._arm, self._kinematics, newest.scene, (project_root(), self._arm.folder))
+        except (SceneError, OSError, ValueError) as error:
+            self._damage = f"the scene cannot be made: {error}"
+            self._node.log.error(f"jog: {self._damage}")
+            return None
         if self._jog is None:
-            self._jog = Jog(self._arm, self._kinematics, world)
-        else:
-            self._jog.set_world(world)
+            return Jog(self._arm, self._kinematics, world)
+        self._jog.set_world(world)
         return self._jog

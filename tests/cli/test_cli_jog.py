@@ -189,19 +189,24 @@ def test_keys_jog_until_they_are_let_go_and_x_leaves(session, gateway, jogger, t
     before = termios.tcgetattr(inner)
 
     def type_keys() -> None:
-        os.write(outer, b"w")
-        session.node.post(lambda: None)
-        while not jogger.commands:
-            done.wait(0.02)
-        done.wait(0.5)
-        os.write(outer, b"x")
+        for _ in range(200):  # what is typed before the keys are read one by one is lost
+            if jogger.commands:
+                break
+            os.write(outer, b"w")
+            pause.wait(0.05)
+        pause.wait(0.5)
+        heard.append(len(jogger.commands))
+        pause.wait(0.3)
+        for _ in range(3):
+            os.write(outer, b"x")
+            pause.wait(0.1)
 
-    done = threading.Event()
+    pause, heard = threading.Event(), list[int]()
     typist = threading.Thread(target=type_keys)
     typist.start()
     assert jog_by_hand(session) is ExitCode.OK
     typist.join()
     assert jogger.commands[0].linear == pytest.approx((FIRST_SPEED * TOOL_SPEED, 0.0, 0.0))
-    assert len(jogger.commands) <= HELD / 0.02 + 2
+    assert len(jogger.commands) == heard[0]
     assert termios.tcgetattr(inner) == before
     assert "space stop" in capsys.readouterr().out

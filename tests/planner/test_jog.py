@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from schemas.joints import JointState
 from schemas.planning import JogCommand
+from services.planner.clearance import CLEARANCE
 from services.planner.jog import DEAD_MAN, PERIOD, SILENCE, Jog
 from tests.planner.jogging import Jogged, arm_of, kinematics_of, world_of
 
@@ -165,6 +166,29 @@ def test_without_a_fresh_state_it_is_refused():
     assert output.targets is None
     assert output.status is not None
     assert "joint" in output.status.limited_by
+
+
+def test_what_appears_in_the_way_stops_the_arm_before_it():
+    jogged = Jogged("rm1", start="home", crowded=False)
+    command = JogCommand(name=("brazo_joint",), velocity=(0.3,))
+    jogged.hold(command, 0.4)
+    jogged.world = world_of("rm1", crowded=True)
+    jogged.jog.set_world(jogged.world)
+    jogged.hold(command, 4.0)
+    assert CLEARANCE <= jogged.world.distance(jogged.commanded[-1]) < 0.01
+    assert not np.any(np.abs(jogged.velocities[-1]) > 0.01)
+    assert "post" in jogged.statuses[-1].limited_by
+
+
+@pytest.mark.parametrize("name", ["rm1", "parol6"])
+def test_the_arm_itself_keeps_to_the_line_of_the_tool(name: str):
+    jogged = Jogged(name, crowded=False)
+    begin = jogged.kinematics.tool(jogged.tracker.knot.position).position
+    jogged.hold(JogCommand(linear=(0.0, 0.08, 0.0)), 0.8)
+    jogged.let_go()
+    way = np.array([jogged.kinematics.tool(knot.position).position for knot in jogged.knots]) - begin
+    assert way[-1][1] > 0.04
+    assert np.max(np.linalg.norm(way[:, [0, 2]], axis=1)) < 0.0015
 
 
 def test_the_status_comes_ten_times_a_second():
