@@ -28,6 +28,8 @@ ALONE = (
     "ik_ms",
     "ik_success",
     "plan_ms",
+    "lin_ms",
+    "jog_tick_us",
     "lost_of_45000_at_25hz",
     "seed_move_percent",
     "clock_sync_error_us",
