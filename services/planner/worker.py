@@ -7,11 +7,12 @@ import signal
 import sys
 import threading
 import time
+import traceback
 from pathlib import Path
 from queue import SimpleQueue
 from typing import IO
 
-from schemas.planning import Timing
+from schemas.planning import PlanResponse, Refusal, Timing
 from services.arm.description import load_arm
 from services.planner.core import Planner
 from services.planner.jobs import Job, Ready, receive, send
@@ -36,7 +37,18 @@ def main() -> None:
             planner.set_world(World(planner.arm, planner.kinematics, job.scene, (project, folder)))
         if job.request.timing is Timing.TIME_OPTIMAL:
             load_toppra()  # seconds, the first time, which are not the plan's
-        send(answers, planner.plan(job.request, job.present, job.age, time.monotonic))
+        send(answers, _planned(planner, job))
+
+
+def _planned(planner: Planner, job: Job) -> PlanResponse:
+    """A defect costs the plan, and its traceback goes to the log; the process goes on."""
+    try:
+        return planner.plan(job.request, job.present, job.age, time.monotonic)
+    except Exception as error:
+        traceback.print_exc()
+        message = f"a defect of the planner: {type(error).__name__}: {error}"
+        remedy = "ask for something else, and report this with what the planner's log says"
+        return PlanResponse(refusal=Refusal(check="planner", subject="worker", message=message, remedy=remedy))
 
 
 def _read(pipe: IO[bytes], jobs: SimpleQueue[Job]) -> None:

@@ -118,7 +118,7 @@ class _Worker:
             self._told = scene
             needs_toppra = job.request.timing is Timing.TIME_OPTIMAL
             importing = START if needs_toppra and not self._has_toppra else 0.0
-            self._wait(min(job.request.allowed_time, LONGEST) + GRACE + importing)
+            self._wait(min(max(0.0, job.request.allowed_time), LONGEST) + GRACE + importing)
             self._has_toppra = self._has_toppra or needs_toppra
             return receive(_pipe(self._process.stdout), PlanResponse)
 

@@ -17,7 +17,11 @@ import pytest
 from schemas.joints import JointState
 from schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Timing
 from schemas.scene import BoxShape, PlanningScene, SceneObject
+from services.arm.description import load_arm
+from services.planner import worker
 from services.planner import workers as module
+from services.planner.core import Planner
+from services.planner.jobs import Job
 from services.planner.workers import Workers
 
 PROJECT = Path(__file__).parents[2]
@@ -103,6 +107,29 @@ def test_a_process_that_dies_is_said_and_replaced(stack: Stack):
     assert stack.answer().code is PlanCode.SUCCESS
 
 
+@pytest.mark.parametrize("allowed", [0.0, -1.0, -1e300])
+def test_a_request_without_time_is_refused_by_the_process_that_goes_on(stack: Stack, allowed: float):
+    stack.ask(PlanRequest(goal=NamedGoal(name="ready"), start=HOME, allowed_time=allowed))
+    refused = stack.answer()
+    (process,) = planning_processes()
+    assert refused.refusal is not None
+    assert refused.refusal.subject == "allowed_time"
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    assert planning_processes() == [process]
+
+
+def test_a_defect_costs_the_plan_and_not_the_process():
+    class Broken(Planner):
+        def plan(self, *_args: object) -> PlanResponse:
+            raise ZeroDivisionError("nothing divides")
+
+    response = worker._planned(Broken(load_arm(PROJECT / "urdf/rm1")), Job(request=EASY))
+    assert response.code is PlanCode.FAILURE
+    assert response.refusal is not None
+    assert "ZeroDivisionError: nothing divides" in response.refusal.message
+
+
 def test_one_client_does_not_block_another(stack: Stack):
     stack.ask(EASY)
     assert stack.answer().code is PlanCode.SUCCESS
@@ -129,9 +156,9 @@ def test_nothing_is_left_of_a_planner_that_is_killed_while_it_plans():
     with subprocess.Popen([sys.executable, "-c", code], cwd=PROJECT, stdout=subprocess.PIPE) as planner:
         assert planner.stdout is not None
         assert planner.stdout.readline() == b"planned\n"
-        (worker,) = planning_processes(planner.pid)
+        (orphan,) = planning_processes(planner.pid)
         os.kill(planner.pid, signal.SIGKILL)
-        assert psutil.wait_procs([worker], timeout=10.0)[1] == []
+        assert psutil.wait_procs([orphan], timeout=10.0)[1] == []
 
 
 def test_the_first_time_optimal_plan_is_not_stopped_while_its_library_loads(stack: Stack):
