@@ -58,10 +58,15 @@ class Unreachable:
         return self._printable(pose.position, posture, frame, is_late)
 
     def _nearest_free(self, target: Target, near: Array, is_late: Clock) -> Array:
-        """The best posture after each has been drawn back towards the start until nothing touches."""
+        """The best posture; one that touches is drawn back towards the start until it does not."""
         postures = self._ik.nearest(target, near, is_late)[:NEAREST_TRIED]
-        free = [last_free(self._collisions, near, posture) for posture in postures]
+        free = [self._drawn_back(near, posture) for posture in postures]
         return min(free, key=lambda q: target.misses(self._kinematics.tool(q))[0])
+
+    def _drawn_back(self, near: Array, posture: Array) -> Array:
+        if self._collisions.distance(posture) > CLEARANCE:
+            return posture
+        return last_free(self._collisions, near, posture)
 
     def _nearest_turned(self, target: Target, place: Target, fallback: Array, near: Array, is_late: Clock) -> Array:
         """At the place, the posture that turns the tool as nearly as it can be, and touches nothing."""

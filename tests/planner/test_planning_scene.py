@@ -6,7 +6,7 @@ import pytest
 
 from schemas.frames import Transform
 from schemas.joints import JointState
-from schemas.planning import JointGoal, PlanCode, PlanRequest, PointToPoint
+from schemas.planning import JointGoal, PlanCode, PlanRequest, PointToPoint, PoseGoal
 from schemas.scene import AllowedPair, BoxShape, PlanningScene, SceneObject, SphereShape
 from services.arm.description import Arm
 from services.planner.core import Planner
@@ -135,3 +135,14 @@ def test_an_object_that_comes_while_a_plan_is_made_stops_the_plan_it_is_in_the_w
         assert "box block" in response.refusal.message
     else:
         assert response.code is PlanCode.SUCCESS
+
+
+def test_an_object_on_the_way_does_not_change_how_far_the_arm_reaches(planner: Planner, home: JointState) -> None:
+    beyond = PlanRequest(goal=PoseGoal(position=(0.1, 0.6, 0.1)))
+    alone = planner.plan(beyond, home).refusal
+    show(planner, scene(block(planner, 0.6)))
+    blocked = planner.plan(beyond, home).refusal
+    assert alone is not None
+    assert blocked is not None
+    assert blocked.value == pytest.approx(alone.value)
+    assert blocked.nearest == pytest.approx(alone.nearest)
