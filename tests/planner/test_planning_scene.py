@@ -140,7 +140,8 @@ def test_an_object_that_comes_while_a_plan_is_made_stops_the_plan_it_is_in_the_w
 def test_an_object_on_the_way_does_not_change_how_far_the_arm_reaches(planner: Planner, home: JointState) -> None:
     beyond = PlanRequest(goal=PoseGoal(position=(0.1, 0.6, 0.1)))
     alone = planner.plan(beyond, home).refusal
-    show(planner, scene(block(planner, 0.6)))
+    wall = SceneObject(name="wall", shape=BoxShape(size=(0.02, 0.02, 1.0)), pose=block(planner, 0.4).pose)
+    show(planner, scene(wall, block(planner, 0.7), block(planner, 1.0)))
     blocked = planner.plan(beyond, home).refusal
     assert alone is not None
     assert blocked is not None
