@@ -76,6 +76,9 @@ class Blockade:
         """What a person can do for an arm that touches something."""
         world = self._surroundings.world
         touched = [name for pair in world.pairs_within(start) for name in pair if name in world.objects]
+        carried = [shown.name for shown in world.scene.objects if shown.attached and shown.name in touched]
+        if carried:
+            return f"name the links that {carried[0]} may touch (`gemelo scene attach --touch`), or let it go"
         if touched:
             return (
                 f"move or remove {touched[0]} (`gemelo scene remove {touched[0]}`), allow the pair, or move the arm "

@@ -142,6 +142,7 @@ def in_collision(
     shown = [[f"{known[name]} {name}" if name in known else name for name in pair] for pair in pairs]
     named = " and ".join(f"{first} with {second}" for first, second in shown)
     is_own = not any(name in known for pair in pairs for name in pair)
+    near = f"would be nearer than {1000 * margin:.2g} mm" if margin > 0.0 else "touch"
     return NoPlan(
         code,
         Refusal(
@@ -150,7 +151,7 @@ def in_collision(
             limit=margin,
             nearest=nearest,
             posture=posture,
-            message=f"{where}, {named} would be nearer than {1000 * margin:g} mm",
+            message=f"{where}, {named} {near}",
             remedy=remedy,
         ),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +100,7 @@ def require_within_limits(arm: Arm, samples: Samples, limits: JointLimits) -> No
         ("acceleration", np.abs(samples.accelerations) - loose * limits.acceleration, samples.accelerations),
     )
     for what, excess, values in checks:
-        if float(excess.max()) > 0.0:
+        if not float(excess.max()) <= 0.0:  # what is not a number is not within its limits
             row, column = np.unravel_index(int(excess.argmax()), excess.shape)
             value, over = values[row, column], excess[row, column]
             name, t = arm.joint_names[int(column)], samples.times[row]
@@ -109,14 +110,17 @@ def require_within_limits(arm: Arm, samples: Samples, limits: JointLimits) -> No
 def require_jerk(arm: Arm, samples: Samples, limits: JointLimits) -> None:
     """Of every sample of a jerk-limited trajectory; raises `BadTrajectory`."""
     share = np.abs(samples.jerks) / limits.jerk
-    if float(share.max()) > LOOSE_JERK:
+    if not float(share.max()) <= LOOSE_JERK:
         row, column = np.unravel_index(int(share.argmax()), share.shape)
         name, t = arm.joint_names[int(column)], samples.times[row]
         raise BadTrajectory(f'jerk of "{name}" is {share[row, column]:.3g} times its limit at {t:.3f} s')
 
 
 def require_ends(trajectory: JointTrajectory, start: tuple[float, ...], goal: tuple[float, ...]) -> None:
-    """Exactly from the start to the goal, at rest at both; raises `BadTrajectory`."""
+    """Exactly from the start to the goal, at rest at both, and never back in time; raises `BadTrajectory`."""
+    for before, after in pairwise(point.time_from_start for point in trajectory.points):
+        if not before < after:
+            raise BadTrajectory(f"the trajectory goes from {before:.6f} s to {after:.6f} s")
     first, last = trajectory.points[0], trajectory.points[-1]
     if first.positions != start or last.positions != goal or first.time_from_start != 0.0:
         raise BadTrajectory("the trajectory does not lead from the start to the goal")

@@ -24,8 +24,10 @@ from schemas.planning import (
     PoseGoal,
     Refusal,
 )
+from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.description import Arm, load_arm
 from services.planner.core import Planner
+from services.planner.world import World
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 PLANNER = Planner(ARM)
@@ -165,6 +167,18 @@ def test_a_start_in_collision_is_not_planned_from(planner: Planner, rm1: Arm):
     start = JointState(name=rm1.joint_names, position=(0.0, 2.9, 0.0))
     refusal = refused(planner.plan(PlanRequest(goal=NamedGoal(name="home")), start), PlanCode.START_STATE_IN_COLLISION)
     assert "base_link with efector_link" in refusal.message
+
+
+def test_an_arm_that_touches_what_it_carries_is_told_what_to_do(rm1: Arm, home: JointState):
+    planner = Planner(rm1)
+    held = SceneObject(name="held", shape=BoxShape(size=(0.4, 0.4, 0.4)), frame=rm1.tool_frame, attached=True)
+    planner.set_world(World(rm1, planner.kinematics, PlanningScene(version=1, objects=(held,))))
+    for motion in (FreeMotion(), PointToPoint(), LinearMotion()):
+        request = PlanRequest(goal=NamedGoal(name="ready"), motion=motion)
+        refusal = refused(planner.plan(request, home), PlanCode.START_STATE_IN_COLLISION)
+        assert refusal.message.endswith("touch")
+        assert "held" in refusal.message
+        assert "--touch" in refusal.remedy
 
 
 def test_no_joint_state_is_said(planner: Planner):

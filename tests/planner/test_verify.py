@@ -66,6 +66,19 @@ def test_wrong_ends_are_refused(trajectory: JointTrajectory):
         require_ends(cut, START, cut.points[-1].positions)
 
 
+@pytest.mark.parametrize("step", [0.0, -0.01])
+def test_a_time_that_stands_or_goes_back_is_refused(rm1: Arm, trajectory: JointTrajectory, step: float):
+    """Between two points at the same time a joint could be anywhere, and nothing measured there is a number."""
+    points = list(trajectory.points)
+    points[3] = msgspec.structs.replace(points[3], time_from_start=points[2].time_from_start + step)
+    odd = msgspec.structs.replace(trajectory, points=tuple(points))
+    with pytest.raises(BadTrajectory, match="goes from"):
+        require_ends(odd, START, GOAL)
+    if step == 0.0:
+        with np.errstate(all="ignore"), pytest.raises(BadTrajectory, match="nan"):
+            require_within_limits(rm1, sample(odd), joint_limits(rm1))
+
+
 def test_a_touch_in_the_middle_of_a_way_is_found(planner: Planner):
     """Both ends are free; between them the effector would pass through the upper arm."""
     collisions = planner.kinematics.collisions
