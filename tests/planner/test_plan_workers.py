@@ -80,6 +80,20 @@ def test_a_change_of_the_scene_reaches_the_process(stack: Stack):
     assert response.scene_version == 2
 
 
+def test_a_change_while_a_process_plans_is_planned_for_again(stack: Stack):
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    (process,) = planning_processes()
+    process.suspend()
+    stack.ask(PlanRequest(goal=NamedGoal(name="ready"), start=HOME, allowed_time=30.0))
+    time.sleep(0.5)  # the request lies in the pipe, with the scene of before
+    stack.scene = PlanningScene(version=2, objects=(SceneObject(name="room", shape=BoxShape(size=(3.0, 3.0, 3.0))),))
+    process.resume()
+    response = stack.answer()
+    assert response.code is PlanCode.START_STATE_IN_COLLISION
+    assert response.scene_version == 2
+
+
 def test_a_process_that_does_not_come_back_is_killed_and_replaced(stack: Stack, monkeypatch: pytest.MonkeyPatch):
     stack.ask(EASY)
     assert stack.answer().code is PlanCode.SUCCESS

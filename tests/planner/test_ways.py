@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import struct
 import time
 from functools import cache
 from pathlib import Path
@@ -14,7 +15,7 @@ import pytest
 from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, Timing
-from schemas.scene import PlanningScene, SceneObject
+from schemas.scene import MeshShape, PlanningScene, SceneObject
 from services.arm.description import load_arm
 from services.bench.plan_scenes import SCENES, box
 from services.planner.core import Planner
@@ -24,6 +25,7 @@ from services.planner.search import KNOWN
 from services.planner.verify import limit_shares, require_ends, sample
 from services.planner.world import World
 from tests.planner.native.coal_truth import Truth
+from tests.planner.native.scenes import star_mesh
 
 ARMS = ("rm1", "parol6")
 DENSER = 100  # samples between two points: ten times as many as the planner looks at
@@ -67,7 +69,7 @@ def between(planner: Planner) -> PlanRequest:
     return asked(planner, start, goal)
 
 
-def require_sound(planner: Planner, request: PlanRequest, response: PlanResponse) -> None:
+def require_sound(planner: Planner, request: PlanRequest, response: PlanResponse, looks: int = 1500) -> None:
     """What must hold for every trajectory that is returned, seen ten times as finely as the planner does."""
     assert response.code is PlanCode.SUCCESS, response.refusal
     limits = joint_limits(planner.arm, request.velocity_scaling, request.acceleration_scaling)
@@ -83,7 +85,7 @@ def require_sound(planner: Planner, request: PlanRequest, response: PlanResponse
     assert request.start is not None
     require_ends(response.trajectory, request.start.position, request.goal.position)
     truth = Truth(planner.arm, native_scene(planner.arm, planner.surroundings.world.scene)[0])
-    rows = samples.positions[:: max(1, len(samples.positions) // 1500)]
+    rows = samples.positions[:: max(1, len(samples.positions) // looks)]
     assert min(truth.distance(row) for row in rows) > 0.0
 
 
@@ -149,6 +151,35 @@ def test_whatever_is_returned_is_within_all_limits_and_touches_nothing(planner: 
             assert response.trajectory.points == ()
             assert response.code is PlanCode.TIMED_OUT
     assert found >= 4
+
+
+def test_two_hundred_obstacles_are_gone_between(planner: Planner):
+    """Strewn anywhere but on one way that is known to be free."""
+    request, random = between(planner), np.random.default_rng(7)
+    known = sample(planner.plan(request, None).trajectory).positions[::25]
+    stones = list(planner.surroundings.newest.scene.objects)
+    while len(stones) < 200:
+        angle, out, up = random.uniform((-np.pi, 0.15, 0.0), (np.pi, 0.6, 0.6))
+        stone = box(f"stone {len(stones)}", (0.02,) * 3, (out * float(np.cos(angle)), out * float(np.sin(angle)), up))
+        world = World(planner.arm, planner.kinematics, PlanningScene(objects=(stone,)))
+        if all(world.distance(row) > 0.02 for row in known):
+            stones.append(stone)
+    show(planner, PlanningScene(version=9, objects=tuple(stones)))
+    require_sound(planner, request, planner.plan(request, None))
+
+
+def test_a_mesh_of_a_hundred_thousand_triangles_is_gone_around(planner: Planner):
+    request = between(planner)
+    (post,) = planner.surroundings.newest.scene.objects
+    mesh = star_mesh(np.random.default_rng(1), rings=224, sectors=224)
+    facets = np.zeros(len(mesh.faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+    facets["corners"] = mesh.vertices[mesh.faces]
+    content = bytes(80) + struct.pack("<I", len(facets)) + facets.tobytes()
+    rock = msgspec.structs.replace(post, name="rock", shape=MeshShape(data=content, scale=(0.4, 0.4, 0.4)))
+    show(planner, PlanningScene(version=10, objects=(rock,)))
+    response = planner.plan(request, None)
+    require_sound(planner, request, response, looks=40)  # each takes the other checker a tenth of a second
+    assert response.planner_id != "straight"
 
 
 def test_a_wall_with_a_window_is_gone_through_or_around(planner: Planner):
