@@ -42,12 +42,13 @@ def unknown_name(code: PlanCode, check: str, name: str, known: Iterable[str], wh
     """A joint, state or frame that is not there."""
     names = sorted(known)
     near = nearest_name(name, names)
+    meant = suggestion(name, names) if near else ""  # else the remedy names them all
     return NoPlan(
         code,
         Refusal(
             check=check,
             subject=name,
-            message=f'{where} has no {check.removeprefix("unknown ")} "{name}"{suggestion(name, names)}',
+            message=f'{where} has no {check.removeprefix("unknown ")} "{name}"{meant}',
             remedy=f'use "{near}"' if near else f"use one of {', '.join(names)}",
         ),
     )

@@ -106,7 +106,7 @@ class Search:
 def require_known(planner_id: str) -> None:
     """Raises `NoPlan` with the known ones."""
     if planner_id not in ("", *KNOWN):
-        raise unknown_name(PlanCode.INVALID_GOAL_CONSTRAINTS, "unknown planner", planner_id, KNOWN, "this planner")
+        raise unknown_name(PlanCode.INVALID_GOAL_CONSTRAINTS, "unknown planner", planner_id, KNOWN, "gemelo")
 
 
 def _not_built() -> NoPlan:
