@@ -40,6 +40,20 @@ Verdict check_velocity(const Span& span, int32_t limit_q8) {
     return Verdict{Code::VelocityLimit, kNoJoint, 0, saturate(peak / dt), limit_q8};
 }
 
+// The acceleration is linear between two knots, so one of its ends is the largest. A quarter more than the limit is for
+// the cubic, which bends a little more than the smooth path that was sampled; the rest is what rounded knots make of
+// it.
+Verdict check_acceleration(const Span& span, int32_t limit_q8) {
+    const int64_t dt = span.dt_us;
+    const int64_t slope = 6 * kMicro * (static_cast<int64_t>(span.p1_q8) - span.p0_q8) / dt;
+    const int64_t first = slope - 4 * static_cast<int64_t>(span.v0_q8) - 2 * static_cast<int64_t>(span.v1_q8);
+    const int64_t last = -slope + 2 * static_cast<int64_t>(span.v0_q8) + 4 * static_cast<int64_t>(span.v1_q8);
+    const int64_t peak = (magnitude(first) > magnitude(last) ? magnitude(first) : magnitude(last)) * kMicro / dt;
+    const int64_t rounding = 6 * kMicro * kMicro / (dt * dt) + 4 * kMicro / dt;
+    if (peak <= limit_q8 + static_cast<int64_t>(limit_q8) / 4 + rounding) return Verdict{};
+    return Verdict{Code::AccelerationLimit, kNoJoint, 0, saturate(peak), limit_q8};
+}
+
 // The four Bezier ordinates of a cubic; it stays within their hull. All in Q16 steps.
 struct Hull {
     int64_t b0, b1, b2, b3;
@@ -88,7 +102,8 @@ Verdict check_position(const Span& span, const JointLimits& limits) {
 }  // namespace
 
 Verdict check_span(const Span& span, const JointLimits& limits) {
-    const Verdict verdict = check_velocity(span, limits.velocity_q8);
+    Verdict verdict = check_velocity(span, limits.velocity_q8);
+    if (verdict.is_ok()) verdict = check_acceleration(span, limits.acceleration_q8);
     return verdict.is_ok() ? check_position(span, limits) : verdict;
 }
 

@@ -11,6 +11,7 @@ struct JointLimits {
     int32_t lower_q8;
     int32_t upper_q8;
     int32_t velocity_q8;
+    int32_t acceleration_q8;
 };
 
 struct Span {

@@ -24,7 +24,8 @@ void Machine::begin(DeviceConfig& config, const Identity& identity, const Sink& 
     rules_.joints = config.joints;
     for (uint8_t j = 0; j < rules_.joints; ++j) {
         const JointConfig& joint = config.joint[j];
-        rules_.limits[j] = JointLimits{joint.lower_q8, joint.upper_q8, velocity_limit_q8(config, j)};
+        rules_.limits[j] =
+            JointLimits{joint.lower_q8, joint.upper_q8, velocity_limit_q8(config, j), joint.max_acceleration_q8};
     }
     begin_inputs();
     begin_outputs();

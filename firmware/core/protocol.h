@@ -51,6 +51,7 @@ enum class Code : uint8_t {
     EstopPressed,
     NoHoming,
     BadArgument,
+    AccelerationLimit,
 };
 
 enum class Mode : uint8_t { Boot, Unreferenced, Homing, Idle, Run, Hold, Fault, EStop };

@@ -28,7 +28,8 @@ const char* name_of(Code code) {
                                       "NOT_ARMED",
                                       "ESTOP_PRESSED",
                                       "NO_HOMING",
-                                      "BAD_ARGUMENT"};
+                                      "BAD_ARGUMENT",
+                                      "ACCELERATION_LIMIT"};
     return kNames[static_cast<uint8_t>(code)];
 }
 

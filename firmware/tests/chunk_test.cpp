@@ -139,6 +139,7 @@ TEST(Chunk, OfAnUnreferencedDeviceIsRefused) {
 TEST(Chunk, MayOvershootNoSoftLimitBetweenItsKnots) {
     DeviceConfig config = two_joints();
     config.joint[0].upper_q8 = 100 * 256;
+    config.joint[0].max_acceleration_q8 = 1 << 30;
     Rig rig(config);
     ChunkSpec chunk;
     chunk.first = chunk.last = true;

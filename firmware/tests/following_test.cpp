@@ -57,6 +57,7 @@ TEST(Following, AndAStreamDoNotMix) {
     Wired wired(open_field(), {0, 0}, true);
     ChunkSpec chunk;
     chunk.first = true;
+    chunk.dt_us = 200000;
     chunk.rows = {Row{{0, 0}, {0, 0}}, Row{{2560, 0}, {0, 0}}};
     ASSERT_EQ(wired.follow(2000, 0), Code::Ok);
     wired.run_ms(100);

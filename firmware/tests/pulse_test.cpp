@@ -70,6 +70,7 @@ TEST(Pulses, NeverComeBeforeDirHasBeenStillForItsSetUpTime) {
     for (uint32_t setup_us : {0u, 5u, 20u, 21u, 100u}) {
         DeviceConfig config = two_joints();
         config.joint[0].dir_setup_us = config.joint[1].dir_setup_us = setup_us;
+        config.joint[0].max_acceleration_q8 = config.joint[1].max_acceleration_q8 = 1 << 30;
         Rig rig(config);
         // There and back within one stream: the direction turns at full swing of both joints.
         ChunkSpec chunk;

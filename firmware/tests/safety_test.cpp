@@ -30,6 +30,7 @@ DeviceConfig open_field() {
 ChunkSpec start_chunk() {
     ChunkSpec chunk;
     chunk.first = true;
+    chunk.dt_us = 100000;
     chunk.rows = {Row{{0, 0}, {0, 0}}, Row{{256, 0}, {0, 0}}};
     return chunk;
 }

@@ -217,6 +217,7 @@ TEST(TextMode, IsNotReadyWhileAStreamIsPlayed) {
     Speaker speaker;
     rig::ChunkSpec chunk;
     chunk.first = true;
+    chunk.dt_us = 100000;
     chunk.rows = {{{0, 0}, {0, 0}}, {{256, 0}, {0, 0}}};
     ASSERT_EQ(speaker.rig.send(chunk).code, Code::Ok);
     EXPECT_EQ(speaker.say(1), "<NAK,1,NOT_READY>");

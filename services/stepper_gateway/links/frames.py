@@ -71,6 +71,7 @@ class Code(IntEnum):
     ESTOP_PRESSED = 18
     NO_HOMING = 19
     BAD_ARGUMENT = 20
+    ACCELERATION_LIMIT = 21
 
 
 class StateFlag(IntFlag):
