@@ -1,6 +1,7 @@
 """No message that can be decoded, however odd, stops the logger or the visualizer."""
 
 import enum
+import operator
 import types
 import typing
 
@@ -77,7 +78,7 @@ URDF = """<robot name="r"><link name="a"/><link name="b"/>
 HANDLERS = {
     "joint_states": "on_joint_state", "joint_commands": "on_joint_command", "step_errors": "on_step_errors",
     "planned_path": "on_planned_path", "device/status": "on_device_status", "device/state": "on_device_state",
-    "device/events": "on_event", "log": "on_log",
+    "device/events": "journal.on_event", "log": "journal.on_log",
 }  # fmt: skip
 
 
@@ -88,7 +89,7 @@ def test_the_visualizer_shows_any_message_of_a_topic(topic):
     def show(received):
         core = Visualizer(parse_urdf(URDF), "r", "b")
         for message in received:
-            getattr(core, HANDLERS[topic.key])(message)
+            operator.attrgetter(HANDLERS[topic.key])(core)(message)
         for update in (*core.step(START), *core.step(START + SECOND)):
             assert update.entity
 

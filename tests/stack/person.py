@@ -9,9 +9,8 @@ from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceMode
 from schemas.joints import JointState
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.planning import JointGoal, PlanCode, PlanRequest
-from schemas.topics import DEVICE_COMMAND, DEVICE_STATE, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, PLAN
+from schemas.topics import DEVICE_COMMAND, DEVICE_SHAFT, DEVICE_STATE, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, PLAN
 from services.arm.description import load_arm
-from services.cli.device import reference_request
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.errors import GoalRefused, NoAnswer, Refused
 from services.runtime.node import Node
@@ -33,6 +32,7 @@ class Operator:
         self.node.subscribe(JOINT_STATES, self._see)
         self.follow = self.node.action(FOLLOW_JOINT_TRAJECTORY)
         self.device = self.node.latest(DEVICE_STATE)
+        self.shaft = self.node.latest(DEVICE_SHAFT)
 
     def close(self):
         self.node.close()
@@ -103,13 +103,21 @@ class Operator:
         self.wait_for(lambda: self.device.message is not None and not self.device.is_stale, 1.0)
         match self.device.message.mode:
             case DeviceMode.UNREFERENCED:
-                request = reference_request(self.arm, ())
+                request = self._where_it_stands()
             case DeviceMode.HOLD:
                 request = DeviceCommandRequest(command=DeviceCommandKind.STOP)
             case _:
                 return []
         answer = self.node.call(DEVICE_COMMAND, request, timeout=3.0)
         return [request.command] if answer.accepted else []
+
+    def _where_it_stands(self):
+        """A person looks at the arm before declaring: a virtual one says where its shafts are."""
+        self.wait_for(lambda: self.shaft.message is not None and not self.shaft.is_stale, 2.0)
+        seen = self.shaft.message
+        positions = dict(zip(seen.name, seen.position, strict=True))
+        clamped = tuple(joint.clamp(positions[joint.name]) for joint in self.arm.joints)
+        return DeviceCommandRequest(command=DeviceCommandKind.REFERENCE, name=self.arm.joint_names, position=clamped)
 
 
 def jumps(arm, states):
