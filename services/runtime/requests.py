@@ -109,7 +109,7 @@ def call(bus: Bus, request: Request[Q, R], question: Q, timeout: float) -> R:
     except Empty:
         answer = None
     if answer is None:
-        raise NoAnswer(f"{request.server} did not answer {request.key} within {timeout:g} s: is it busy, or gone?")
+        raise NoAnswer(_silent(bus, request, timeout))
     return response_in(request, answer)
 
 
@@ -125,7 +125,18 @@ def response_in(request: Request[Q, R], answer: Answer) -> R:
     raise Refused(failure.message, failure.kind)
 
 
+def _silent(bus: Bus, request: Request[Q, R], timeout: float) -> str:
+    """Who is known to serve may be forgotten a moment after the router has gone: so its absence is looked for first."""
+    if not bus.is_connected:
+        return _away(request)
+    return f"{request.server} did not answer {request.key} within {timeout:g} s: is it busy, or gone?"
+
+
+def _away(request: Request[Q, R]) -> str:
+    return f"{request.key}: the router is away; start it with `make up`"
+
+
 def _nobody(bus: Bus, request: Request[Q, R]) -> str:
     if not bus.is_connected:
-        return f"{request.key}: the router is away; start it with `make up`"
+        return _away(request)
     return f"nobody serves {request.key}: is {request.server} running? `gemelo node list` shows who is"

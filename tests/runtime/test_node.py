@@ -19,7 +19,9 @@ from schemas.system import Empty, LogRecord, NodeStatistics, Parameter, Paramete
 from schemas.topics import COMMAND_ACKS, DESCRIPTION, JOINT_STATES, LOG, PLAN, STATISTICS, Request
 from services.runtime.bus import Answer
 from services.runtime.errors import NoAnswer, NodeNameTaken, Refused
+from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
+from services.runtime.requests import call
 from tests.runtime.support import Buses, hear, spinning, until
 
 
@@ -197,6 +199,14 @@ def test_nobody_and_a_silent_server_are_told_apart(buses: Buses) -> None:
     server.serve(PLAN, lambda request: PlanResponse())  # and does not spin
     with pytest.raises(NoAnswer, match="did not answer plan within"):
         client.call(PLAN, PlanRequest(), timeout=0.3)
+
+
+def test_a_router_that_goes_while_an_answer_is_awaited_is_named_and_not_the_server() -> None:
+    network = MemoryNetwork()
+    server, client = MemoryBus(network), MemoryBus(network)
+    server.serve(PLAN.key, lambda query: setattr(network, "is_connected", False))
+    with pytest.raises(NoAnswer, match="the router is away"):
+        call(client, PLAN, PlanRequest(), 0.1)
 
 
 def test_an_answer_that_comes_too_late_harms_nobody(buses: Buses) -> None:
