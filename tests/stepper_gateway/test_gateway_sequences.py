@@ -287,3 +287,14 @@ def test_whatever_the_sequence_the_arm_stays_safe_and_every_goal_ends(
         play.wait(wait)
     settle(play)
     assert_next_goal_succeeds(play)
+
+
+def test_a_path_that_is_judged_from_within_a_motion_is_judged_as_it_was() -> None:
+    play = Play(Wire(), seed=0)
+    for act, wait in ((stream((0.0, 0.0, 0.0), 0.1, 7, 0.02), 0.03), (planned((0.0, 0.0, 0.0), 0.0, 0.0, 0.0), 0.05)):
+        act(play)
+        play.wait(wait)
+    assert play.rig.device.moving
+    play.quiet_since = len(play.rig.path)
+    play.rig.run(4.0)
+    play.finish_track()
