@@ -14,13 +14,13 @@ from services.arm.description import Arm
 from services.bench.arms import parol6, rm1
 from services.bench.figure import Figure, Goal, of_samples, quantile
 from services.bench.plan_scenes import SCENES
-from services.planner.clearance import CLEARANCE
 from services.planner.core import Planner
-from services.planner.goals import Goals
-from services.planner.ompl_search import ompl_corners
-from services.planner.validity import CoalValidity
-from services.planner.way import Deadline, NoWay
-from services.planner.world import World
+from services.planner.goals.goals import Goals
+from services.planner.scene.clearance import CLEARANCE
+from services.planner.scene.world import World
+from services.planner.search.ompl_search import ompl_corners
+from services.planner.search.validity import CoalValidity
+from services.planner.search.way import Deadline, NoWay
 
 UNIT = "ms"
 GOAL = Goal(median=2.0, p99=20.0)

@@ -14,8 +14,8 @@ from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.arm.transforms import inverse, multiply
 from services.bench.postures import random_postures
-from services.planner.ik import InverseKinematics, never
-from services.planner.targets import Target
+from services.planner.goals.ik import InverseKinematics, never
+from services.planner.goals.targets import Target
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from services.cli.exits import CommandError, ExitCode, usage
 if TYPE_CHECKING:
     from services.arm.collision_matrix import Verdict
 
-FIT = "services.planner.collision_fit"  # in a process of its own: the command line loads no planner
+FIT = "services.planner.covers.collision_fit"  # in a process of its own: the command line loads no planner
 
 
 def fit(folder: Path, bulge: float) -> ExitCode:

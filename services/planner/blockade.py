@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from schemas.message import Vector
 from schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
 from services.arm.description import Arm
-from services.planner.clearance import CLEARANCE, ROUNDING, first_collision, last_free
-from services.planner.goals import Goals
+from services.planner.goals.goals import Goals
 from services.planner.refusals import NoPlan, in_collision
-from services.planner.surroundings import Surroundings
-from services.planner.way import Start
+from services.planner.scene.clearance import CLEARANCE, ROUNDING, first_collision, last_free
+from services.planner.scene.surroundings import Surroundings
+from services.planner.search.way import Start
 
 Array = NDArray[np.float64]
 

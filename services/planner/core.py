@@ -25,20 +25,20 @@ from schemas.planning import (
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.blockade import Blockade
-from services.planner.clearance import CLEARANCE, first_collision
 from services.planner.finish import Finished, Finisher, Touching
-from services.planner.goals import Goals, timed_out
-from services.planner.profile import JointLimits, joint_limits
+from services.planner.goals.goals import Goals, timed_out
 from services.planner.refusals import NoPlan, malformed, no_way_around, scaling_refused
-from services.planner.search import Search, require_known
+from services.planner.scene.clearance import CLEARANCE, first_collision
+from services.planner.scene.surroundings import Surroundings
+from services.planner.scene.world import World
+from services.planner.search.search import Search, require_known
+from services.planner.search.via import Errand, Via
+from services.planner.search.way import STRAIGHT, Deadline, NoWay, Start, endless
 from services.planner.start import resolve_start
-from services.planner.surroundings import Surroundings
 from services.planner.times import Stopwatch
-from services.planner.tool_motions import ToolMotions
-from services.planner.verify import sample
-from services.planner.via import Errand, Via
-from services.planner.way import STRAIGHT, Deadline, NoWay, Start, endless
-from services.planner.world import World
+from services.planner.timing.profile import JointLimits, joint_limits
+from services.planner.tool.tool_motions import ToolMotions
+from services.planner.verify.verify import sample
 
 Array = NDArray[np.float64]
 

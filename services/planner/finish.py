@@ -10,16 +10,16 @@ import numpy as np
 from schemas.motion import JointTrajectory
 from schemas.planning import PlanRequest, StepMargin, StepPolicy, Timing
 from services.arm.description import Arm
-from services.planner.clearance import Sweeper
-from services.planner.curve import TurnsOnTheSpot
-from services.planner.feasibility import feasible_scale, require_feasible, slowed
-from services.planner.profile import JointLimits, NoProfile, straight_line
 from services.planner.refusals import NoPlan, not_verified
-from services.planner.smoothing import stopping
+from services.planner.scene.clearance import Sweeper
+from services.planner.search.curve import TurnsOnTheSpot
+from services.planner.search.smoothing import stopping
+from services.planner.search.way import Array, Start, Way
 from services.planner.times import Stopwatch
-from services.planner.timing import timed_way
-from services.planner.verify import BadTrajectory, require_ends, require_jerk, require_within_limits, sample
-from services.planner.way import Array, Start, Way
+from services.planner.timing.profile import JointLimits, NoProfile, straight_line
+from services.planner.timing.timing import timed_way
+from services.planner.verify.feasibility import feasible_scale, require_feasible, slowed
+from services.planner.verify.verify import BadTrajectory, require_ends, require_jerk, require_within_limits, sample
 
 
 class Touching(Exception):
@@ -68,7 +68,7 @@ class Finisher:
         names = self._arm.joint_names
         with self._watch.phase("timing"):
             if self._request.timing is Timing.TIME_OPTIMAL:
-                from services.planner.time_optimal import time_optimal_way
+                from services.planner.timing.time_optimal import time_optimal_way
 
                 trajectory = _timed(lambda: time_optimal_way(names, control, self._limits))
             else:

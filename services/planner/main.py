@@ -9,11 +9,11 @@ from schemas.planning import PlanCode, PlanRequest, PlanResponse
 from schemas.topics import FK, IK, JOINT_STATES, PLAN, PLANNED_PATH
 from services.arm.description import load_arm
 from services.planner.core import Planner
-from services.planner.jog_service import JogService
-from services.planner.kinematic_requests import KinematicRequests
-from services.planner.scene_keeper import SceneKeeper
+from services.planner.goals.kinematic_requests import KinematicRequests
+from services.planner.jog.jog_service import JogService
+from services.planner.scene.scene_keeper import SceneKeeper
 from services.planner.start import STALE_AFTER
-from services.planner.workers import Workers
+from services.planner.workers.workers import Workers
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node

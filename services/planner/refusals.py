@@ -8,7 +8,7 @@ from schemas.message import Vector
 from schemas.planning import PlanCode, Refusal
 from services.arm.description import Arm, Joint
 from services.arm.errors import nearest_name, suggestion
-from services.planner.way import Why
+from services.planner.search.way import Why
 
 Point = Sequence[float]
 

@@ -26,7 +26,7 @@ from schemas.topics import JOINT_STATES, SCENE
 from services.cli import session as session_module
 from services.cli.exits import ExitCode
 from services.cli.main import run
-from services.planner.scene_keeper import SceneKeeper
+from services.planner.scene.scene_keeper import SceneKeeper
 from services.runtime.memory_bus import MemoryBus
 from services.runtime.node import Node
 

@@ -14,8 +14,8 @@ from schemas.planning import JogCommand, JogStatus
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics
-from services.planner.jog import PERIOD, Jog
-from services.planner.world import World
+from services.planner.jog.jog import PERIOD, Jog
+from services.planner.scene.world import World
 from services.stepper_gateway.knots import Knot
 from services.stepper_gateway.limits import Limits
 from services.stepper_gateway.tracking import Tracker

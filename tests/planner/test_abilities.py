@@ -12,11 +12,11 @@ import pytest
 from schemas.planning import PoseGoal
 from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics
-from services.planner.abilities import Abilities, abilities
-from services.planner.goals import Goals
-from services.planner.ik import never
+from services.planner.goals.abilities import Abilities, abilities
+from services.planner.goals.goals import Goals
+from services.planner.goals.ik import never
+from services.planner.goals.targets import Pointing, Target
 from services.planner.refusals import NoPlan
-from services.planner.targets import Pointing, Target
 
 ROOT = Path(__file__).parents[2] / "urdf"
 

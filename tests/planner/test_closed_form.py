@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics
-from services.planner.closed_form import closed_form, turns_about
-from services.planner.ik import InverseKinematics, never
-from services.planner.targets import Target
+from services.planner.goals.closed_form import closed_form, turns_about
+from services.planner.goals.ik import InverseKinematics, never
+from services.planner.goals.targets import Target
 
 ROOT = Path(__file__).parents[2] / "urdf"
 PAROL6 = load_arm(ROOT / "parol6")

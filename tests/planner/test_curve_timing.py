@@ -13,14 +13,14 @@ from ruckig import InputParameter, Result, Ruckig, Trajectory
 from services.arm.description import load_arm
 from services.arm.kinematics import Kinematics
 from services.bench.plan_scenes import SCENES
-from services.planner import timing
-from services.planner.curve import smooth_runs
-from services.planner.profile import joint_limits
-from services.planner.smoothing import smooth, stopping
-from services.planner.time_optimal import time_optimal_way
-from services.planner.timing import timed_way
-from services.planner.verify import limit_shares, require_ends, sample
-from services.planner.world import World
+from services.planner.scene.world import World
+from services.planner.search.curve import smooth_runs
+from services.planner.search.smoothing import smooth, stopping
+from services.planner.timing import timing
+from services.planner.timing.profile import joint_limits
+from services.planner.timing.time_optimal import time_optimal_way
+from services.planner.timing.timing import timed_way
+from services.planner.verify.verify import limit_shares, require_ends, sample
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")
 LOWER = np.array([joint.lower for joint in ARM.joints])

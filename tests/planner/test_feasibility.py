@@ -17,7 +17,9 @@ from schemas.planning import StepMargin
 from schemas.robot import PullOut
 from services.arm.description import Arm
 from services.arm.device_config import device_config
-from services.planner.feasibility import (
+from services.planner.refusals import NoPlan
+from services.planner.timing.profile import joint_limits, straight_line
+from services.planner.verify.feasibility import (
     feasible_scale,
     margins,
     queue_share,
@@ -26,9 +28,7 @@ from services.planner.feasibility import (
     slowed,
     step_stream,
 )
-from services.planner.profile import joint_limits, straight_line
-from services.planner.refusals import NoPlan
-from services.planner.verify import at_times
+from services.planner.verify.verify import at_times
 from services.stepper_gateway.links.frames import Chunk, ChunkFlag, Heartbeat, encode
 
 FAR = (1.5, -1.2, 0.1)

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from services.arm.description import load_arm
 from services.arm.kinematics import Kinematics
-from services.planner.ik import InverseKinematics, never
-from services.planner.targets import Target
+from services.planner.goals.ik import InverseKinematics, never
+from services.planner.goals.targets import Target
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 KINEMATICS = Kinematics(ARM)

@@ -14,10 +14,10 @@ from schemas.joints import JointState
 from schemas.planning import FkRequest, IkRequest, IkResponse, PlanCode, PoseGoal
 from services.arm.description import load_arm
 from services.arm.kinematics import Kinematics
-from services.planner.clearance import CLEARANCE
-from services.planner.ik import InverseKinematics, never
-from services.planner.kinematic_requests import KinematicRequests
-from services.planner.targets import Target
+from services.planner.goals.ik import InverseKinematics, never
+from services.planner.goals.kinematic_requests import KinematicRequests
+from services.planner.goals.targets import Target
+from services.planner.scene.clearance import CLEARANCE
 
 ROOT = Path(__file__).parents[2] / "urdf"
 RM1, PAROL6 = load_arm(ROOT / "rm1"), load_arm(ROOT / "parol6")

@@ -18,11 +18,11 @@ from schemas.joints import JointState
 from schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Timing
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.description import load_arm
-from services.planner import worker
-from services.planner import workers as module
 from services.planner.core import Planner
-from services.planner.jobs import Job
-from services.planner.workers import Workers
+from services.planner.workers import worker
+from services.planner.workers import workers as module
+from services.planner.workers.jobs import Job
+from services.planner.workers.workers import Workers
 
 PROJECT = Path(__file__).parents[2]
 HOME = JointState(name=("brazo_joint", "antebrazo_joint", "efector_joint"), position=(0.0, 0.0, 0.0))
@@ -160,7 +160,7 @@ def test_one_client_does_not_block_another(stack: Stack):
 def test_nothing_is_left_of_a_planner_that_is_killed_while_it_plans():
     code = (
         "import time; from pathlib import Path; from schemas.planning import *; from schemas.joints import JointState;"
-        "from schemas.scene import PlanningScene; from services.planner.workers import Workers;"
+        "from schemas.scene import PlanningScene; from services.planner.workers.workers import Workers;"
         f"scene = PlanningScene(); project = Path({str(PROJECT)!r});"
         "w = Workers(project / 'urdf/rm1', project, lambda: (None, 0.0), lambda: scene);"
         f"home = JointState(name={HOME.name!r}, position=(0.0, 0.0, 0.0));"

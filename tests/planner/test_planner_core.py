@@ -14,8 +14,8 @@ from schemas.joints import JointState
 from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
 from services.arm.description import Arm, load_arm
 from services.planner.core import Planner
-from services.planner.profile import joint_limits
-from services.planner.verify import require_within_limits, sample
+from services.planner.timing.profile import joint_limits
+from services.planner.verify.verify import require_within_limits, sample
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 PLANNER = Planner(ARM)

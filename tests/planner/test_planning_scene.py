@@ -10,7 +10,7 @@ from schemas.planning import JointGoal, PlanCode, PlanRequest, PointToPoint, Pos
 from schemas.scene import AllowedPair, BoxShape, PlanningScene, SceneObject, SphereShape
 from services.arm.description import Arm
 from services.planner.core import Planner
-from services.planner.world import Positions, World
+from services.planner.scene.world import Positions, World
 
 GOAL = JointGoal(name=("brazo_joint",), position=(1.2,))
 REQUEST = PlanRequest(goal=GOAL, motion=PointToPoint())

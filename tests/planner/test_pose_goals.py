@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from schemas.planning import PlanCode, PoseGoal, Refusal
 from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics, Pose
-from services.planner.goals import Goals, Start
-from services.planner.ik import never
+from services.planner.goals.goals import Goals, Start
+from services.planner.goals.ik import never
 from services.planner.refusals import NoPlan
 
 ROOT = Path(__file__).parents[2] / "urdf"

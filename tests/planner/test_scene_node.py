@@ -19,7 +19,7 @@ from schemas.topics import CONTACTS, JOINT_STATES, PLAN, SCENE, SCENE_EDIT
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.main import run
-from services.planner.scene_file import load_scene, save_scene
+from services.planner.scene.scene_file import load_scene, save_scene
 from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
 from services.runtime.stopping import StopRequest

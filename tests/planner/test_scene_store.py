@@ -28,9 +28,9 @@ from schemas.scene import (
 from services.arm.chain import link_transforms
 from services.arm.description import load_arm
 from services.arm.transforms import compose, from_message, to_message
-from services.planner.scene_check import require_scene
-from services.planner.scene_file import DamagedScene, load_scene, put_aside, save_scene
-from services.planner.scene_store import SceneStore
+from services.planner.scene.scene_check import require_scene
+from services.planner.scene.scene_file import DamagedScene, load_scene, put_aside, save_scene
+from services.planner.scene.scene_store import SceneStore
 
 Poses = Mapping[str, Transform]
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")

@@ -10,10 +10,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from services.arm.kinematics import Pose
-from services.planner.arcs import arc_about, arc_through
-from services.planner.path_curve import CubicSpline, rounded_runs
 from services.planner.refusals import NoPlan
-from services.planner.tool_path import NO_WAY, ToolPath, polyline
+from services.planner.tool.arcs import arc_about, arc_through
+from services.planner.tool.path_curve import CubicSpline, rounded_runs
+from services.planner.tool.tool_path import NO_WAY, ToolPath, polyline
 
 NUMBERS = st.floats(-1.0, 1.0).map(lambda value: round(value, 4))
 POINTS = st.tuples(NUMBERS, NUMBERS, NUMBERS).map(np.array)

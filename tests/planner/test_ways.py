@@ -19,11 +19,11 @@ from schemas.scene import MeshShape, PlanningScene, SceneObject
 from services.arm.description import load_arm
 from services.bench.plan_scenes import SCENES, box
 from services.planner.core import Planner
-from services.planner.native_scene import native_scene
-from services.planner.profile import joint_limits
-from services.planner.search import KNOWN
-from services.planner.verify import limit_shares, require_ends, sample
-from services.planner.world import World
+from services.planner.scene.world import World
+from services.planner.search.native_scene import native_scene
+from services.planner.search.search import KNOWN
+from services.planner.timing.profile import joint_limits
+from services.planner.verify.verify import limit_shares, require_ends, sample
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.scenes import star_mesh
 

@@ -15,10 +15,10 @@ from schemas.joints import JointState
 from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
 from services.arm.description import Joint, load_arm
 from services.planner.core import Planner
-from services.planner.ik import InverseKinematics, never
-from services.planner.profile import joint_limits
-from services.planner.targets import Target
-from services.planner.verify import require_within_limits, sample
+from services.planner.goals.ik import InverseKinematics, never
+from services.planner.goals.targets import Target
+from services.planner.timing.profile import joint_limits
+from services.planner.verify.verify import require_within_limits, sample
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")
 PLANNER = Planner(ARM)

@@ -4,10 +4,10 @@ Lengths in m, angles in rad, everything in the arm's base frame; joint values (n
 Importing it raises `NativeMissing`, an ImportError, where the core has not been built.
 """
 
+from services.planner.covers.shapes import Attachment, Mesh, Shape, ShapeKind
 from services.planner.native.core import Contact, MotionCore
 from services.planner.native.library import CancelFlag, NativeMissing
 from services.planner.native.paths import FreePath, NoPath, Why
-from services.planner.shapes import Attachment, Mesh, Shape, ShapeKind
 
 __all__ = [
     "Attachment",

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.description import Arm
-from services.planner.link_spheres import cover_shapes, link_shapes
+from services.planner.covers.link_spheres import cover_shapes, link_shapes
+from services.planner.covers.shapes import Attachment, Shape
+from services.planner.covers.spheres import BULGE, Cover
 from services.planner.native.chain import frames_of
 from services.planner.native.library import motion
 from services.planner.native.obstacles import obstacle_of
-from services.planner.shapes import Attachment, Shape
-from services.planner.spheres import BULGE, Cover
 
 Array = NDArray[np.float64]
 

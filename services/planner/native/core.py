@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from services.arm.description import Arm
+from services.planner.covers.shapes import Attachment, Shape
+from services.planner.covers.spheres import BULGE, Cover
 from services.planner.native.assembly import Assembly
 from services.planner.native.library import CancelFlag, motion
 from services.planner.native.paths import Effort, FreePath, NoPath, Why
-from services.planner.shapes import Attachment, Shape
-from services.planner.spheres import BULGE, Cover
 
 Array = NDArray[np.float64]
 

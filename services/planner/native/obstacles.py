@@ -7,9 +7,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from services.planner.covers.shapes import Mesh, Shape, ShapeKind
 from services.planner.native.chain import transform_row
 from services.planner.native.library import motion
-from services.planner.shapes import Mesh, Shape, ShapeKind
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ import pinocchio as pin
 import pytest
 
 from services.arm.kinematics import Kinematics
+from services.planner.covers.shapes import ShapeKind
 from services.planner.native import MotionCore
 from services.planner.native.library import motion
-from services.planner.shapes import ShapeKind
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import random_shape
 

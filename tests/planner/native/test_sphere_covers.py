@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.planner.link_spheres import cover_shapes, link_shapes
-from services.planner.shapes import Shape, ShapeKind
-from services.planner.solids import Box, Capsule, Cylinder, Solid
-from services.planner.spheres import cover_of, mesh_cover
+from services.planner.covers.link_spheres import cover_shapes, link_shapes
+from services.planner.covers.shapes import Shape, ShapeKind
+from services.planner.covers.solids import Box, Capsule, Cylinder, Solid
+from services.planner.covers.spheres import cover_of, mesh_cover
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import star_mesh
 

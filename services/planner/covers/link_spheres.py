@@ -1,0 +1,91 @@
+"""The collision shapes of an arm's links, and the spheres that cover them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+from services.arm.errors import DescriptionError
+from services.planner.covers.shapes import Mesh, Shape, ShapeKind
+from services.planner.covers.solids import Box, Capsule, Cylinder, Solid
+from services.planner.covers.spheres import Cover, cover_of, mesh_cover
+
+Array = NDArray[np.float64]
+Form = tuple[ShapeKind, tuple[float, ...], Mesh | None]
+
+
+def link_shapes(arm: Arm) -> dict[str, tuple[Shape, ...]]:
+    """The collision shapes of every link that has any, in the link's frame; pinocchio drops what it does not know
+    WITHOUT an error, so they are counted, and `DescriptionError` is raised where one is missing."""
+    model = pin.buildModelFromUrdf(str(arm.urdf_path))
+    kind = pin.GeometryType.COLLISION
+    geometry = pin.buildGeomFromUrdf(model, str(arm.urdf_path), kind, package_dirs=[str(arm.folder)])
+    expected = sum(len(link.collisions) for link in arm.model.links)
+    if geometry.ngeoms != expected or expected == 0:
+        raise DescriptionError(
+            f"{arm.urdf_path}: {geometry.ngeoms} of {expected} collision shapes could be loaded; use box, cylinder, "
+            "sphere or mesh"
+        )
+    shapes: dict[str, tuple[Shape, ...]] = {}
+    for item in geometry.geometryObjects:
+        frame = model.frames[item.parentFrame]
+        placement = frame.placement.actInv(item.placement)
+        x, y, z, w = pin.Quaternion(placement.rotation).coeffs().tolist()
+        form, size, mesh = _form_of(item.geometry, frame.name)
+        shape = Shape(item.name, form, size, (tuple(placement.translation.tolist()), (x, y, z, w)), mesh)
+        shapes[frame.name] = (*shapes.get(frame.name, ()), shape)
+    return shapes
+
+
+def cover_shapes(shapes: Sequence[Shape], bulge: float) -> Cover:
+    """The spheres of several shapes in the frame that their poses are in; raises ValueError for one without an end."""
+    covers = [_placed(shape, bulge) for shape in shapes]
+    return Cover(np.vstack([cover.spheres for cover in covers]), max(cover.bulge for cover in covers))
+
+
+def _form_of(geometry: coal.CollisionGeometry, link: str) -> Form:
+    """A shape of coal's as one of ours."""
+    match geometry:
+        case coal.Box():
+            return ShapeKind.BOX, tuple((2.0 * geometry.halfSide).tolist()), None
+        case coal.Cylinder():
+            return ShapeKind.CYLINDER, (float(geometry.radius), 2.0 * float(geometry.halfLength)), None
+        case coal.Capsule():
+            return ShapeKind.CAPSULE, (float(geometry.radius), 2.0 * float(geometry.halfLength)), None
+        case coal.Sphere():
+            return ShapeKind.SPHERE, (float(geometry.radius),), None
+        case coal.BVHModelBase():
+            vertices = np.array([geometry.vertex(i) for i in range(geometry.num_vertices)]).reshape(-1, 3)
+            triangles = map(geometry.tri_indices, range(geometry.num_tris))
+            faces = np.array([[triangle[k] for k in range(3)] for triangle in triangles], dtype=np.int32)
+            return ShapeKind.MESH, (), Mesh(vertices, faces)
+    raise DescriptionError(
+        f'link "{link}": there are no spheres for a {type(geometry).__name__}; use box, cylinder, sphere or mesh'
+    )
+
+
+def _placed(shape: Shape, bulge: float) -> Cover:
+    cover = mesh_cover(*shape.mesh.arrays, bulge) if shape.mesh else cover_of(_solid(shape), bulge)
+    spheres = cover.spheres.copy()
+    spheres[:, :3] = spheres[:, :3] @ shape.rotation.T + shape.pose[0]
+    spheres[:, 3] += shape.padding
+    return Cover(spheres, cover.bulge)
+
+
+def _solid(shape: Shape) -> Solid:
+    size = shape.size
+    match shape.kind:
+        case ShapeKind.BOX:
+            return Box((0.5 * size[0], 0.5 * size[1], 0.5 * size[2]))
+        case ShapeKind.SPHERE:
+            return Capsule(size[0], 0.0)
+        case ShapeKind.CYLINDER:
+            return Cylinder(size[0], 0.5 * size[1])
+        case ShapeKind.CAPSULE:
+            return Capsule(size[0], 0.5 * size[1])
+    raise ValueError(f'"{shape.name}": a {shape.kind} has no end and cannot be covered')

@@ -1,0 +1,136 @@
+"""Inverse kinematics in closed form for arms that EAIK can decompose (Ostermeier, Külz, Althoff 2025, RA-L 10(10)).
+
+The arm is given to it as the axes of its joints at zero, read from the kinematics, and is held against them.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.goals.targets import any_normal
+
+if TYPE_CHECKING:
+    from eaik.pybindings.EAIK import Robot
+
+Array = NDArray[np.float64]
+
+JOINTS = 6  # with fewer, EAIK answers positions or pairs of turns only
+SAMPLES = 8  # postures at which EAIK's forward kinematics is held against ours
+AGREEMENT = 1e-9  # [m], and per entry of the rotation
+MOST_TURNS = 64  # combinations of full turns of one branch
+ROUNDING = 1e-9  # [rad] by which a solution may be beyond a limit before it is put onto it
+
+log = logging.getLogger(__name__)
+
+
+class ClosedForm:
+    """All postures of one arm for a full tool pose; joint values are (n,) [rad] in the arm's order."""
+
+    def __init__(self, arm: Arm, robot: Robot, order: list[int]) -> None:
+        self._robot = robot
+        self._order = order  # the arm's joints from the base to the tool
+        self._lower = np.array([joint.lower - ROUNDING for joint in arm.joints])
+        self._upper = np.array([joint.upper + ROUNDING for joint in arm.joints])
+
+    def postures(self, position: Array, rotation: Array, near: Array) -> tuple[list[Array], list[Array]]:
+        """The exact ones within the limits, with every full turn, in no order; and what EAIK calls least squares.
+
+        Those are out of reach, or, where axes coincide, a solution that lacks one turn.
+        """
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = rotation, position
+        answer = self._robot.calculate_IK(pose)
+        branches = np.empty_like(answer.Q)
+        branches[:, self._order] = answer.Q
+        is_guess = np.array(answer.is_LS, dtype=bool)
+        return self.within_limits(branches[~is_guess], near), [*branches[is_guess & np.isfinite(branches).all(axis=1)]]
+
+    def within_limits(self, branches: Array, near: Array) -> list[Array]:
+        """The branches (m, n) or one of them (n,) turned into the limits, in every way that there is."""
+        branches = np.atleast_2d(branches)
+        lower = np.where(np.isinf(self._lower), near - math.pi, self._lower)
+        upper = np.where(np.isinf(self._upper), near + math.pi, self._upper)
+        first = branches + math.tau * np.ceil((lower - branches) / math.tau)
+        more = np.floor((upper - first) / math.tau)
+        postures: list[Array] = []
+        for values, turns in zip(first, more, strict=True):
+            if turns.min() >= 0.0:  # false for what is not a number, too
+                postures.extend(_turned(values, turns) if turns.any() else [values])
+        return postures
+
+
+def _turned(values: Array, turns: Array) -> list[Array]:
+    """`values` with up to `turns` full turns added to each."""
+    while np.prod(turns + 1.0) > MOST_TURNS:
+        turns = np.minimum(turns, turns.max() - 1.0)
+    amounts = product(*(range(int(most) + 1) for most in turns))
+    return [values + math.tau * np.array(amount) for amount in amounts]
+
+
+def closed_form(arm: Arm, kinematics: Kinematics) -> ClosedForm | None:
+    """The arm's closed form, or None where it has none or EAIK is not there."""
+    if len(arm.joints) != JOINTS or any(joint.unit != "rad" for joint in arm.joints):
+        return None
+    try:
+        from eaik.pybindings.EAIK import Robot
+    except ImportError as error:
+        log.warning(f"no inverse kinematics in closed form, it is searched for instead: {error}")
+        return None
+    order = chain_order(arm)
+    pose, jacobian = kinematics.tool_and_jacobian(np.zeros(JOINTS))
+    axes = jacobian[3:, order].T
+    if not np.allclose(np.linalg.norm(axes, axis=1), 1.0, atol=AGREEMENT):
+        return None  # a mimic turns with one of them
+    # With v the tool point's velocity when a joint turns at 1 rad/s: tool + axis x v lies on the joint's axis.
+    on_axes = pose.position + np.cross(axes, jacobian[:3, order].T)
+    ways = np.diff(np.vstack((np.zeros(3), on_axes, pose.position)), axis=0)
+    robot = Robot(axes.T, ways.T, pose.rotation, [], True)
+    if not robot.has_known_decomposition() or not _agrees(arm, kinematics, robot, order):
+        return None
+    return ClosedForm(arm, robot, order)
+
+
+def turns_about(direction: Array, axis: Array, rotation: Array, count: int) -> list[Array]:
+    """`count` rotations (3, 3), evenly spread, that bring the tool's `axis` along `direction`.
+
+    The first one keeps the tool's present `rotation` about it as well as it can.
+    """
+    across = any_normal(axis)
+    wanted = rotation @ across
+    wanted = wanted - direction * float(direction @ wanted)
+    length = float(np.linalg.norm(wanted))
+    wanted = any_normal(direction) if length < 1e-6 else wanted / length
+    tool = np.column_stack((axis, across, np.cross(axis, across)))
+    side = np.cross(direction, wanted)
+    turns = (math.tau * index / count for index in range(count))
+    firsts = (math.cos(turn) * wanted + math.sin(turn) * side for turn in turns)
+    return [np.column_stack((direction, first, np.cross(direction, first))) @ tool.T for first in firsts]
+
+
+def chain_order(arm: Arm) -> list[int]:
+    """The arm's joints as they follow one another from the base to the tool."""
+    by_child = {joint.child: joint for joint in arm.model.joints}
+    link, names = arm.tool_frame, []
+    while link in by_child:
+        names.append(by_child[link].name)
+        link = by_child[link].parent
+    known = {name: index for index, name in enumerate(arm.joint_names)}
+    chain = [known[name] for name in reversed(names) if name in known]
+    return chain + [index for index in range(len(arm.joints)) if index not in chain]
+
+
+def _agrees(arm: Arm, kinematics: Kinematics, robot: Robot, order: list[int]) -> bool:
+    """Whether EAIK's forward kinematics is ours."""
+    for values in np.random.default_rng(1).uniform(-math.pi, math.pi, (SAMPLES, JOINTS)):
+        ours, theirs = kinematics.tool(values), robot.fwdkin(values[order])
+        if max(np.abs(theirs[:3, 3] - ours.position).max(), np.abs(theirs[:3, :3] - ours.rotation).max()) > AGREEMENT:
+            return False
+    return True

@@ -1,0 +1,231 @@
+"""Jogging: the newest command and where the arm is, fifty times a second, to the next target and what limits it.
+
+A target is where the arm comes to rest from the velocity it is to have: the gateway, which approaches targets at rest,
+then follows without lag, and where the targets cease the arm stops in room that was found free.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.joints import JointState, JointTargets
+from schemas.planning import JogCommand, JogStatus
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.jog.braking import Braking
+from services.planner.jog.jog_command import BadJog, JogInterpreter, Wanted
+from services.planner.jog.jog_room import Allowed, Room
+from services.planner.jog.jog_start import JogRefused, standing_position
+from services.planner.scene.world import World
+
+Array = NDArray[np.float64]
+
+PERIOD = 0.02  # [s] between two steps, however late they come: a late step makes the arm slower, never faster
+DEAD_MAN = 0.1  # [s] without a command until the arm brakes
+STATUS_PERIOD = 0.1  # [s]
+SILENCE = 0.6  # [s] without a command after which an interrupted jog may begin again; the gateway wants 0.5
+FOLLOW = 0.6  # [s] that the arm may be behind its targets, with the gateway's lead and the states' way back
+GRACE = 0.2  # [s] that it may be elsewhere
+STEPS_ASTRAY = 3.0  # [steps] that are no straying
+FADING = 1.0  # [s] in which a tool brakes on its line
+LAST = 0.02  # of the twist, that is given up off the line
+MOST_SAID = 100  # different complaints about commands; more is a client gone mad
+ARRIVAL = 1.5  # [s] that the target is repeated at most until the arm has come to rest there
+NEVER = -1.0e9  # [s]
+
+
+@dataclass(frozen=True)
+class JogOutput:
+    """What a step has to say: a target while the arm is led, a status now and then, a sentence once."""
+
+    targets: JointTargets | None = None
+    status: JogStatus | None = None
+    said: str = ""
+
+
+class Jog:
+    """Leads one arm; times are [s] of one monotonic clock."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics, world: World) -> None:
+        self._arm = arm
+        self._interpreter = JogInterpreter(kinematics)
+        self._braking = Braking(arm, PERIOD)
+        self._room = Room(arm, world, self._braking)
+        self._command = JogCommand()
+        self._heard = self._told = self._rested = self._on_way = NEVER
+        self._must_be_silent = self._is_heard = False
+        self._known: set[str] = set()  # sentences that have been said
+        self._trail: deque[tuple[float, Array]] = deque()
+        self._positions: Array | None = None  # commanded, where the jog leads; None: it leads nothing
+        self._velocity: Array = np.zeros(len(arm.joints))
+        self._scale = 1.0
+        self._wanted_now, self._allowed_now = Wanted(self._velocity), Allowed(self._velocity)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether there is anything to do for a step."""
+        return self._positions is not None or self._is_heard
+
+    @property
+    def commanded(self) -> tuple[Array, Array] | None:
+        """Position and velocity (n,) that the arm is to have now; None while it is not led."""
+        return None if self._positions is None else (self._positions.copy(), self._velocity.copy())
+
+    def set_world(self, world: World) -> None:
+        """What counts from the next step on."""
+        self._room = Room(self._arm, world, self._braking)
+
+    def on_command(self, command: JogCommand, now: float) -> None:
+        """The newest one counts."""
+        if now - self._heard > SILENCE:
+            self._must_be_silent = False
+        self._command, self._heard = command, now
+        self._is_heard = True
+
+    def step(self, now: float, stamp: int, present: JointState | None, age: float, goal_is_active: bool) -> JogOutput:
+        """One period; `present` is `age` [s] old, `stamp` is [ns] UNIX."""
+        self._is_heard = now - self._heard <= DEAD_MAN
+        if not self.is_busy:
+            return JogOutput()
+        try:
+            if self._positions is None:
+                self._begin(present, age, goal_is_active, now)
+            said = self._lead(now)
+            self._require_followed(present, age, goal_is_active, now)
+        except JogRefused as refused:
+            return self._end(str(refused), now, stamp)
+        return self._output(now, stamp, present, said)
+
+    def _begin(self, present: JointState | None, age: float, goal_is_active: bool, now: float) -> None:
+        if goal_is_active:
+            raise JogRefused("a goal is being carried out: cancel it first")
+        if self._must_be_silent:
+            raise JogRefused(f"jogging was interrupted, and nothing resumes by itself: let go for {SILENCE:g} s")
+        self._positions = np.array(standing_position(self._arm, present, age))
+        self._velocity = np.zeros(len(self._arm.joints))
+        self._trail.clear()
+        self._rested = self._on_way = now
+
+    def _lead(self, now: float) -> str:
+        """Takes the next velocity; gives what there is to say about the command."""
+        assert self._positions is not None
+        there = self._positions + 0.5 * PERIOD * self._velocity  # halfway: the tool's line bends less
+        wanted, said = self._wanted(there) if self._is_heard else (self._fading(there, now), "")
+        is_regular = partial(self._interpreter.twists.stays_regular, self._positions) if wanted.is_twist else None
+        allowed = self._room.allowed(self._positions, self._velocity, wanted.velocity, is_regular)
+        self._velocity = allowed.velocity
+        self._positions = self._positions + PERIOD * allowed.velocity
+        self._scale = wanted.scale * allowed.share
+        self._wanted_now, self._allowed_now = wanted, allowed
+        return said
+
+    def _wanted(self, positions: Array) -> tuple[Wanted, str]:
+        """A command that cannot be followed is a stop; each reason is said once."""
+        try:
+            return self._interpreter.wanted(self._command, positions), ""
+        except BadJog as error:
+            said = "" if str(error) in self._known or len(self._known) >= MOST_SAID else str(error)
+            self._known |= {said} - {""}
+            return Wanted(np.zeros(len(positions)), 0.0, (str(error),)), said
+
+    def _fading(self, positions: Array, now: float) -> Wanted:
+        """Less of the last twist, so that the tool brakes on its line; of joints, and after a while, nothing."""
+        standing = Wanted(np.zeros(len(positions)))
+        if now - self._heard > DEAD_MAN + FADING:
+            return standing
+        wanted, _ = self._wanted(positions)
+        size = float(wanted.velocity @ wanted.velocity)
+        if not wanted.is_twist or size == 0.0:
+            return standing
+        braked = self._braking.towards(self._velocity, standing.velocity)
+        share = float(braked @ wanted.velocity) / size
+        if share < LAST:
+            return standing
+        return Wanted(min(1.0, share) * wanted.velocity, is_twist=True)
+
+    def _obstacles(self, allowed: Allowed) -> tuple[str, ...]:
+        limits = (allowed.limited_by,) if allowed.limited_by else ()
+        return limits if allowed.touching is None else (*limits, self._room.names_at(allowed.touching))
+
+    def _require_followed(self, present: JointState | None, age: float, goal_is_active: bool, now: float) -> None:
+        """Raises `JogRefused` where somebody else moves the arm, or nobody does."""
+        if goal_is_active:
+            raise JogRefused("a goal has taken over")
+        if present is None or age > FOLLOW:
+            raise JogRefused("no fresh joint_states: is the stepper_gateway running?")
+        self._remember(now)
+        astray = self._astray(present)
+        if not astray:
+            self._on_way = now
+        elif now - self._on_way > GRACE:
+            raise JogRefused(f"{astray} does not follow its targets: see what `gemelo state` says of the device")
+
+    def _remember(self, now: float) -> None:
+        assert self._positions is not None
+        self._trail += ((now, self._positions), (now, self._target()))
+        while now - self._trail[0][0] > FOLLOW:
+            self._trail.popleft()
+
+    def _astray(self, present: JointState) -> str:
+        """The name of a joint that is not between its targets of late; empty if all are."""
+        trail = np.array([positions for _, positions in self._trail])
+        found = dict(zip(present.name, present.position, strict=False))
+        for column, joint in enumerate(self._arm.joints):
+            track, slack = trail[:, column], STEPS_ASTRAY * joint.steps.resolution
+            place = found.get(joint.name, float(track[-1]))
+            if not float(track.min()) - slack <= place <= float(track.max()) + slack:
+                return joint.name
+        return ""
+
+    def _target(self) -> Array:
+        """(n,) [rad] or [m] where each joint comes to rest by itself; within the limits."""
+        assert self._positions is not None
+        target = self._positions + self._braking.alone(self._velocity)
+        return np.clip(target, self._braking.lower, self._braking.upper)
+
+    def _output(self, now: float, stamp: int, present: JointState | None, said: str) -> JogOutput:
+        target = tuple(self._target().tolist())
+        targets = JointTargets(stamp=stamp, name=self._arm.joint_names, position=target)
+        if np.any(self._velocity) or self._is_heard:
+            self._rested = now
+        elif now - self._rested > ARRIVAL or (now - self._rested > DEAD_MAN and self._has_arrived(present)):
+            self._positions = None
+            return JogOutput(targets, JogStatus(stamp=stamp), said)
+        return JogOutput(targets, self._status(now, stamp), said)
+
+    def _has_arrived(self, present: JointState | None) -> bool:
+        if present is None or any(present.velocity):
+            return False
+        found = dict(zip(present.name, present.position, strict=False))
+        assert self._positions is not None
+        return all(
+            abs(found.get(joint.name, np.inf) - place) <= joint.steps.resolution
+            for joint, place in zip(self._arm.joints, self._positions.tolist(), strict=True)
+        )
+
+    def _status(self, now: float, stamp: int) -> JogStatus | None:
+        if now - self._told < STATUS_PERIOD - 0.5 * PERIOD or self._positions is None:
+            return None
+        self._told = now
+        return JogStatus(
+            stamp=stamp,
+            active=True,
+            scale=self._scale,
+            limited_by="; ".join(dict.fromkeys((*self._wanted_now.limited_by, *self._obstacles(self._allowed_now)))),
+            manipulability=self._interpreter.twists.manipulability(self._positions),
+        )
+
+    def _end(self, reason: str, now: float, stamp: int) -> JogOutput:
+        """No more targets; what was led and is interrupted begins again only after a silence."""
+        was_led, self._positions = self._positions is not None, None
+        self._velocity = np.zeros(len(self._arm.joints))
+        self._must_be_silent = self._must_be_silent or was_led
+        if not was_led and now - self._told < STATUS_PERIOD - 0.5 * PERIOD:
+            return JogOutput()
+        self._told = now
+        return JogOutput(status=JogStatus(stamp=stamp, scale=0.0, limited_by=reason), said=reason if was_led else "")

@@ -1,0 +1,100 @@
+"""What a jog command asks of the joints, before anything but their speed limits is in its way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.planning import JogCommand
+from services.arm.errors import suggestion
+from services.arm.kinematics import Kinematics
+from services.planner.jog.twist import TwistSolver
+
+Array = NDArray[np.float64]
+
+FASTEST_TWIST = 1e3  # [m/s] and [rad/s]: more is as absurd, and loses its digits
+
+
+class BadJog(ValueError):
+    """A command that cannot be followed; the text names the thing and the remedy."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """(n,) [rad/s] or [m/s] within the limits, the share of the commanded speed that it is, and what took the rest."""
+
+    velocity: Array
+    scale: float = 1.0
+    limited_by: tuple[str, ...] = ()
+    is_twist: bool = False
+
+
+class JogInterpreter:
+    """Reads the commands for one arm."""
+
+    def __init__(self, kinematics: Kinematics) -> None:
+        self._arm = kinematics.arm
+        self._kinematics = kinematics
+        self.twists = TwistSolver(kinematics)
+        self._speeds = np.array([joint.velocity for joint in self._arm.joints])
+
+    def wanted(self, command: JogCommand, positions: Array) -> Wanted:
+        """Of the arm at `positions`; raises `BadJog`."""
+        has_twist = bool(command.linear or command.angular)
+        if command.name and has_twist:
+            raise BadJog("a jog command has joints and a twist: give one of them")
+        return self._of_twist(command, positions) if has_twist else self._of_joints(command)
+
+    def _of_joints(self, command: JogCommand) -> Wanted:
+        names = self._arm.joint_names
+        if len(command.name) != len(command.velocity):
+            raise BadJog(f"a jog command names {len(command.name)} joints and gives {len(command.velocity)} velocities")
+        velocity = np.zeros(len(names))
+        for name, value in zip(command.name, command.velocity, strict=True):
+            if name not in names:
+                raise BadJog(f'{self._arm.name} has no joint "{name}"{suggestion(name, names)}')
+            if command.name.count(name) > 1:
+                raise BadJog(f'a jog command names "{name}" twice')
+            velocity[names.index(name)] = value
+        return self._clamped(velocity, 1.0, ())
+
+    def _of_twist(self, command: JogCommand, positions: Array) -> Wanted:
+        twist = self._in_base(command, positions)
+        notes: tuple[str, ...] = ()
+        if not self.twists.turns and np.any(twist[3:]):
+            notes = (f"{self._arm.name} cannot turn its tool as it likes: only the linear part counts",)
+            twist[3:] = 0.0
+        if not np.any(twist):
+            return Wanted(np.zeros(len(self._speeds)), limited_by=notes)
+        motion = self.twists.solve(positions, twist)
+        if motion.scale < 1.0:
+            notes = (*notes, "singularity")
+        return replace(self._clamped(motion.velocity, motion.scale, notes), is_twist=True)
+
+    def _in_base(self, command: JogCommand, positions: Array) -> Array:
+        """(6,) along the base's axes."""
+        for part, values in (("linear", command.linear), ("angular", command.angular)):
+            if len(values) not in (0, 3):
+                raise BadJog(f"{part} has {len(values)} values: give 3")
+        twist = np.array([*(command.linear or (0.0,) * 3), *(command.angular or (0.0,) * 3)])
+        twist *= min(1.0, FASTEST_TWIST / max(FASTEST_TWIST, float(np.max(np.abs(twist)))))
+        frames = (self._arm.base_frame, self._arm.tool_frame)
+        if command.frame in ("", self._arm.base_frame):
+            return twist
+        if command.frame != self._arm.tool_frame:
+            raise BadJog(
+                f'a twist is given in the base or the tool, not in "{command.frame}": use {" or ".join(frames)}'
+            )
+        rotation = self._kinematics.tool(positions).rotation
+        return np.concatenate((rotation @ twist[:3], rotation @ twist[3:]))
+
+    def _clamped(self, velocity: Array, scale: float, notes: tuple[str, ...]) -> Wanted:
+        """All joints slowed together until the last one keeps its limit."""
+        shares = np.abs(velocity) / self._speeds
+        worst = int(np.argmax(shares))
+        most = float(shares[worst])
+        if most <= 1.0:
+            return Wanted(velocity, scale, notes)
+        return Wanted(velocity / most, scale / most, (*notes, f"speed limit of {self._arm.joint_names[worst]}"))

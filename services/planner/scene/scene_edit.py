@@ -1,0 +1,148 @@
+"""One change of a planning scene: what each `SceneAction` makes of it. Pure; raises `SceneError`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import msgspec
+
+from schemas.frames import Transform
+from schemas.scene import AllowedPair, PlanningScene, SceneAction, SceneObject, SceneRequest
+from services.arm.description import Arm
+from services.arm.errors import suggestion
+from services.arm.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
+from services.planner.scene.scene_check import require_link
+from services.planner.scene.scene_shapes import SceneError, pose_of
+
+LinkPoses = Callable[
+    [], Mapping[str, Transform] | None
+]  # in the base, now; None while it is not known where the arm is
+
+replace = msgspec.structs.replace
+
+
+def edited(arm: Arm, scene: PlanningScene, request: SceneRequest, links: LinkPoses) -> PlanningScene:
+    """The scene after the change; whether it can be is `scene_check`'s to say. Its version stays."""
+    edit = SceneEdit(arm, scene, links)
+    match request.action:
+        case SceneAction.ADD:
+            return edit.add(request.object)
+        case SceneAction.REMOVE:
+            return edit.remove(request.name)
+        case SceneAction.MOVE:
+            return edit.move(request.name, request.object)
+        case SceneAction.RESIZE:
+            return edit.put(replace(edit.named(request.name), shape=request.object.shape))
+        case SceneAction.ATTACH:
+            return edit.attach(request.name, request.object.frame, request.object.touch_links)
+        case SceneAction.DETACH:
+            return edit.detach(request.name)
+        case SceneAction.ALLOW:
+            return edit.allow(request.pair)
+        case SceneAction.DISALLOW:
+            return edit.disallow(request.pair)
+        case SceneAction.REPLACE:
+            return edit.replace_by(request.scene)
+        case SceneAction.CLEAR:
+            return replace(scene, objects=(), allowed=())
+
+
+class SceneEdit:
+    """One scene and where the arm's links are, to be changed in one way or another."""
+
+    def __init__(self, arm: Arm, scene: PlanningScene, links: LinkPoses) -> None:
+        self._arm, self._scene, self._links = arm, scene, links
+
+    def named(self, name: str) -> SceneObject:
+        """The object of that name."""
+        for item in self._scene.objects:
+            if item.name == name:
+                return item
+        raise SceneError(f'there is no object "{name}"{suggestion(name, [item.name for item in self._scene.objects])}')
+
+    def put(self, item: SceneObject) -> PlanningScene:
+        """The object in the place of the one of its name, or as the last."""
+        objects = tuple(item if old.name == item.name else old for old in self._scene.objects)
+        known = any(old.name == item.name for old in self._scene.objects)
+        return replace(self._scene, objects=objects if known else (*objects, item))
+
+    def add(self, item: SceneObject) -> PlanningScene:
+        return self.put(self._settled(item))
+
+    def remove(self, name: str) -> PlanningScene:
+        """Without the object, and without what was allowed to it."""
+        gone = self.named(name)
+        objects = tuple(item for item in self._scene.objects if item is not gone)
+        allowed = tuple(pair for pair in self._scene.allowed if name not in (pair.first, pair.second))
+        return replace(self._scene, objects=objects, allowed=allowed)
+
+    def move(self, name: str, to: SceneObject) -> PlanningScene:
+        """An attached object stays attached, elsewhere on its link."""
+        item = self.named(name)
+        pose = pose_of(replace(to, name=name))
+        if not (item.attached and to.frame == item.frame):
+            pose = compose(self._frame(to.frame, name), pose)
+            if item.attached:
+                pose = compose(inverse(self._frame(item.frame, name)), pose)
+        return self.put(replace(item, pose=to_message(pose)))
+
+    def attach(self, name: str, link: str, touch_links: tuple[str, ...]) -> PlanningScene:
+        """From where it is now, be that in the base or on another link."""
+        item = self.named(name)
+        require_link(self._arm, link, f'object "{name}" cannot be attached')
+        pose = compose(inverse(self._frame(link, name)), self._in_base(item))
+        return self.put(replace(item, pose=to_message(pose), frame=link, attached=True, touch_links=touch_links))
+
+    def detach(self, name: str) -> PlanningScene:
+        item = self.named(name)
+        if not item.attached:
+            raise SceneError(f'object "{name}" is not attached to any link; there is nothing to detach')
+        pose = to_message(self._in_base(item))
+        return self.put(replace(item, pose=pose, frame="", attached=False, touch_links=()))
+
+    def allow(self, pair: AllowedPair) -> PlanningScene:
+        if self._is_allowed(pair):
+            return self._scene
+        return replace(self._scene, allowed=(*self._scene.allowed, pair))
+
+    def disallow(self, pair: AllowedPair) -> PlanningScene:
+        if not self._is_allowed(pair):
+            named = "; ".join(f'"{old.first}" and "{old.second}"' for old in self._scene.allowed) or "nothing"
+            raise SceneError(
+                f'"{pair.first}" and "{pair.second}" are not allowed to touch by this scene: allowed is {named} '
+                "(what the SRDF allows is changed there)"
+            )
+        return replace(self._scene, allowed=tuple(old for old in self._scene.allowed if not _same(old, pair)))
+
+    def replace_by(self, scene: PlanningScene) -> PlanningScene:
+        objects = tuple(self._settled(item) for item in scene.objects)
+        return replace(self._scene, objects=objects, allowed=scene.allowed)
+
+    def _is_allowed(self, pair: AllowedPair) -> bool:
+        return any(_same(old, pair) for old in self._scene.allowed)
+
+    def _settled(self, item: SceneObject) -> SceneObject:
+        """What is not attached stands still from now on: in the base, wherever its frame is at present."""
+        if item.attached or not item.frame:
+            return item
+        return replace(item, pose=to_message(self._in_base(item)), frame="")
+
+    def _in_base(self, item: SceneObject) -> Rigid:
+        return compose(self._frame(item.frame, item.name), pose_of(item))
+
+    def _frame(self, frame: str, name: str) -> Rigid:
+        """Where a frame is in the base now."""
+        if frame in ("", self._arm.base_frame):
+            return IDENTITY
+        require_link(self._arm, frame, f'object "{name}" cannot be placed')
+        poses = self._links()
+        if poses is None:
+            raise SceneError(
+                f'object "{name}" cannot be placed by "{frame}": it is not known where the arm is (no fresh '
+                "joint_states); start the stepper_gateway, or give the pose in the base frame"
+            )
+        return from_message(poses[frame])
+
+
+def _same(one: AllowedPair, other: AllowedPair) -> bool:
+    return {one.first, one.second} == {other.first, other.second}

@@ -1,0 +1,118 @@
+"""The scene on the bus: edits in, the scene and what touches out, and the file that survives a restart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import msgspec
+
+from schemas.frames import Transform
+from schemas.joints import JointState
+from schemas.planning import PlanCode, PlanResponse
+from schemas.scene import Contacts, PlanningScene, SceneRequest, SceneResponse
+from schemas.topics import CONTACTS, SCENE, SCENE_EDIT
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.scene.clearance import CLEARANCE, ROUNDING
+from services.planner.scene.scene_check import usable_part
+from services.planner.scene.scene_file import FILE, DamagedScene, load_scene, put_aside, save_scene
+from services.planner.scene.scene_shapes import SceneError
+from services.planner.scene.scene_store import SceneStore
+from services.planner.scene.world import World
+from services.planner.start import STALE_AFTER
+from services.runtime.deployment import project_root
+from services.runtime.node import Node
+from services.runtime.topics import Latest
+
+OnWorld = Callable[[World], None]
+
+
+class SceneKeeper:
+    """Holds the scene of one arm; `on_world` is told of the first world and of every later one.
+
+    `world` is for the node's thread of logic alone.
+    """
+
+    def __init__(self, node: Node, arm: Arm, states: Latest[JointState], folder: Path, on_world: OnWorld) -> None:
+        self._node, self._arm, self._states, self._on_world = node, arm, states, on_world
+        self._kinematics = Kinematics(arm)  # its own: the planner's is in use in another thread
+        self._file = folder / FILE
+        self._folders = (project_root(), arm.folder)
+        self._scene, self._contacts = node.publisher(SCENE), node.publisher(CONTACTS)
+        self._store = SceneStore(arm, self._folders, self._restored())
+        self._is_touching = False
+        self.world = self._built(self._store.scene)
+        self._show()
+        node.serve(SCENE_EDIT, self._edit)
+
+    def heed(self, response: PlanResponse) -> None:
+        """Shows what touches where a plan was refused, until one succeeds."""
+        refusal = response.refusal
+        if refusal is not None and refusal.posture:
+            margin = CLEARANCE if refusal.limit is None else refusal.limit
+            touching = tuple(self.world.contacts(refusal.posture, margin + ROUNDING))
+            names = self._arm.joint_names
+            self._contacts.put(
+                Contacts(stamp=self._node.now(), name=names, position=refusal.posture, contacts=touching)
+            )
+            self._is_touching = True
+        elif response.code is PlanCode.SUCCESS and self._is_touching:
+            self._contacts.put(Contacts(stamp=self._node.now()))
+            self._is_touching = False
+
+    def _edit(self, request: SceneRequest) -> SceneResponse:
+        before = self._store.scene
+        response = self._store.edit(request, self._links, self._node.now())
+        if self._store.scene is before:
+            return response
+        try:
+            world = self._built(self._store.scene)
+        except (SceneError, ValueError) as error:
+            self._store.scene = before
+            return SceneResponse(reason=str(error), version=before.version)
+        self.world = world
+        self._show()
+        return msgspec.structs.replace(response, reason=self._save(world.scene))
+
+    def _built(self, scene: PlanningScene) -> World:
+        return World(self._arm, self._kinematics, scene, self._folders)
+
+    def _show(self) -> None:
+        """Tells the planner and the bus; a world is no thing for two threads, so the planner has one of its own."""
+        self._on_world(self._built(self.world.scene))
+        self._scene.put(self.world.scene)
+
+    def _links(self) -> Mapping[str, Transform] | None:
+        """Where the links are, or None without a fresh joint state of all joints."""
+        state = self._states.message
+        if state is None or self._states.age() > STALE_AFTER:
+            return None
+        values = dict(zip(state.name, state.position, strict=False))
+        if any(name not in values for name in self._arm.joint_names):
+            return None
+        return self._kinematics.link_poses([values[name] for name in self._arm.joint_names])
+
+    def _save(self, scene: PlanningScene) -> str:
+        """What went wrong; the scene is changed nevertheless."""
+        try:
+            save_scene(self._file, scene)
+        except OSError as error:
+            said = f"the scene is changed, but {self._file} cannot be written ({error.strerror}): a restart forgets it"
+            self._node.log.error(said)
+            return said
+        return ""
+
+    def _restored(self) -> PlanningScene:
+        """The scene of the file as far as it can be; what cannot is said, and its file kept."""
+        try:
+            scene = load_scene(self._file) or PlanningScene()
+        except DamagedScene as error:
+            self._node.log.error(f"{error}; it lies in {put_aside(self._file)} now, and NOTHING is around the arm")
+            return PlanningScene()
+        usable, reasons = usable_part(self._arm, scene, self._folders)
+        if reasons:
+            aside = put_aside(self._file)
+            self._node.log.error(f"left out of the scene, as {aside} still has it: {'; '.join(reasons)}")
+            self._save(usable)
+        return usable

@@ -1,0 +1,32 @@
+"""The planning scene as the planner holds it: always valid, its version one more with every change."""
+
+from __future__ import annotations
+
+import msgspec
+
+from schemas.scene import PlanningScene, SceneRequest, SceneResponse
+from services.arm.description import Arm
+from services.planner.scene.scene_check import require_scene
+from services.planner.scene.scene_edit import LinkPoses, edited
+from services.planner.scene.scene_shapes import Folders, SceneError
+
+
+class SceneStore:
+    """Takes a change wholly or not at all; mesh files are looked for in `folders`."""
+
+    def __init__(self, arm: Arm, folders: Folders = (), scene: PlanningScene | None = None) -> None:
+        """Raises `SceneError` for a scene that cannot be."""
+        self._arm, self._folders = arm, folders
+        self.scene = scene or PlanningScene()
+        require_scene(arm, self.scene, folders)
+
+    def edit(self, request: SceneRequest, links: LinkPoses, stamp: int) -> SceneResponse:
+        """Whether the scene is changed, or why not; `links` says where the links are now, `stamp` is [ns] UNIX."""
+        try:
+            changed = edited(self._arm, self.scene, request, links)
+            if changed != self.scene:
+                require_scene(self._arm, changed, self._folders)
+                self.scene = msgspec.structs.replace(changed, stamp=stamp, version=self.scene.version + 1)
+        except SceneError as error:
+            return SceneResponse(reason=str(error), version=self.scene.version)
+        return SceneResponse(accepted=True, version=self.scene.version)

@@ -1,0 +1,155 @@
+"""Whether the arm touches itself, what it carries, or what stands around it: coal on the exact shapes.
+
+The reference of every faster check, with the names that `SelfCollisions` has for the arm alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from schemas.scene import Contact, PlanningScene
+from services.arm.collisions import LinkPair
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.scene.solid_geometry import is_inside
+from services.planner.scene.sweep import Sweep
+from services.planner.scene.world_bounds import LowerBounds
+from services.planner.scene.world_geometry import WorldGeometry
+
+Array = NDArray[np.float64]
+Positions = Sequence[float] | Array
+
+
+class World:
+    """One arm in one state of the scene, never changed; joint values are (n,) [rad] or [m] in the arm's order."""
+
+    def __init__(
+        self,
+        arm: Arm,
+        kinematics: Kinematics,
+        scene: PlanningScene | None = None,
+        folders: Sequence[Path] = (),
+    ) -> None:
+        """Mesh files are looked for in `folders`; raises `SceneError` for a scene that cannot be."""
+        self.arm = arm
+        self.scene, self.folders = scene or PlanningScene(), tuple(folders)
+        self._kinematics = kinematics
+        self._geometry = WorldGeometry(arm, kinematics, self.scene, folders)
+        self._bounds = LowerBounds(self._geometry)
+        self._data = kinematics.model.createData()
+        self._placed = self._geometry.model.createData()
+        for index in self._bounds.pairs:
+            self._placed.deactivateCollisionPair(index)
+        self.reach: Array = self._geometry.reach
+        self._sweep = Sweep(arm, kinematics, self._geometry, self._distance_at)
+
+    @property
+    def version(self) -> int:
+        """Of the scene."""
+        return self.scene.version
+
+    @property
+    def objects(self) -> dict[str, str]:
+        """What each object of the scene is: "box", "sphere", ... by name."""
+        return {item.name: str(item.shape.__struct_config__.tag) for item in self.scene.objects}
+
+    @property
+    def geometry_count(self) -> int:
+        """How many shapes there are, of links and of objects; never zero."""
+        return int(self._geometry.model.ngeoms)
+
+    @property
+    def pairs(self) -> tuple[LinkPair, ...]:
+        """The names of links and objects that are checked against one another."""
+        return tuple(dict.fromkeys(self._geometry.names))
+
+    def distance(self, positions: Positions, padding: float = 0.0) -> float:
+        """[m] between the nearest pair that is checked, less `padding`; negative inside, infinite where nothing is."""
+        self._place(positions)
+        nearest = min((distance for _, distance in self._direct()), default=math.inf)
+        bounds = self._bounds.of(self._placed)
+        for place in np.argsort(bounds).tolist():
+            if bounds[place] >= nearest:
+                break
+            nearest = min(nearest, self._exact(self._bounds.pairs[place]))
+        return nearest - padding
+
+    def touching(self, positions: Array, margin: float) -> Array | None:
+        """Any posture along the rows of `positions` (m, n) at which something is nearer than `margin` [m], or None."""
+        return self._sweep.touching(positions, margin)
+
+    def pairs_within(self, positions: Positions, margin: float = 0.0) -> list[LinkPair]:
+        """The pairs of names nearer than `margin` [m], each once."""
+        near = (self._geometry.names[index] for index, _ in self._near(positions, margin))
+        return list(dict.fromkeys(near))
+
+    def contacts(self, positions: Positions, margin: float = 0.0) -> list[Contact]:
+        """The pairs nearer than `margin` [m] with their distance and the point between them, the nearest first."""
+        found: dict[LinkPair, Contact] = {}
+        for index, distance in sorted(self._near(positions, margin), key=lambda near: near[1]):
+            pair = self._geometry.names[index]
+            point = self._point_between(index)
+            found.setdefault(pair, Contact(first=pair[0], second=pair[1], distance=distance, point=point))
+        return list(found.values())
+
+    def _place(self, positions: Positions) -> None:
+        """Moves the shapes, and computes the distances of the pairs that are looked at in every posture."""
+        q = self._kinematics.configuration.to_pinocchio(positions)
+        pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
+        pin.computeDistances(self._geometry.model, self._placed)
+
+    def _distance_at(self, positions: Array, pairs: Sequence[int]) -> Array:
+        """(k,) [m] between the shapes of these pairs alone."""
+        q = self._kinematics.configuration.to_pinocchio(positions)
+        pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
+        return np.array([self._exact(index) for index in pairs])
+
+    def _direct(self) -> Iterator[tuple[int, float]]:
+        """Number and distance [m] of the pairs that `_place` has looked at."""
+        results = self._placed.distanceResults
+        for index, padding in enumerate(self._geometry.padding[: self._geometry.direct]):
+            yield index, results[index].min_distance - padding
+
+    def _near(self, positions: Positions, margin: float) -> Iterator[tuple[int, float]]:
+        """Number and distance [m] of the pairs nearer than `margin`."""
+        self._place(positions)
+        yield from (near for near in self._direct() if near[1] <= margin)
+        for place in np.flatnonzero(self._bounds.of(self._placed) <= margin).tolist():
+            index = self._bounds.pairs[place]
+            distance = self._exact(index)
+            if distance <= margin:
+                yield index, distance
+
+    def _exact(self, index: int) -> float:
+        """[m] between the two shapes of a pair, less their padding."""
+        result = pin.computeDistance(self._geometry.model, self._placed, index)
+        distance = float(result.min_distance)
+        if distance > 0.0 and self._is_swallowed(index):
+            distance = -distance
+        return distance - self._geometry.padding[index]
+
+    def _is_swallowed(self, index: int) -> bool:
+        """Whether one shape of the pair is wholly inside the other, a mesh: coal sees surfaces only."""
+        one, other = self._geometry.pairs[index]
+        return self._holds(one, other) or self._holds(other, one)
+
+    def _holds(self, outer: int, inner: int) -> bool:
+        mesh = self._geometry.meshes[outer]
+        if mesh is None or not np.isfinite(self._geometry.boxes[inner]).all():
+            return False
+        filling = self._geometry.meshes[inner]
+        point = self._geometry.boxes[inner][0] if filling is None else filling.vertices[0]
+        there = self._placed.oMg[outer].actInv(self._placed.oMg[inner].act(point))
+        return is_inside(mesh, there)
+
+    def _point_between(self, index: int) -> tuple[float, ...]:
+        """(3,) [m] in the base frame, of the distance that was computed last for this pair."""
+        result = self._placed.distanceResults[index]
+        middle = 0.5 * (result.getNearestPoint1() + result.getNearestPoint2())
+        return tuple(self._kinematics.base.actInv(middle).tolist())

@@ -1,0 +1,100 @@
+"""A polyline made shorter by straight cuts, and its corners round: what the compiled core does for its own ways."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.planner.search.validity import Validity
+
+Array = NDArray[np.float64]
+
+CUTS = 60  # tried; each costs the check of a line
+FRUITLESS = 15  # of them in a row are enough
+WIDEST = 0.5  # share of an edge that its corner may be rounded over
+LEAST = 1.0 / 64.0
+
+
+def shorten(corners: Array, validity: Validity, seed: int, is_late: Callable[[], bool]) -> Array:
+    """The polyline (m, n) with straight cuts between random places on it, for as long as there is time.
+
+    At last it loses the corners that it can do without: two that nearly coincide let the arm creep around them.
+    """
+    random = np.random.default_rng(seed)
+    fruitless = 0
+    for _ in range(CUTS):
+        if len(corners) <= 2 or fruitless >= FRUITLESS or is_late():
+            break
+        low, high = sorted(random.uniform(0.0, len(corners) - 1.0, 2).tolist())
+        cut = _cut(corners, low, high, validity)
+        fruitless = fruitless + 1 if cut is None else 0
+        corners = corners if cut is None else cut
+    return _needed(corners, validity, is_late)
+
+
+def smooth(corners: Array, validity: Validity, is_late: Callable[[], bool]) -> Array:
+    """Control points (k, n) of a uniform cubic B-spline along the polyline, free as a whole.
+
+    Every corner keeps its own control point, with one before and one after it on its edges; where the curve touches,
+    they come nearer to the corner, and at last the curve goes to the corner itself and stops there.
+    """
+    shares = np.full(len(corners), WIDEST)
+    shares[[0, -1]] = 0.0
+    while not is_late():
+        control, places = _lay(corners, shares)
+        touching = [
+            corner
+            for corner in range(1, len(corners) - 1)
+            if shares[corner] > 0.0 and not validity.is_curve_free(control[places[corner] - 3 : places[corner] + 4])
+        ]
+        if not touching:
+            return control
+        shares[touching] = np.where(shares[touching] > LEAST, 0.5 * shares[touching], 0.0)
+    return stopping(corners)
+
+
+def stopping(corners: Array) -> Array:
+    """As `smooth`, stopping at every corner: the polyline itself."""
+    return np.repeat(corners, 3, axis=0)
+
+
+def _needed(corners: Array, validity: Validity, is_late: Callable[[], bool]) -> Array:
+    """The polyline without each corner that a straight line may pass by."""
+    kept = [corners[0]]
+    for corner, after in pairwise(corners[1:]):
+        if is_late() or not validity.is_line_free(kept[-1], after):
+            kept.append(corner)
+    return np.array([*kept, corners[-1]])
+
+
+def _cut(corners: Array, low: float, high: float, validity: Validity) -> Array | None:
+    """The polyline that goes straight from one place on it to another; None where it is not free or no shorter."""
+    first, last = int(low), int(high)
+    if first == last:
+        return None
+    begin = corners[first] + (low - first) * (corners[first + 1] - corners[first])
+    end = corners[last] + (high - last) * (corners[min(last + 1, len(corners) - 1)] - corners[last])
+    if not validity.is_line_free(begin, end):
+        return None
+    rows = np.vstack((corners[: first + 1], begin, end, corners[last + 1 :]))
+    moving = np.concatenate(([True], np.any(np.abs(np.diff(rows, axis=0)) > 1e-9, axis=1)))
+    moving[-1] = True
+    return np.asarray(rows[moving])
+
+
+def _lay(corners: Array, shares: Array) -> tuple[Array, list[int]]:
+    """The control points, and the place of each corner's own among them."""
+    rows, places = [corners[0]] * 3, [0]
+    for index in range(1, len(corners) - 1):
+        before, corner, after = corners[index - 1 : index + 2]
+        share = shares[index]
+        is_shared = share == WIDEST and shares[index - 1] == WIDEST and index > 1
+        if not is_shared:
+            rows.append(corner + share * (before - corner))
+        places.append(len(rows))
+        rows += [corner, corner + share * (after - corner)]
+    places.append(len(rows))
+    return np.array([*rows, *[corners[-1]] * 3]), places

@@ -1,0 +1,128 @@
+"""By way of several goals in the space of the joints: lines from posture to posture, corners cut within the blend."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.motion import JointTrajectory
+from schemas.planning import FreeMotion, Motion, WaypointGoal
+from services.arm.description import Arm
+from services.planner.blockade import Blockade
+from services.planner.finish import Finished, Finisher, Touching
+from services.planner.goals.goals import Goals, timed_out
+from services.planner.refusals import NoPlan, no_way_around, not_verified
+from services.planner.scene.clearance import CLEARANCE, Sweeper
+from services.planner.search.search import Search
+from services.planner.search.way import STRAIGHT, Deadline, NoWay, Start
+from services.planner.times import Stopwatch
+from services.planner.timing.path_timing import demand_of, time_law
+from services.planner.timing.profile import JointLimits, NoProfile, straight_line
+from services.planner.tool.path_curve import RoundedLines, rounded_runs
+from services.planner.tool.path_points import Run, normalised, trajectory_along
+from services.planner.tool.tool_motions import points_of
+
+Array = NDArray[np.float64]
+
+BLENDS = 4  # times that the blend is halved where a cut corner touches, before the arm stops at every one
+
+
+@dataclass(frozen=True)
+class Errand:
+    """What a request by waypoints has besides its goal."""
+
+    motion: Motion
+    start: Start
+    limits: JointLimits
+    margin: float  # [m]
+    finisher: Finisher
+    deadline: Deadline
+    watch: Stopwatch
+
+
+class Via:
+    """Ways by waypoints for one arm."""
+
+    def __init__(self, arm: Arm, goals: Goals, checker: Sweeper, blockade: Blockade) -> None:
+        self._arm, self._goals, self._checker, self._blockade = arm, goals, checker, blockade
+
+    def plan(self, goal: WaypointGoal, errand: Errand, search: Callable[[], Search]) -> tuple[Finished, str]:
+        """Straight, or around what is in the way from one to the next, with as much blend as is free."""
+        with errand.watch.phase("ik"):
+            postures = self._postures(goal, errand.start, errand.deadline.is_late)
+        corners, planner_id = np.array(postures), STRAIGHT
+        if isinstance(errand.motion, FreeMotion):
+            corners, planner_id = self._corners(errand.motion, postures, errand, search)
+        refusal: NoPlan | None = None
+        for trajectory in self._trajectories(corners, goal.blend, errand):
+            try:
+                return errand.finisher.finish(trajectory, errand.start, postures[-1]), planner_id
+            except Touching as touching:
+                refusal = self._blockade.by(touching.posture, errand.margin)
+            if errand.deadline.is_late():
+                break
+        raise refusal or timed_out()
+
+    def _postures(self, goal: WaypointGoal, start: Start, is_late: Callable[[], bool]) -> list[Start]:
+        """The start, and for each waypoint the free posture nearest to the one before."""
+        chosen = [start]
+        for point in points_of(goal):
+            touching: Start | None = None
+            for posture in self._goals.candidates(point, chosen[-1], is_late):
+                if self._checker.distance(posture) > CLEARANCE:
+                    chosen.append(posture)
+                    break
+                touching = touching or posture
+            else:
+                if touching is None:
+                    raise timed_out()
+                raise self._blockade.goal(point, touching, chosen[-1], is_late)
+        return chosen
+
+    def _corners(
+        self, motion: FreeMotion, postures: list[Start], errand: Errand, search: Callable[[], Search]
+    ) -> tuple[Array, str]:
+        """The polyline by `postures`, with the corners of a way around wherever a leg is not free."""
+        rows, planner_id = [np.array(postures[:1])], STRAIGHT
+        for begin, end in pairwise(postures):
+            leg = np.array((begin, end))
+            if self._checker.touching(leg, errand.margin) is None:
+                rows.append(leg[1:])
+                continue
+            try:
+                with errand.watch.phase("search"):
+                    way = search().find(
+                        leg[0], leg[1:], errand.margin, motion.planner_id, motion.seed, errand.deadline, errand.watch
+                    )
+            except NoWay as no_way:
+                raise no_way_around(no_way.why, self._blockade.line(begin, end, errand.margin)) from no_way
+            rows.append(way.corners[1:])
+            planner_id = way.planner_id
+        return np.vstack(rows), planner_id
+
+    def _trajectories(self, corners: Array, blend: float, errand: Errand) -> Iterator[JointTrajectory]:
+        """With the blend [m], with less and less of it, at last with a stop at each corner."""
+        radii = [blend * 0.5**index for index in range(BLENDS)] if blend > 0.0 else []
+        for radius in [*radii, 0.0]:
+            with errand.watch.phase("timing"):
+                trajectory = self._trajectory(corners, errand.limits, radius)
+            yield trajectory
+
+    def _trajectory(self, corners: Array, limits: JointLimits, blend: float) -> JointTrajectory:
+        names = self._arm.joint_names
+        lines = rounded_runs(corners, limits.velocity, self._checker.reach, blend)
+        try:
+            if not lines:
+                return straight_line(names, corners[0].tolist(), corners[-1].tolist(), limits)
+            return normalised(trajectory_along(names, [_run(line, limits) for line in lines]), limits)
+        except NoProfile as error:
+            raise not_verified(str(error)) from error
+
+
+def _run(line: RoundedLines, limits: JointLimits) -> Run:
+    law = time_law(demand_of(line, limits, (0.0, 0.0), line.marks))
+    return Run(line, law, line.start, line.end)

@@ -1,0 +1,178 @@
+"""Ways of the tool: lines, arcs and rounded polylines followed by the joints, as far as they go, and timed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from schemas.motion import JointTrajectory
+from schemas.planning import PlanCode, Refusal
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.refusals import NoPlan, not_verified
+from services.planner.scene.clearance import Checker
+from services.planner.search.way import Start
+from services.planner.timing.path_timing import demand_of, time_law
+from services.planner.timing.profile import JointLimits, NoProfile
+from services.planner.tool.continuation import FINEST, Continuation, Followed, Stop
+from services.planner.tool.path_points import Run, between, normalised, trajectory_along
+from services.planner.tool.tool_limits import ToolLimits
+from services.planner.tool.tool_path import ToolPath
+from services.planner.verify.feasibility import slowed
+
+Array = NDArray[np.float64]
+
+DEEPER = 1.06  # share of the margin that the way keeps, so that samples taken elsewhere keep the margin itself
+LEAST_LOOK = 0.1  # share of the margin by which the arm moves on at least from one look to the next
+SHORTEST_WAY = 1e-4  # of length: less is no way
+MOST_ROWS = 4000
+SPEED_LOOKS = 4  # in a segment, at which the tool's speed is measured
+
+
+@dataclass(frozen=True)
+class CartesianWay:
+    """A timed way, not yet verified; `stopped_by` says why it is not all of it."""
+
+    trajectory: JointTrajectory
+    end: Start
+    fraction: float
+    stopped_by: Refusal | None
+
+
+class CartesianPlanner:
+    """Takes one arm along paths of its tool, among what `checker` knows."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics, checker: Checker, holds_turn: bool) -> None:
+        self._arm, self._kinematics, self._checker = arm, kinematics, checker
+        self._continuation = Continuation(arm, kinematics, holds_turn)
+
+    def plan(
+        self,
+        paths: Sequence[ToolPath],
+        start: Start,
+        limits: JointLimits,
+        tool: ToolLimits,
+        margin: float,
+        is_late: Callable[[], bool],
+    ) -> CartesianWay:
+        """Along the paths one after the other, at rest between them; raises `NoPlan`."""
+        whole, before = sum(path.length for path in paths), 0.0
+        metres = sum(path.metres for path in paths)
+        runs: list[Run] = []
+        posture, refusal, gone = np.array(start), None, 0.0
+        for path in paths:
+            followed = self._follow(path, posture, tool, margin, is_late)
+            stop = followed if isinstance(followed, Stop) else followed.stop
+            if isinstance(followed, Followed):
+                runs.append(self._run(path, followed, limits, tool))
+                posture, before = followed.postures[-1], before + float(followed.lengths[-1])
+                gone += path.metres_to(float(followed.lengths[-1]))
+            if stop is not None:
+                refusal = _stopped(stop, gone, metres, before / whole)
+                break
+        fraction = 1.0 if refusal is None else before / whole
+        if refusal is not None and (not runs or fraction < tool.least_fraction):
+            raise NoPlan(_code(refusal), _too_little(refusal, fraction, tool.least_fraction))
+        trajectory = self._within(trajectory_along(self._arm.joint_names, runs), limits, tool)
+        return CartesianWay(trajectory, tuple(posture.tolist()), fraction, refusal)
+
+    def _follow(
+        self, path: ToolPath, start: Array, tool: ToolLimits, margin: float, is_late: Callable[[], bool]
+    ) -> Followed | Stop:
+        """As far as the joints and what stands around let it."""
+        followed = self._continuation.follow(path, start, tool.max_step, tool.jump, is_late)
+        if isinstance(followed, Stop):
+            return followed
+        free, touching = self._free(followed, margin)
+        if touching is None:
+            return followed
+        stop = self._touches(touching, margin)
+        if free < SHORTEST_WAY:
+            return stop
+        return self._continuation.shortened(path, followed, free, stop)
+
+    def _free(self, followed: Followed, margin: float) -> tuple[float, Array | None]:
+        """The length up to which everything keeps clear, and the posture that does not; looked at by conservative
+        advancement, so that nothing is skipped."""
+        end, joints = float(followed.lengths[-1]), followed.postures.shape[1]
+        rows = np.linspace(0.0, end, min(MOST_ROWS, 8 * len(followed.lengths)))
+        postures = followed.curve.at(rows).value[:, :joints]
+        moved = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(postures, axis=0)) @ self._checker.reach)))
+        along, free = 0.0, 0.0
+        while True:
+            length = float(np.interp(along, moved, rows))
+            posture = followed.curve.at(np.array([length])).value[0, :joints]
+            clearance = self._checker.distance(posture) - DEEPER * margin
+            if clearance <= 0.0:
+                return free, posture
+            free = length
+            if along >= moved[-1]:
+                return end, None
+            along = min(float(moved[-1]), along + max(clearance, LEAST_LOOK * margin))
+
+    def _run(self, path: ToolPath, followed: Followed, limits: JointLimits, tool: ToolLimits) -> Run:
+        end = float(followed.lengths[-1])
+        marks = np.array([0.0, *(mark for mark in path.marks if FINEST < mark < end - FINEST), end])
+        demand = demand_of(followed.curve, limits, (tool.speed, tool.acceleration), marks)
+        try:
+            law = time_law(demand)
+        except NoProfile as error:
+            raise not_verified(str(error)) from error
+        return Run(
+            followed.curve,
+            law,
+            followed.postures[0],
+            followed.postures[-1],
+            lambda length, posture: self._continuation.solver.error(path.at(length), posture),
+        )
+
+    def _within(self, trajectory: JointTrajectory, limits: JointLimits, tool: ToolLimits) -> JointTrajectory:
+        """Slower, where a joint or the tool would be a little faster than it may."""
+        even = normalised(trajectory, limits)
+        is_free = not tool.speed and not tool.acceleration
+        if is_free or even.points[-1].time_from_start > trajectory.points[-1].time_from_start:
+            trajectory = even
+        if not tool.speed:
+            return trajectory
+        rows = between(trajectory, SPEED_LOOKS)
+        fastest = max(
+            float(np.linalg.norm(self._kinematics.jacobian(q)[:3] @ v))
+            for q, v in zip(rows.positions, rows.velocities, strict=True)
+        )
+        return trajectory if fastest <= tool.speed else slowed(trajectory, 0.999 * tool.speed / fastest)
+
+    def _touches(self, posture: Array, margin: float) -> Stop:
+        pairs = self._checker.pairs_within(posture, DEEPER * margin + 1e-9) or [("?", "?")]
+        named = " and ".join(f"{first} with {second}" for first, second in pairs)
+        what = f"{named} would be nearer than {1000 * margin:g} mm"
+        distance = self._checker.distance(posture)
+        return Stop("collision", " / ".join(pairs[0]), distance, margin, what, "move what is in the way, or go around")
+
+
+def _stopped(stop: Stop, gone: float, metres: float, fraction: float) -> Refusal:
+    place = f"at {gone:.4f} m of {metres:.4f} m" if metres > SHORTEST_WAY else f"at {fraction:.1%} of the turn"
+    return Refusal(
+        check=stop.check,
+        subject=stop.subject,
+        value=stop.value,
+        limit=stop.limit,
+        message=f"{place} along the way, {stop.what}",
+        remedy=stop.remedy,
+    )
+
+
+def _too_little(stop: Refusal, fraction: float, least: float) -> Refusal:
+    message = f"only {fraction:.1%} of the way can be gone, {least:.1%} is the least: {stop.message}"
+    if fraction == 0.0:
+        message = f"the way cannot be begun: {stop.message}"
+    remedy = f"{stop.remedy}; or allow less (least_fraction {math.floor(1000 * fraction) / 1000:g})"
+    return replace(stop, message=message, remedy=remedy if fraction > 0.001 else stop.remedy)
+
+
+def _code(stop: Refusal) -> PlanCode:
+    return PlanCode.NO_IK_SOLUTION if stop.check in ("joint limit", "singularity", "jump") else PlanCode.PLANNING_FAILED

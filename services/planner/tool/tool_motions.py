@@ -1,0 +1,156 @@
+"""From a request for a line or an arc of the tool to its way: where it ends, what lies between, and how far it goes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from schemas.message import Vector
+from schemas.planning import CircularMotion, Goal, LinearMotion, PlanCode, PlanRequest, PoseGoal, WaypointGoal
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics, Pose
+from services.arm.transforms import IDENTITY, compose
+from services.planner.goals.abilities import Abilities
+from services.planner.goals.goals import Goals
+from services.planner.goals.pose_goals import target_of
+from services.planner.goals.targets import ROTATION_TOLERANCE, Target, turn_between
+from services.planner.refusals import NoPlan, malformed
+from services.planner.scene.clearance import Checker
+from services.planner.search.way import Start
+from services.planner.timing.profile import JointLimits, straight_line
+from services.planner.tool.arcs import arc_about, arc_through
+from services.planner.tool.cartesian import CartesianPlanner, CartesianWay
+from services.planner.tool.tool_limits import ToolLimits, require_tool_limits
+from services.planner.tool.tool_path import ToolPath, polyline
+
+Array = NDArray[np.float64]
+
+INVALID = PlanCode.INVALID_GOAL_CONSTRAINTS
+FARTHEST = 1e3  # [m] a blend beyond it is a mistake
+
+
+class ToolMotions:
+    """Lines and arcs of one arm's tool."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics, goals: Goals, checker: Checker) -> None:
+        self._arm, self._kinematics, self._goals = arm, kinematics, goals
+        self._abilities: Abilities = goals.abilities
+        self._planner = CartesianPlanner(arm, kinematics, checker, self._abilities.is_full)
+
+    def plan(
+        self, request: PlanRequest, start: Start, limits: JointLimits, margin: float, is_late: Callable[[], bool]
+    ) -> CartesianWay:
+        """The timed way, to be verified; raises `NoPlan`."""
+        tool = _tool_limits(request.motion)
+        require_tool_limits(tool)
+        try:
+            paths = self._paths(request, start, is_late)
+            way = self._along(paths, start, limits, tool, margin, is_late)
+        except NoPlan:
+            self._require_reachable(request.goal, start, tool, is_late)
+            raise
+        if way.fraction == 1.0:
+            self._require_turned(request.goal, start, way.end)
+        return way
+
+    def _along(
+        self,
+        paths: list[ToolPath],
+        start: Start,
+        limits: JointLimits,
+        tool: ToolLimits,
+        margin: float,
+        is_late: Callable[[], bool],
+    ) -> CartesianWay:
+        if paths:
+            return self._planner.plan(paths, start, limits, tool, margin, is_late)
+        return CartesianWay(straight_line(self._arm.joint_names, start, start, limits), start, 1.0, None)
+
+    def _paths(self, request: PlanRequest, start: Start, is_late: Callable[[], bool]) -> list[ToolPath]:
+        goal, begin = request.goal, self._kinematics.tool(start)
+        if isinstance(request.motion, CircularMotion):
+            return [self._arc(request.motion, goal, start, begin, is_late)]
+        poses = [begin]
+        for point in points_of(goal):
+            poses.append(self._pose(point, start, poses[-1], is_late))
+        return polyline(poses, goal.blend if isinstance(goal, WaypointGoal) else 0.0)
+
+    def _arc(
+        self, motion: CircularMotion, goal: Goal, start: Start, begin: Pose, is_late: Callable[[], bool]
+    ) -> ToolPath:
+        if isinstance(goal, WaypointGoal):
+            raise malformed(INVALID, "goal", "an arc has one goal, not waypoints", "ask for one arc after the other")
+        if bool(motion.interim) == bool(motion.center):
+            given = "both an interim point and a center" if motion.interim else "neither an interim point nor a center"
+            raise malformed(INVALID, "interim", f"the arc has {given}", "give one of them, x y z in m")
+        end = self._pose(goal, start, begin, is_late)
+        name, values = ("interim", motion.interim) if motion.interim else ("center", motion.center)
+        point = self._point(name, values, goal, start)
+        return ToolPath([arc_through(begin, point, end) if motion.interim else arc_about(begin, point, end)])
+
+    def _point(self, name: str, values: Vector, goal: Goal, start: Start) -> Array:
+        """In the base frame; given in the goal's."""
+        if len(values) != 3:
+            raise malformed(INVALID, name, f"{name} has 3 numbers, not {len(values)}", "give x y z in m")
+        frame = self._goals.frame(goal, start) if isinstance(goal, PoseGoal) else IDENTITY
+        x, y, z = values
+        return np.array(compose(frame, ((x, y, z), IDENTITY[1]))[0])
+
+    def _pose(self, goal: Goal, start: Start, before: Pose, is_late: Callable[[], bool]) -> Pose:
+        """Where the tool is to be; as it was turned before, where the goal leaves that open."""
+        if not isinstance(goal, PoseGoal):
+            return self._kinematics.tool(next(self._goals.candidates(goal, start, is_late)))
+        target = self._target(goal, start)
+        if target.rotation is not None:
+            return Pose(target.position, target.rotation)
+        if target.pointing is None:
+            return Pose(target.position, before.rotation)
+        turn = turn_between(before.rotation @ target.pointing.axis, target.pointing.direction)
+        return Pose(target.position, pin.exp3(turn) @ before.rotation)
+
+    def _target(self, goal: PoseGoal, start: Start) -> Target:
+        return target_of(goal, self._goals.frame(goal, start))
+
+    def _require_reachable(self, goal: Goal, start: Start, tool: ToolLimits, is_late: Callable[[], bool]) -> None:
+        """Raises the better refusal of a goal that no posture meets, wherever the way to it ends."""
+        if tool.least_fraction == 1.0 and not is_late():
+            for point in points_of(goal):
+                next(self._goals.candidates(point, start, is_late), None)
+
+    def _require_turned(self, goal: Goal, start: Start, end: Start) -> None:
+        """An arm whose tool turns as its position has it may end turned otherwise than asked."""
+        last = points_of(goal)[-1]
+        if self._abilities.is_full or not isinstance(last, PoseGoal):
+            return
+        target = self._target(last, start)
+        missing = target.misses(self._kinematics.tool(end))[1]
+        if missing > max(ROTATION_TOLERANCE, target.rotation_tolerance):
+            next(self._goals.candidates(last, start, lambda: False), None)
+            message = f"on this way the tool ends {np.degrees(missing):.3g} deg from the orientation that was asked for"
+            raise malformed(INVALID, "orientation", message, self._abilities.remedy, check="orientation")
+
+
+def points_of(goal: Goal) -> tuple[Goal, ...]:
+    """The goals to be passed in order; raises `NoPlan` where there is none, or the blend is no length."""
+    if not isinstance(goal, WaypointGoal):
+        return (goal,)
+    if not goal.points:
+        raise malformed(INVALID, "points", "the goal has no waypoint", "give at least one")
+    if not 0.0 <= goal.blend <= FARTHEST:
+        message = f"blend is {goal.blend:g} m: it must be 0 or more, and no more than {FARTHEST:g}"
+        raise malformed(INVALID, "blend", message, "give 0 to stop at every point, or a radius in m")
+    return goal.points
+
+
+def _tool_limits(motion: object) -> ToolLimits:
+    match motion:
+        case LinearMotion():
+            return ToolLimits(
+                motion.speed, motion.acceleration, motion.max_step, motion.jump_threshold, motion.least_fraction
+            )
+        case CircularMotion():
+            return ToolLimits(motion.speed, motion.acceleration)
+    return ToolLimits()

@@ -1,0 +1,128 @@
+"""The finished trajectory, looked at densely before anybody may have it: limits, continuity, collisions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.motion import JointTrajectory
+from services.arm.description import Arm
+from services.planner.timing.profile import JointLimits
+
+Array = NDArray[np.float64]
+
+DENSITY = 10  # samples between two points
+ROUNDING = 1e-9  # [rad] or [m], and a share of limits: what floating point may add
+
+LOOSE_JERK = 1.01  # share of the limit: third differences of neighbouring points have few digits left
+
+
+class BadTrajectory(ValueError):
+    """A trajectory that must not be executed; the text names the joint, the value and the limit."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Rows in time: `times` (m,) [s] and positions, velocities, accelerations, jerks (m, n)."""
+
+    times: Array
+    positions: Array
+    velocities: Array
+    accelerations: Array
+    jerks: Array
+
+
+def sample(trajectory: JointTrajectory, density: int = DENSITY) -> Samples:
+    """The quintic through the points at `density` instants a segment, all at once, with both ends of every segment."""
+    return sample_between(*_columns(trajectory), density)
+
+
+def sample_between(stamps: Array, p: Array, v: Array, a: Array, density: int = DENSITY) -> Samples:
+    """As `sample`, through positions, velocities and accelerations (m, n) at `stamps` (m,) [s]."""
+    shares = np.linspace(0.0, 1.0, density + 1)
+    times = (stamps[:-1, None] + shares * np.diff(stamps)[:, None]).reshape(-1)
+    return _evaluate((stamps, p, v, a), times, np.repeat(np.arange(len(stamps) - 1), density + 1))
+
+
+def at_times(trajectory: JointTrajectory, times: Array) -> Samples:
+    """The quintic through the points at `times` (m,) [s], which lie within the trajectory."""
+    stamps = np.array([point.time_from_start for point in trajectory.points])
+    index = np.clip(np.searchsorted(stamps, times, side="right") - 1, 0, len(stamps) - 2)
+    return _evaluate(_columns(trajectory), times, index)
+
+
+def _columns(trajectory: JointTrajectory) -> tuple[Array, Array, Array, Array]:
+    """Stamps (m,) [s], positions, velocities and accelerations (m, n)."""
+    stamps = np.array([point.time_from_start for point in trajectory.points])
+    p = np.array([point.positions for point in trajectory.points])
+    v = np.array([point.velocities for point in trajectory.points])
+    a = np.array([point.accelerations for point in trajectory.points])
+    return stamps, p, v, a
+
+
+def _evaluate(columns: tuple[Array, Array, Array, Array], times: Array, index: NDArray[np.int64]) -> Samples:
+    """At `times` (m,) [s], each in the segment `index` (m,) (Biagiotti and Melchiorri 2008, section 2.1)."""
+    stamps, p, v, a = columns
+    dt = np.diff(stamps)[index][:, None]
+    u = (times - stamps[index])[:, None] / dt
+    p0, v0, a0 = p[index], v[index] * dt, a[index] * dt * dt
+    rise = p[index + 1] - p0 - v0 - 0.5 * a0
+    climb, bend = v[index + 1] * dt - v0 - a0, a[index + 1] * dt * dt - a0
+    third = 10 * rise - 4 * climb + bend / 2
+    fourth = -15 * rise + 7 * climb - bend
+    fifth = 6 * rise - 3 * climb + bend / 2
+    positions = p0 + u * (v0 + u * (a0 / 2 + u * (third + u * (fourth + u * fifth))))
+    velocities = (v0 + u * (a0 + u * (3 * third + u * (4 * fourth + u * 5 * fifth)))) / dt
+    accelerations = (a0 + u * (6 * third + u * (12 * fourth + u * 20 * fifth))) / dt**2
+    jerks = (6 * third + u * (24 * fourth + u * 60 * fifth)) / dt**3
+    return Samples(times, positions, velocities, accelerations, jerks)
+
+
+def limit_shares(samples: Samples, limits: JointLimits) -> tuple[float, float, float]:
+    """The largest share of any joint's velocity, acceleration and jerk limits."""
+    velocity = np.abs(samples.velocities) / limits.velocity
+    acceleration = np.abs(samples.accelerations) / limits.acceleration
+    jerk = np.abs(samples.jerks) / limits.jerk
+    return float(velocity.max()), float(acceleration.max()), float(jerk.max())
+
+
+def require_within_limits(arm: Arm, samples: Samples, limits: JointLimits) -> None:
+    """Position, velocity and acceleration of every sample; raises `BadTrajectory`."""
+    lower = np.array([joint.lower for joint in arm.joints]) - ROUNDING
+    upper = np.array([joint.upper for joint in arm.joints]) + ROUNDING
+    loose = 1.0 + ROUNDING
+    checks = (
+        ("position", np.maximum(samples.positions - upper, lower - samples.positions), samples.positions),
+        ("velocity", np.abs(samples.velocities) - loose * limits.velocity, samples.velocities),
+        ("acceleration", np.abs(samples.accelerations) - loose * limits.acceleration, samples.accelerations),
+    )
+    for what, excess, values in checks:
+        if not float(excess.max()) <= 0.0:  # what is not a number is not within its limits
+            row, column = np.unravel_index(int(excess.argmax()), excess.shape)
+            value, over = values[row, column], excess[row, column]
+            name, t = arm.joint_names[int(column)], samples.times[row]
+            raise BadTrajectory(f'{what} of "{name}" is {value:.6g} at {t:.3f} s, {over:.2g} beyond its limit')
+
+
+def require_jerk(arm: Arm, samples: Samples, limits: JointLimits) -> None:
+    """Of every sample of a jerk-limited trajectory; raises `BadTrajectory`."""
+    share = np.abs(samples.jerks) / limits.jerk
+    if not float(share.max()) <= LOOSE_JERK:
+        row, column = np.unravel_index(int(share.argmax()), share.shape)
+        name, t = arm.joint_names[int(column)], samples.times[row]
+        raise BadTrajectory(f'jerk of "{name}" is {share[row, column]:.3g} times its limit at {t:.3f} s')
+
+
+def require_ends(trajectory: JointTrajectory, start: tuple[float, ...], goal: tuple[float, ...]) -> None:
+    """Exactly from the start to the goal, at rest at both, and never back in time; raises `BadTrajectory`."""
+    for before, after in pairwise(point.time_from_start for point in trajectory.points):
+        if not before < after:
+            raise BadTrajectory(f"the trajectory goes from {before:.6f} s to {after:.6f} s")
+    first, last = trajectory.points[0], trajectory.points[-1]
+    if first.positions != start or last.positions != goal or first.time_from_start != 0.0:
+        raise BadTrajectory("the trajectory does not lead from the start to the goal")
+    if any(first.velocities + first.accelerations + last.velocities + last.accelerations):
+        raise BadTrajectory("the trajectory is not at rest at its ends")
