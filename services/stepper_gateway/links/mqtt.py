@@ -1,7 +1,7 @@
 """MQTT to the device: one fresh client per connection, so that nothing outlives one.
 
 A new connection starts with empty queues by construction; while there is none, `send` refuses.
-paho's threads only append to a bounded inbox and wake the node.
+paho's threads only put into a bounded inbox and wake the node.
 """
 
 from __future__ import annotations
@@ -11,21 +11,19 @@ import secrets
 import socket
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterable
 
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
+from services.stepper_gateway.links.connection import Inbox, keep_connected
 from services.stepper_gateway.links.link import FROM_DEVICE, Kind, Received
 
 PREFIX = "gemelo/v1"
 UNACKNOWLEDGED = (Kind.HB, Kind.SYNC, Kind.SYNC_R, Kind.TRAJ_ACK, Kind.STATE, Kind.SENSORS, Kind.SHAFT)  # QoS 0
 MAX_PAYLOAD = 65_536  # [bytes] no frame of the device comes near
-INBOX = 4096  # [messages] 80 s of state
 CONNECT_TIMEOUT = 2.0  # [s]
 KEEP_ALIVE = 5  # [s]
-BACK_OFF = (0.1, 0.2, 0.5, 1.0)  # [s] between attempts
 
 
 class MqttLink:
@@ -35,12 +33,14 @@ class MqttLink:
         self._address = (host, port)
         self._prefix = f"{PREFIX}/{device}/"
         self._wake = wake
-        self._inbox: deque[Received] = deque(maxlen=INBOX)
+        self._inbox = Inbox(wake)
         self._client: paho.Client | None = None
         self._reason = f"no connection yet to the MQTT broker at {host}:{port}"
         self._lost = threading.Event()
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._keep_connected, name="mqtt-link", daemon=True)
+        self._thread = threading.Thread(
+            target=keep_connected, args=(self._connection, self._stop), name="mqtt-link", daemon=True
+        )
         self._thread.start()
 
     @property
@@ -60,24 +60,12 @@ class MqttLink:
         return client.publish(self._prefix + kind, payload, _qos(kind), retain).rc == paho.MQTT_ERR_SUCCESS
 
     def take(self, most: int) -> list[Received]:
-        taken: list[Received] = []
-        with contextlib.suppress(IndexError):
-            while len(taken) < most:
-                taken.append(self._inbox.popleft())
-        return taken
+        return self._inbox.take(most)
 
     def close(self) -> None:
         self._stop.set()
         self._lost.set()
         self._thread.join(timeout=CONNECT_TIMEOUT + 2.0)
-
-    def _keep_connected(self) -> None:
-        attempt = 0
-        while not self._stop.is_set():
-            if self._connection():
-                attempt = 0
-            self._stop.wait(BACK_OFF[min(attempt, len(BACK_OFF) - 1)])
-            attempt += 1
 
     def _connection(self) -> bool:
         """One connection from beginning to end; true if there was one."""
@@ -149,8 +137,7 @@ class MqttLink:
             kind = Kind(message.topic.removeprefix(self._prefix))
         except ValueError:
             return
-        self._inbox.append(Received(kind, payload, message.retain, arrival))
-        self._wake()
+        self._inbox.put(Received(kind, payload, message.retain, arrival))
 
 
 def _qos(kind: Kind) -> int:

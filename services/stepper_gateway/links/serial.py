@@ -6,13 +6,13 @@ nobody up. Both end with the port, and what has not been written by then is forg
 
 from __future__ import annotations
 
-import contextlib
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
 
 from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
+from services.stepper_gateway.links.connection import Inbox, keep_connected
 from services.stepper_gateway.links.frames import FrameType
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.links.serial_port import Line, complaint, open_port
@@ -33,9 +33,7 @@ TEXTS = {
     JsonFrame.SHAFT: Kind.SHAFT,
 }
 FRAMES = {kind: frame for frame, kind in TEXTS.items()}  # of the kinds that are JSON
-INBOX = 4096  # [messages] 80 s of state
 BACKLOG = 16_384  # [bytes] that may wait: 0.2 s at 921,600 baud
-BACK_OFF = (0.1, 0.2, 0.5, 1.0)  # [s] between attempts
 
 
 class SerialLink:
@@ -43,13 +41,15 @@ class SerialLink:
 
     def __init__(self, port: str, baud: int, wake: Callable[[], None]) -> None:
         self._port, self._baud, self._wake = port, baud, wake
-        self._inbox: deque[Received] = deque(maxlen=INBOX)
+        self._inbox = Inbox(wake)
         self._outgoing: deque[bytes] = deque()
         self._has_outgoing = threading.Event()
         self._line: Line | None = None
         self._reason = f"the serial port {port} has not been opened yet"
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._keep_open, name="serial-link", daemon=True)
+        self._thread = threading.Thread(
+            target=keep_connected, args=(self._connection, self._stop), name="serial-link", daemon=True
+        )
         self._thread.start()
 
     @property
@@ -68,23 +68,11 @@ class SerialLink:
         return True
 
     def take(self, most: int) -> list[Received]:
-        taken: list[Received] = []
-        with contextlib.suppress(IndexError):
-            while len(taken) < most:
-                taken.append(self._inbox.popleft())
-        return taken
+        return self._inbox.take(most)
 
     def close(self) -> None:
         self._stop.set()
         self._thread.join(timeout=3.0)
-
-    def _keep_open(self) -> None:
-        attempt = 0
-        while not self._stop.is_set():
-            if self._connection():
-                attempt = 0
-            self._stop.wait(BACK_OFF[min(attempt, len(BACK_OFF) - 1)])
-            attempt += 1
 
     def _connection(self) -> bool:
         """One open port from beginning to end; true if there was one."""
@@ -119,8 +107,7 @@ class SerialLink:
             # What is no packet comes as no bytes at all: it is counted with the other bad ones.
             received += [Received(Kind.STATE, b"", False, arrival)] * (packets.bad - bad)
             if received:
-                self._inbox.extend(received)
-                self._wake()
+                self._inbox.put(*received)
 
     def _write(self, line: Line) -> None:
         while self._line is line:

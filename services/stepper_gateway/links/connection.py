@@ -1,0 +1,42 @@
+"""What every wire has: a thread that connects again and again, and an inbox for what arrives."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections import deque
+from collections.abc import Callable
+
+from services.stepper_gateway.links.link import Received
+
+CAPACITY = 4096  # [messages] 80 s of state
+BACK_OFF = (0.1, 0.2, 0.5, 1.0)  # [s] between attempts
+
+
+class Inbox:
+    """Bounded: what is not taken in time makes room for what is newer; any thread may put, one takes."""
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        self._waiting: deque[Received] = deque(maxlen=CAPACITY)
+        self._wake = wake
+
+    def put(self, *received: Received) -> None:
+        self._waiting.extend(received)
+        self._wake()
+
+    def take(self, most: int) -> list[Received]:
+        taken: list[Received] = []
+        with contextlib.suppress(IndexError):
+            while len(taken) < most:
+                taken.append(self._waiting.popleft())
+        return taken
+
+
+def keep_connected(connection: Callable[[], bool], stop: threading.Event) -> None:
+    """Until `stop`: one `connection` after the other; each returns at its end, and says whether it ever stood."""
+    attempt = 0
+    while not stop.is_set():
+        if connection():
+            attempt = 0
+        stop.wait(BACK_OFF[min(attempt, len(BACK_OFF) - 1)])
+        attempt += 1
