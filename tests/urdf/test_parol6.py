@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -207,12 +206,12 @@ def test_the_meshes_are_small_and_drawn_within_the_links_shapes():
 
 
 def test_the_meshes_are_what_their_script_draws(tmp_path: Path):
-    script = Path(shutil.copy(ARM.folder / "make_meshes.py", tmp_path))
-    subprocess.run([sys.executable, str(script)], check=True, capture_output=True)
+    command = [sys.executable, "-m", "urdf.parol6.make_meshes", str(tmp_path)]
+    subprocess.run(command, cwd=ARM.folder.parents[1], check=True, capture_output=True)
     names = sorted(path.name for path in (ARM.folder / "meshes").iterdir())
-    assert names == sorted(path.name for path in (tmp_path / "meshes").iterdir())
+    assert names == sorted(path.name for path in tmp_path.iterdir())
     for name in names:
-        assert (tmp_path / "meshes" / name).stat().st_size == (ARM.folder / "meshes" / name).stat().st_size
+        assert (tmp_path / name).stat().st_size == (ARM.folder / "meshes" / name).stat().st_size
 
 
 def test_nothing_refers_to_a_ros_package():

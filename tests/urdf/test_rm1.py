@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 import sys
 import warnings
@@ -102,12 +101,12 @@ def test_the_meshes_load_and_are_small(rm1: Arm):
 
 
 def test_the_meshes_are_what_their_script_draws(rm1: Arm, tmp_path: Path):
-    script = Path(shutil.copy(rm1.folder / "make_meshes.py", tmp_path))
-    subprocess.run([sys.executable, str(script)], check=True, capture_output=True)
+    command = [sys.executable, "-m", "urdf.rm1.make_meshes", str(tmp_path)]
+    subprocess.run(command, cwd=rm1.folder.parents[1], check=True, capture_output=True)
     names = sorted(path.name for path in (rm1.folder / "meshes").iterdir())
-    assert names == sorted(path.name for path in (tmp_path / "meshes").iterdir())
+    assert names == sorted(path.name for path in tmp_path.iterdir())
     for name in names:
-        assert (tmp_path / "meshes" / name).stat().st_size == (rm1.folder / "meshes" / name).stat().st_size
+        assert (tmp_path / name).stat().st_size == (rm1.folder / "meshes" / name).stat().st_size
 
 
 def test_nothing_refers_to_a_ros_package(rm1: Arm):

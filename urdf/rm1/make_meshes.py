@@ -1,4 +1,4 @@
-"""Draw rm1: one small GLB a link, from convex parts with chamfered edges. Needs trimesh and shapely (extra `view`)."""
+"""Draw rm1: one small GLB a link. From the project's folder: `python -m urdf.rm1.make_meshes`."""
 
 from __future__ import annotations
 
@@ -6,53 +6,28 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from trimesh.visual.material import PBRMaterial
 
-Outline = NDArray[np.float64]  # (n, 2) [m], convex
-MESHES = Path(__file__).parent / "meshes"
-CORNERS = 28  # points of a full circle
-
-CHARCOAL = PBRMaterial(
-    name="charcoal", baseColorFactor=[0.16, 0.18, 0.21, 1.0], metallicFactor=0.1, roughnessFactor=0.6
+from urdf.drawing import (
+    BLACK,
+    CHARCOAL,
+    CORNERS,
+    STEEL,
+    WHITE,
+    Parts,
+    circle,
+    hull,
+    rounded,
+    solid,
+    tapered,
+    write_meshes,
 )
+
 ORANGE = PBRMaterial(name="orange", baseColorFactor=[0.93, 0.43, 0.10, 1.0], metallicFactor=0.1, roughnessFactor=0.45)
-WHITE = PBRMaterial(name="white", baseColorFactor=[0.88, 0.89, 0.90, 1.0], metallicFactor=0.0, roughnessFactor=0.5)
-STEEL = PBRMaterial(name="steel", baseColorFactor=[0.62, 0.64, 0.67, 1.0], metallicFactor=0.5, roughnessFactor=0.35)
-BLACK = PBRMaterial(name="black", baseColorFactor=[0.06, 0.06, 0.07, 1.0], metallicFactor=0.1, roughnessFactor=0.5)
 BRASS = PBRMaterial(name="brass", baseColorFactor=[0.80, 0.62, 0.26, 1.0], metallicFactor=0.5, roughnessFactor=0.35)
 
 
-def circle(radius: float, at: tuple[float, float] = (0.0, 0.0)) -> Outline:
-    """A circle [m] in the plane."""
-    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
-    return np.column_stack((at[0] + radius * np.cos(angle), at[1] + radius * np.sin(angle)))
-
-
-def rounded(size: tuple[float, float], radius: float, at: tuple[float, float] = (0.0, 0.0)) -> Outline:
-    """A rectangle of `size` [m] with rounded corners."""
-    x, y = size[0] / 2.0 - radius, size[1] / 2.0 - radius
-    return np.vstack([circle(radius, (at[0] + sx * x, at[1] + sy * y)) for sx in (-1, 1) for sy in (-1, 1)])
-
-
-def tapered(radius: float, at: tuple[float, float], end_radius: float, end: tuple[float, float]) -> Outline:
-    """A beam between two round ends."""
-    return np.vstack((circle(radius, at), circle(end_radius, end)))
-
-
-def solid(outline: Outline, low: float, high: float, material: PBRMaterial, chamfer: float = 0.002) -> trimesh.Trimesh:
-    """The convex outline from z = `low` to `high` [m], its edges chamfered, flat faces flat and round ones smooth."""
-    middle = outline.mean(axis=0)
-    extent = np.abs(outline - middle).max(axis=0)
-    inner = middle + (outline - middle) * (1.0 - chamfer / extent)
-    layers = ((inner, low), (outline, low + chamfer), (outline, high - chamfer), (inner, high))
-    points = np.vstack([np.column_stack((ring, np.full(len(ring), z))) for ring, z in layers])
-    mesh = trimesh.graph.smooth_shade(trimesh.convex.convex_hull(points), angle=np.radians(35.0))
-    mesh.visual = trimesh.visual.TextureVisuals(material=material)
-    return mesh
-
-
-def screws(centres: list[tuple[float, float]], low: float, high: float) -> list[trimesh.Trimesh]:
+def screws(centres: list[tuple[float, float]], low: float, high: float) -> Parts:
     """Screw heads of 6 mm."""
     return [solid(circle(0.003, centre)[::3], low, high, BLACK, 0.0004) for centre in centres]
 
@@ -62,7 +37,7 @@ def square(half: float, at: tuple[float, float] = (0.0, 0.0)) -> list[tuple[floa
     return [(at[0] + x * half, at[1] + y * half) for x in (-1, 1) for y in (-1, 1)]
 
 
-def base() -> list[trimesh.Trimesh]:
+def base() -> Parts:
     """Plate, housing of the NEMA23 and its gearbox, and the bearing ring that the arm turns on."""
     return [
         solid(rounded((0.18, 0.18), 0.02), 0.0, 0.012, CHARCOAL),
@@ -75,7 +50,7 @@ def base() -> list[trimesh.Trimesh]:
     ]
 
 
-def upper_arm() -> list[trimesh.Trimesh]:
+def upper_arm() -> Parts:
     """Shoulder hub, beam, elbow hub, and the elbow's NEMA17 hanging below it."""
     elbow = (0.20188, -0.00037)
     return [
@@ -91,7 +66,7 @@ def upper_arm() -> list[trimesh.Trimesh]:
     ]
 
 
-def forearm() -> list[trimesh.Trimesh]:
+def forearm() -> Parts:
     """The box of 252 x 77 x 64 mm, its cover, the tool's guide and the NEMA17 of the rack."""
     return [
         solid(circle(0.030), 0.0, 0.004, STEEL, 0.001),
@@ -105,46 +80,23 @@ def forearm() -> list[trimesh.Trimesh]:
     ]
 
 
-def effector() -> list[trimesh.Trimesh]:
+def effector() -> Parts:
     """The rack of 24 x 42 x 191 mm; its frame lies in the tip with z down, so the body is at negative z."""
     return [
         solid(rounded((0.024, 0.042), 0.004), -0.191, -0.030, STEEL, 0.001),
         solid(rounded((0.0235, 0.010), 0.002), -0.1905, -0.0305, BRASS, 0.0005),
         solid(rounded((0.024, 0.042), 0.006), -0.032, -0.022, CHARCOAL, 0.001),
         solid(circle(0.009), -0.022, -0.010, BLACK, 0.001),
-        solid(np.vstack((circle(0.005),)), -0.011, -0.004, ORANGE, 0.001),
+        solid(circle(0.005), -0.011, -0.004, ORANGE, 0.001),
         cone(0.0045, -0.005, 0.0, ORANGE),
     ]
 
 
 def cone(radius: float, low: float, high: float, material: PBRMaterial) -> trimesh.Trimesh:
     """A cone whose point is at `high` [m]."""
-    points = np.vstack((np.column_stack((circle(radius), np.full(CORNERS, low))), [[0.0, 0.0, high]]))
-    mesh = trimesh.graph.smooth_shade(trimesh.convex.convex_hull(points), angle=np.radians(35.0))
-    mesh.visual = trimesh.visual.TextureVisuals(material=material)
-    return mesh
-
-
-def joined(parts: list[trimesh.Trimesh]) -> trimesh.Scene:
-    """One scene with one mesh a material, so that the file holds few nodes."""
-    scene = trimesh.Scene()
-    for material in {part.visual.material.name: part.visual.material for part in parts}.values():
-        same = [part for part in parts if part.visual.material.name == material.name]
-        mesh = trimesh.util.concatenate([trimesh.Trimesh(p.vertices, p.faces, process=False) for p in same])
-        mesh.visual = trimesh.visual.TextureVisuals(material=material)
-        scene.add_geometry(mesh, geom_name=material.name, node_name=material.name)
-    return scene
-
-
-def main() -> None:
-    """Write meshes/<link>.glb."""
-    MESHES.mkdir(exist_ok=True)
-    drawings = {"base_link": base, "brazo_link": upper_arm, "antebrazo_link": forearm, "efector_link": effector}
-    for link, draw in drawings.items():
-        data = joined(draw()).export(file_type="glb", include_normals=True)
-        (MESHES / f"{link}.glb").write_bytes(data)
-        print(f"{link}.glb {len(data) / 1024:.0f} KiB")
+    return hull(np.vstack((np.column_stack((circle(radius), np.full(CORNERS, low))), [[0.0, 0.0, high]])), material)
 
 
 if __name__ == "__main__":
-    main()
+    drawings = {"base_link": base, "brazo_link": upper_arm, "antebrazo_link": forearm, "efector_link": effector}
+    write_meshes(Path(__file__).parent, drawings)
