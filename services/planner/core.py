@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cached_property
 
 import msgspec
 import numpy as np
@@ -46,6 +45,7 @@ PATH_POINTS = 100
 MOST_GOALS = 8  # postures of one goal that are tried
 LONGEST = 120.0  # [s] that may be allowed
 ATTEMPTS = 3  # searches, where the finished way fails its verification
+NEAR_START = 0.9  # of the distance at the start is kept on the way, where that is less than the clearance
 TOOL = "tool"  # the planner_id of lines and arcs of the tool
 
 
@@ -59,7 +59,8 @@ class Planner:
         self._goals = Goals(arm, self.kinematics, self.surroundings)
         self._blockade = Blockade(arm, self._goals, self.surroundings)
         self._tool_motions = ToolMotions(arm, self.kinematics, self._goals, self.surroundings)
-        self._via = Via(arm, self._goals, self.surroundings, self._blockade)
+        self._search = Search(arm, self.surroundings)
+        self._via = Via(arm, self._goals, self.surroundings, self._blockade, self._search)
 
     def set_world(self, world: World) -> None:
         """What later plans heed; a plan that is being made is held against it at its end."""
@@ -67,7 +68,7 @@ class Planner:
 
     def prepare(self) -> None:
         """Does now what the first search would wait for: seconds, in which the links are filled with spheres."""
-        _ = self._search
+        self.surroundings.core(CLEARANCE)
 
     def plan(
         self,
@@ -101,15 +102,6 @@ class Planner:
             times=tuple(row.time_from_start for row in shown),
         )
 
-    @cached_property
-    def _search(self) -> Search:
-        return Search(self.arm, self.surroundings.world)
-
-    def _heeding(self) -> Search:
-        """The search, in the world of the plan at hand."""
-        self._search.heed(self.surroundings.world)
-        return self._search
-
     def _plan(
         self, request: PlanRequest, present: JointState | None, age: float, deadline: Deadline, watch: Stopwatch
     ) -> PlanResponse:
@@ -126,7 +118,7 @@ class Planner:
             fraction, stopped_by = way.fraction, way.stopped_by
         elif isinstance(request.goal, WaypointGoal):
             errand = Errand(request.motion, start, limits, margin, finisher, deadline, watch)
-            finished, planner_id = self._via.plan(request.goal, errand, self._heeding)
+            finished, planner_id = self._via.plan(request.goal, errand)
         else:
             finished, planner_id = self._found(request, start, margin, finisher, deadline, watch)
         self._hold_against_newest(finished.trajectory)
@@ -163,7 +155,7 @@ class Planner:
         touching: list[Start] = []
         goals: list[Start] = []
         for goal in self._postures(request, start, deadline, watch):
-            if self.surroundings.distance(goal) <= CLEARANCE:
+            if not self.surroundings.keeps(goal, CLEARANCE):
                 touching.append(goal)
             else:
                 try:
@@ -202,7 +194,6 @@ class Planner:
         watch: Stopwatch,
     ) -> tuple[Finished, str]:
         """A way around what is on the straight one; another one, where the finished trajectory touches."""
-        self._search.heed(self.surroundings.world)
         refusal: NoPlan | None = None
         for attempt in range(ATTEMPTS):
             try:
@@ -241,10 +232,12 @@ class Planner:
 
     def _start_margin(self, start: Start) -> float:
         """[m] to keep on the way: an arm that already stands nearer than the clearance may come away from there."""
+        if self.surroundings.keeps(start, CLEARANCE / NEAR_START):
+            return CLEARANCE
         distance = self.surroundings.distance(start)
         if distance <= 0.0:
             raise self._blockade.start(start)
-        return min(CLEARANCE, 0.9 * distance)
+        return min(CLEARANCE, NEAR_START * distance)
 
 
 def _require_known(request: PlanRequest) -> None:

@@ -10,7 +10,7 @@ from schemas.planning import JointGoal, PlanCode, PlanRequest, PointToPoint, Pos
 from schemas.scene import AllowedPair, BoxShape, PlanningScene, SceneObject, SphereShape
 from services.arm.description import Arm
 from services.planner.core import Planner
-from services.planner.scene.world import Positions, World
+from services.planner.scene.world import World
 
 GOAL = JointGoal(name=("brazo_joint",), position=(1.2,))
 REQUEST = PlanRequest(goal=GOAL, motion=PointToPoint())
@@ -108,26 +108,17 @@ def test_what_the_arm_carries_is_kept_clear_too(planner: Planner, home: JointSta
     assert planner.plan(REQUEST, home).code is PlanCode.SUCCESS
 
 
-class ChangedMeanwhile(World):
-    """A world that is asked about while somebody changes the scene."""
-
-    planner: Planner
-    newer: World
-
-    def distance(self, positions: Positions, padding: float = 0.0) -> float:
-        self.planner.set_world(self.newer)
-        return super().distance(positions, padding)
-
-
 @pytest.mark.parametrize("turn", [0.6, -0.6])
 def test_an_object_that_comes_while_a_plan_is_made_stops_the_plan_it_is_in_the_way_of(
     planner: Planner, home: JointState, turn: float
 ) -> None:
-    changed = ChangedMeanwhile(planner.arm, planner.kinematics)
-    changed.planner = planner
-    changed.newer = World(planner.arm, planner.kinematics, scene(block(planner, turn), version=9))
-    planner.set_world(changed)
-    response = planner.plan(REQUEST, home)
+    newer = World(planner.arm, planner.kinematics, scene(block(planner, turn), version=9))
+
+    def clock() -> float:  # is looked at all the while
+        planner.set_world(newer)
+        return 0.0
+
+    response = planner.plan(REQUEST, home, clock=clock)
     assert response.scene_version == 9
     if turn > 0.0:
         assert response.refusal is not None
@@ -141,7 +132,7 @@ def test_an_object_on_the_way_does_not_change_how_far_the_arm_reaches(planner: P
     beyond = PlanRequest(goal=PoseGoal(position=(0.1, 0.6, 0.1)))
     alone = planner.plan(beyond, home).refusal
     wall = SceneObject(name="wall", shape=BoxShape(size=(0.02, 0.02, 1.0)), pose=block(planner, 0.4).pose)
-    show(planner, scene(wall, block(planner, 0.7), block(planner, 1.0)))
+    show(planner, scene(wall, block(planner, 0.7), block(planner, 1.0, "another")))
     blocked = planner.plan(beyond, home).refusal
     assert alone is not None
     assert blocked is not None

@@ -1,8 +1,13 @@
-"""What a plan heeds: one world from its beginning to its end, however often the scene changes meanwhile."""
+"""What a plan heeds: one world from its beginning to its end, however often the scene changes meanwhile.
+
+The compiled core is asked first: what its spheres let be is free on the exact shapes too. Coal decides about the rest.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +15,16 @@ from numpy.typing import NDArray
 from schemas.scene import Contact
 from services.arm.collisions import LinkPair
 from services.planner.scene.world import World
+from services.planner.search.native_scene import native_scene
+from services.planner.search.native_search import native_core, show_scene
+
+if TYPE_CHECKING:
+    from services.planner.native import MotionCore
 
 Array = NDArray[np.float64]
 Positions = Sequence[float] | Array
+
+STRETCH = 40  # rows of a way that the core judges at once, where it does not let all of it be
 
 
 class Surroundings:
@@ -21,15 +33,38 @@ class Surroundings:
     def __init__(self, world: World) -> None:
         self.newest = world
         self.world = world
+        self._shown: World | None = None
 
     def begin(self) -> World:
         """From now on the newest world counts."""
         self.world = self.newest
         return self.world
 
+    def core(self, margin: float) -> MotionCore | None:
+        """The compiled core in this world, to keep `margin` [m]; None where it is not built."""
+        core = self._core
+        if core is not None:
+            if self._shown is not self.world:
+                show_scene(core, *native_scene(self.world.arm, self.world.scene, self.world.folders))
+                self._shown = self.world
+            core.margin = margin
+        return core
+
+    @cached_property
+    def _core(self) -> MotionCore | None:
+        """Takes a second, the first time: the links are filled with spheres."""
+        return native_core(self.world.arm)
+
     @property
     def reach(self) -> Array:
         return self.world.reach
+
+    def keeps(self, positions: Positions, margin: float) -> bool:
+        """Whether everything is farther than `margin` [m]."""
+        core = self.core(margin)
+        if core is not None and core.free(np.array([positions]))[0]:
+            return True
+        return self.world.distance(positions) > margin
 
     def distance(self, positions: Positions) -> float:
         """[m], as `World.distance`."""
@@ -37,7 +72,11 @@ class Surroundings:
 
     def touching(self, positions: Array, margin: float) -> Array | None:
         """As `World.touching`."""
-        return self.world.touching(positions, margin)
+        for stretch in self._doubtful(positions, margin):
+            posture = self.world.touching(stretch, margin)
+            if posture is not None:
+                return posture
+        return None
 
     def pairs_within(self, positions: Positions, margin: float = 0.0) -> list[LinkPair]:
         """As `World.pairs_within`."""
@@ -46,3 +85,14 @@ class Surroundings:
     def contacts(self, positions: Positions, margin: float = 0.0) -> list[Contact]:
         """As `World.contacts`."""
         return self.world.contacts(positions, margin)
+
+    def _doubtful(self, rows: Array, margin: float) -> Iterator[Array]:
+        """The stretches of the polyline through `rows` (m, n) that the core does not let be."""
+        core = self.core(margin)
+        if core is None or len(rows) < 2:
+            yield rows
+        elif not core.way_free(rows):
+            for first in range(0, len(rows) - 1, STRETCH):
+                stretch = rows[first : first + STRETCH + 1]
+                if not core.way_free(stretch):
+                    yield stretch

@@ -16,7 +16,8 @@ from services.planner.blockade import Blockade
 from services.planner.finish import Finished, Finisher, Touching
 from services.planner.goals.goals import Goals, timed_out
 from services.planner.refusals import NoPlan, no_way_around, not_verified
-from services.planner.scene.clearance import CLEARANCE, Sweeper
+from services.planner.scene.clearance import CLEARANCE
+from services.planner.scene.surroundings import Surroundings
 from services.planner.search.search import Search
 from services.planner.search.way import STRAIGHT, Deadline, NoWay, Start
 from services.planner.times import Stopwatch
@@ -47,16 +48,17 @@ class Errand:
 class Via:
     """Ways by waypoints for one arm."""
 
-    def __init__(self, arm: Arm, goals: Goals, checker: Sweeper, blockade: Blockade) -> None:
-        self._arm, self._goals, self._checker, self._blockade = arm, goals, checker, blockade
+    def __init__(self, arm: Arm, goals: Goals, surroundings: Surroundings, blockade: Blockade, search: Search) -> None:
+        self._arm, self._goals, self._surroundings = arm, goals, surroundings
+        self._blockade, self._search = blockade, search
 
-    def plan(self, goal: WaypointGoal, errand: Errand, search: Callable[[], Search]) -> tuple[Finished, str]:
+    def plan(self, goal: WaypointGoal, errand: Errand) -> tuple[Finished, str]:
         """Straight, or around what is in the way from one to the next, with as much blend as is free."""
         with errand.watch.phase("ik"):
             postures = self._postures(goal, errand.start, errand.deadline.is_late)
         corners, planner_id = np.array(postures), STRAIGHT
         if isinstance(errand.motion, FreeMotion):
-            corners, planner_id = self._corners(errand.motion, postures, errand, search)
+            corners, planner_id = self._corners(errand.motion, postures, errand)
         refusal: NoPlan | None = None
         for trajectory in self._trajectories(corners, goal.blend, errand):
             try:
@@ -73,7 +75,7 @@ class Via:
         for point in points_of(goal):
             touching: Start | None = None
             for posture in self._goals.candidates(point, chosen[-1], is_late):
-                if self._checker.distance(posture) > CLEARANCE:
+                if self._surroundings.keeps(posture, CLEARANCE):
                     chosen.append(posture)
                     break
                 touching = touching or posture
@@ -83,19 +85,17 @@ class Via:
                 raise self._blockade.goal(point, touching, chosen[-1], is_late)
         return chosen
 
-    def _corners(
-        self, motion: FreeMotion, postures: list[Start], errand: Errand, search: Callable[[], Search]
-    ) -> tuple[Array, str]:
+    def _corners(self, motion: FreeMotion, postures: list[Start], errand: Errand) -> tuple[Array, str]:
         """The polyline by `postures`, with the corners of a way around wherever a leg is not free."""
         rows, planner_id = [np.array(postures[:1])], STRAIGHT
         for begin, end in pairwise(postures):
             leg = np.array((begin, end))
-            if self._checker.touching(leg, errand.margin) is None:
+            if self._surroundings.touching(leg, errand.margin) is None:
                 rows.append(leg[1:])
                 continue
             try:
                 with errand.watch.phase("search"):
-                    way = search().find(
+                    way = self._search.find(
                         leg[0], leg[1:], errand.margin, motion.planner_id, motion.seed, errand.deadline, errand.watch
                     )
             except NoWay as no_way:
@@ -114,7 +114,7 @@ class Via:
 
     def _trajectory(self, corners: Array, limits: JointLimits, blend: float) -> JointTrajectory:
         names = self._arm.joint_names
-        lines = rounded_runs(corners, limits.velocity, self._checker.reach, blend)
+        lines = rounded_runs(corners, limits.velocity, self._surroundings.reach, blend)
         try:
             if not lines:
                 return straight_line(names, corners[0].tolist(), corners[-1].tolist(), limits)
