@@ -44,6 +44,7 @@ class FollowJointTrajectoryGoal(Message, frozen=True, kw_only=True):
     path_tolerance: tuple[JointTolerance, ...] = ()
     goal_tolerance: tuple[JointTolerance, ...] = ()
     goal_time_tolerance: float = 0.0  # [s] 0 is the default of the gateway, which is finite
+    scene_version: int | None = None  # of the planning scene it is free of; absent: not planned in one
 
 
 class FollowJointTrajectoryFeedback(Message, frozen=True, kw_only=True):
@@ -72,6 +73,7 @@ class FollowErrorCode(IntEnum):
     CANCELED = -10
     PREEMPTED = -11
     DEVICE_FAILED = -12
+    SCENE_CHANGED = -13
 
 
 class FollowJointTrajectoryResult(Message, frozen=True, kw_only=True):

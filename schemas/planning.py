@@ -104,6 +104,7 @@ class PlanRequest(Message, frozen=True, kw_only=True):
     motion: Motion = FreeMotion()
     timing: Timing = Timing.JERK_LIMITED
     step_policy: StepPolicy = StepPolicy.SLOW_DOWN
+    request_id: str = ""  # the client's own, for `plan/progress` and `plan/cancel`; empty: the planner makes one
 
 
 class PlanCode(IntEnum):
@@ -113,6 +114,7 @@ class PlanCode(IntEnum):
     FAILURE = 99999
     PLANNING_FAILED = -1
     TIMED_OUT = -6
+    PREEMPTED = -7  # cancelled
     START_STATE_IN_COLLISION = -10
     GOAL_IN_COLLISION = -12
     GOAL_VIOLATES_PATH_CONSTRAINTS = -13
@@ -172,6 +174,40 @@ class PlanResponse(Message, frozen=True, kw_only=True):
     times: PlanningTimes = PlanningTimes()
     planner_id: str = ""  # that found the way
     scene_version: int = 0  # that it is free of
+
+
+class PlanCancel(Message, frozen=True, kw_only=True):
+    """End a plan that waits or is being made; its own answer is then PREEMPTED."""
+
+    request_id: str = ""
+
+
+class PlanCancelResult(Message, frozen=True, kw_only=True):
+    """Whether there was such a plan, and a sentence that says what becomes of it."""
+
+    found: bool = False
+    message: str = ""
+
+
+class PlanPhase(StrEnum):
+    """What a plan is at."""
+
+    WAITING = "waiting"  # for a process that is free, or takes in the scene
+    IK = "ik"
+    SEARCH = "search"
+    SMOOTHING = "smoothing"
+    TIMING = "timing"
+    VERIFICATION = "verification"
+
+
+class PlanProgress(Message, frozen=True, kw_only=True):
+    """How one plan stands, 10 times a second once it has lasted 0.1 s."""
+
+    stamp: int = 0  # [ns] UNIX time
+    request_id: str = ""
+    phase: PlanPhase = PlanPhase.WAITING
+    elapsed: float = 0.0  # [s] since it was asked for, waiting included
+    allowed: float = 0.0  # [s] for all but the waiting
 
 
 class PlannedPath(Message, frozen=True, kw_only=True):
@@ -238,11 +274,22 @@ class JogCommand(Message, frozen=True, kw_only=True):
     frame: str = ""  # empty: the base; the tool's own name: the tool
 
 
+class JogLimit(Message, frozen=True, kw_only=True):
+    """What slows a jog: the check, the thing, how it stands now and the limit."""
+
+    check: str = ""  # "joint limit", "collision", "contact", "singularity", "speed limit", "command"
+    subject: str = ""  # joint or pair of links and objects
+    value: float | None = None  # [rad] or [m] of the joint, [m] between the pair, share of the manipulability
+    limit: float | None = None
+    message: str = ""  # for a person
+
+
 class JogStatus(Message, frozen=True, kw_only=True):
     """What becomes of the jog commands, 10 times a second while there are some."""
 
     stamp: int = 0  # [ns] UNIX time
     active: bool = False
     scale: float = 1.0  # of the commanded speed that is left
-    limited_by: str = ""  # "singularity", "joint limit of ...", "collision of ... and ..."; empty: nothing
+    limited_by: str = ""  # the sentences of `limits`, or why there is no jogging; empty: nothing
     manipulability: float = 0.0
+    limits: tuple[JogLimit, ...] = ()

@@ -40,7 +40,10 @@ from schemas.planning import (
     IkResponse,
     JogCommand,
     JogStatus,
+    PlanCancel,
+    PlanCancelResult,
     PlannedPath,
+    PlanProgress,
     PlanRequest,
     PlanResponse,
 )
@@ -117,6 +120,9 @@ STATIC_FRAMES = Topic(
     "static_frames", FrameTransforms, LATCHED, None, True, "state_publisher", "poses of the fixed links"
 )
 PLANNED_PATH = Topic("planned_path", PlannedPath, LATCHED, None, True, "planner", "the tool's planned way")
+PLAN_PROGRESS = Topic(  # EVERY: several plans share the key, and the newest of one must not push out another's
+    "plan/progress", PlanProgress, EVERY, None, True, "planner", "how each plan stands that takes longer than 0.1 s"
+)
 SCENE = Topic("scene", PlanningScene, LATCHED, None, True, "planner", "what stands around the arm and what it carries")
 CONTACTS = Topic("contacts", Contacts, LATCHED, None, True, "planner", "what touches where a plan was refused")
 JOG = Topic("jog", JogCommand, LATEST, 50.0, True, ANY, "how to move now, by hand")
@@ -144,12 +150,14 @@ STATISTICS = Topic(
 
 TOPICS: tuple[Topic[Message], ...] = (
     DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, JOINT_TARGETS, FRAMES, STATIC_FRAMES, PLANNED_PATH,
+    PLAN_PROGRESS,
     SCENE, CONTACTS, JOG, JOG_STATUS, DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, DEVICE_CONFIGURATION,
     SENSORS, DEVICE_SHAFT,
     COMMANDS, COMMAND_ACKS, LOG, STATISTICS,
 )  # fmt: skip
 
 PLAN = Request("plan", PlanRequest, PlanResponse, "planner", "a goal in, a verified trajectory or a refusal out")
+PLAN_CANCEL = Request("plan/cancel", PlanCancel, PlanCancelResult, "planner", "end a plan before its end")
 IK = Request("ik", IkRequest, IkResponse, "planner", "joint values for a tool pose")
 FK = Request("fk", FkRequest, FkResponse, "planner", "link poses for joint values")
 SCENE_EDIT = Request("scene/edit", SceneRequest, SceneResponse, "planner", "add, remove, move, attach, allow ...")
@@ -166,6 +174,7 @@ DEVICE_PRESS = Request(
 
 REQUESTS: tuple[Request[Message, Message], ...] = (
     PLAN,
+    PLAN_CANCEL,
     IK,
     FK,
     SCENE_EDIT,
