@@ -79,10 +79,13 @@ class LatestBox:
 
 
 class EveryBox:
-    """Room for many arrivals in order: one that does not fit is lost, and counted."""
+    """Room for many arrivals in order: one that does not fit is lost, and counted.
 
-    def __init__(self, inbox: Inbox, handle: Callable[[Arrival], None], capacity: int = EVERY_CAPACITY) -> None:
-        self._inbox, self._handle, self._capacity = inbox, handle, capacity
+    Each has a task of its own in the inbox; without one they wait to be handled together, and wake nobody.
+    """
+
+    def __init__(self, inbox: Inbox | None, handle: Callable[[Arrival], None]) -> None:
+        self._inbox, self._handle = inbox, handle
         self._lock = threading.Lock()
         self._waiting: deque[Arrival] = deque()
         self._bytes = 0
@@ -91,54 +94,31 @@ class EveryBox:
     def on_arrival(self, arrival: Arrival) -> None:
         with self._lock:
             size = len(arrival.payload)
-            if len(self._waiting) >= self._capacity or self._bytes + size > EVERY_BYTES:
+            if len(self._waiting) >= EVERY_CAPACITY or self._bytes + size > EVERY_BYTES:
                 self.dropped += 1
                 return
             self._waiting.append(arrival)
             self._bytes += size
-        self._inbox.put(self._deliver)
+        if self._inbox is not None:
+            self._inbox.put(self._deliver)
 
     def on_miss(self, count: int) -> None:
         with self._lock:
             self.dropped += count
 
-    def _deliver(self) -> None:
-        with self._lock:
-            arrival = self._waiting.popleft()
-            self._bytes -= len(arrival.payload)
-        self._handle(arrival)
-
-
-class BatchBox:
-    """Room for many arrivals that wait to be handled together: none of them wakes the thread of logic."""
-
-    def __init__(self, handle: Callable[[Arrival], None], capacity: int = EVERY_CAPACITY) -> None:
-        self._handle, self._capacity = handle, capacity
-        self._waiting: deque[Arrival] = deque()
-        self._lock = threading.Lock()
-        self._bytes = 0
-        self.dropped = 0
-
-    def on_arrival(self, arrival: Arrival) -> None:
-        with self._lock:
-            size = len(arrival.payload)
-            if len(self._waiting) >= self._capacity or self._bytes + size > EVERY_BYTES:
-                self.dropped += 1
-            else:
-                self._waiting.append(arrival)
-                self._bytes += size
-
-    def on_miss(self, count: int) -> None:
-        with self._lock:
-            self.dropped += count
-
-    def deliver(self) -> None:
+    def deliver_all(self) -> None:
         """Handles all that wait, in order."""
         with self._lock:
             waiting, self._waiting = self._waiting, deque()
             self._bytes = 0
         for arrival in waiting:
             self._handle(arrival)
+
+    def _deliver(self) -> None:
+        with self._lock:
+            arrival = self._waiting.popleft()
+            self._bytes -= len(arrival.payload)
+        self._handle(arrival)
 
 
 def _nothing() -> None:

@@ -10,7 +10,7 @@ from schemas.message import BadMessage, Message
 from schemas.system import TopicStatistics
 from schemas.topics import Delivery, Topic
 from services.runtime.bus import Arrival, Bus
-from services.runtime.inbox import BatchBox, Box, EveryBox, LatestBox
+from services.runtime.inbox import Box, EveryBox, LatestBox
 from services.runtime.loop import Loop
 from services.runtime.wire import from_arrival, schema_of, to_payload
 
@@ -62,8 +62,8 @@ class Subscription(Generic[M]):
 
     def _box_for(self, batch: float | None) -> Box:
         if batch is not None:
-            box = BatchBox(self._handle)
-            self._loop.every(batch, box.deliver)
+            box = EveryBox(None, self._handle)
+            self._loop.every(batch, box.deliver_all)
             return box
         latest = self.topic.delivery is Delivery.LATEST
         return (LatestBox if latest else EveryBox)(self._loop.inbox, self._handle)
@@ -74,8 +74,8 @@ class Subscription(Generic[M]):
 
     def close(self) -> None:
         self._declaration.close()
-        if isinstance(self._box, BatchBox):
-            self._loop.forget(self._box.deliver)
+        if isinstance(self._box, EveryBox):
+            self._loop.forget(self._box.deliver_all)
 
     def report_losses(self) -> None:
         """Says once that an EVERY topic has lost messages."""
