@@ -64,6 +64,7 @@ class Curve:
 
     def __init__(self, pieces: Array) -> None:
         self._pieces = pieces
+        self._squares = _squared_speeds(pieces)
         starts = np.linspace(0.0, 1.0, PARTS, endpoint=False)
         self._part_u = np.tile(starts, len(pieces))
         self._part_piece = np.repeat(np.arange(len(pieces)), PARTS)
@@ -84,6 +85,16 @@ class Curve:
         piece, u = self._locate(np.clip(lengths, 0.0, self.length))
         return self._derivatives(piece, u)
 
+    def cut(self, parts: int, shares: Array) -> tuple[Array, Derivatives]:
+        """(k parts,) lengths of the pieces' even parts, `parts` a divisor of PARTS, and the curve inside each of them.
+
+        It is looked at where the parameter is at `shares` (m,) of a part, by rows.
+        """
+        lengths = np.diff(self._part_length[:: PARTS // parts])
+        u = ((np.arange(parts)[:, None] + shares) / parts).reshape(-1)
+        count = len(self._pieces)
+        return lengths, self._derivatives(np.repeat(np.arange(count), len(u)), np.tile(u, count))
+
     def _locate(self, lengths: Array) -> tuple[Indices, Array]:
         """Piece and parameter, by Newton from the table."""
         row = np.clip(np.searchsorted(self._part_length, lengths, side="right") - 1, 0, len(self._part_u) - 1)
@@ -103,13 +114,12 @@ class Curve:
         return result
 
     def _speed(self, piece: Indices, u: Array) -> Array:
-        _, c1, c2, c3 = np.moveaxis(self._pieces[piece], 1, 0)
-        u = u[:, None]
-        return np.asarray(np.linalg.norm(c1 + u * (2.0 * c2 + u * 3.0 * c3), axis=1))
+        s0, s1, s2, s3, s4 = self._squares[piece].T
+        return np.asarray(np.sqrt(np.maximum(s0 + u * (s1 + u * (s2 + u * (s3 + u * s4))), 0.0)))
 
     def _derivatives(self, piece: Indices, u: Array) -> Derivatives:
         """By the chain rule; r is the speed in the parameter, a dash after it a derivative by the parameter."""
-        c0, c1, c2, c3 = np.moveaxis(self._pieces[piece], 1, 0)
+        c0, c1, c2, c3 = self._pieces[piece].transpose(1, 0, 2)
         u = u[:, None]
         value = c0 + u * (c1 + u * (c2 + u * c3))
         y1, y2, y3 = c1 + u * (2.0 * c2 + u * 3.0 * c3), 2.0 * c2 + u * 6.0 * c3, 6.0 * c3
@@ -127,6 +137,13 @@ def _powers(control: Array) -> Array:
     windows = np.stack([control[i : len(control) - 3 + i] for i in range(4)], axis=1)
     powers: Array = np.einsum("uc,kcn->kun", BLENDING, windows)
     return powers
+
+
+def _squared_speeds(pieces: Array) -> Array:
+    """(k, 5) the square of each piece's speed in its parameter, in powers of that."""
+    d0, d1, d2 = pieces[:, 1], 2.0 * pieces[:, 2], 3.0 * pieces[:, 3]
+    products = (d0 * d0, 2.0 * d0 * d1, d1 * d1 + 2.0 * d0 * d2, 2.0 * d1 * d2, d2 * d2)
+    return np.stack([product.sum(axis=1) for product in products], axis=1)
 
 
 def _straightened(control: Array) -> Array:

@@ -1,0 +1,107 @@
+"""A smooth way in sections, in each of which the movement along it has bounds under which no joint exceeds its own.
+
+With y the joints by the way's length, divided by their speed limits, and a dash for a derivative by it:
+q' = y' v, q'' = y'' v^2 + y' a, q''' = y''' v^3 + 3 y'' v a + y' j.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.planner.search.curve import Curve
+from services.planner.timing.profile import JointLimits
+
+Array = NDArray[np.float64]
+
+BENDING = 0.8  # share of the acceleration's limit that bending may use
+TWISTING = 0.6  # share of the jerk's limit that the bend's own change may use
+CROSSING = 0.2  # share of the jerk's limit for accelerating in a bend
+CUTS = 2  # sections of a piece, before the ones that are alike become one
+SHARES = np.linspace(1e-6, 1.0 - 1e-6, 5)  # of a section, at which its bounds are taken
+ALIKE = 1.08  # sections whose speeds differ by less are one
+STRAIGHT = 1e-9  # 1/s of bend below which a piece is straight
+TINY = 1e-12
+HALVINGS = 30
+
+
+@dataclass(frozen=True)
+class Section:
+    """A stretch of the way with bounds of the movement along it."""
+
+    length: float  # [s at full speed]
+    speed: float
+    acceleration: float
+    jerk: float
+    bends: bool
+
+
+def sections_of(run: Curve, limits: JointLimits) -> list[Section]:
+    """Some for each piece of the curve, with the bounds of all their samples; those that are alike are one."""
+    lengths, way = run.cut(CUTS, SHARES)
+    y1, y2, y3 = (np.abs(part) + TINY for part in way[1:])
+    most_a, most_j = limits.acceleration / limits.velocity, limits.jerk / limits.velocity
+    speeds = np.minimum(1.0 / y1, np.minimum((BENDING * most_a / y2) ** 0.5, (TWISTING * most_j / y3) ** (1.0 / 3.0)))
+    v = _least(speeds)
+    speed = np.repeat(v, len(SHARES))[:, None]
+    crossing = 3.0 * y2 * speed
+    a = np.minimum(_least((most_a - y2 * speed**2) / y1), _least(CROSSING * most_j / crossing))
+    left = most_j - y3 * speed**3 - np.minimum(CROSSING * most_j, crossing * most_a / y1)
+    bends = _least(-y2) < -STRAIGHT
+    rows = zip(*(column.tolist() for column in (lengths, v, a, _least(left / y1), bends)), strict=True)
+    return _merged([Section(*row) for row in rows])
+
+
+def boundary_speeds(sections: list[Section]) -> list[float]:
+    """Steady speeds between the sections, that can be reached from rest and brought to rest."""
+    speeds = [0.0, *(min(one.speed, other.speed) for one, other in pairwise(sections)), 0.0]
+    for index, section in enumerate(sections[:-1]):
+        speeds[index + 1] = min(speeds[index + 1], _reachable(speeds[index], section))
+    for index in range(len(sections) - 1, 0, -1):
+        speeds[index] = min(speeds[index], _reachable(speeds[index + 1], sections[index]))
+    return speeds
+
+
+def _least(rows: Array) -> Array:
+    """(k,) the least of all samples and joints of each section."""
+    least: Array = rows.reshape(-1, len(SHARES) * rows.shape[1]).min(axis=1)
+    return least
+
+
+def _merged(sections: list[Section]) -> list[Section]:
+    """Fewer of them: neighbours that are about as fast become one, under the bounds of the slower."""
+    merged = [sections[0]]
+    for section in sections[1:]:
+        last = merged[-1]
+        if max(last.speed, section.speed) <= ALIKE * min(last.speed, section.speed):
+            merged[-1] = Section(
+                last.length + section.length,
+                min(last.speed, section.speed),
+                min(last.acceleration, section.acceleration),
+                min(last.jerk, section.jerk),
+                last.bends or section.bends,
+            )
+        else:
+            merged.append(section)
+    return merged
+
+
+def _reachable(speed: float, section: Section) -> float:
+    """The fastest steady speed at the other end of the section, by bisection."""
+    low, high = speed, max(speed, section.speed)
+    if _distance(low, high, section) <= section.length:
+        return high
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _distance(speed, middle, section) <= section.length else (low, middle)
+    return low
+
+
+def _distance(low: float, high: float, section: Section) -> float:
+    """What a jerk-limited change of speed takes, steady before and after."""
+    change, a, j = high - low, section.acceleration, section.jerk
+    duration = change / a + a / j if change * j >= a * a else 2.0 * (change / j) ** 0.5
+    return 0.5 * (low + high) * duration
