@@ -32,7 +32,7 @@ from services.planner.scene.surroundings import Surroundings
 from services.planner.scene.world import World
 from services.planner.search.search import Search, require_known
 from services.planner.search.via import Errand, Via
-from services.planner.search.way import STRAIGHT, Deadline, NoWay, Start, endless
+from services.planner.search.way import STRAIGHT, Deadline, Flag, NoWay, Start, endless
 from services.planner.start import resolve_start
 from services.planner.times import Stopwatch
 from services.planner.timing.profile import JointLimits, joint_limits
@@ -76,10 +76,15 @@ class Planner:
         present: JointState | None,
         age: float = 0.0,
         clock: Callable[[], float] = endless,
+        cancel: Flag | None = None,
+        watch: Stopwatch | None = None,
     ) -> PlanResponse:
-        """The answer; `age` [s] is how old `present` is, `clock` [s] says how the allowed time goes by."""
+        """The answer; `age` [s] is how old `present` is, `clock` [s] says how the allowed time goes by.
+
+        Another thread may set `cancel`, and see on `watch` what the plan is at.
+        """
         self.surroundings.begin()
-        watch, deadline = Stopwatch(clock), Deadline(clock, min(request.allowed_time, LONGEST), clock())
+        watch, deadline = watch or Stopwatch(clock), Deadline(clock, request.allowed_time, clock(), cancel)
         try:
             response = self._plan(request, present, age, deadline, watch)
         except NoPlan as no_plan:
@@ -242,8 +247,8 @@ class Planner:
 
 def _require_known(request: PlanRequest) -> None:
     """Raises `NoPlan` for what this planner cannot do."""
-    if request.allowed_time <= 0.0:
-        message = f"allowed_time is {request.allowed_time:g} s: it must be above 0"
+    if not 0.0 < request.allowed_time <= LONGEST:
+        message = f"allowed_time is {request.allowed_time:g} s: it must be above 0 and at most {LONGEST:g}"
         raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, "allowed_time", message, "allow 1 s, which is the default")
     if isinstance(request.motion, FreeMotion):
         require_known(request.motion.planner_id)

@@ -6,7 +6,7 @@ import msgspec
 
 from schemas.deployment import Deployment
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
-from schemas.topics import FK, IK, JOINT_STATES, PLAN, PLANNED_PATH
+from schemas.topics import FK, IK, JOINT_STATES, PLAN, PLAN_CANCEL, PLAN_PROGRESS, PLANNED_PATH
 from services.arm.description import load_arm
 from services.planner.core import Planner
 from services.planner.goals.kinematic_requests import KinematicRequests
@@ -19,6 +19,7 @@ from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.runtime.requests import Pending
 
+PROGRESS_RATE = 10.0  # [Hz]
 NOT_READY = "no fresh joint_states: is the stepper_gateway running?"
 
 
@@ -27,7 +28,7 @@ def run(node: Node, deployment: Deployment) -> None:
     planner = Planner(load_arm(project_root() / deployment.robot))
     kinematic = KinematicRequests(planner.arm)
     states = node.latest(JOINT_STATES)
-    path = node.publisher(PLANNED_PATH)
+    path, progress = node.publisher(PLANNED_PATH), node.publisher(PLAN_PROGRESS)
     folder = project_root() / deployment.paths.run
     keeper = SceneKeeper(node, planner.arm, states, folder, planner.set_world)
     JogService(node, planner.arm, states, lambda: keeper.world)
@@ -48,10 +49,13 @@ def run(node: Node, deployment: Deployment) -> None:
         keeper.heed(response)
         pending.reply(msgspec.structs.replace(response, planning_time=node.monotonic() - began))
 
-    def step(_now: int) -> None:
+    def step(now: int) -> None:
+        for each in workers.progress(now):
+            progress.put(each)
         node.set_ready(states.age() < STALE_AFTER, "" if states.age() < STALE_AFTER else NOT_READY)
 
     node.serve_later(PLAN, plan)
+    node.serve(PLAN_CANCEL, lambda request: workers.cancel(request.request_id))
     node.serve(
         IK,
         lambda request: kinematic.ik(request, states.message, states.age(), planner.surroundings.newest),
@@ -59,7 +63,7 @@ def run(node: Node, deployment: Deployment) -> None:
     )
     node.serve(FK, lambda request: kinematic.fk(request, states.message, states.age()), worker=True)
     try:
-        node.spin(step, rate=10.0)
+        node.spin(step, rate=PROGRESS_RATE)
     finally:
         workers.close()
 

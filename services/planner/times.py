@@ -15,10 +15,12 @@ class Stopwatch:
         self._clock = clock
         self._spent = dict.fromkeys(PlanningTimes.__struct_fields__, 0.0)
         self._inner = 0.0
+        self.newest = ""  # the phase begun last; another thread may look
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
         began, outer, self._inner = self._clock(), self._inner, 0.0
+        self.newest = name
         try:
             yield
         finally:

@@ -85,7 +85,7 @@ class _Problem:
             planner.setRange(RANGE * math.sqrt(len(self._scale)))
         planner.setProblemDefinition(self._definition)
         planner.setup()
-        is_late = self._base.timedPlannerTerminationCondition(deadline.left).eval
+        is_late = self._late(deadline)
         is_over = _bettered(planner, BETTERING[planner_id], is_late) if planner_id in BETTERING else is_late
         planner.solve(self._base.PlannerTerminationCondition(is_over))
         if not self._definition.hasExactSolution():
@@ -99,9 +99,9 @@ class _Problem:
         planner = geometric.PRM(self.information)
         planner.setProblemDefinition(self._definition)
         planner.setup()
-        is_over = self._base.timedPlannerTerminationCondition(deadline.left)
-        while not is_over.eval():
-            planner.growRoadmapPtc(self._base.PlannerTerminationCondition(_after(BATCH, is_over.eval)))
+        is_late = self._late(deadline)
+        while not is_late():
+            planner.growRoadmapPtc(self._base.PlannerTerminationCondition(_after(BATCH, is_late)))
             data = self._base.PlannerData(self.information)
             planner.getPlannerData(data)
             postures = [_posture(data.getVertex(row).getState(), self._scale) for row in range(data.numVertices())]
@@ -112,6 +112,11 @@ class _Problem:
             if found is not None:
                 return found
         raise NoWay(Why.TIMED_OUT)
+
+    def _late(self, deadline: Deadline) -> Callable[[], bool]:
+        """By the clock on the wall too, where the deadline's own stands."""
+        is_over = self._base.timedPlannerTerminationCondition(deadline.left).eval
+        return lambda: bool(is_over()) or deadline.is_late()
 
     def _state(self, posture: Array) -> Any:
         state = self.information.allocState()

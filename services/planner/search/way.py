@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,17 +55,28 @@ def endless() -> float:
     return 0.0
 
 
+class Flag(Protocol):
+    """Set from another thread to cancel a plan: the compiled core's `CancelFlag`, or a `threading.Event`."""
+
+    def set(self) -> None: ...
+
+    def is_set(self) -> bool: ...
+
+
 @dataclass(frozen=True)
 class Deadline:
-    """`clock` in s; what began at `began` may take `allowed`."""
+    """`clock` in s; what began at `began` may take `allowed`, and no more once it is cancelled."""
 
     clock: Callable[[], float] = endless
     allowed: float = math.inf
     began: float = 0.0
+    cancel: Flag | None = None
 
     @property
     def left(self) -> float:
         """[s], at least 0."""
+        if self.cancel is not None and self.cancel.is_set():
+            return 0.0
         return max(0.0, self.allowed - (self.clock() - self.began))
 
     def is_late(self) -> bool:

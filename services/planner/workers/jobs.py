@@ -8,14 +8,14 @@ from typing import IO, TypeVar
 import msgspec
 
 from schemas.joints import JointState
-from schemas.planning import PlanRequest
+from schemas.planning import PlanPhase, PlanRequest, PlanResponse
 from schemas.scene import PlanningScene
 
 T = TypeVar("T")
 LENGTH = struct.Struct("<I")
 
 
-class Job(msgspec.Struct, frozen=True, kw_only=True):
+class Job(msgspec.Struct, frozen=True, kw_only=True, tag=True):
     """One plan; `scene` is there where the worker does not have it yet."""
 
     request: PlanRequest
@@ -24,25 +24,57 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     scene: PlanningScene | None = None
 
 
-class Ready(msgspec.Struct, frozen=True):
+class Cancel(msgspec.Struct, frozen=True, tag=True):
+    """The plan at hand is wanted no more; whatever answer it has by now will do."""
+
+
+class Ask(msgspec.Struct, frozen=True, tag=True):
+    """What is the plan at hand at? A short plan is never asked, and so pays nothing for it."""
+
+
+class Ready(msgspec.Struct, frozen=True, tag=True):
     """The worker's first word: from now on it plans."""
 
 
-def send(pipe: IO[bytes], message: msgspec.Struct) -> None:
+class At(msgspec.Struct, frozen=True, tag=True):
+    """What is answered to `Ask`."""
+
+    phase: PlanPhase
+
+
+class Planned(msgspec.Struct, frozen=True, tag=True):
+    """What is answered to `Job`."""
+
+    response: PlanResponse
+
+
+Order = Job | Cancel | Ask
+Report = Ready | At | Planned
+
+ORDERS: msgspec.msgpack.Decoder[Order] = msgspec.msgpack.Decoder(Order)
+REPORTS: msgspec.msgpack.Decoder[Report] = msgspec.msgpack.Decoder(Report)
+
+
+def send(pipe: IO[bytes], message: Order | Report) -> None:
     """Writes one message; raises OSError where nobody reads any more."""
     content = msgspec.msgpack.encode(message)
-    pipe.write(LENGTH.pack(len(content)) + content)
+    left = memoryview(LENGTH.pack(len(content)) + content)
+    while left:
+        left = left[pipe.write(left) :]
     pipe.flush()
 
 
-def receive(pipe: IO[bytes], kind: type[T]) -> T:
+def receive(pipe: IO[bytes], kind: msgspec.msgpack.Decoder[T]) -> T:
     """Waits for one message; raises `EOFError` where the other side has ended."""
     (length,) = LENGTH.unpack(_exactly(pipe, LENGTH.size))
-    return msgspec.msgpack.decode(_exactly(pipe, length), type=kind)
+    return kind.decode(_exactly(pipe, length))
 
 
 def _exactly(pipe: IO[bytes], size: int) -> bytes:
-    content = pipe.read(size)
-    if len(content) < size:
-        raise EOFError("the other side has ended")
+    content = b""
+    while len(content) < size:
+        more = pipe.read(size - len(content))
+        if not more:
+            raise EOFError("the other side has ended")
+        content += more
     return content

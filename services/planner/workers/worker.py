@@ -12,38 +12,66 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import IO
 
-from schemas.planning import PlanResponse, Refusal, Timing
+from schemas.planning import PlanPhase, PlanResponse, Refusal, Timing
 from services.arm.description import load_arm
 from services.planner.core import Planner
 from services.planner.scene.world import World
+from services.planner.search.native_search import cancel_flag
+from services.planner.times import Stopwatch
 from services.planner.timing.time_optimal import load_toppra
-from services.planner.workers.jobs import Job, Ready, receive, send
+from services.planner.workers.jobs import ORDERS, Ask, At, Cancel, Job, Planned, Ready, Report, receive, send
+
+
+class AtHand:
+    """A job, and what is said about it while it is done."""
+
+    def __init__(self, job: Job) -> None:
+        self.job = job
+        self.cancel = cancel_flag()
+        self.watch = Stopwatch(time.monotonic)
+
+    @property
+    def phase(self) -> PlanPhase:
+        return PlanPhase(self.watch.newest or PlanPhase.WAITING)
+
+
+class Answers:
+    """The way back, for two threads."""
+
+    def __init__(self, pipe: IO[bytes]) -> None:
+        self._pipe = pipe
+        self._lock = threading.Lock()
+
+    def put(self, report: Report) -> None:
+        with self._lock:
+            send(self._pipe, report)
 
 
 def main() -> None:
     """`python -m services.planner.workers.worker ROBOT_FOLDER PROJECT_FOLDER`."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the planner, which closes this one's input
-    answers = os.fdopen(os.dup(1), "wb")
+    answers = Answers(os.fdopen(os.dup(1), "wb"))
     os.dup2(2, 1)  # what a library prints is no answer
     folder, project = Path(sys.argv[1]), Path(sys.argv[2])
-    jobs: SimpleQueue[Job] = SimpleQueue()
-    threading.Thread(target=_read, args=(sys.stdin.buffer, jobs), daemon=True).start()
+    jobs: SimpleQueue[AtHand] = SimpleQueue()
+    threading.Thread(target=_read, args=(sys.stdin.buffer, jobs, answers), daemon=True).start()
     planner = Planner(load_arm(folder))
     planner.prepare()
-    send(answers, Ready())
+    answers.put(Ready())
     while True:
-        job = jobs.get()
-        if job.scene is not None:
-            planner.set_world(World(planner.arm, planner.kinematics, job.scene, (project, folder)))
-        if job.request.timing is Timing.TIME_OPTIMAL:
+        at_hand = jobs.get()
+        if at_hand.job.scene is not None:
+            planner.set_world(World(planner.arm, planner.kinematics, at_hand.job.scene, (project, folder)))
+        if at_hand.job.request.timing is Timing.TIME_OPTIMAL:
             load_toppra()  # seconds, the first time, which are not the plan's
-        send(answers, _planned(planner, job))
+        answers.put(Planned(_planned(planner, at_hand)))
 
 
-def _planned(planner: Planner, job: Job) -> PlanResponse:
+def _planned(planner: Planner, at_hand: AtHand) -> PlanResponse:
     """A defect costs the plan, and its traceback goes to the log; the process goes on."""
+    job = at_hand.job
     try:
-        return planner.plan(job.request, job.present, job.age, time.monotonic)
+        return planner.plan(job.request, job.present, job.age, time.monotonic, at_hand.cancel, at_hand.watch)
     except Exception as error:
         traceback.print_exc()
         message = f"a defect of the planner: {type(error).__name__}: {error}"
@@ -51,11 +79,19 @@ def _planned(planner: Planner, job: Job) -> PlanResponse:
         return PlanResponse(refusal=Refusal(check="planner", subject="worker", message=message, remedy=remedy))
 
 
-def _read(pipe: IO[bytes], jobs: SimpleQueue[Job]) -> None:
+def _read(pipe: IO[bytes], jobs: SimpleQueue[AtHand], answers: Answers) -> None:
     """Ends the process at the end of its input, whatever it is planning."""
+    at_hand: AtHand | None = None
     try:
         while True:
-            jobs.put(receive(pipe, Job))
+            match receive(pipe, ORDERS):
+                case Job() as job:
+                    at_hand = AtHand(job)
+                    jobs.put(at_hand)
+                case Cancel() if at_hand is not None:
+                    at_hand.cancel.set()
+                case Ask() if at_hand is not None:
+                    answers.put(At(at_hand.phase))
     finally:
         os._exit(0)
 

@@ -1,40 +1,30 @@
-"""Plans in processes of their own: several at a time, each stopped when its time is over, whatever it is doing."""
+"""Plans in processes of their own: several at a time, each stopped when its time is over or it is cancelled."""
 
 from __future__ import annotations
 
-import os
-import select
-import subprocess
-import sys
+import itertools
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from pathlib import Path
 from queue import SimpleQueue
-from typing import IO
 
 from schemas.joints import JointState
-from schemas.planning import PlanCode, PlanRequest, PlanResponse, Refusal, Timing
+from schemas.planning import PlanCancelResult, PlanCode, PlanProgress, PlanRequest, PlanResponse, Refusal
 from schemas.scene import PlanningScene
 from services.planner.core import LONGEST
-from services.planner.goals.goals import timed_out
-from services.planner.workers.jobs import Job, Ready, receive, send
+from services.planner.workers.assignment import Answer, Assignment, Cancelled
+from services.planner.workers.jobs import Job
+from services.planner.workers.process import Process, WorkerDied
 
 MOST = 2  # processes: as many as small computers have cores for it
 GRACE = 1.0  # [s] beyond the allowed time in which a worker ends its plan by itself
-START = 60.0  # [s] in which a worker must have started, or have imported toppra for the first time
 PATIENCE = 5.0  # [s] for a thread to see that its process is gone
 AGAIN = 3  # plans of one request, where the scene changes meanwhile
-CHILD = "services.planner.workers.worker"
+SHORT = 0.1  # [s] until which nothing is said of a plan
+LONGEST_ID = 100  # characters
 
 Present = Callable[[], tuple[JointState | None, float]]
 Scene = Callable[[], PlanningScene]
-Answer = Callable[[PlanResponse], None]
-Task = tuple[PlanRequest, Answer]
-
-
-class WorkerDied(Exception):
-    """The process has ended, or does not answer."""
 
 
 class Workers:
@@ -43,147 +33,115 @@ class Workers:
     def __init__(self, folder: Path, project: Path, present: Present, scene: Scene) -> None:
         self._folder, self._project = folder, project
         self._present, self._scene = present, scene
-        self._tasks: SimpleQueue[Task | None] = SimpleQueue()
-        self._workers: list[_Worker] = []
+        self._tasks: SimpleQueue[Assignment | None] = SimpleQueue()
+        self._processes: list[Process] = []
         self._threads: list[threading.Thread] = []
-        self._busy = 0
+        self._assignments: dict[str, Assignment] = {}
+        self._numbers = itertools.count(1)
         self._lock = threading.Lock()
         self._start_one()
 
     def plan(self, request: PlanRequest, answer: Answer) -> None:
-        """`answer` is called with the response, in another thread; a second process is started for a second plan."""
+        """`answer` is called with the response, mostly in another thread; a second process starts for a second plan."""
         with self._lock:
-            self._busy += 1
-            if self._busy > len(self._workers) < MOST:
-                self._start_one()
-        self._tasks.put((request, answer))
+            request_id = request.request_id or f"planner-{next(self._numbers)}"
+            objection = self._objection(request_id)
+            if not objection:
+                assignment = Assignment(request_id, request, lambda response: self._end(request_id, response, answer))
+                self._assignments[request_id] = assignment
+                self._tasks.put(assignment)
+                if len(self._assignments) > len(self._processes) < MOST:
+                    self._start_one()
+        if objection:
+            answer(_refused("request_id", objection, "choose another request_id, or leave it empty"))
+
+    def cancel(self, request_id: str) -> PlanCancelResult:
+        """Ends a plan that waits now, one that is being made soon."""
+        if not request_id:
+            return PlanCancelResult(message="request_id is empty: give the one that the plan was asked for with")
+        with self._lock:
+            assignment = self._assignments.get(request_id)
+        if assignment is None or not assignment.cancel():
+            return PlanCancelResult(message=f'there is no plan "{request_id}": it has ended, or never began')
+        return PlanCancelResult(found=True, message=f'the plan "{request_id}" is cancelled {assignment.words}')
+
+    def progress(self, now: int) -> list[PlanProgress]:
+        """Of every plan that is no short one; `now` [ns] UNIX."""
+        with self._lock:
+            assignments = list(self._assignments.values())
+        return [assignment.progress(now) for assignment in assignments if assignment.elapsed > SHORT]
 
     def close(self) -> None:
         """Ends every process, in the midst of a plan too."""
-        for worker in self._workers:
+        for process in self._processes:
             self._tasks.put(None)
-            worker.end()
+            process.end()
         for thread in self._threads:
             thread.join(PATIENCE)
 
+    def _objection(self, request_id: str) -> str:
+        if len(request_id) > LONGEST_ID:
+            return f"request_id has {len(request_id)} characters: at most {LONGEST_ID}"
+        return f'a plan "{request_id}" is being made already' if request_id in self._assignments else ""
+
+    def _end(self, request_id: str, response: PlanResponse, answer: Answer) -> None:
+        with self._lock:
+            del self._assignments[request_id]
+        answer(response)
+
     def _start_one(self) -> None:
-        worker = _Worker(self._folder, self._project)
-        thread = threading.Thread(target=self._work, args=(worker,), daemon=True, name="planner worker")
-        self._workers.append(worker)
+        process = Process(self._folder, self._project)
+        thread = threading.Thread(target=self._work, args=(process,), daemon=True, name="planner worker")
+        self._processes.append(process)
         self._threads.append(thread)
         thread.start()
 
-    def _work(self, worker: _Worker) -> None:
-        while (task := self._tasks.get()) is not None:
-            request, answer = task
-            try:
-                response = self._planned(worker, request)
-            finally:
-                with self._lock:
-                    self._busy -= 1
-            answer(response)
-        worker.close()
+    def _work(self, process: Process) -> None:
+        while (assignment := self._tasks.get()) is not None:
+            if assignment.begin():
+                assignment.end(self._planned(process, assignment))
+        process.close()
 
-    def _planned(self, worker: _Worker, request: PlanRequest) -> PlanResponse:
-        """A plan in the scene as it is at the plan's end."""
+    def _planned(self, process: Process, assignment: Assignment) -> PlanResponse | None:
+        """A plan in the scene as it is at the plan's end; None for one that was cancelled."""
+        request = assignment.request
+        seconds = min(max(0.0, request.allowed_time), LONGEST) + GRACE
         for _ in range(AGAIN):
             try:
-                worker.be_ready()
+                process.be_ready(assignment)
                 scene = self._scene()
                 present, age = self._present()
-                response = worker.plan(Job(request=request, present=present, age=age), scene)
+                response = process.plan(assignment, Job(request=request, present=present, age=age), scene, seconds)
+            except Cancelled:
+                return None
             except TimeoutError:
-                no_plan = timed_out()
-                return PlanResponse(code=no_plan.code, refusal=no_plan.refusal, scene_version=self._scene().version)
+                return self._late(assignment)
             except WorkerDied as error:
-                return _failed(f"the planner's worker process has ended ({error})", "plan again: a new one is started")
+                remedy = "plan again: a new one is started"
+                return _failed(f"the planner's worker process has ended ({error})", remedy)
             if response.code is not PlanCode.SUCCESS or self._scene() is scene:
                 return response
         return _failed("the scene changes faster than a plan can be made in it", "plan again when it stays as it is")
 
-
-class _Worker:
-    """One process, and another after it has ended or was too late."""
-
-    def __init__(self, folder: Path, project: Path) -> None:
-        self._folders = (str(folder), str(project))
-        self._told: PlanningScene | None = None
-        self._is_ready = self._has_toppra = self._is_over = False
-        self._process = self._started()
-
-    def plan(self, job: Job, scene: PlanningScene) -> PlanResponse:
-        """Raises `TimeoutError` after the allowed time and `GRACE`, and `WorkerDied`; the process is gone then."""
-        with self._replaced_where_it_fails():
-            send(_pipe(self._process.stdin), job if self._told is scene else _with_scene(job, scene))
-            self._told = scene
-            needs_toppra = job.request.timing is Timing.TIME_OPTIMAL
-            importing = START if needs_toppra and not self._has_toppra else 0.0
-            self._wait(min(max(0.0, job.request.allowed_time), LONGEST) + GRACE + importing)
-            self._has_toppra = self._has_toppra or needs_toppra
-            return receive(_pipe(self._process.stdout), PlanResponse)
-
-    def be_ready(self) -> None:
-        """Waits until the process plans; raises as `plan`."""
-        with self._replaced_where_it_fails():
-            if not self._is_ready:
-                self._wait(START)
-                receive(_pipe(self._process.stdout), Ready)
-                self._is_ready = True
-
-    def end(self) -> None:
-        """At once, and for good."""
-        self._is_over = True
-        self._process.kill()
-        self._process.wait()
-
-    def close(self) -> None:
-        """Its pipes."""
-        for pipe in (self._process.stdin, self._process.stdout):
-            with suppress(OSError):
-                _pipe(pipe).close()
-
-    def _replace(self) -> int | None:
-        """Another process in place of this one, whose exit code is returned."""
-        self._process.kill()
-        code = self._process.wait()
-        self.close()
-        if not self._is_over:
-            self._process, self._told = self._started(), None
-            self._is_ready = self._has_toppra = False
-        return code
-
-    def _started(self) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", CHILD, *self._folders]
-        alone = {
-            **os.environ,
-            "OPENBLAS_NUM_THREADS": "1",
-        }  # its matrices are small, and threads cost more than they do
-        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=self._folders[1], env=alone)
-
-    @contextmanager
-    def _replaced_where_it_fails(self) -> Iterator[None]:
-        try:
-            yield
-        except TimeoutError:
-            self._replace()
-            raise
-        except (OSError, EOFError, ValueError) as error:
-            raise WorkerDied(f"exit code {self._replace()}") from error
-
-    def _wait(self, seconds: float) -> None:
-        if not select.select([_pipe(self._process.stdout)], [], [], seconds)[0]:
-            raise TimeoutError(f"no answer within {seconds:g} s")
-
-
-def _with_scene(job: Job, scene: PlanningScene) -> Job:
-    return Job(request=job.request, present=job.present, age=job.age, scene=scene)
-
-
-def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:
-    assert pipe is not None  # both are asked for when the process is started
-    return pipe
+    def _late(self, assignment: Assignment) -> PlanResponse:
+        """It was stopped, for it did not stop by itself."""
+        allowed = assignment.request.allowed_time
+        refusal = Refusal(
+            check="allowed time",
+            subject="allowed_time",
+            value=assignment.elapsed,
+            limit=allowed,
+            message=f"the plan was stopped {assignment.words}: {allowed:g} s were allowed",
+            remedy="allow more time, or ask for a goal nearer to where the arm is",
+        )
+        return PlanResponse(code=PlanCode.TIMED_OUT, refusal=refusal, scene_version=self._scene().version)
 
 
 def _failed(message: str, remedy: str) -> PlanResponse:
     refusal = Refusal(check="planner", subject="worker", message=message, remedy=remedy)
     return PlanResponse(code=PlanCode.FAILURE, refusal=refusal)
+
+
+def _refused(subject: str, message: str, remedy: str) -> PlanResponse:
+    refusal = Refusal(check="request", subject=subject, message=message, remedy=remedy)
+    return PlanResponse(code=PlanCode.INVALID_GOAL_CONSTRAINTS, refusal=refusal)

@@ -1,0 +1,135 @@
+"""One worker's process as its planner sees it: a plan in, an answer out in time, another process where it fails."""
+
+from __future__ import annotations
+
+import os
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, TypeVar
+
+from msgspec.structs import replace
+
+from schemas.planning import PlanResponse, Timing
+from schemas.scene import PlanningScene
+from services.planner.workers.assignment import Assignment, Cancelled
+from services.planner.workers.jobs import REPORTS, Ask, At, Cancel, Job, Order, Planned, Ready, receive, send
+
+START = 60.0  # [s] in which a worker must have started, or have imported toppra for the first time
+STOPS_WITHIN = 0.2  # [s] from a cancel to the answer of a process that lives on
+TICK = 0.05  # [s] between two looks whether the plan is still wanted
+CHILD = "services.planner.workers.worker"
+
+R = TypeVar("R", Ready, Planned)
+
+
+class WorkerDied(Exception):
+    """The process has ended."""
+
+
+class Process:
+    """For one thread, but `end`."""
+
+    def __init__(self, folder: Path, project: Path) -> None:
+        self._folders = (str(folder), str(project))
+        self._told: PlanningScene | None = None
+        self._is_ready = self._has_toppra = self._is_over = False
+        self._process = self._started()
+
+    def be_ready(self, assignment: Assignment) -> None:
+        """Waits until it plans; raises as `plan`, and leaves it to start where the plan is cancelled meanwhile."""
+        with self._replaced_where_it_fails():
+            if not self._is_ready:
+                self._hear(Ready, START, assignment, assignment.require_wanted)
+                self._is_ready = True
+
+    def plan(self, assignment: Assignment, job: Job, scene: PlanningScene, seconds: float) -> PlanResponse:
+        """Raises `TimeoutError` after `seconds`, `Cancelled` or `WorkerDied`; it is replaced where it did not end."""
+        with self._replaced_where_it_fails():
+            self._send(job if self._told is scene else replace(job, scene=scene))
+            self._told = scene
+            needs_toppra = job.request.timing is Timing.TIME_OPTIMAL
+            importing = START if needs_toppra and not self._has_toppra else 0.0
+            try:
+                planned = self._hear(Planned, seconds + importing, assignment, lambda: self._look_after(assignment))
+            except Cancelled:
+                self._send(Cancel())
+                self._hear(Planned, STOPS_WITHIN, assignment)
+                raise
+            self._has_toppra = self._has_toppra or needs_toppra
+            return planned.response
+
+    def end(self) -> None:
+        """At once, and for good; from any thread."""
+        self._is_over = True
+        self._process.kill()
+        self._process.wait()
+
+    def close(self) -> None:
+        """Its pipes."""
+        for pipe in (self._process.stdin, self._process.stdout):
+            with suppress(OSError):
+                _pipe(pipe).close()
+
+    def _look_after(self, assignment: Assignment) -> None:
+        assignment.require_wanted()
+        self._send(Ask())
+
+    def _send(self, order: Order) -> None:
+        send(_pipe(self._process.stdin), order)
+
+    def _hear(
+        self, kind: type[R], seconds: float, assignment: Assignment, on_tick: Callable[[], None] = lambda: None
+    ) -> R:
+        """The next report of this kind; raises `TimeoutError`."""
+        pipe, end = _pipe(self._process.stdout), time.monotonic() + seconds
+        while True:
+            left = end - time.monotonic()
+            if select.select([pipe], [], [], max(0.0, min(left, TICK)))[0]:
+                report = receive(pipe, REPORTS)
+                if isinstance(report, At):
+                    assignment.phase = report.phase
+                elif isinstance(report, kind):
+                    return report
+            elif left <= 0.0:
+                raise TimeoutError(f"no answer within {seconds:g} s")
+            else:
+                on_tick()
+
+    def _replace(self) -> int | None:
+        """Another process in place of this one, whose exit code is returned."""
+        self._process.kill()
+        code = self._process.wait()
+        self.close()
+        if not self._is_over:
+            self._process, self._told = self._started(), None
+            self._is_ready = self._has_toppra = False
+        return code
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", CHILD, *self._folders]
+        # Its matrices are small, and threads cost more than they do.
+        alone = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+        # Without buffers: what lies in one is not seen by `select`.
+        return subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=self._folders[1], env=alone, bufsize=0
+        )
+
+    @contextmanager
+    def _replaced_where_it_fails(self) -> Iterator[None]:
+        try:
+            yield
+        except TimeoutError:
+            self._replace()
+            raise
+        except (OSError, EOFError, ValueError) as error:
+            raise WorkerDied(f"exit code {self._replace()}") from error
+
+
+def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:
+    assert pipe is not None  # both are asked for when the process is started
+    return pipe
