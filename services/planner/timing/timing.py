@@ -72,10 +72,10 @@ def along_runs(
     states = States(*(column[kept] for column in whole))
     states.positions[0], states.positions[-1] = control[0], control[-1]
     states.velocities[[0, -1]] = states.accelerations[[0, -1]] = 0.0
-    return _trajectory(names, _at_limits(states, limits, with_jerk))
+    return trajectory_of(names, at_limits(states, limits, with_jerk))
 
 
-def _at_limits(states: States, limits: JointLimits, with_jerk: bool) -> States:
+def at_limits(states: States, limits: JointLimits, with_jerk: bool) -> States:
     """The same way in the time in which the joint that is asked most of is just within its limits."""
     velocity, acceleration, jerk = peak_shares(*states, limits)
     most = max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0) if with_jerk else 0.0)
@@ -84,7 +84,8 @@ def _at_limits(states: States, limits: JointLimits, with_jerk: bool) -> States:
     return States(times / scale, positions, velocities * scale, accelerations * scale * scale)
 
 
-def _trajectory(names: Sequence[str], states: States) -> JointTrajectory:
+def trajectory_of(names: Sequence[str], states: States) -> JointTrajectory:
+    """The states as points."""
     rows = zip(*(column.tolist() for column in states), strict=True)
     points = [
         TrajectoryPoint(positions=tuple(p), velocities=tuple(v), accelerations=tuple(a), time_from_start=t)
@@ -95,12 +96,12 @@ def _trajectory(names: Sequence[str], states: States) -> JointTrajectory:
 
 def _run_states(run: Curve, limits: JointLimits) -> States:
     """Of one run, from its beginning; the points stand where a piece begins, too, so that none bridges two of them."""
-    law = TimeLaw(_stretches(sections_of(run, limits)))
+    law = TimeLaw(stretches_through(sections_of(run, limits)))
     times = law.times(run.knots[1:-1], max(SPACING, law.duration / MOST_POINTS))
     return states_along(run, limits, times, *law.at(times))
 
 
-def _stretches(sections: list[Section]) -> Iterator[Stretch]:
+def stretches_through(sections: list[Section]) -> Iterator[Stretch]:
     """Of steady jerk, through all sections; raises `NoProfile`."""
     speeds, travelled = boundary_speeds(sections), 0.0
     for section, before, after in zip(sections, speeds[:-1], speeds[1:], strict=True):

@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from services.planner.search.curve import Derivatives
 from services.planner.tool.tool_path import NO_WAY, blending, cut
 
 Array = NDArray[np.float64]
-
-
-class Derivatives(NamedTuple):
-    """(m, k) each: the value, and its derivatives by the length."""
-
-    value: Array
-    first: Array
-    second: Array
-    third: Array
 
 
 class PathCurve(Protocol):
