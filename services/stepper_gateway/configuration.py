@@ -13,7 +13,7 @@ from services.arm.device_config import device_config
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.links.reports import ConfigAckReport
 from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import ConfigureAnswer, Outbox
+from services.stepper_gateway.outputs import Answer, Outbox
 from services.stepper_gateway.session import DeviceSession
 
 AGAIN = 1.0  # [s] until a configuration that was not answered is sent once more
@@ -129,9 +129,7 @@ class Configuration:
 
     def _answer(self, ticket: int, accepted: bool, reason: str) -> None:
         self._tickets.pop(ticket, None)
-        self._out.put(
-            ConfigureAnswer(ticket, ConfigureResponse(accepted=accepted, reason=reason, crc32=self.device_crc32))
-        )
+        self._out.put(Answer(ticket, ConfigureResponse(accepted=accepted, reason=reason, crc32=self.device_crc32)))
 
     def _tell(self, absence: str, moment: Moment) -> None:
         message = DeviceConfiguration(

@@ -95,20 +95,20 @@ class GatewayCore:
         return self._finish(moment)
 
     def on_command(self, request: DeviceCommandRequest, ticket: int, moment: Moment) -> list[Output]:
-        """A person's command; its answer comes as a `CommandAnswer` with this ticket."""
+        """A person's command; its answer comes as an `Answer` with this ticket."""
         if self._parts.desk.ask(request, ticket, self._parts.goals.is_active, moment):
             self._give_way(request, moment)
         self._parts.desk.send_due(moment)
         return self._finish(moment)
 
     def on_configure(self, ticket: int, moment: Moment) -> list[Output]:
-        """A person wants the device configured; the answer comes as a `ConfigureAnswer` with this ticket."""
+        """A person wants the device configured; the answer comes as an `Answer` with this ticket."""
         mover = self.mover
         mover.configuration.ask(ticket, mover.absence(moment), moment)
         return self._finish(moment)
 
     def on_press(self, request: PressRequest, ticket: int, moment: Moment) -> list[Output]:
-        """A press of a virtual device; its answer comes as a `PressAnswer` with this ticket."""
+        """A press of a virtual device; its answer comes as an `Answer` with this ticket."""
         self._parts.presses.ask(request, ticket, moment)
         return self._finish(moment)
 

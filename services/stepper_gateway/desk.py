@@ -9,7 +9,7 @@ from services.stepper_gateway.links.frames import Code, CommandReply, encode
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.mover import Mover
-from services.stepper_gateway.outputs import CommandAnswer
+from services.stepper_gateway.outputs import Answer
 from services.stepper_gateway.refusals import GoalRejected, invalid
 from services.stepper_gateway.reporting import code_name
 
@@ -124,4 +124,4 @@ class CommandDesk:
         said = mode is not None and mode in DeviceMode._value2member_map_
         known = DeviceMode(mode or 0) if said else self._mover.session.mode
         response = DeviceCommandResponse(accepted=accepted, reason=reason, mode=known)
-        self._mover.out.put(CommandAnswer(ticket, response))
+        self._mover.out.put(Answer(ticket, response))

@@ -13,6 +13,8 @@ from schemas.system import LogLevel
 from schemas.topics import Topic
 from services.stepper_gateway.links.link import Kind
 
+Response = DeviceCommandResponse | ConfigureResponse | PressResponse
+
 
 @dataclass(frozen=True, slots=True)
 class SendFrame:
@@ -55,27 +57,11 @@ class GoalFinished:
 
 
 @dataclass(frozen=True, slots=True)
-class CommandAnswer:
-    """The answer to the device command that was asked for under `ticket`."""
+class Answer:
+    """The answer to whoever has asked under `ticket`."""
 
     ticket: int
-    response: DeviceCommandResponse
-
-
-@dataclass(frozen=True, slots=True)
-class ConfigureAnswer:
-    """The answer to the request for a configuration under `ticket`."""
-
-    ticket: int
-    response: ConfigureResponse
-
-
-@dataclass(frozen=True, slots=True)
-class PressAnswer:
-    """The answer to the press that was asked for under `ticket`."""
-
-    ticket: int
-    response: PressResponse
+    response: Response
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +72,6 @@ class LogLine:
     text: str
 
 
-Answer = CommandAnswer | ConfigureAnswer | PressAnswer
 Output = SendFrame | Publish | GoalExecuting | GoalProgress | GoalFinished | Answer | LogLine
 
 

@@ -15,7 +15,7 @@ from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.links.reports import EventReport
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.mover import Mover
-from services.stepper_gateway.outputs import PressAnswer
+from services.stepper_gateway.outputs import Answer
 from services.stepper_gateway.refusals import GoalRejected, invalid
 
 DONE, REFUSED = "pressed", "press_refused"
@@ -75,7 +75,7 @@ class PressDesk:
             self._mover.out.send(Kind.PRESS, msgspec.json.encode(self._waiting[0].request))
 
     def _answer(self, ticket: int, accepted: bool, reason: str) -> None:
-        self._mover.out.put(PressAnswer(ticket, PressResponse(accepted=accepted, reason=reason)))
+        self._mover.out.put(Answer(ticket, PressResponse(accepted=accepted, reason=reason)))
 
 
 def target_of(request: PressRequest, arm: Arm) -> str:

@@ -31,15 +31,14 @@ from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import (
-    CommandAnswer,
-    ConfigureAnswer,
+    Answer,
     GoalExecuting,
     GoalFinished,
     GoalProgress,
     LogLine,
     Output,
-    PressAnswer,
     Publish,
+    Response,
     SendFrame,
 )
 from services.stepper_gateway.parameters import GatewayParameters
@@ -47,7 +46,6 @@ from services.stepper_gateway.parameters import GatewayParameters
 AT_ONCE = 64  # payloads handled before the loop may look at its deadline
 PATIENCE = 12.0  # [s] a caller waits; the core answers sooner
 
-Response = DeviceCommandResponse | ConfigureResponse | PressResponse
 R = TypeVar("R", DeviceCommandResponse, ConfigureResponse, PressResponse)
 Server = ActionServer[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
 
@@ -154,9 +152,7 @@ class Shell:
                     self._server.feedback(goal_id, feedback)
                 case GoalFinished(goal_id, status, result):
                     self._server.finish(goal_id, status, result)
-                case (
-                    CommandAnswer(number, response) | ConfigureAnswer(number, response) | PressAnswer(number, response)
-                ):
+                case Answer(number, response):
                     self._answer(number, response)
                 case LogLine(level, text):
                     self._node.log.log(level, "%s", text)

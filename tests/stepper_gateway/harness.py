@@ -45,14 +45,12 @@ from services.stepper_gateway.limits import Limits
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import (
-    CommandAnswer,
-    ConfigureAnswer,
+    Answer,
     GoalExecuting,
     GoalFinished,
     GoalProgress,
     LogLine,
     Output,
-    PressAnswer,
     Publish,
     SendFrame,
 )
@@ -288,11 +286,11 @@ class Rig:
                 case GoalFinished(goal_id, status, result):
                     assert goal_id not in self.finished, f"{goal_id} ends twice"
                     self.finished[goal_id] = (status, result)
-                case CommandAnswer(ticket, response):
+                case Answer(ticket, DeviceCommandResponse() as response):
                     self.answers[ticket] = response
-                case ConfigureAnswer(ticket, response):
+                case Answer(ticket, ConfigureResponse() as response):
                     self.configured[ticket] = response
-                case PressAnswer(ticket, response):
+                case Answer(ticket, PressResponse() as response):
                     self.pressed[ticket] = response
                 case LogLine(_, text):
                     self.log.append(text)

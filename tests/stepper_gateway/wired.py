@@ -23,19 +23,10 @@ from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.links.mqtt import MqttLink
 from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import (
-    Answer,
-    CommandAnswer,
-    ConfigureAnswer,
-    GoalFinished,
-    Output,
-    PressAnswer,
-    Publish,
-    SendFrame,
-)
+from services.stepper_gateway.outputs import Answer, GoalFinished, Output, Publish, Response, SendFrame
 from tests.stepper_gateway.harness import move, rm1
 
-A = TypeVar("A", CommandAnswer, ConfigureAnswer, PressAnswer)
+R = TypeVar("R", DeviceCommandResponse, ConfigureResponse, PressResponse)
 
 
 class Gateway:
@@ -46,7 +37,7 @@ class Gateway:
         self.published: dict[str, list[Any]] = defaultdict(list)
         self.finished: dict[str, tuple[GoalStatusCode, FollowJointTrajectoryResult]] = {}
         self._woken = threading.Event()
-        self._answers: dict[int, Answer] = {}
+        self._answers: dict[int, Response] = {}
         self.link = link(self._woken.set) if link else MqttLink("127.0.0.1", port, "rm1", self._woken.set)
 
     def close(self) -> None:
@@ -97,8 +88,8 @@ class Gateway:
                     self.published[topic.key].append(message)
                 case GoalFinished(goal_id, status, result):
                     self.finished[goal_id] = (status, result)
-                case CommandAnswer() | ConfigureAnswer() | PressAnswer():
-                    self._answers[output.ticket] = output
+                case Answer(ticket, response):
+                    self._answers[ticket] = response
                 case _:
                     pass
 
@@ -111,19 +102,19 @@ class Gateway:
     def press(self, request: PressRequest) -> PressResponse:
         """The answer of the virtual device."""
         self.do(self.core.on_press(request, 1, self.moment))
-        return self._answer(PressAnswer).response
+        return self._answer(PressResponse)
 
     def command(self, request: DeviceCommandRequest) -> DeviceCommandResponse:
         """The answer of the device."""
         self.do(self.core.on_command(request, 1, self.moment))
-        return self._answer(CommandAnswer).response
+        return self._answer(DeviceCommandResponse)
 
     def configure(self) -> ConfigureResponse:
         """The answer of the device."""
         self.do(self.core.on_configure(1, self.moment))
-        return self._answer(ConfigureAnswer).response
+        return self._answer(ConfigureResponse)
 
-    def _answer(self, kind: type[A]) -> A:
+    def _answer(self, kind: type[R]) -> R:
         assert self.run(8.0, lambda: 1 in self._answers)
         answer = self._answers.pop(1)
         assert isinstance(answer, kind)
