@@ -15,14 +15,15 @@ from schemas.device import DeviceState, DeviceStatus, SensorReadings, ShaftPosit
 from schemas.joints import JointState, StepErrors
 from schemas.planning import PlannedPath
 from services.visualizer import entities
+from services.visualizer.arm_poses import arm_poses
 from services.visualizer.journal import Journal, bounded
 from services.visualizer.model import Joint, Model
-from services.visualizer.panel import LOST, Facts, panel, shaft_errors
+from services.visualizer.panel import Facts, is_lost, panel, shaft_errors
 from services.visualizer.preview import Preview
 from services.visualizer.rotations import Array
 from services.visualizer.scene import Loader, SceneView, no_mesh
 from services.visualizer.thinning import Thinned
-from services.visualizer.updates import Panel, Poses, Scalars, State, Strip, Times, Tint, Update
+from services.visualizer.updates import Panel, Scalars, State, Strip, Times, Tint, Update
 
 PANEL_PERIOD = 500_000_000  # [ns]
 BAND = 0.5  # [steps] rounding to whole steps alone gives as much
@@ -118,22 +119,14 @@ class Visualizer:
         if not len(times):
             return []
         plots = self._plots(times, rows, entities.executed)
-        return [*self._poses(entities.MEASURED, times, rows), *plots, *self._trail(times, rows)]
+        return [*arm_poses(self.model, entities.MEASURED, times, rows), *plots, *self._trail(times, rows)]
 
     def _ghost(self) -> list[Update]:
         times, rows = self._commanded.take()
         if not len(times):
             return []
-        return [*self._poses(entities.COMMANDED, times, rows), *self._plots(times, rows, entities.commanded)]
-
-    def _poses(self, root: str, times: Times, rows: Array) -> list[Update]:
-        return [
-            Poses(
-                f"{root}/{self.model.paths[joint.child]}", times,
-                *joint.poses(self.model.positions(joint, rows, self._names)),
-            )
-            for joint in self.model.joints if joint.is_moving
-        ]  # fmt: skip
+        plots = self._plots(times, rows, entities.commanded)
+        return [*arm_poses(self.model, entities.COMMANDED, times, rows), *plots]
 
     def _plots(self, times: Times, rows: Array, entity: Callable[[str], str]) -> list[Update]:
         return [
@@ -187,11 +180,6 @@ class Visualizer:
         if self._facts.status is not None and not self._facts.status.online:
             return "OFFLINE"
         return "WAITING" if self._facts.state is None else self._facts.state.mode.name
-
-
-def is_lost(error: int) -> bool:
-    """Whether a shaft is farther from its counter [steps] than a motor that holds its load may be."""
-    return abs(error) > LOST
 
 
 def on_screen(joint: Joint) -> float:

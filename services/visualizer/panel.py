@@ -10,8 +10,6 @@ from schemas.device_faults import explain
 from schemas.joints import JointState, StepErrors
 
 STALE = 1_000_000_000  # [ns] after which a state is no longer called present
-
-
 LOST = 1  # [steps] between counter and shaft that a motor under load may be off
 
 
@@ -42,6 +40,11 @@ def shaft_errors(shaft: ShaftPositions | None) -> dict[str, int]:
     return {name: true - counted for name, counted, true in zip(shaft.name, shaft.steps, shaft.shaft, strict=False)}
 
 
+def is_lost(error: int) -> bool:
+    """Whether a shaft is farther from its counter [steps] than a motor that holds its load may be."""
+    return abs(error) > LOST
+
+
 def _heading(facts: Facts, now: int) -> str:
     state, status = facts.state, facts.status
     if status is not None and not status.online:
@@ -67,7 +70,7 @@ def _fault(robot: str, state: DeviceState) -> str:
 
 def _lost(facts: Facts) -> str:
     """The shafts that are not where their counters say."""
-    off = {name: error for name, error in shaft_errors(facts.shaft).items() if abs(error) > LOST}
+    off = {name: error for name, error in shaft_errors(facts.shaft).items() if is_lost(error)}
     if not off:
         return ""
     said = ", ".join(f"{name} {error:+d}" for name, error in off.items())

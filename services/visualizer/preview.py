@@ -7,10 +7,11 @@ import numpy as np
 from schemas.joints import JointState
 from schemas.planning import PlannedPath
 from services.visualizer import entities, palette
+from services.visualizer.arm_poses import arm_at
 from services.visualizer.journal import bounded
 from services.visualizer.model import Model
 from services.visualizer.rotations import Array
-from services.visualizer.updates import Gone, Poses, Shadow, Update
+from services.visualizer.updates import Gone, Shadow, Update
 
 TIMES = 3  # that a motion is played
 REST = 0.7  # [s] at its end
@@ -61,14 +62,3 @@ class Preview:
         self._is_over = played >= TIMES
         posture = np.array([np.interp(phase, self._times, column) for column in self._rows.T])
         return [*drawn, *arm_at(self._model, entities.PLANNED, now, posture)]
-
-
-def arm_at(model: Model, root: str, now: int, posture: Array) -> list[Update]:
-    """The arm under `root` in `posture` (n,), in the order of `model.moving`."""
-    names = [joint.name for joint in model.moving]
-    times, rows = np.array([now], dtype=np.int64), posture[None, :]
-    return [
-        Poses(f"{root}/{model.paths[joint.child]}", times, *joint.poses(model.positions(joint, rows, names)))
-        for joint in model.joints
-        if joint.is_moving
-    ]

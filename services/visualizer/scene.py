@@ -19,9 +19,9 @@ from schemas.scene import (
     SphereShape,
 )
 from services.visualizer import entities, palette
+from services.visualizer.arm_poses import arm_at
 from services.visualizer.journal import bounded
 from services.visualizer.model import Model, Shape
-from services.visualizer.preview import arm_at
 from services.visualizer.shapes import Mesh, mesh_of
 from services.visualizer.updates import Gone, Labels, Shadow, Thing, Update
 
