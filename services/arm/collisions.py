@@ -120,7 +120,7 @@ def driver_of(arm: Arm, model: pin.Model, index: int) -> tuple[int, float]:
 
 
 def _joint_reach(arm: Arm, model: pin.Model, geometry: pin.GeometryModel, joint: int) -> float:
-    if model.joints[joint].shortname().startswith("JointModelP"):
+    if _slides(model, joint):
         return 1.0
     moved = (shape for shape in geometry.geometryObjects if joint in model.supports[shape.parentJoint])
     return max((shape_reach(arm, model, shape, joint) for shape in moved), default=0.0)
@@ -128,7 +128,7 @@ def _joint_reach(arm: Arm, model: pin.Model, geometry: pin.GeometryModel, joint:
 
 def shape_reach(arm: Arm, model: pin.Model, shape: pin.GeometryObject, joint: int) -> float:
     """How far at most [m] any point of a shape moves per unit of pinocchio's `joint`, which carries it."""
-    if model.joints[joint].shortname().startswith("JointModelP"):
+    if _slides(model, joint):
         return 1.0
     shape.geometry.computeLocalAABB()
     length = float(np.linalg.norm(shape.placement.translation)) + _radius(shape)
@@ -146,7 +146,11 @@ def _radius(shape: pin.GeometryObject) -> float:
 
 def _travel(arm: Arm, model: pin.Model, joint: int) -> float:
     """How far a sliding joint can move [m]; 0 for a turning one."""
-    if not model.joints[joint].shortname().startswith("JointModelP"):
+    if not _slides(model, joint):
         return 0.0
     limit = arm.model.joint(model.names[joint]).limit
     return 0.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
+
+
+def _slides(model: pin.Model, joint: int) -> bool:
+    return bool(model.joints[joint].shortname().startswith("JointModelP"))
