@@ -20,7 +20,7 @@ PIECES = 16  # of the integral over the speeds between now and rest
 
 
 class Braking:
-    """The limits of one arm, in periods of `dt` [s]; velocities are (n,) [rad/s] or [m/s]."""
+    """The limits of one arm, in periods of `dt` [s]; velocities are (n,) or (m, n) [rad/s] or [m/s]."""
 
     def __init__(self, arm: Arm, dt: float) -> None:
         self.dt = dt
@@ -39,17 +39,25 @@ class Braking:
         """
         change = wanted - present
         rates = np.where(change * present < 0.0, self._braking_rates(np.abs(present)), self.acceleration)
-        needed = float(np.max(np.abs(change) / rates)) / self.dt
-        return wanted.copy() if needed <= 1.0 else present + change / needed
+        needed = np.max(np.abs(change) / rates, axis=-1, keepdims=True) / self.dt
+        after: Array = np.where(needed <= 1.0, wanted, present + change / np.maximum(needed, 1.0))
+        return after
 
     def together(self, velocity: Array) -> Array:
-        """(n,) [rad] or [m] that braking with `towards` takes at most, all joints at rest at one time.
+        """[rad] or [m] that braking with `towards` takes at most, all joints at rest at one time.
 
         With v the share of the velocity that is left and t its time constant, dv/dt = -v/t: the way is the integral of
         t over v from 0 to 1, summed from above.
         """
-        constants = np.max(self._time_constants(self._shares * np.abs(velocity)), axis=1)
-        return float(np.mean(constants)) * velocity
+        speeds = self._shares * np.abs(velocity)[..., None, :]
+        constants = self._time_constants(speeds).max(axis=-1)
+        way: Array = constants.mean(axis=-1, keepdims=True) * velocity
+        return way
+
+    def way_to_rest(self, velocity: Array) -> Array:
+        """[rad] or [m] with the period that is about to come."""
+        way: Array = self.dt * velocity + self.together(velocity)
+        return way
 
     def alone(self, velocity: Array) -> Array:
         """(n,) [rad] or [m] until each joint has come to rest as fast as it can: never farther than `together`."""

@@ -8,18 +8,18 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from schemas.joints import JointState, JointTargets
-from schemas.planning import JogCommand, JogStatus
+from schemas.planning import JogCommand, JogLimit, JogStatus
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.jog.braking import Braking
 from services.planner.jog.jog_command import BadJog, JogInterpreter, Wanted
-from services.planner.jog.jog_room import Allowed, Room
+from services.planner.jog.jog_limits import no_command, singularity
+from services.planner.jog.jog_room import Room
 from services.planner.jog.jog_start import JogRefused, standing_position
 from services.planner.scene.world import World
 
@@ -58,13 +58,14 @@ class Jog:
         self._room = Room(arm, world, self._braking)
         self._command = JogCommand()
         self._heard = self._told = self._rested = self._on_way = NEVER
-        self._must_be_silent = self._is_heard = False
+        self._is_heard = False
+        self._interrupted_by = ""  # what has ended the jog while it was commanded: to be let go before it begins again
         self._known: set[str] = set()  # sentences that have been said
         self._trail: deque[tuple[float, Array]] = deque()
         self._positions: Array | None = None  # commanded, where the jog leads; None: it leads nothing
         self._velocity: Array = np.zeros(len(arm.joints))
         self._scale = 1.0
-        self._wanted_now, self._allowed_now = Wanted(self._velocity), Allowed(self._velocity)
+        self._limits: tuple[JogLimit, ...] = ()
 
     @property
     def is_busy(self) -> bool:
@@ -83,29 +84,42 @@ class Jog:
     def on_command(self, command: JogCommand, now: float) -> None:
         """The newest one counts."""
         if now - self._heard > SILENCE:
-            self._must_be_silent = False
+            self._interrupted_by = ""
         self._command, self._heard = command, now
         self._is_heard = True
 
-    def step(self, now: float, stamp: int, present: JointState | None, age: float, goal_is_active: bool) -> JogOutput:
-        """One period; `present` is `age` [s] old, `stamp` is [ns] UNIX."""
+    def step(
+        self,
+        now: float,
+        stamp: int,
+        present: JointState | None,
+        age: float,
+        goal_is_active: bool,
+        hindrance: str = "",
+    ) -> JogOutput:
+        """One period; `present` is `age` [s] old, `stamp` is [ns] UNIX, `hindrance` why the device does not move."""
         self._is_heard = now - self._heard <= DEAD_MAN
         if not self.is_busy:
             return JogOutput()
         try:
             if self._positions is None:
-                self._begin(present, age, goal_is_active, now)
+                self._begin(present, age, goal_is_active, hindrance, now)
             said = self._lead(now)
-            self._require_followed(present, age, goal_is_active, now)
+            self._require_followed(present, age, goal_is_active, hindrance, now)
         except JogRefused as refused:
             return self._end(str(refused), now, stamp)
         return self._output(now, stamp, present, said)
 
-    def _begin(self, present: JointState | None, age: float, goal_is_active: bool, now: float) -> None:
+    def _begin(self, present: JointState | None, age: float, goal_is_active: bool, hindrance: str, now: float) -> None:
         if goal_is_active:
             raise JogRefused("a goal is being carried out: cancel it first")
-        if self._must_be_silent:
-            raise JogRefused(f"jogging was interrupted, and nothing resumes by itself: let go for {SILENCE:g} s")
+        if hindrance:
+            raise JogRefused(hindrance)
+        if self._interrupted_by:
+            raise JogRefused(
+                f"jogging was interrupted ({self._interrupted_by}), and nothing resumes by itself: "
+                f"let go for {SILENCE:g} s"
+            )
         self._positions = np.array(standing_position(self._arm, present, age))
         self._velocity = np.zeros(len(self._arm.joints))
         self._trail.clear()
@@ -116,13 +130,18 @@ class Jog:
         assert self._positions is not None
         there = self._positions + 0.5 * PERIOD * self._velocity  # halfway: the tool's line bends less
         wanted, said = self._wanted(there) if self._is_heard else (self._fading(there, now), "")
-        is_regular = partial(self._interpreter.twists.stays_regular, self._positions) if wanted.is_twist else None
-        allowed = self._room.allowed(self._positions, self._velocity, wanted.velocity, is_regular)
+        singular = self._singularity_on if wanted.is_twist else None
+        allowed = self._room.allowed(self._positions, self._velocity, wanted.velocity, singular)
         self._velocity = allowed.velocity
         self._positions = self._positions + PERIOD * allowed.velocity
         self._scale = wanted.scale * allowed.share
-        self._wanted_now, self._allowed_now = wanted, allowed
+        self._limits = (*wanted.limits, *allowed.limits)
         return said
+
+    def _singularity_on(self, way: Array) -> JogLimit | None:
+        assert self._positions is not None
+        regularity = self._interpreter.twists.singularity_on(self._positions, way)
+        return None if regularity is None else singularity(regularity)
 
     def _wanted(self, positions: Array) -> tuple[Wanted, str]:
         """A command that cannot be followed is a stop; each reason is said once."""
@@ -131,7 +150,7 @@ class Jog:
         except BadJog as error:
             said = "" if str(error) in self._known or len(self._known) >= MOST_SAID else str(error)
             self._known |= {said} - {""}
-            return Wanted(np.zeros(len(positions)), 0.0, (str(error),)), said
+            return Wanted(np.zeros(len(positions)), 0.0, (no_command(str(error)),)), said
 
     def _fading(self, positions: Array, now: float) -> Wanted:
         """Less of the last twist, so that the tool brakes on its line; of joints, and after a while, nothing."""
@@ -148,22 +167,22 @@ class Jog:
             return standing
         return Wanted(min(1.0, share) * wanted.velocity, is_twist=True)
 
-    def _obstacles(self, allowed: Allowed) -> tuple[str, ...]:
-        limits = (allowed.limited_by,) if allowed.limited_by else ()
-        return limits if allowed.touching is None else (*limits, self._room.names_at(allowed.touching))
-
-    def _require_followed(self, present: JointState | None, age: float, goal_is_active: bool, now: float) -> None:
+    def _require_followed(
+        self, present: JointState | None, age: float, goal_is_active: bool, hindrance: str, now: float
+    ) -> None:
         """Raises `JogRefused` where somebody else moves the arm, or nobody does."""
         if goal_is_active:
             raise JogRefused("a goal has taken over")
         if present is None or age > FOLLOW:
-            raise JogRefused("no fresh joint_states: is the stepper_gateway running?")
+            raise JogRefused(hindrance or "no fresh joint_states: is the stepper_gateway running?")
         self._remember(now)
         astray = self._astray(present)
-        if not astray:
+        if not (astray or hindrance):
             self._on_way = now
         elif now - self._on_way > GRACE:
-            raise JogRefused(f"{astray} does not follow its targets: see what `gemelo state` says of the device")
+            raise JogRefused(
+                hindrance or f"{astray} does not follow its targets: see what `gemelo state` says of the device"
+            )
 
     def _remember(self, now: float) -> None:
         assert self._positions is not None
@@ -212,11 +231,13 @@ class Jog:
         if now - self._told < STATUS_PERIOD - 0.5 * PERIOD or self._positions is None:
             return None
         self._told = now
+        limits = tuple({limit.check: limit for limit in reversed(self._limits)}.values())[::-1]
         return JogStatus(
             stamp=stamp,
             active=True,
             scale=self._scale,
-            limited_by="; ".join(dict.fromkeys((*self._wanted_now.limited_by, *self._obstacles(self._allowed_now)))),
+            limited_by="; ".join(limit.message for limit in limits),
+            limits=limits,
             manipulability=self._interpreter.twists.manipulability(self._positions),
         )
 
@@ -224,7 +245,7 @@ class Jog:
         """No more targets; what was led and is interrupted begins again only after a silence."""
         was_led, self._positions = self._positions is not None, None
         self._velocity = np.zeros(len(self._arm.joints))
-        self._must_be_silent = self._must_be_silent or was_led
+        self._interrupted_by = reason if was_led else self._interrupted_by
         if not was_led and now - self._told < STATUS_PERIOD - 0.5 * PERIOD:
             return JogOutput()
         self._told = now

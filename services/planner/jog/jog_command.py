@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.planning import JogCommand
+from schemas.planning import JogCommand, JogLimit
 from services.arm.errors import suggestion
 from services.arm.kinematics import Kinematics
+from services.planner.jog.jog_limits import no_command, singularity, speed_limit
 from services.planner.jog.twist import TwistSolver
 
 Array = NDArray[np.float64]
@@ -27,7 +28,7 @@ class Wanted:
 
     velocity: Array
     scale: float = 1.0
-    limited_by: tuple[str, ...] = ()
+    limits: tuple[JogLimit, ...] = ()
     is_twist: bool = False
 
 
@@ -62,15 +63,15 @@ class JogInterpreter:
 
     def _of_twist(self, command: JogCommand, positions: Array) -> Wanted:
         twist = self._in_base(command, positions)
-        notes: tuple[str, ...] = ()
+        notes: tuple[JogLimit, ...] = ()
         if not self.twists.turns and np.any(twist[3:]):
-            notes = (f"{self._arm.name} cannot turn its tool as it likes: only the linear part counts",)
+            notes = (no_command(f"{self._arm.name} cannot turn its tool as it likes: only the linear part counts"),)
             twist[3:] = 0.0
         if not np.any(twist):
-            return Wanted(np.zeros(len(self._speeds)), limited_by=notes)
+            return Wanted(np.zeros(len(self._speeds)), limits=notes)
         motion = self.twists.solve(positions, twist)
         if motion.scale < 1.0:
-            notes = (*notes, "singularity")
+            notes = (*notes, singularity(motion.regularity))
         return replace(self._clamped(motion.velocity, motion.scale, notes), is_twist=True)
 
     def _in_base(self, command: JogCommand, positions: Array) -> Array:
@@ -90,11 +91,12 @@ class JogInterpreter:
         rotation = self._kinematics.tool(positions).rotation
         return np.concatenate((rotation @ twist[:3], rotation @ twist[3:]))
 
-    def _clamped(self, velocity: Array, scale: float, notes: tuple[str, ...]) -> Wanted:
+    def _clamped(self, velocity: Array, scale: float, notes: tuple[JogLimit, ...]) -> Wanted:
         """All joints slowed together until the last one keeps its limit."""
         shares = np.abs(velocity) / self._speeds
         worst = int(np.argmax(shares))
         most = float(shares[worst])
         if most <= 1.0:
             return Wanted(velocity, scale, notes)
-        return Wanted(velocity / most, scale / most, (*notes, f"speed limit of {self._arm.joint_names[worst]}"))
+        limit = speed_limit(self._arm.joints[worst], float(velocity[worst]))
+        return Wanted(velocity / most, scale / most, (*notes, limit))

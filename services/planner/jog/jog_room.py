@@ -8,21 +8,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from schemas.planning import JogLimit
 from services.arm.description import Arm
 from services.planner.jog.braking import Braking
-from services.planner.scene.clearance import CLEARANCE
+from services.planner.jog.jog_limits import joint_limit
+from services.planner.jog.jog_obstacles import Obstacles
 from services.planner.scene.world import World
 
 Array = NDArray[np.float64]
 
-LEAST_LOOK = 0.001  # [m] that any point of the arm moves at most between two looks at distances
-SLACK = 0.0006  # [m] more than the clearance, for what happens between two looks
-MOST_LOOKS = 8  # at distances for one velocity: a longer way along an obstacle has to be gone slower
-LIMIT_HALVINGS, SINGULARITY_HALVINGS = 14, 6
+LIMIT_SHARES, LIMIT_ROUNDS = 25, 3  # that are tried at once, and how often more finely
+SINGULARITY_HALVINGS = 6
 FACTORS = (1.2, 0.9, 0.5)  # of the share of the tick before, where something is in the way
 LEAST_SHARE = 0.01
 
-IsFree = Callable[[Array], bool]  # whether a way (n,) [rad] or [m] from where the arm is may be gone
+# What is too near on a way (n,) [rad] or [m] from where the arm is; None where it may be gone.
+Singular = Callable[[Array], JogLimit | None]
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,7 @@ class Allowed:
 
     velocity: Array
     share: float = 1.0
-    limited_by: str = ""
-    touching: Array | None = None  # the posture that was too near something
+    limits: tuple[JogLimit, ...] = ()
 
 
 class Room:
@@ -42,110 +42,68 @@ class Room:
     """
 
     def __init__(self, arm: Arm, world: World, braking: Braking) -> None:
-        self._names = arm.joint_names
-        self._world, self._braking = world, braking
+        self._joints, self._braking = arm.joints, braking
+        self._obstacles = Obstacles(world, braking)
         self._share = 1.0  # of the wanted velocity that was free the last time something was in the way
 
-    @property
-    def world(self) -> World:
-        return self._world
-
-    def allowed(self, positions: Array, velocity: Array, wanted: Array, is_regular: IsFree | None = None) -> Allowed:
-        """The velocity of the next tick on the way from `velocity` to `wanted`; ways must also be `is_regular`."""
+    def allowed(self, positions: Array, velocity: Array, wanted: Array, singular: Singular | None = None) -> Allowed:
+        """The velocity of the next tick on the way from `velocity` to `wanted`, where it may be."""
         if not np.any(wanted):
             return Allowed(self._next(velocity, wanted, 0.0))
-        share, limited_by = self._within_limits(positions, velocity, wanted)
-        if is_regular is not None and not is_regular(self._way(self._next(velocity, wanted, share))):
-            limited_by = "singularity"
+        share, limit = self._within_limits(positions, velocity, wanted)
+        if singular is not None and (found := singular(self._way(velocity, wanted, share))) is not None:
+            limit = found
             share = _largest(
-                lambda part: is_regular(self._way(self._next(velocity, wanted, part))), share, SINGULARITY_HALVINGS
+                lambda part: singular(self._way(velocity, wanted, part)) is None, share, SINGULARITY_HALVINGS
             )
-        return self._free(positions, velocity, wanted, share, limited_by)
-
-    def names_at(self, posture: Array) -> str:
-        """What is nearest at a posture."""
-        margin = self._world.distance(posture) + 1e-6
-        pairs = self._world.pairs_within(posture, margin)
-        return "collision of " + " and ".join(pairs[0]) if pairs else "collision"
+        return self._free(positions, velocity, wanted, share, limit)
 
     def _next(self, velocity: Array, wanted: Array, share: float) -> Array:
         return self._braking.towards(velocity, share * wanted)
 
-    def _way(self, velocity: Array) -> Array:
-        """(n,) [rad] or [m] to rest, with the tick that is about to come."""
-        return self._braking.dt * velocity + self._braking.together(velocity)
+    def _way(self, velocity: Array, wanted: Array, share: float) -> Array:
+        return self._braking.way_to_rest(self._next(velocity, wanted, share))
 
-    def _within_limits(self, positions: Array, velocity: Array, wanted: Array) -> tuple[float, str]:
-        lower = np.minimum(self._braking.lower, positions) - 1e-12
-        upper = np.maximum(self._braking.upper, positions) + 1e-12
-
-        def beyond(share: float) -> Array:
-            end = positions + self._way(self._next(velocity, wanted, share))
-            outside: Array = np.maximum(lower - end, end - upper)
-            return outside
-
-        outside = beyond(1.0)
+    def _within_limits(self, positions: Array, velocity: Array, wanted: Array) -> tuple[float, JogLimit | None]:
+        outside = self._beyond(positions, velocity, wanted)
         if np.all(outside <= 0.0):
-            return 1.0, ""
-        share = _largest(lambda part: bool(np.all(beyond(part) <= 0.0)), 1.0, LIMIT_HALVINGS)
-        return share, f"joint limit of {self._names[int(np.argmax(outside))]}"
+            return 1.0, None
+        worst = int(np.argmax(outside))
+        limit = joint_limit(self._joints[worst], float(positions[worst]), float(wanted[worst]))
+        least, width = 0.0, 1.0  # 0, which is braking, always is allowed
+        for _ in range(LIMIT_ROUNDS):
+            shares = least + width * np.arange(1, LIMIT_SHARES) / LIMIT_SHARES
+            allowed = np.all(self._beyond(positions, velocity, shares[:, None] * wanted) <= 0.0, axis=1)
+            width /= LIMIT_SHARES
+            least += width * (len(shares) if allowed.all() else int(np.argmin(allowed)))
+        return least, limit
 
-    def _free(self, positions: Array, velocity: Array, wanted: Array, most: float, limited_by: str) -> Allowed:
-        here = self._world.distance(positions)
+    def _beyond(self, positions: Array, velocity: Array, wanted: Array) -> Array:
+        """[rad] or [m] by which each joint would come to rest outside its limits, a row for each of `wanted`."""
+        end = positions + self._braking.way_to_rest(self._braking.towards(velocity, wanted))
+        lower, upper = np.minimum(self._braking.lower, positions), np.maximum(self._braking.upper, positions)
+        outside: Array = np.maximum(lower - end, end - upper) - 1e-12
+        return outside
+
+    def _free(self, positions: Array, velocity: Array, wanted: Array, most: float, limit: JogLimit | None) -> Allowed:
+        self._obstacles.move_to(positions)
+        out, contact = self._obstacles.most_out_of_contact(wanted)
+        most = min(most, out)
         candidate = self._next(velocity, wanted, most)
-        touching = self._touching(positions, candidate, here)
-        if touching is None:
-            self._share = most
-            return Allowed(candidate, most, limited_by)
-        self._share = self._near_the_last(
-            lambda part: self._touching(positions, self._next(velocity, wanted, part), here) is None, most
-        )
-        return Allowed(self._next(velocity, wanted, self._share), self._share, limited_by, touching)
+        obstacle = self._obstacles.on_the_way(candidate)
+        self._share = most if obstacle is None else self._near_the_last(velocity, wanted, most)
+        limits = tuple(found for found in (limit, obstacle or contact) if found is not None)
+        if obstacle is None:
+            return Allowed(candidate, most, limits)
+        return Allowed(self._next(velocity, wanted, self._share), self._share, limits)
 
-    def _near_the_last(self, is_free: Callable[[float], bool], most: float) -> float:
+    def _near_the_last(self, velocity: Array, wanted: Array, most: float) -> float:
         """A share that is free, not far from the one before: distances are dear."""
         for factor in FACTORS:
             share = min(factor * max(self._share, LEAST_SHARE), most)
-            if is_free(share):
+            if self._obstacles.on_the_way(self._next(velocity, wanted, share)) is None:
                 return share
         return 0.0
-
-    def _touching(self, positions: Array, velocity: Array, here: float) -> Array | None:
-        """The first posture on the way to rest that is too near something, or None; `here` [m] is the distance now.
-
-        Conservative advancement; what is nearer than it should be already may only come away.
-        """
-        way = self._way(velocity)
-        reach = self._world.reach
-        length = float(np.abs(way) @ reach)  # [m] that any point moves at most
-        floor = CLEARANCE + SLACK + self._straying(velocity)
-        end = positions + way
-        last = self._world.distance(end) if here - floor < length else floor
-        if last < floor and last <= here:
-            return end
-        along, before = 0.0, here
-        for _ in range(MOST_LOOKS):
-            along += max(before - floor, LEAST_LOOK)
-            if along >= length and before >= floor:
-                return None
-            posture = positions + min(1.0, along / length) * way if length > 0.0 else positions
-            distance = self._world.distance(posture)
-            if distance < floor and distance <= before:
-                return posture
-            if along >= length:
-                return None
-            before = distance
-        return posture
-
-    def _straying(self, velocity: Array) -> float:
-        """[m] by which joints that stop each on its own, when the targets cease, leave the straight way at most."""
-        together, alone = np.abs(self._braking.together(velocity)), np.abs(self._braking.alone(velocity))
-        reach = self._world.reach
-        whole = float(together @ reach)
-        if whole == 0.0:
-            return 0.0
-        nearest = float(alone @ reach) / whole  # a place on the straight way that is near to where they stop
-        return float(np.abs(alone - nearest * together) @ reach)
 
 
 def _largest(is_allowed: Callable[[float], bool], most: float, halvings: int) -> float:

@@ -29,10 +29,14 @@ PLACES = np.linspace(0.25, 1.0, 4)[:, None]  # of a way to rest that are looked 
 
 @dataclass(frozen=True)
 class ToolMotion:
-    """(n,) [rad/s] or [m/s], already slowed by `scale`; 1 far from singularities."""
+    """(n,) [rad/s] or [m/s], already slowed by `scale`; 1 far from singularities.
+
+    `regularity` is the manipulability as a share of the one at which slowing begins.
+    """
 
     velocity: Array
     scale: float
+    regularity: float
 
 
 class TwistSolver:
@@ -73,19 +77,22 @@ class TwistSolver:
         motion = right.T @ (shares * (left.T @ wanted))
         velocity = self._speeds * motion
         if share >= 1.0:
-            return ToolMotion(velocity, 1.0)
+            return ToolMotion(velocity, 1.0, share)
         scale = _straightness(wanted, left @ (values * (right @ motion)))
         reached = velocity * min(1.0, 1.0 / max(1e-9, float(np.max(np.abs(motion)))))
         ahead = float(self._values([positions + LOOK_AHEAD * reached])[0].prod()) / self._near
         if ahead < share - NOISE:
             scale *= share
-        return ToolMotion(scale * velocity, scale)
+        return ToolMotion(scale * velocity, scale, share)
 
-    def stays_regular(self, positions: Array, way: Array) -> bool:
-        """Whether no singularity is come too near to on a way (n,) [rad] or [m]; going along one or away is allowed."""
+    def singularity_on(self, positions: Array, way: Array) -> float | None:
+        """The regularity where the arm is, if a way (n,) [rad] or [m] comes too near to a singularity, else None.
+
+        Going along one or away is allowed.
+        """
         shares = self._signed(np.vstack((positions, positions + PLACES * way))) / self._near
         shares = np.abs(shares) if abs(shares[0]) <= NOISE else shares * np.sign(shares[0])
-        return bool(shares[1:].min() >= min(LEAST, shares[0] - NOISE))
+        return None if shares[1:].min() >= min(LEAST, shares[0] - NOISE) else abs(float(shares[0]))
 
     def _signed(self, postures: Array) -> Array:
         """(m,) manipulabilities; of a square Jacobian with the sign, which is another beyond a singularity."""

@@ -30,13 +30,13 @@ class Sweep:
 
     def __init__(self, arm: Arm, kinematics: Kinematics, geometry: WorldGeometry, look: Look) -> None:
         self._look = look
-        self._reach = _pair_reach(arm, kinematics.model, geometry)
+        self.reach: Array = _pair_reach(arm, kinematics.model, geometry)
 
     def touching(self, positions: Array, margin: float) -> Array | None:
         """Any posture along the rows of `positions` (m, n) at which a pair is nearer than `margin` [m], or None."""
         moved = self._movement(positions)
         finest = max(FINEST * margin, float(moved[-1].max(initial=0.0)) / MOST_LOOKS)
-        waiting = [(0.0, float(len(positions) - 1), np.arange(len(self._reach)), moved[0], moved[-1])]
+        waiting = [(0.0, float(len(positions) - 1), np.arange(len(self.reach)), moved[0], moved[-1])]
         while waiting:
             low, high, pairs, left, right = waiting.pop()
             middle = 0.5 * (low + high)
@@ -54,8 +54,8 @@ class Sweep:
 
     def _movement(self, positions: Array) -> Array:
         """(m, k) [m] that each pair has moved at most since the first row."""
-        steps = np.abs(np.diff(positions, axis=0)) @ self._reach.T
-        return np.concatenate((np.zeros((1, len(self._reach))), np.cumsum(steps, axis=0)))
+        steps = np.abs(np.diff(positions, axis=0)) @ self.reach.T
+        return np.concatenate((np.zeros((1, len(self.reach))), np.cumsum(steps, axis=0)))
 
 
 def _at(place: float, rows: Array) -> Array:

@@ -47,7 +47,7 @@ class World:
         for index in self._bounds.pairs:
             self._placed.deactivateCollisionPair(index)
         self.reach: Array = self._geometry.reach
-        self._sweep = Sweep(arm, kinematics, self._geometry, self._distance_at)
+        self._sweep = Sweep(arm, kinematics, self._geometry, self.distances)
 
     @property
     def version(self) -> int:
@@ -80,6 +80,22 @@ class World:
             nearest = min(nearest, self._exact(self._bounds.pairs[place]))
         return nearest - padding
 
+    def distances(self, positions: Positions, numbers: Sequence[int]) -> Array:
+        """(k,) [m] between the shapes of these pairs alone; a number is the place in `pair_names`."""
+        q = self._kinematics.configuration.to_pinocchio(positions)
+        pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
+        return np.array([self._exact(index) for index in numbers])
+
+    @property
+    def pair_names(self) -> Sequence[LinkPair]:
+        """Of every pair of shapes; a link may have several shapes."""
+        return self._geometry.names
+
+    @property
+    def pair_reach(self) -> Array:
+        """(pairs, n) how far at most [m] two shapes move against one another per unit of each joint."""
+        return self._sweep.reach
+
     def touching(self, positions: Array, margin: float) -> Array | None:
         """Any posture along the rows of `positions` (m, n) at which something is nearer than `margin` [m], or None."""
         return self._sweep.touching(positions, margin)
@@ -103,12 +119,6 @@ class World:
         q = self._kinematics.configuration.to_pinocchio(positions)
         pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
         pin.computeDistances(self._geometry.model, self._placed)
-
-    def _distance_at(self, positions: Array, pairs: Sequence[int]) -> Array:
-        """(k,) [m] between the shapes of these pairs alone."""
-        q = self._kinematics.configuration.to_pinocchio(positions)
-        pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
-        return np.array([self._exact(index) for index in pairs])
 
     def _direct(self) -> Iterator[tuple[int, float]]:
         """Number and distance [m] of the pairs that `_place` has looked at."""

@@ -1,0 +1,104 @@
+"""What stands in the way of a jogged arm, itself included, and how it comes out where it touches already."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.planning import JogLimit
+from services.planner.jog.braking import Braking
+from services.planner.jog.jog_limits import collision
+from services.planner.jog.nearness import Nearness, Pairs
+from services.planner.scene.clearance import CLEARANCE
+from services.planner.scene.world import World
+
+Array = NDArray[np.float64]
+
+LEAST_LOOK = 0.001  # [m] that two shapes move against one another at most between two looks at their distance
+SLACK = 0.0006  # [m] more than the clearance, for what happens between two looks
+MOST_LOOKS = 8  # at distances for one velocity: a longer way along an obstacle has to be gone slower
+LEVEL = 1e-7  # [m] that a depth may seem to grow between two looks where the motion is along the surface
+CONTACT_SPEED = 0.03  # [m/s] of what is nearer than the clearance already, on its way out
+
+
+class Obstacles:
+    """Of one world."""
+
+    def __init__(self, world: World, braking: Braking) -> None:
+        self._reach = world.reach
+        self._nearness = Nearness(world)
+        self._braking = braking
+        self._here: Array = np.zeros(len(world.reach))
+
+    def move_to(self, positions: Array) -> None:
+        """The arm is here now."""
+        self._here = positions
+        self._nearness.move_to(positions)
+
+    def most_out_of_contact(self, wanted: Array) -> tuple[float, JogLimit | None]:
+        """The share of a velocity at which nothing that is too near already moves too fast."""
+        pairs = self._nearness.pairs_within(CLEARANCE)
+        if not pairs.size:
+            return 1.0, None
+        most = CONTACT_SPEED / max(CONTACT_SPEED, float(self._nearness.speeds(wanted, pairs).max()))
+        return most, None if most == 1.0 else self._said(pairs, self._nearness.distances(pairs))
+
+    def on_the_way(self, velocity: Array) -> JogLimit | None:
+        """What comes too near something on the way to rest.
+
+        Conservative advancement, pair by pair; two that are nearer than they should be already may only come away.
+        """
+        way = self._braking.way_to_rest(velocity)
+        floor = CLEARANCE + SLACK + self._straying(velocity)
+        pairs = self._nearness.pairs_within(floor, way)
+        before = self._nearness.distances(pairs)
+        closing = self._closing(way, pairs, before, floor)
+        if closing is None:
+            closing = self._closing_before(way, pairs, before, floor)
+        return None if closing is None else self._said(closing, self._nearness.distances(closing))
+
+    def _closing(self, way: Array, pairs: Pairs, before: Array, floor: float) -> Pairs | None:
+        """The pairs that are too near at the end of the way, and not farther than before."""
+        if not pairs.size:
+            return None
+        after = self._nearness.distances_at(self._here + way, pairs)
+        too_near = _closer(before, after, floor)
+        return pairs[too_near] if too_near.any() else None
+
+    def _closing_before(self, way: Array, pairs: Pairs, before: Array, floor: float) -> Pairs | None:
+        """The same of any place before the end; pairs that are clear of one another for the rest fall out."""
+        moved, along = self._nearness.speeds(way, pairs), 0.0
+        for _ in range(MOST_LOOKS):
+            free = np.maximum(before - floor, LEAST_LOOK)
+            counts = (before < floor) | (free < (1.0 - along) * moved)
+            pairs, before, moved, free = pairs[counts], before[counts], moved[counts], free[counts]
+            if not pairs.size:
+                return None
+            along = min(1.0, along + float(np.min(free / moved)))
+            after = self._nearness.distances_at(self._here + along * way, pairs)
+            too_near = _closer(before, after, floor)
+            if too_near.any():
+                return pairs[too_near]
+            if along == 1.0:
+                return None
+            before = after
+        return pairs
+
+    def _straying(self, velocity: Array) -> float:
+        """[m] by which joints that stop each on its own, when the targets cease, leave the straight way at most."""
+        together, alone = np.abs(self._braking.together(velocity)), np.abs(self._braking.alone(velocity))
+        whole = float(together @ self._reach)
+        if whole == 0.0:
+            return 0.0
+        nearest = float(alone @ self._reach) / whole  # a place on the straight way that is near to where they stop
+        return float(np.abs(alone - nearest * together) @ self._reach)
+
+    def _said(self, pairs: Pairs, distances: Array) -> JogLimit:
+        nearest = int(np.argmin(distances))
+        return collision(self._nearness.names(int(pairs[nearest])), float(distances[nearest]))
+
+
+def _closer(before: Array, after: Array, floor: float) -> NDArray[np.bool_]:
+    """Which are nearer than `floor` [m] and did not come away; from inside, a way along the surface leads out too."""
+    come_away = (after > before) | ((before < 0.0) & (after > before - LEVEL))
+    return (after < floor) & ~come_away

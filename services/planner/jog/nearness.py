@@ -1,0 +1,68 @@
+"""How far apart the shapes of every pair are while the arm moves on: few pairs have to be looked at again.
+
+Two shapes that were seen so far apart stay apart until the joints between them may have carried them that far.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.collisions import LinkPair
+from services.planner.scene.world import World
+
+Array = NDArray[np.float64]
+Pairs = NDArray[np.int_]
+
+STILL = 1e-9  # [m] that two shapes move against one another: they do not
+
+
+class Nearness:
+    """Of one world, at one posture (n,) [rad] or [m] after the other; pairs of shapes have numbers."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._reach: Array = world.pair_reach
+        self._least: Array = np.full(len(self._reach), -np.inf)  # [m] that they are apart at least
+        self._is_exact = np.zeros(len(self._reach), dtype=bool)
+        self._here: Array | None = None
+
+    def move_to(self, posture: Array) -> None:
+        """From now on it is about this posture."""
+        if self._here is not None:
+            self._least -= self._moved(posture - self._here)
+        self._is_exact[:] = False
+        self._here = posture
+
+    def pairs_within(self, margin: float, way: Array | None = None) -> Pairs:
+        """Which may be nearer than `margin` [m] here, or somewhere on a `way` (n,) from here that moves them."""
+        moved = self._moved(way) if way is not None else np.zeros(len(self._reach))
+        counts = moved > STILL if way is not None else np.ones(len(self._reach), dtype=bool)
+        self._look_at(np.flatnonzero(counts & ~self._is_exact & (self._least - moved < margin)))
+        return np.flatnonzero(counts & (self._least - moved < margin))
+
+    def distances(self, pairs: Pairs) -> Array:
+        """(k,) [m] here; exact for pairs that are not known to be farther."""
+        return self._least[pairs]
+
+    def distances_at(self, posture: Array, pairs: Pairs) -> Array:
+        """(k,) [m] somewhere else."""
+        return self._world.distances(posture, pairs.tolist())
+
+    def speeds(self, velocity: Array, pairs: Pairs) -> Array:
+        """(k,) [m/s] at which the shapes move against one another at most."""
+        speeds: Array = self._reach[pairs] @ np.abs(velocity)
+        return speeds
+
+    def names(self, pair: int) -> LinkPair:
+        return self._world.pair_names[pair]
+
+    def _moved(self, way: Array) -> Array:
+        moved: Array = self._reach @ np.abs(way)
+        return moved
+
+    def _look_at(self, pairs: Pairs) -> None:
+        if pairs.size:
+            assert self._here is not None
+            self._least[pairs] = self._world.distances(self._here, pairs.tolist())
+            self._is_exact[pairs] = True
