@@ -14,7 +14,7 @@ import msgspec
 NOTHING = 255  # no pin, no joint, no input
 
 
-class DeviceRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class ConfigRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """An object of the configuration."""
 
 
@@ -42,7 +42,7 @@ class SensorKind(StrEnum):
     ULTRASONIC = "ultrasonic"  # [us] length of the echo
 
 
-class HomingConfig(DeviceRecord, frozen=True, kw_only=True):
+class HomingConfig(ConfigRecord, frozen=True, kw_only=True):
     """How a joint finds its place: fast to its switch, off it, slowly to it again."""
 
     input: int  # index of the switch
@@ -56,7 +56,7 @@ class HomingConfig(DeviceRecord, frozen=True, kw_only=True):
     timeout_ms: int  # of the joint's whole homing
 
 
-class JointConfig(DeviceRecord, frozen=True, kw_only=True):
+class JointConfig(ConfigRecord, frozen=True, kw_only=True):
     """One joint's limits and its driver's demands."""
 
     name: str
@@ -72,7 +72,7 @@ class JointConfig(DeviceRecord, frozen=True, kw_only=True):
     homing: HomingConfig | None = None
 
 
-class InputConfig(DeviceRecord, frozen=True, kw_only=True):
+class InputConfig(ConfigRecord, frozen=True, kw_only=True):
     """A switch or button."""
 
     name: str
@@ -83,7 +83,7 @@ class InputConfig(DeviceRecord, frozen=True, kw_only=True):
     pull: Pull = Pull.NONE
 
 
-class OutputConfig(DeviceRecord, frozen=True, kw_only=True):
+class OutputConfig(ConfigRecord, frozen=True, kw_only=True):
     """A digital output."""
 
     name: str
@@ -93,7 +93,7 @@ class OutputConfig(DeviceRecord, frozen=True, kw_only=True):
     off_at_estop: bool = False
 
 
-class SensorConfig(DeviceRecord, frozen=True, kw_only=True):
+class SensorConfig(ConfigRecord, frozen=True, kw_only=True):
     """A reading: value [1/1000] = raw * scale_q16 / 65536 + offset_milli."""
 
     name: str
@@ -104,7 +104,7 @@ class SensorConfig(DeviceRecord, frozen=True, kw_only=True):
     offset_milli: int = 0
 
 
-class DeviceConfig(DeviceRecord, frozen=True, kw_only=True):
+class DeviceConfig(ConfigRecord, frozen=True, kw_only=True):
     """The whole configuration."""
 
     name: str
