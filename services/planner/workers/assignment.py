@@ -55,6 +55,10 @@ class Assignment:
             allowed=self.request.allowed_time,
         )
 
+    def at(self, phase: PlanPhase) -> None:
+        """What it is at now."""
+        self.phase = phase
+
     def begin(self) -> bool:
         """A process takes it up, unless it has been cancelled."""
         with self._lock:

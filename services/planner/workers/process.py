@@ -14,7 +14,7 @@ from typing import IO, TypeVar
 
 from msgspec.structs import replace
 
-from schemas.planning import PlanResponse, Timing
+from schemas.planning import PlanPhase, PlanResponse, Timing
 from schemas.scene import PlanningScene
 from services.planner.workers.assignment import Assignment, Cancelled
 from services.planner.workers.jobs import REPORTS, Ask, At, Cancel, Job, Order, Planned, Ready, receive, send
@@ -25,6 +25,10 @@ TICK = 0.05  # [s] between two looks whether the plan is still wanted
 CHILD = "services.planner.workers.worker"
 
 R = TypeVar("R", Ready, Planned)
+
+
+def nothing(*_: object) -> None:
+    """Nobody wants to know."""
 
 
 class WorkerDied(Exception):
@@ -40,11 +44,11 @@ class Process:
         self._is_ready = self._has_toppra = self._is_over = False
         self._process = self._started()
 
-    def be_ready(self, assignment: Assignment) -> None:
-        """Waits until it plans; raises as `plan`, and leaves it to start where the plan is cancelled meanwhile."""
+    def be_ready(self, on_tick: Callable[[], None] = nothing) -> None:
+        """Waits until it plans; raises as `plan`, and what `on_tick` raises: then it goes on starting."""
         with self._replaced_where_it_fails():
             if not self._is_ready:
-                self._hear(Ready, START, assignment, assignment.require_wanted)
+                self._hear(Ready, START, on_tick)
                 self._is_ready = True
 
     def plan(self, assignment: Assignment, job: Job, scene: PlanningScene, seconds: float) -> PlanResponse:
@@ -55,10 +59,10 @@ class Process:
             needs_toppra = job.request.timing is Timing.TIME_OPTIMAL
             importing = START if needs_toppra and not self._has_toppra else 0.0
             try:
-                planned = self._hear(Planned, seconds + importing, assignment, lambda: self._look_after(assignment))
+                planned = self._hear(Planned, seconds + importing, lambda: self._look_after(assignment), assignment.at)
             except Cancelled:
                 self._send(Cancel())
-                self._hear(Planned, STOPS_WITHIN, assignment)
+                self._hear(Planned, STOPS_WITHIN)
                 raise
             self._has_toppra = self._has_toppra or needs_toppra
             return planned.response
@@ -83,7 +87,11 @@ class Process:
         send(_pipe(self._process.stdin), order)
 
     def _hear(
-        self, kind: type[R], seconds: float, assignment: Assignment, on_tick: Callable[[], None] = lambda: None
+        self,
+        kind: type[R],
+        seconds: float,
+        on_tick: Callable[[], None] = nothing,
+        on_phase: Callable[[PlanPhase], None] = nothing,
     ) -> R:
         """The next report of this kind; raises `TimeoutError`."""
         pipe, end = _pipe(self._process.stdout), time.monotonic() + seconds
@@ -92,7 +100,7 @@ class Process:
             if select.select([pipe], [], [], max(0.0, min(left, TICK)))[0]:
                 report = receive(pipe, REPORTS)
                 if isinstance(report, At):
-                    assignment.phase = report.phase
+                    on_phase(report.phase)
                 elif isinstance(report, kind):
                     return report
             elif left <= 0.0:

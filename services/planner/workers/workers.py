@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from queue import SimpleQueue
 
@@ -39,6 +40,7 @@ class Workers:
         self._assignments: dict[str, Assignment] = {}
         self._numbers = itertools.count(1)
         self._lock = threading.Lock()
+        self.have_started = False  # so that a plan need not wait for it
         self._start_one()
 
     def plan(self, request: PlanRequest, answer: Answer) -> None:
@@ -97,10 +99,18 @@ class Workers:
         thread.start()
 
     def _work(self, process: Process) -> None:
+        self._prepare(process)
         while (assignment := self._tasks.get()) is not None:
             if assignment.begin():
                 assignment.end(self._planned(process, assignment))
+                self._prepare(process)
         process.close()
+
+    def _prepare(self, process: Process) -> None:
+        """Waits for it, without a plan that would have to wait too; what keeps it from starting the next plan says."""
+        with suppress(TimeoutError, WorkerDied):
+            process.be_ready()
+            self.have_started = True
 
     def _planned(self, process: Process, assignment: Assignment) -> PlanResponse | None:
         """A plan in the scene as it is at the plan's end; None for one that was cancelled."""
@@ -108,7 +118,7 @@ class Workers:
         seconds = min(max(0.0, request.allowed_time), LONGEST) + GRACE
         for _ in range(AGAIN):
             try:
-                process.be_ready(assignment)
+                process.be_ready(assignment.require_wanted)
                 scene = self._scene()
                 present, age = self._present()
                 response = process.plan(assignment, Job(request=request, present=present, age=age), scene, seconds)

@@ -1,0 +1,43 @@
+"""Plans on the bus: `plan`, its cancel, how those stand that take longer, and the way that was planned."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from schemas.planning import PlanCancel, PlanCancelResult, PlanCode, PlanRequest, PlanResponse
+from schemas.topics import PLAN, PLAN_CANCEL, PLAN_PROGRESS, PLANNED_PATH
+from services.planner.core import Planner
+from services.planner.scene.scene_keeper import SceneKeeper
+from services.planner.workers.workers import Workers
+from services.runtime.node import Node
+from services.runtime.requests import Pending
+
+
+class PlanService:
+    """Hands requests to the workers and their answers back, all in the node's thread of logic."""
+
+    def __init__(self, node: Node, workers: Workers, planner: Planner, keeper: SceneKeeper) -> None:
+        self._node, self._workers, self._planner, self._keeper = node, workers, planner, keeper
+        self._path, self._progress = node.publisher(PLANNED_PATH), node.publisher(PLAN_PROGRESS)
+        node.serve_later(PLAN, self._plan)
+        node.serve(PLAN_CANCEL, self._cancel)
+
+    def step(self, now: int) -> None:
+        """Says how plans stand; `now` [ns] UNIX."""
+        for progress in self._workers.progress(now):
+            self._progress.put(progress)
+
+    def _plan(self, request: PlanRequest, pending: Pending[PlanResponse]) -> None:
+        began = self._node.monotonic()
+        self._workers.plan(request, lambda response: self._node.post(lambda: self._answer(response, pending, began)))
+
+    def _cancel(self, request: PlanCancel) -> PlanCancelResult:
+        return self._workers.cancel(request.request_id)
+
+    def _answer(self, response: PlanResponse, pending: Pending[PlanResponse], began: float) -> None:
+        if response.code is PlanCode.SUCCESS:
+            self._path.put(self._planner.planned_path(response.trajectory, self._node.now()))
+        elif response.refusal is not None:
+            self._node.log.info(f"refused: {response.refusal.message}")
+        self._keeper.heed(response)
+        pending.reply(replace(response, planning_time=self._node.monotonic() - began))
