@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from services.bench.arms import parol6
 from services.bench.figure import Figure, NotMeasured, of_samples, quantile
-from services.bench.postures import SCENE, random_postures
-
-if TYPE_CHECKING:
-    from services.planner.native import MotionCore
+from services.bench.postures import SCENE, CoalChecker, random_postures
+from services.planner.search.native_scene import native_scene
 
 Array = NDArray[np.float64]
 
 UNIT = "1/s"
 WAYS, POINTS = 300, 200
+FEW = 30  # of them for coal
 
 
 def measure() -> Figure:
@@ -33,11 +32,15 @@ def measure() -> Figure:
     samples: dict[str, list[float]] = {}
     for name in motion.kernel_names():
         core = MotionCore(arm, kernel=name)
-        core.set_scene(SCENE)
-        samples[name] = rates(core, ways)
+        core.set_scene(native_scene(arm, SCENE)[0])
+        samples[name] = rates(core.free, ways)
     best = motion.kernel_names()[0]
     reference = {name: quantile(rate, 0.5) for name, rate in samples.items() if name != best}
-    note = f"parol6, {len(SCENE)} boxes, {best}, {WAYS} lines of {POINTS} postures; p99 is the fastest; one thread"
+    checker = CoalChecker(arm, SCENE)
+    reference["pinocchio + coal"] = quantile(rates(lambda way: [checker.is_free(row) for row in way], ways[:FEW]), 0.5)
+    note = (
+        f"parol6, {len(SCENE.objects)} boxes, {best}, {WAYS} lines of {POINTS} postures; p99 is the fastest; one thread"
+    )
     return of_samples(samples[best], UNIT, None, reference, note)
 
 
@@ -47,11 +50,11 @@ def lines(rows: Array) -> list[Array]:
     return [start + shares * (goal - start) for start, goal in zip(rows[::2], rows[1::2], strict=True)]
 
 
-def rates(core: MotionCore, ways: list[Array]) -> list[float]:
+def rates(check: Callable[[Array], object], ways: list[Array]) -> list[float]:
     """[1/s] for each line."""
     measured = []
     for way in ways:
         started = time.perf_counter()
-        core.free(way)
+        check(way)
         measured.append(len(way) / (time.perf_counter() - started))
     return measured

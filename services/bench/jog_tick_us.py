@@ -29,7 +29,10 @@ def measure() -> Figure:
         "parol6, no scene": quantile(ticks(parol6(), PlanningScene()), 0.5),
         "rm1, same scene": quantile(ticks(rm1(), SCENE), 0.5),
     }
-    note = f"parol6, {len(SCENE.objects)} boxes, {COMMANDS} random twists of up to {SPEED:g} m/s, {STEPS} steps each, CPU time"
+    note = (
+        f"parol6, {len(SCENE.objects)} boxes, {COMMANDS} random twists of up to {SPEED:g} m/s, {STEPS} steps each, "
+        "CPU time"
+    )
     return of_samples(ticks(parol6(), SCENE), UNIT, GOAL, reference, note)
 
 

@@ -62,19 +62,24 @@ def processor() -> str:
 
 
 def text_of(report: BenchReport) -> str:
-    """The table, and a note under each figure that has one."""
+    """The table, and under it for each figure its note and what it is held against."""
     rows = [
-        (name, figure.unit, _number(figure.median), _number(figure.p99), figure.goal or "-", _verdict(figure),
-         ", ".join(f"{what} {value:g}" for what, value in figure.reference.items()))
+        (name, figure.unit, _number(figure.median), _number(figure.p99), figure.goal or "-", _verdict(figure))
         for name, figure in report.figures.items()
-    ]  # fmt: skip
-    notes = [
-        textwrap.fill(f"{name}: {figure.note}", 116, subsequent_indent="    ")
-        for name, figure in report.figures.items()
-        if figure.note
     ]
-    headings = ("figure", "unit", "median", "p99", "goal", "met", "reference")
-    return f"{report.machine}, commit {report.commit}\n\n{table(headings, rows)}\n\n" + "\n".join(notes)
+    told = [_told(name, figure) for name, figure in report.figures.items() if figure.note or figure.reference]
+    headings = ("figure", "unit", "median", "p99", "goal", "met")
+    return f"{report.machine}, commit {report.commit}\n\n{table(headings, rows)}\n\n" + "\n".join(told)
+
+
+def _told(name: str, figure: Figure) -> str:
+    """The note, and the references, as many in a line as there is room for."""
+    held = "; ".join(f"{what} {value:g}" for what, value in figure.reference.items())
+    texts = [f"{name}: {figure.note}", *([held] if held else [])]
+    return "\n".join(
+        textwrap.fill(text, 116, initial_indent="    " * (place > 0), subsequent_indent="    ", break_on_hyphens=False)
+        for place, text in enumerate(texts)
+    )
 
 
 def _number(value: float | None) -> str:

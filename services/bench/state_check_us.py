@@ -14,6 +14,7 @@ from services.arm.kinematics import Kinematics
 from services.bench.arms import parol6, rm1
 from services.bench.figure import Figure, NotMeasured, of_samples, quantile
 from services.bench.postures import SCENE, CoalChecker, random_postures
+from services.planner.search.native_scene import native_scene
 
 if TYPE_CHECKING:
     from services.planner.native import MotionCore
@@ -33,7 +34,7 @@ def measure() -> Figure:
         raise NotMeasured(str(error)) from error
     arm = parol6()
     core = MotionCore(arm)
-    core.set_scene(SCENE)
+    core.set_scene(native_scene(arm, SCENE)[0])
     rows = random_postures(arm, BATCH * BATCHES)
     samples = []
     for batch in np.array_split(rows, BATCHES):
@@ -45,9 +46,12 @@ def measure() -> Figure:
         "services.arm.kinematics, self only": self_us(arm),
         "motion core, one posture a call": single_us(core, rows),
         "rm1, motion core": batch_us(rm1()),
-        "rm1, pinocchio + coal": coal_us(rm1()),
+        "rm1, pinocchio + coal, same scene": coal_us(rm1()),
     }
-    note = f"parol6, {core.sphere_count} spheres, {len(SCENE)} boxes, batches of {BATCH} random postures, {core.kernel}"
+    note = (
+        f"parol6, {core.sphere_count} spheres, {len(SCENE.objects)} boxes, batches of {BATCH} random postures within "
+        f"the limits, {core.kernel}"
+    )
     return of_samples(samples, UNIT, None, reference, note)
 
 
@@ -56,7 +60,7 @@ def batch_us(arm: Arm) -> float:
     from services.planner.native import MotionCore
 
     core = MotionCore(arm)
-    core.set_scene(SCENE)
+    core.set_scene(native_scene(arm, SCENE)[0])
     return median_us(core.free, np.array_split(random_postures(arm, BATCH * BATCHES), BATCHES)) / BATCH
 
 
@@ -67,11 +71,11 @@ def single_us(core: MotionCore, rows: Array) -> float:
 
 def coal_us(arm: Arm) -> float:
     """[us] median of one posture with pinocchio and coal."""
-    return median_us(CoalChecker(arm).is_free, random_postures(arm, ONE_BY_ONE))
+    return median_us(CoalChecker(arm, SCENE).is_free, random_postures(arm, ONE_BY_ONE))
 
 
 def self_us(arm: Arm) -> float:
-    """[us] median of one posture as services/planner asks today: distances of the links to one another, no scene."""
+    """[us] median of one posture's distances of the links to one another, no scene."""
     return median_us(Kinematics(arm).collisions.distance, random_postures(arm, ONE_BY_ONE))
 
 
