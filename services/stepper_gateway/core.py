@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceStatus, PressRequest
 from schemas.joints import JointTargets
 from schemas.motion import FollowJointTrajectoryGoal
+from schemas.scene import PlanningScene
 from schemas.system import LogLevel
 from schemas.topics import DEVICE_STATUS
 from services.arm.description import Arm
@@ -88,6 +89,10 @@ class GatewayCore:
         reason = self._parts.goals.cancel(goal_id, moment)
         self._parts.desk.send_due(moment)
         return reason, self._finish(moment)
+
+    def on_scene(self, scene: PlanningScene) -> None:
+        """The planner's newest scene: goals planned in another are refused."""
+        self._parts.goals.scenes.heed(scene.version)
 
     def on_targets(self, targets: JointTargets, moment: Moment) -> list[Output]:
         """A streamed target."""

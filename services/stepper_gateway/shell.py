@@ -22,7 +22,14 @@ from schemas.motion import (
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
 )
-from schemas.topics import DEVICE_COMMAND, DEVICE_CONFIGURE, DEVICE_PRESS, FOLLOW_JOINT_TRAJECTORY, JOINT_TARGETS
+from schemas.topics import (
+    DEVICE_COMMAND,
+    DEVICE_CONFIGURE,
+    DEVICE_PRESS,
+    FOLLOW_JOINT_TRAJECTORY,
+    JOINT_TARGETS,
+    SCENE,
+)
 from services.runtime.action_server import ActionServer, GoalDecision, accept, refuse
 from services.runtime.errors import Refused
 from services.runtime.node import Node
@@ -69,6 +76,7 @@ class Shell:
         self._numbers = itertools.count(1)
         self._server: Server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self._on_goal, self._on_cancel)
         node.subscribe(JOINT_TARGETS, self._on_targets)
+        node.subscribe(SCENE, core.on_scene)
         node.serve(DEVICE_COMMAND, self._on_command, worker=True)
         node.serve(DEVICE_CONFIGURE, self._on_configure, worker=True)
         node.serve(DEVICE_PRESS, self._on_press, worker=True)

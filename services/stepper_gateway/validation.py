@@ -29,6 +29,7 @@ class CheckedGoal:
     path_tolerance: Bounds  # [steps]
     goal_tolerance: Bounds  # [steps]
     time_tolerance: float | None  # [s]
+    scene_version: int | None  # that it was planned in
 
     @property
     def target(self) -> Vector:
@@ -70,7 +71,7 @@ class Validator:
         trajectory = ordered_trajectory(goal.trajectory, self._joints)
         _require_time_ahead(trajectory, now)
         require_points_within(trajectory, self._joints)
-        return CheckedGoal(trajectory, path_bounds, end_bounds, late)
+        return CheckedGoal(trajectory, path_bounds, end_bounds, late, goal.scene_version)
 
     def path(self, goal: CheckedGoal, presence: Presence, now: int, parameters: GatewayParameters) -> Path:
         """The path from where the arm is, all of it within the limits; raises `GoalRejected`."""

@@ -14,6 +14,7 @@ from schemas.actions import GoalStatusCode
 from schemas.device import ConfigureRequest, DeviceCommandKind, DeviceCommandRequest, PressKind, PressRequest
 from schemas.joints import JointState, JointTargets
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from schemas.scene import PlanningScene
 from schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURE,
@@ -21,6 +22,7 @@ from schemas.topics import (
     FOLLOW_JOINT_TRAJECTORY,
     JOINT_STATES,
     JOINT_TARGETS,
+    SCENE,
 )
 from services.runtime.errors import GoalRefused
 from services.runtime.memory_bus import MemoryBus, MemoryNetwork
@@ -110,3 +112,15 @@ def test_a_client_moves_cancels_streams_and_commands(running: Running) -> None:
     assert pressed.accepted, pressed.reason
     answer = running.client.call(DEVICE_COMMAND, DeviceCommandRequest(command=DeviceCommandKind.RESET), 3.0)
     assert "release it" in answer.reason
+
+
+def test_the_scene_of_the_bus_decides_which_plans_are_followed(running: Running) -> None:
+    running.client.publisher(SCENE).put(PlanningScene(version=4))
+    running.client.wait(0.2)
+    action = running.client.action(FOLLOW_JOINT_TRAJECTORY)
+    trajectory = move((0.0, 0.0, 0.0), (0.1, -0.2, 0.01))
+    with pytest.raises(GoalRefused, match="planned in scene version 3, the scene is version 4 now") as refused:
+        action.send(FollowJointTrajectoryGoal(trajectory=trajectory, scene_version=3))
+    assert refused.value.code == FollowErrorCode.SCENE_CHANGED
+    outcome = action.send(FollowJointTrajectoryGoal(trajectory=trajectory, scene_version=4)).wait(20.0)
+    assert outcome.status == GoalStatusCode.SUCCEEDED

@@ -1,0 +1,86 @@
+"""A trajectory that was planned in another scene than the newest is not followed."""
+
+from __future__ import annotations
+
+import pytest
+from msgspec.structs import replace
+
+from schemas.actions import GoalStatusCode
+from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from schemas.scene import PlanningScene
+from services.stepper_gateway.goals import GoalVerdict
+from tests.stepper_gateway.harness import Rig, move
+
+HOME, THERE = (0.0, 0.0, 0.0), (0.1, -0.2, 0.01)
+
+
+def goal(version: int | None, delay: float = 0.0, rig: Rig | None = None) -> FollowJointTrajectoryGoal:
+    """To be begun `delay` [s] from now on."""
+    trajectory = move(HOME, THERE)
+    if rig is not None:
+        trajectory = replace(trajectory, stamp=rig.moment.unix + round(delay * 1e9))
+    return FollowJointTrajectoryGoal(trajectory=trajectory, scene_version=version)
+
+
+def heard(*versions: int) -> Rig:
+    """A gateway that has been told these scenes, in this order."""
+    rig = Rig().ready()
+    for version in versions:
+        rig.core.on_scene(PlanningScene(version=version))
+    return rig
+
+
+def test_a_plan_of_an_older_scene_is_refused_with_both_versions():
+    rig = heard(3, 4)
+    said = "planned in scene version 3, the scene is version 4 now: plan again"
+    assert rig.goal(goal(3)) == GoalVerdict(False, FollowErrorCode.SCENE_CHANGED, said)
+    assert rig.goal(goal(4)).accepted
+    assert rig.finish()[0] is GoalStatusCode.SUCCEEDED
+
+
+def test_the_scene_before_the_first_edit_is_one_too():
+    rig = heard(0, 1)
+    assert rig.goal(goal(0)).code is FollowErrorCode.SCENE_CHANGED
+
+
+@pytest.mark.parametrize("versions", [(), (4,)])
+def test_what_was_not_planned_in_a_scene_is_followed(versions: tuple[int, ...]):
+    assert heard(*versions).goal(goal(None)).accepted
+
+
+def test_a_gateway_that_knows_of_no_scene_refuses_none():
+    assert heard().goal(goal(7)).accepted
+
+
+def test_a_planner_that_starts_again_tells_its_scene_again_and_plans_stay_good():
+    assert heard(4, 4).goal(goal(4)).accepted
+
+
+def test_a_client_may_know_of_a_new_scene_sooner_than_the_gateway():
+    rig = heard(4)
+    assert rig.goal(goal(5)).accepted
+
+
+def test_a_scene_that_went_back_makes_plans_of_the_later_one_bad():
+    """A planner whose file was damaged begins again with nothing around the arm."""
+    rig = heard(4, 5, 0)
+    assert rig.goal(goal(5)).code is FollowErrorCode.SCENE_CHANGED
+    assert rig.goal(goal(0)).accepted
+
+
+def test_a_goal_that_waits_for_its_time_is_aborted_where_the_scene_changes_meanwhile():
+    rig = heard(4)
+    assert rig.goal(goal(4, delay=1.0, rig=rig)).accepted
+    rig.run(0.5)
+    rig.core.on_scene(PlanningScene(version=5))
+    status, result = rig.finish()
+    assert (status, result.error_code) == (GoalStatusCode.ABORTED, FollowErrorCode.SCENE_CHANGED)
+    assert rig.position == HOME
+
+
+def test_an_edit_does_not_stop_what_is_under_way():
+    rig = heard(4)
+    assert rig.goal(goal(4)).accepted
+    rig.run(0.2)
+    rig.core.on_scene(PlanningScene(version=5))
+    assert rig.finish()[0] is GoalStatusCode.SUCCEEDED
