@@ -19,7 +19,7 @@ from services.planner.goals.goals import Goals
 from services.planner.scene.clearance import CLEARANCE
 from services.planner.scene.world import World
 from services.planner.search.ompl_search import ompl_corners
-from services.planner.search.validity import CoalValidity
+from services.planner.search.validity import Validity
 from services.planner.search.way import Deadline, NoWay
 
 UNIT = "ms"
@@ -113,7 +113,7 @@ def coal_ms(planner: Planner, world: World, request: PlanRequest, start: tuple[f
     if not goals:
         return None
     began = time.perf_counter()
-    validity = CoalValidity(world, CLEARANCE)
+    validity = Validity(world, CLEARANCE)
     try:
         ompl_corners(
             planner.arm,

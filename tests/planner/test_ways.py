@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import struct
 import time
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from schemas.scene import MeshShape, PlanningScene, SceneObject
 from services.arm.description import load_arm
 from services.bench.plan_scenes import SCENES, box
 from services.planner.core import Planner
+from services.planner.scene.clearance import CLEARANCE
 from services.planner.scene.world import World
 from services.planner.search.native_scene import native_scene
 from services.planner.search.search import KNOWN
@@ -151,6 +153,31 @@ def test_whatever_is_returned_is_within_all_limits_and_touches_nothing(planner: 
             assert response.trajectory.points == ()
             assert response.code is PlanCode.TIMED_OUT
     assert found >= 4
+
+
+def narrow_postures(planner: Planner) -> Iterator[np.ndarray]:
+    """Those that keep the clearance, though the spheres of the compiled core do not."""
+    random, world = np.random.default_rng(5), planner.surroundings.begin()
+    lower, upper = np.array([(joint.lower, joint.upper) for joint in planner.arm.joints]).T
+    core = planner.surroundings.core(CLEARANCE)
+    assert core is not None
+    while True:
+        rows = random.uniform(lower, upper, (500, len(lower)))
+        yield from (row for row in rows[~core.free(rows)] if world.distance(row) > CLEARANCE + 0.0003)
+
+
+@pytest.mark.parametrize("planner_id", ["", "native", "RRTConnect"])
+def test_a_way_from_where_only_coal_lets_the_arm_be_to_such_a_place_is_found_twice_the_same(
+    planner: Planner, planner_id: str
+):
+    show(planner, SCENES["cage"])
+    postures = narrow_postures(planner)
+    for _ in range(3):
+        request = asked(planner, next(postures), next(postures), motion=FreeMotion(planner_id=planner_id, seed=4))
+        first, second = planner.plan(request, None), planner.plan(request, None)
+        require_sound(planner, request, first)
+        assert first.planner_id in {planner_id or "native", "straight"}
+        assert first.trajectory == second.trajectory
 
 
 def test_two_hundred_obstacles_are_gone_between(planner: Planner):

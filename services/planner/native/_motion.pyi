@@ -60,7 +60,7 @@ def look(
     finest: float,
     seconds: float,
     cancel: CancelFlag | None,
-) -> tuple[int, int, int, int]: ...
+) -> tuple[int, Array]: ...
 def plan(
     world: World,
     kernel: Kernel,

@@ -28,6 +28,7 @@ class Held:
     """An attachment and its compiled part."""
 
     attachment: Attachment
+    cover: Cover
     part: motion.Part
 
 
@@ -39,6 +40,8 @@ class Setting:
     names: tuple[str, ...]  # of the parts: links, then what is attached
     shapes: tuple[Shape, ...]
     held: Mapping[str, Held]
+    bulge: float  # [m] that spheres may be nearer at most than what they cover
+    least: float  # [m] the smallest sphere's radius
 
     def name_of(self, number: int) -> str:
         """Of a part or an obstacle, by its number in a contact."""
@@ -63,7 +66,7 @@ class Assembly:
         if attachment.name in self._links:
             raise ValueError(f'"{attachment.name}" is the name of a link; give what is attached another one')
         cover = cover_shapes(attachment.shapes, _bulge(attachment.shapes))
-        return Held(attachment, self._part(attachment.link, attachment.shapes, cover))
+        return Held(attachment, cover, self._part(attachment.link, attachment.shapes, cover))
 
     def setting(self, shapes: Sequence[Shape], held: Mapping[str, Held]) -> Setting:
         """Links, then what is attached; raises ValueError for two obstacles of one name or an unknown name."""
@@ -80,7 +83,10 @@ class Assembly:
         obstacles = [obstacle_of(shape, shape.matrix, touching=_bits(shape, names)) for shape in shapes]
         both = np.array(pairs, dtype=np.int32).reshape(-1, 2)
         world = motion.world(self._chain, [part for _, _, part in parts], both, obstacles)
-        return Setting(world, names, tuple(shapes), dict(held))
+        covers = [*self.covers.values(), *(one.cover for one in held.values())]
+        bulge = max(cover.bulge for cover in covers) + 2.0 * self._rounding()
+        least = min(float(cover.spheres[:, 3].min()) for cover in covers)
+        return Setting(world, names, tuple(shapes), dict(held), bulge, least)
 
     def _part(self, link: str, shapes: Sequence[Shape], cover: Cover) -> motion.Part:
         """A link's solids and their spheres in its frame, larger by what floats lose on an arm of this reach."""

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 MARGIN = 0.001  # [m]
 FINEST = 0.0002  # [m] how much nearer than the margin a way may seem before it is refused
+FREE, TOUCHING = 0, 1  # rake.h
 FOUND = 0  # plan.h
 
 
@@ -97,6 +98,18 @@ class MotionCore:
         """Whether the uniform cubic B-spline of the control points (k, n) keeps the margin everywhere."""
         return self._look(self._rows(control), 3)
 
+    def touching(self, rows: ArrayLike) -> Array | None:
+        """A posture (n,) on the polyline through `rows` (m, n) that does not keep the margin, however much bulges.
+
+        None where there is none, or where only the true shapes can tell.
+        """
+        setting = self._setting
+        margin = self.margin - setting.bulge  # [m] below 0: by how much spheres are in one another
+        if margin + setting.least <= 0.0:
+            return None
+        verdict, posture = motion.look(setting.world, self._kernel, self._rows(rows), 1, margin, FINEST, math.inf, None)
+        return posture if verdict == TOUCHING else None
+
     def distance(self, positions: ArrayLike, most: float = 1.0) -> float:
         """[m] that the arm keeps at least to itself and everything else; 0 where spheres touch, at most `most`."""
         return motion.clearance(self._setting.world, self._kernel, self._row(positions), most)[0]
@@ -158,7 +171,5 @@ class MotionCore:
         return row
 
     def _look(self, rows: Array, degree: int) -> bool:
-        return (
-            motion.look(self._setting.world, self._kernel, rows, degree, self.margin, FINEST, math.inf, None)[0]
-            == FOUND
-        )
+        world, margin = self._setting.world, self.margin
+        return motion.look(world, self._kernel, rows, degree, margin, FINEST, math.inf, None)[0] == FREE

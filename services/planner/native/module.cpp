@@ -209,7 +209,7 @@ nb::tuple first_contact(const World& world, const Kernel& kernel, const Row& row
     return nb::make_tuple(!is_free, rake.answer().first, rake.answer().second);
 }
 
-// Verdict of a polyline (degree 1) or of a B-spline by its control points (degree 3).
+// Verdict of a polyline (degree 1) or of a B-spline by its control points (degree 3), and where on it, if it touches.
 nb::tuple look(const World& world, const Kernel& kernel, const Rows& rows, int degree, double margin, double finest,
                double seconds, Flag cancel) {
     require_columns(rows.shape(1), static_cast<size_t>(world.dof()), "joint values");
@@ -225,7 +225,7 @@ nb::tuple look(const World& world, const Kernel& kernel, const Rows& rows, int d
     const Verdict verdict = degree == 1 ? rake.look(Polyline(rows.data(), rows.shape(0), rows.shape(1)), stop)
                                         : rake.look(Spline(rows.data(), rows.shape(0), rows.shape(1)), stop);
     nb::gil_scoped_acquire acquire;
-    return nb::make_tuple(static_cast<int>(verdict), rake.checks(), rake.answer().first, rake.answer().second);
+    return nb::make_tuple(static_cast<int>(verdict), array_of(Joints(rake.touching()), {rake.touching().size()}));
 }
 
 std::vector<Joints> each_row(const Rows& rows, const World& world, const char* what) {

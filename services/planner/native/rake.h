@@ -23,11 +23,13 @@ enum class Verdict { kFree, kTouching, kTooNear, kStopped };
 class Rake {
   public:
     Rake(const World& world, const Kernel& kernel, const Tolerances& tolerances)
-        : world_(world), kernel_(kernel), tolerances_(tolerances) {}
+        : world_(world), kernel_(kernel), tolerances_(tolerances), touching_(dof()) {}
 
     // How many configurations have been looked at.
     uint64_t checks() const { return checks_; }
     const Answer& answer() const { return answer_; }  // the last contact, where the verdict is not kFree
+    // Where on the course it was, where the verdict is kTouching.
+    const Joints& touching() const { return touching_; }
 
     bool is_free(const double* joints) {
         stretches_.assign(1, {0, 0.5, 0.0});
@@ -50,7 +52,11 @@ class Rake {
         for (size_t next = 0; next < stretches_.size();) {
             if (stop()) return Verdict::kStopped;
             const size_t count = std::min<size_t>(kLanes, stretches_.size() - next);
-            if (ask(course, next, count) != 0) return Verdict::kTouching;
+            if (ask(course, next, count) != 0) {
+                const Stretch& stretch = stretches_[next + first_lane(answer_.hits)];
+                course.at(stretch.span, stretch.middle, touching_.data());
+                return Verdict::kTouching;
+            }
             for (size_t lane = 0; lane < count; ++lane) {
                 if ((answer_.near >> lane & 1u) != 0 && !cut(stretches_[next + lane])) return Verdict::kTooNear;
             }
@@ -64,6 +70,12 @@ class Rake {
         size_t span;
         double middle, half;
     };
+
+    static size_t first_lane(uint32_t lanes) {
+        size_t lane = 0;
+        while (!(lanes >> lane & 1u)) ++lane;
+        return lane;
+    }
 
     size_t dof() const { return static_cast<size_t>(world_.dof()); }
 
@@ -132,6 +144,7 @@ class Rake {
     const World& world_;
     const Kernel& kernel_;
     Tolerances tolerances_;
+    Joints touching_;
     Answer answer_{};
     uint64_t checks_ = 0;
     double motion_ = 0.0;

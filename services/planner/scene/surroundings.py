@@ -5,7 +5,7 @@ The compiled core is asked first: what its spheres let be is free on the exact s
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -72,11 +72,13 @@ class Surroundings:
 
     def touching(self, positions: Array, margin: float) -> Array | None:
         """As `World.touching`."""
-        for stretch in self._doubtful(positions, margin):
-            posture = self.world.touching(stretch, margin)
-            if posture is not None:
-                return posture
-        return None
+        core = self.core(margin)
+        if core is None or len(positions) < 2:
+            return self.world.touching(positions, margin)
+        if core.way_free(positions):
+            return None
+        surely = core.touching(positions)
+        return self._touching_in_doubt(core, positions, margin) if surely is None else surely
 
     def pairs_within(self, positions: Positions, margin: float = 0.0) -> list[LinkPair]:
         """As `World.pairs_within`."""
@@ -86,13 +88,11 @@ class Surroundings:
         """As `World.contacts`."""
         return self.world.contacts(positions, margin)
 
-    def _doubtful(self, rows: Array, margin: float) -> Iterator[Array]:
-        """The stretches of the polyline through `rows` (m, n) that the core does not let be."""
-        core = self.core(margin)
-        if core is None or len(rows) < 2:
-            yield rows
-        elif not core.way_free(rows):
-            for first in range(0, len(rows) - 1, STRETCH):
-                stretch = rows[first : first + STRETCH + 1]
-                if not core.way_free(stretch):
-                    yield stretch
+    def _touching_in_doubt(self, core: MotionCore, rows: Array, margin: float) -> Array | None:
+        """By coal, on the stretches of the polyline through `rows` (m, n) that the core does not let be."""
+        for first in range(0, len(rows) - 1, STRETCH):
+            stretch = rows[first : first + STRETCH + 1]
+            posture = None if core.way_free(stretch) else self.world.touching(stretch, margin)
+            if posture is not None:
+                return posture
+        return None

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,14 +14,19 @@ from services.planner.refusals import NoPlan, unknown_name
 from services.planner.scene.surroundings import Surroundings
 from services.planner.search.native_search import NATIVE, native_way
 from services.planner.search.ompl_search import PLANNERS, ompl_corners
-from services.planner.search.smoothing import shorten, smooth
-from services.planner.search.validity import CoalValidity, NativeValidity, Validity
+from services.planner.search.room import with_room
+from services.planner.search.smoothing import continued, shorten, smooth
+from services.planner.search.validity import Validity
 from services.planner.search.way import Deadline, NoWay, Way, Why
 from services.planner.times import Stopwatch
 
+if TYPE_CHECKING:
+    from services.planner.native import MotionCore
+
 Array = NDArray[np.float64]
 
-DEFAULT = "RRTConnect"  # where the compiled core is not built, or is too cautious
+DEFAULT = "RRTConnect"  # where the compiled core is not built, or finds nothing
+PATIENCE = 0.5  # share of the time left that the compiled core is given, where another may follow
 KNOWN = (NATIVE, *PLANNERS)
 SEEDS = 2**32  # that are told apart; the generators take none below 0
 
@@ -41,44 +49,61 @@ class Search:
     ) -> Way:
         """A smooth way from `start` (n,) to one of `goals` (m, n) that keeps `margin` [m]; raises `NoWay`, `NoPlan`."""
         require_known(planner_id)
-        seed %= SEEDS
-        core = self._surroundings.core(margin)
-        if planner_id == NATIVE and core is None:
+        core, seed = self._surroundings.core(margin), seed % SEEDS
+        if core is None and planner_id == NATIVE:
             raise _not_built()
-        if planner_id == NATIVE and core is not None:
-            return native_way(core, start, goals, seed, deadline)
-        if planner_id == "" and core is not None:
+        sought = _Sought(start, goals, Validity(self._surroundings, margin), seed, watch)
+        if core is not None and planner_id in ("", NATIVE):
             try:
-                return native_way(core, start, goals, seed, deadline)
-            except NoWay as no_way:
-                if no_way.why is Why.TIMED_OUT:
+                return self._native(core, sought, deadline if planner_id else deadline.share(PATIENCE))
+            except NoWay:
+                if planner_id or deadline.is_late():
                     raise
-        return self._sampled(start, goals, margin, planner_id or DEFAULT, seed, deadline, watch)
+        return self._sampled(planner_id or DEFAULT, sought, deadline)
 
-    def _sampled(
-        self,
-        start: Array,
-        goals: Array,
-        margin: float,
-        planner_id: str,
-        seed: int,
-        deadline: Deadline,
-        watch: Stopwatch,
-    ) -> Way:
-        validity = self._validity(start, goals, margin)
-        corners = ompl_corners(self._arm, planner_id, start, goals, validity, seed, deadline)
-        with watch.phase("smoothing"):
-            corners = shorten(corners, validity, seed, deadline.is_late)
-            return Way(corners, smooth(corners, validity, deadline.is_late), planner_id)
+    def _native(self, core: MotionCore, sought: _Sought, deadline: Deadline) -> Way:
+        """By the compiled core, between where it lets the arm be; from the start and to a goal by straight lines."""
+        start, *goals = (
+            with_room(self._arm, core, end, sought.validity, sought.seed, deadline.is_late)
+            for end in (sought.start, *sought.goals)
+        )
+        if start is None:
+            raise NoWay(Why.START_TOUCHES)
+        ends = [(goal, near) for goal, near in zip(sought.goals, goals, strict=True) if near is not None]
+        if not ends:
+            raise NoWay(Why.GOAL_TOUCHES)
+        way = native_way(core, start, np.array([near for _, near in ends]), sought.seed, deadline)
+        goal = next(goal for goal, near in ends if np.array_equal(near, way.corners[-1]))
+        return self._joined(sought, start, way, goal, deadline)
 
-    def _validity(self, start: Array, goals: Array, margin: float) -> Validity:
-        """The compiled core's spheres where they let the start and a goal be, otherwise the exact shapes."""
-        core = self._surroundings.core(margin)
-        if core is not None:
-            free = core.free(np.vstack((start, goals)))
-            if free[0] and free[1:].any():
-                return NativeValidity(core)
-        return CoalValidity(self._surroundings.world, margin)
+    def _joined(self, sought: _Sought, near: Array, way: Way, goal: Array, deadline: Deadline) -> Way:
+        """The compiled core's way from near the start to near the goal, continued to both."""
+        is_at_goal = np.array_equal(goal, way.corners[-1])
+        if near is sought.start and is_at_goal:
+            return way
+        with sought.watch.phase("smoothing"):
+            corners = way.corners if near is sought.start else continued(way.corners, sought.start, sought.validity)
+            corners = corners if is_at_goal else continued(corners[::-1], goal, sought.validity)[::-1]
+            return Way(corners, smooth(corners, sought.validity, deadline.is_late), NATIVE)
+
+    def _sampled(self, planner_id: str, sought: _Sought, deadline: Deadline) -> Way:
+        corners = ompl_corners(
+            self._arm, planner_id, sought.start, sought.goals, sought.validity, sought.seed, deadline
+        )
+        with sought.watch.phase("smoothing"):
+            corners = shorten(corners, sought.validity, sought.seed, deadline.is_late)
+            return Way(corners, smooth(corners, sought.validity, deadline.is_late), planner_id)
+
+
+@dataclass(frozen=True)
+class _Sought:
+    """What all searches are asked: a way from `start` (n,) to one of `goals` (m, n)."""
+
+    start: Array
+    goals: Array
+    validity: Validity
+    seed: int
+    watch: Stopwatch
 
 
 def require_known(planner_id: str) -> None:

@@ -43,17 +43,26 @@ def smooth(corners: Array, validity: Validity, is_late: Callable[[], bool]) -> A
     """
     shares = np.full(len(corners), WIDEST)
     shares[[0, -1]] = 0.0
-    while not is_late():
-        control, places = _lay(corners, shares)
-        touching = [
+    waiting = set(range(1, len(corners) - 1))
+    control, places = _lay(corners, shares)
+    while waiting and not is_late():
+        touching = {
             corner
-            for corner in range(1, len(corners) - 1)
-            if shares[corner] > 0.0 and not validity.is_curve_free(control[places[corner] - 3 : places[corner] + 4])
-        ]
-        if not touching:
-            return control
-        shares[touching] = np.where(shares[touching] > LEAST, 0.5 * shares[touching], 0.0)
-    return stopping(corners)
+            for corner in sorted(waiting)
+            if not validity.is_curve_free(control[places[corner] - 3 : places[corner] + 4])
+        }
+        for corner in touching:
+            shares[corner] = 0.5 * shares[corner] if shares[corner] > LEAST else 0.0
+        near = touching | {corner + side for corner in touching for side in (-1, 1)}  # they share its edges
+        waiting = {corner for corner in near if shares[corner] > 0.0}
+        control, places = _lay(corners, shares)
+    return stopping(corners) if waiting else control
+
+
+def continued(corners: Array, end: Array, validity: Validity) -> Array:
+    """The polyline from `end` (n,) straight to its first corner, or past it to the second where that is free."""
+    is_needless = len(corners) > 1 and validity.is_line_free(end, corners[1])
+    return np.vstack((end, corners[1:] if is_needless else corners))
 
 
 def stopping(corners: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Protocol
 
@@ -81,3 +81,8 @@ class Deadline:
 
     def is_late(self) -> bool:
         return self.left <= 0.0
+
+    def share(self, part: float) -> Deadline:
+        """Within this one: of the time that is left only a part."""
+        now = self.clock()
+        return replace(self, allowed=part * (self.allowed - (now - self.began)), began=now)

@@ -45,6 +45,25 @@ def test_a_refused_line_comes_within_the_margin_and_the_bulge(arm, core, posture
             assert not core.free(ways).all() or min(core.distance(row) for row in ways) < core.margin + 0.001
 
 
+def test_what_surely_touches_is_within_the_margin_by_coal_too(arm, core, postures):
+    rng = np.random.default_rng(8)
+    core.margin = 0.004
+    sure = unsure = 0
+    for round_ in range(4):
+        scene = [random_shape(rng, kind, kind) for kind in ShapeKind if kind is not ShapeKind.MESH]
+        core.set_scene(scene)
+        truth = Truth(arm, scene)
+        for start, goal in pairwise(postures(60, 40 + round_)):
+            touching = core.touching([start, goal])
+            if touching is not None:
+                sure += 1
+                assert truth.distance(touching) < core.margin + UNSURE
+                assert not core.edge_free(start, goal)
+            else:
+                unsure += not core.edge_free(start, goal)
+    assert sure > 10 * unsure
+
+
 @pytest.mark.parametrize("thickness", [0.02, 0.002, 0.0002, 0.00002])
 def test_the_thinnest_sheet_is_not_tunnelled_through(thickness):
     core = MotionCore(load("rm1"))

@@ -1,0 +1,49 @@
+"""From where only the exact shapes let the arm be, a short straight way to where the compiled core lets it be too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+from services.planner.search.validity import Validity
+
+if TYPE_CHECKING:
+    from services.planner.native import MotionCore
+
+Array = NDArray[np.float64]
+
+NEAREST, FARTHEST = 0.02, 1.3  # [s] at full speed: how far from the posture is looked first and last
+SAMPLES = 64  # postures at each distance, which doubles
+TRIED = 3  # of them, the nearest, to which the straight way is looked at
+
+
+def with_room(
+    arm: Arm, core: MotionCore, posture: Array, validity: Validity, seed: int, is_late: Callable[[], bool]
+) -> Array | None:
+    """`posture` (n,) itself where the core lets it be, else a near one that it does, None where none was found."""
+    if core.free(posture[None, :])[0]:
+        return posture
+    for rows in _around(arm, posture, seed):
+        for row in rows[core.free(rows)][:TRIED]:
+            if validity.is_line_free(posture, row):
+                return np.asarray(row)
+        if is_late():
+            break
+    return None
+
+
+def _around(arm: Arm, posture: Array, seed: int) -> Iterator[Array]:
+    """(m, n) postures within the limits, nearest first, from farther and farther away."""
+    random = np.random.default_rng(seed)
+    speed = np.array([joint.velocity for joint in arm.joints])
+    lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
+    distance = NEAREST
+    while distance < FARTHEST:
+        steps = distance * random.uniform(-1.0, 1.0, (SAMPLES, len(speed)))
+        rows = np.clip(posture + speed * steps, lower, upper)
+        yield rows[np.argsort(np.abs(steps).max(axis=1), kind="stable")]
+        distance *= 2.0
