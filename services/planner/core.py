@@ -18,7 +18,6 @@ from schemas.planning import (
     PlannedPath,
     PlanRequest,
     PlanResponse,
-    Timing,
     WaypointGoal,
 )
 from services.arm.description import Arm
@@ -122,7 +121,7 @@ class Planner:
             finished, planner_id = self._verified(way.trajectory, start, way.end, finisher, margin), TOOL
             fraction, stopped_by = way.fraction, way.stopped_by
         elif isinstance(request.goal, WaypointGoal):
-            errand = Errand(request.motion, start, limits, margin, finisher, deadline, watch)
+            errand = Errand(request.motion, request.timing, start, limits, margin, finisher, deadline, watch)
             finished, planner_id = self._via.plan(request.goal, errand)
         else:
             finished, planner_id = self._found(request, start, margin, finisher, deadline, watch)
@@ -252,7 +251,3 @@ def _require_known(request: PlanRequest) -> None:
         raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, "allowed_time", message, "allow 1 s, which is the default")
     if isinstance(request.motion, FreeMotion):
         require_known(request.motion.planner_id)
-    is_given = isinstance(request.motion, LinearMotion | CircularMotion) or isinstance(request.goal, WaypointGoal)
-    if is_given and request.timing is not Timing.JERK_LIMITED:
-        message = "lines, arcs and ways by waypoints are timed jerk-limited only"
-        raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, "timing", message, "leave timing at its default")

@@ -1,11 +1,13 @@
 """Lines, arcs and waypoints as they will be executed, on both arms."""
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from schemas.frames import Transform
 from schemas.joints import JointState
@@ -335,16 +337,76 @@ def test_what_is_not_a_number_is_no_message():
         LinearMotion(speed=float("nan"))
 
 
-def test_lines_and_waypoints_are_not_timed_without_a_jerk_limit():
+OPTIMAL = [
+    (NamedGoal(name="left"), PointToPoint()),
+    (PoseGoal(position=(0.0, 0.05, 0.01)), LinearMotion()),
+    (PoseGoal(position=(0.0, 0.05, 0.01)), LinearMotion(speed=0.05, acceleration=0.3)),
+    (PoseGoal(position=(0.0, 0.05, 0.01)), CircularMotion(interim=(0.01, 0.025, 0.01), speed=0.08, acceleration=0.4)),
+    (WaypointGoal(points=(PoseGoal(position=(0.0, 0.05, 0.0)), PoseGoal(position=(0.0, 0.05, 0.03)))), LinearMotion()),
+    (
+        WaypointGoal(points=(PoseGoal(position=(0.0, 0.05, 0.0)), PoseGoal(position=(0.0, 0.05, 0.03))), blend=0.01),
+        LinearMotion(acceleration=0.5),
+    ),
+    (WaypointGoal(points=(NamedGoal(name="home"), NamedGoal(name="left"))), FreeMotion()),
+    (WaypointGoal(points=(NamedGoal(name="left"), NamedGoal(name="right")), blend=0.05), PointToPoint()),
+]
+
+
+def beside(goal: Goal, begin: np.ndarray) -> Goal:
+    """Positions are from where the tool is."""
+    match goal:
+        case PoseGoal():
+            return replace(goal, position=tuple(np.add(goal.position, begin).tolist()))
+        case WaypointGoal():
+            return replace(goal, points=tuple(beside(point, begin) for point in goal.points))
+    return goal
+
+
+@ARMS
+@pytest.mark.parametrize(("goal", "motion"), OPTIMAL)
+def test_what_is_timed_optimally_is_no_slower_and_heeds_all_limits_but_the_jerk(name: str, goal: Goal, motion: Motion):
+    planner = PLANNERS[name]
+    start = planner.arm.named_states["ready"]
+    begin = planner.kinematics.tool(start).position
+    if isinstance(motion, CircularMotion):
+        motion = replace(motion, interim=tuple(np.add(motion.interim, begin).tolist()))
+    fast, smooth = (plan(planner, beside(goal, begin), motion, start, timing=timing) for timing in reversed(Timing))
+    assert fast.code is smooth.code is PlanCode.SUCCESS
+    assert fast.duration < smooth.duration + 0.05  # its accelerations come and go in 0.03 s
+    require_within_limits(planner.arm, sample(fast.trajectory, 50), joint_limits(planner.arm))
+    assert fast.trajectory.points[-1].positions == pytest.approx(smooth.trajectory.points[-1].positions, abs=1e-9)
+    speed, acceleration = tool_peaks(planner, fast)
+    if isinstance(motion, LinearMotion | CircularMotion):
+        assert speed <= (motion.speed or math.inf) * (1.0 + 1e-3)
+        assert acceleration <= (motion.acceleration or math.inf) * 1.01
+
+
+def tool_peaks(planner: Planner, response: PlanResponse) -> tuple[float, float]:
+    """Speed [m/s] and acceleration [m/s^2] by differences of the tool's places at even times."""
+    sampler, step = TrajectorySampler(response.trajectory), 1e-3
+    times = np.arange(0.0, response.duration, step)
+    rows = np.array([planner.kinematics.tool(sampler.at(t)[0]).position for t in times.tolist()])
+    velocity = np.diff(rows, axis=0) / step
+    return (
+        float(np.linalg.norm(velocity, axis=1).max()),
+        float(np.linalg.norm(np.diff(velocity, axis=0) / step, axis=1).max()),
+    )
+
+
+@pytest.mark.parametrize("timing", Timing)
+@pytest.mark.parametrize("motion", [PointToPoint(), LinearMotion()])
+@pytest.mark.parametrize("which", ["velocity_scaling", "acceleration_scaling"])
+def test_a_scaling_near_nothing_is_told_in_seconds_that_nobody_waits(timing: Timing, motion: Motion, which: str):
     planner = PLANNERS["rm1"]
     start = planner.arm.named_states["ready"]
-    for goal, motion in (
-        (NamedGoal(name="home"), LinearMotion()),
-        (WaypointGoal(points=(NamedGoal(name="home"), NamedGoal(name="left"))), FreeMotion()),
-    ):
-        response = plan(planner, goal, motion, start, timing=Timing.TIME_OPTIMAL)
-        assert response.refusal is not None
-        assert response.refusal.subject == "timing"
+    goal = JointGoal(name=planner.arm.joint_names, position=tuple(value + 0.05 for value in start))
+    response = plan(planner, goal, motion, start, timing=timing, **{which: 1e-300})
+    assert response.refusal is not None
+    assert "86400 s is the most" in response.refusal.message
+    assert "scaling" in response.refusal.remedy
+    slow = plan(planner, goal, motion, start, timing=timing, **{which: 1e-3})
+    assert slow.code is PlanCode.SUCCESS
+    assert slow.duration > 10.0
 
 
 def test_a_line_to_where_the_tool_is_stands():

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory
-from schemas.planning import FreeMotion, Motion, WaypointGoal
+from schemas.planning import FreeMotion, Motion, Timing, WaypointGoal
 from services.arm.description import Arm
 from services.planner.blockade import Blockade
 from services.planner.finish import Finished, Finisher, Touching
@@ -21,10 +21,11 @@ from services.planner.scene.surroundings import Surroundings
 from services.planner.search.search import Search
 from services.planner.search.way import STRAIGHT, Deadline, NoWay, Start
 from services.planner.times import Stopwatch
-from services.planner.timing.path_timing import demand_of, time_law
+from services.planner.timing.path_timing import law_along
 from services.planner.timing.profile import JointLimits, NoProfile, straight_line
+from services.planner.timing.timing import at_limits, trajectory_of
 from services.planner.tool.path_curve import RoundedLines, rounded_runs
-from services.planner.tool.path_points import Run, normalised, trajectory_along
+from services.planner.tool.path_points import Run, states_of_runs
 from services.planner.tool.tool_motions import points_of
 
 Array = NDArray[np.float64]
@@ -37,12 +38,18 @@ class Errand:
     """What a request by waypoints has besides its goal."""
 
     motion: Motion
+    timing: Timing
     start: Start
     limits: JointLimits
     margin: float  # [m]
     finisher: Finisher
     deadline: Deadline
     watch: Stopwatch
+
+    def heed(self) -> None:
+        """Raises `NoPlan` where the time is up."""
+        if self.deadline.is_late():
+            raise timed_out()
 
 
 class Via:
@@ -109,20 +116,21 @@ class Via:
         radii = [blend * 0.5**index for index in range(BLENDS)] if blend > 0.0 else []
         for radius in [*radii, 0.0]:
             with errand.watch.phase("timing"):
-                trajectory = self._trajectory(corners, errand.limits, radius)
+                trajectory = self._trajectory(corners, errand, radius)
             yield trajectory
 
-    def _trajectory(self, corners: Array, limits: JointLimits, blend: float) -> JointTrajectory:
-        names = self._arm.joint_names
+    def _trajectory(self, corners: Array, errand: Errand, blend: float) -> JointTrajectory:
+        names, limits = self._arm.joint_names, errand.limits
         lines = rounded_runs(corners, limits.velocity, self._surroundings.reach, blend)
         try:
             if not lines:
                 return straight_line(names, corners[0].tolist(), corners[-1].tolist(), limits)
-            return normalised(trajectory_along(names, [_run(line, limits) for line in lines]), limits)
+            states = states_of_runs([_run(line, errand) for line in lines], errand.heed)
+            return trajectory_of(names, at_limits(states, limits, errand.timing is Timing.JERK_LIMITED))
         except NoProfile as error:
             raise not_verified(str(error)) from error
 
 
-def _run(line: RoundedLines, limits: JointLimits) -> Run:
-    law = time_law(demand_of(line, limits, (0.0, 0.0), line.marks))
-    return Run(line, law, line.start, line.end)
+def _run(line: RoundedLines, errand: Errand) -> Run:
+    law = law_along(line, errand.limits, (0.0, 0.0), line.marks, errand.timing, errand.heed)
+    return Run(line, law, line.start, line.end, line.marks[1:-1])

@@ -7,17 +7,24 @@ q_s s''' (Biagiotti and Melchiorri 2008, section 9.1). Between stretches the spe
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
-from services.planner.timing.profile import JointLimits, NoProfile
+from schemas.planning import Timing
+from services.planner.timing.profile import JointLimits, NoProfile, require_short
+from services.planner.timing.sections import Section
+from services.planner.timing.time_law import TimeLaw
+from services.planner.timing.timing import stretches_through
 from services.planner.tool.path_curve import PathCurve
 
 Array = NDArray[np.float64]
+Heed = Callable[[], None]  # raises where the time is up
 
 NEAR = 1e-4  # share of the length: marks that are nearer to one another are one
 ASIDE = 1e-6  # share of the length from a mark at which the way is that of one side
@@ -29,7 +36,15 @@ CENTRIPETAL = 0.8  # share of the acceleration that curvature may take
 JERK_OF_SPEED, JERK_OF_BOTH = 0.5, 0.25  # shares of the jerk: of q_sss s'^3, and of 3 q_ss s' s''
 MARGIN = 0.98  # share of the limits that is used: the quintics between points swing a little
 FASTEST = 1e3  # [lengths of the way per second], where nothing else limits
-HALVINGS = 30
+
+
+class Law(Protocol):
+    """The way's length by time, from rest to rest."""
+
+    @property
+    def duration(self) -> float: ...
+    def at(self, times: Array) -> tuple[Array, Array, Array]: ...
+    def times(self, lengths: Array, spacing: float) -> Array: ...
 
 
 @dataclass(frozen=True)
@@ -45,43 +60,33 @@ class Demand:
     jerk: Array
     marks: Array  # lengths from 0 to the end between which the way is of one kind
 
+    @cached_property
+    def speeds(self) -> Array:
+        """(m,) that each row allows."""
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            straight = _least(self.velocity / self.first)
+            bent = np.sqrt(_least(CENTRIPETAL * self.acceleration / self.second))
+            twisted = np.cbrt(_least(JERK_OF_SPEED * self.jerk / self.third))
+        return np.fmin(np.fmin(straight, bent), twisted)
 
-@dataclass(frozen=True)
-class Bounds:
-    """Of the length's time law in one stretch."""
 
-    velocity: float
-    acceleration: float
-    jerk: float
+def law_along(
+    curve: PathCurve, limits: JointLimits, tool: tuple[float, float], marks: Array, timing: Timing, heed: Heed
+) -> Law:
+    """Of the kind that was asked for; `tool` is its speed [m/s] and acceleration [m/s^2], 0 for no limit.
 
+    Its position is in the columns behind the joints; raises `NoProfile`, and what `heed` raises.
+    """
+    if timing is Timing.JERK_LIMITED:
+        return time_law(demand_of(curve, limits, tool, marks), heed)
+    from services.planner.timing.time_optimal import time_optimal_law
 
-class TimeLaw:
-    """Length by time, from rest to rest; `changes` are the times [s] at which its jerk changes."""
-
-    def __init__(self, stretches: list[tuple[float, Trajectory]]) -> None:
-        self._begins = [begin for begin, _ in stretches]
-        self._profiles = [profile for _, profile in stretches]
-        ends = np.cumsum([profile.duration for profile in self._profiles])
-        self._times = np.concatenate(([0.0], ends[:-1]))
-        self.duration = float(ends[-1])
-        self.changes = [
-            float(time + change)
-            for time, profile in zip(self._times, self._profiles, strict=True)
-            for change in np.cumsum(profile.profiles[0][0].t)
-        ]
-
-    def at(self, time: float) -> tuple[float, float, float]:
-        """Length, its speed and acceleration at a time [s]."""
-        index = int(np.searchsorted(self._times, time, side="right")) - 1
-        position, velocity, acceleration = self._profiles[index].at_time(time - float(self._times[index]))
-        return self._begins[index] + float(position[0]), float(velocity[0]), float(acceleration[0])
+    heed()
+    return time_optimal_law(curve, limits, tool)
 
 
 def demand_of(curve: PathCurve, limits: JointLimits, tool: tuple[float, float], marks: Array) -> Demand:
-    """What `curve` asks of the joints, and of the tool, where its position is in the columns behind them.
-
-    `tool` is its speed [m/s] and acceleration [m/s^2], 0 for no limit.
-    """
+    """What `curve` asks of the joints, and of the tool."""
     end, joints = float(curve.knots[-1]), len(limits.velocity)
     aside, marks = ASIDE * end, _apart(marks, NEAR * end)
     inside = [np.linspace(low, high, 4 * PARTS + 1) for low, high in pairwise(marks.tolist())]
@@ -103,15 +108,21 @@ def demand_of(curve: PathCurve, limits: JointLimits, tool: tuple[float, float], 
     )
 
 
-def time_law(demand: Demand) -> TimeLaw:
+def time_law(demand: Demand, heed: Heed) -> TimeLaw:
     """The fastest of several divisions into stretches; raises `NoProfile`."""
     whole, *finer = _divisions(demand)
     tries = [(whole, share) for share in SHARES] + [(edges, share) for edges in finer for share in SHARES[:2]]
-    laws = [_law(demand, edges, share) for edges, share in tries]
-    found = [law for law in laws if law is not None]
-    if not found:
-        raise NoProfile(f"no jerk-limited profile for a way of {float(demand.along[-1]):.3g}")
-    return min(found, key=lambda law: law.duration)
+    laws: list[TimeLaw] = []
+    why = NoProfile(f"no jerk-limited profile for a way of {float(demand.along[-1]):.3g}")
+    for edges, share in tries:
+        heed()
+        try:
+            laws.append(TimeLaw(stretches_through(_sections(demand, edges, share))))
+        except NoProfile as error:
+            why = error
+    if not laws:
+        raise why
+    return min(laws, key=lambda law: law.duration)
 
 
 def _apart(marks: Array, least: float) -> Array:
@@ -133,83 +144,42 @@ def _divisions(demand: Demand) -> list[Array]:
     return [even[0], marks, finer]
 
 
-def _law(demand: Demand, edges: Array, share: float) -> TimeLaw | None:
-    lengths = np.diff(edges).tolist()
-    bounds = [_bounds(demand, *pair, share) for pair in pairwise(edges.tolist())]
-    speeds = _edge_speeds(bounds, lengths)
-    stretches: list[tuple[float, Trajectory]] = []
-    rows = zip(edges.tolist(), lengths, bounds, pairwise(speeds), strict=False)
-    for begin, length, bound, (before, after) in rows:
-        profile = _profile(length, bound, before, after)
-        if profile is None:
-            return None
-        stretches.append((begin, profile))
-    return TimeLaw(stretches)
-
-
-def _bounds(demand: Demand, begin: float, end: float, share: float) -> Bounds:
-    """What every row in the stretch allows at every speed up to the one given."""
-    inside = 0.5 * ASIDE * float(demand.along[-1])
-    low, high = np.searchsorted(demand.along, (begin + inside, end - inside))
-    first, second, third = demand.first[low:high], demand.second[low:high], demand.third[low:high]
+def _sections(demand: Demand, edges: Array, share: float) -> list[Section]:
+    """With what every row in each of them allows at every speed up to the one given; raises `NoProfile`."""
+    end = float(demand.along[-1])
+    inside = 0.5 * ASIDE * end
+    bounds = np.searchsorted(demand.along, np.column_stack((edges[:-1] + inside, edges[1:] - inside)))
+    first, second, third = demand.first, demand.second, demand.third
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        velocity = share * min(
-            _least(demand.velocity / first),
-            math.sqrt(_least(CENTRIPETAL * demand.acceleration / second)),
-            _least(JERK_OF_SPEED * demand.jerk / third) ** (1.0 / 3.0),
-            FASTEST * float(demand.along[-1]) / share,
+        speed = np.fmin(share * _least_in(demand.speeds, bounds), FASTEST * end)
+        fast = _spread(speed, bounds, len(demand.along))[:, None]
+        bend, twist = second * fast * fast, 3.0 * second * fast
+        rises = np.fmin(_least((demand.acceleration - bend) / first), _least(JERK_OF_BOTH * demand.jerk / twist))
+        rise = np.fmin(_least_in(rises, bounds), FASTEST * speed)
+        steep = _spread(rise, bounds, len(demand.along))[:, None]
+        jerk = np.fmin(
+            _least_in(_least((demand.jerk - third * fast**3 - twist * steep) / first), bounds), FASTEST * rise
         )
-        acceleration = min(
-            _least((demand.acceleration - second * velocity**2) / first),
-            _least(JERK_OF_BOTH * demand.jerk / (3.0 * second * velocity)),
-            FASTEST * velocity,
-        )
-        used = third * velocity**3 + 3.0 * second * velocity * acceleration
-        jerk = min(_least((demand.jerk - used) / first), FASTEST * acceleration)
-    return Bounds(velocity, acceleration, jerk)
+        require_short(float(np.sum(np.diff(edges) / speed)))
+        require_short(math.sqrt(end / float(rise.max())))
+    rows = zip(*(column.tolist() for column in (np.diff(edges), speed, rise, jerk)), strict=True)
+    sections = [Section(length, v, a, j, bends=True) for length, v, a, j in rows]
+    if min(min(section.speed, section.acceleration, section.jerk) for section in sections) <= 0.0:
+        raise NoProfile(f"no jerk-limited profile for a way of {end:.3g}")
+    return sections
 
 
-def _edge_speeds(bounds: list[Bounds], lengths: list[float]) -> list[float]:
-    """At the stretches' ends: rest, and between what both sides allow and can be reached, forward and back."""
-    speeds = [0.0, *(min(one.velocity, other.velocity) for one, other in pairwise(bounds)), 0.0]
-    stretches = list(enumerate(zip(bounds, lengths, strict=True)))
-    for index, (bound, length) in stretches:
-        speeds[index + 1] = min(speeds[index + 1], _reachable(speeds[index], length, bound))
-    for index, (bound, length) in reversed(stretches):
-        speeds[index] = min(speeds[index], _reachable(speeds[index + 1], length, bound))
-    return speeds
+def _least_in(rows: Array, bounds: NDArray[np.int64]) -> Array:
+    """(j,) the least of `rows` (m,) in each stretch from a row up to another, both in `bounds` (j, 2)."""
+    least: Array = np.fmin.reduceat(rows, bounds.reshape(-1))[::2]
+    return least
 
 
-def _reachable(speed: float, length: float, bound: Bounds) -> float:
-    """The highest speed after `length`, from and to no acceleration: (v + w) / 2 times the duration is the length."""
-    low, high = 0.0, max(0.0, bound.velocity - speed)
-    for _ in range(HALVINGS):
-        rise = 0.5 * (low + high)
-        is_long = rise > bound.acceleration**2 / bound.jerk
-        lasts = (
-            rise / bound.acceleration + bound.acceleration / bound.jerk
-            if is_long
-            else 2.0 * math.sqrt(rise / bound.jerk)
-        )
-        low, high = (rise, high) if (speed + 0.5 * rise) * lasts <= (1.0 - 1e-9) * length else (low, rise)
-    return speed + low
-
-
-def _profile(length: float, bound: Bounds, before: float, after: float) -> Trajectory | None:
-    demand = InputParameter(1)
-    demand.target_position = [length]
-    demand.current_velocity, demand.target_velocity = [before], [after]
-    demand.max_velocity, demand.max_acceleration, demand.max_jerk = (
-        [bound.velocity],
-        [bound.acceleration],
-        [bound.jerk],
-    )
-    profile = Trajectory(1)
-    try:
-        result = Ruckig(1).calculate(demand, profile)
-    except RuckigError:
-        return None
-    return profile if result in (Result.Working, Result.Finished) else None
+def _spread(values: Array, bounds: NDArray[np.int64], count: int) -> Array:
+    """(m,) for every row what its stretch has; rows between two stretches belong to the one before."""
+    stretch = np.searchsorted(bounds[:, 0], np.arange(count), side="right") - 1
+    spread: Array = values[np.maximum(stretch, 0)]
+    return spread
 
 
 def _norms(rows: Array) -> Array:
@@ -217,5 +187,7 @@ def _norms(rows: Array) -> Array:
     return np.asarray(np.linalg.norm(rows, axis=1, keepdims=True))
 
 
-def _least(values: Array) -> float:
-    return float(np.nanmin(values))
+def _least(values: Array) -> Array:
+    """(m,) of each row, what is no number apart."""
+    least: Array = np.fmin.reduce(values, axis=1)
+    return least

@@ -61,12 +61,17 @@ def straight_line(
     length = float(np.max(np.abs(way) / limits.velocity))  # [s] at full speed
     if length < STANDSTILL:
         return _trajectory(names, [_rest(start, 0.0), _rest(goal, HOLD)])
-    if length > LONGEST:
-        raise NoProfile(f"it would take more than {length:.3g} s, {LONGEST:g} s is the most")
+    require_short(max(length, float(np.max(np.abs(way) / limits.acceleration)) ** 0.5))
     direction = way / length
     profile, changes = _time_way(length, direction, limits)
     inner = _inner_points(start, direction, profile, _times(changes, profile.duration))
     return _trajectory(names, [_rest(start, 0.0), *inner, _rest(goal, profile.duration)])
+
+
+def require_short(lasts: float) -> None:
+    """Raises `NoProfile` for a way that takes at least so long [s]."""
+    if not lasts <= LONGEST:
+        raise NoProfile(f"it would take more than {lasts:.3g} s, {LONGEST:g} s is the most")
 
 
 def _time_way(length: float, direction: Array, limits: JointLimits) -> tuple[Trajectory, list[float]]:

@@ -7,7 +7,6 @@ its limits.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -18,7 +17,15 @@ from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from services.planner.search.curve import Curve, smooth_runs
 from services.planner.timing.peaks import peak_shares
-from services.planner.timing.profile import MARGIN, MOST_POINTS, SPACING, JointLimits, NoProfile, straight_line
+from services.planner.timing.profile import (
+    MARGIN,
+    MOST_POINTS,
+    SPACING,
+    JointLimits,
+    NoProfile,
+    require_short,
+    straight_line,
+)
 from services.planner.timing.sections import Section, boundary_speeds, sections_of
 from services.planner.timing.time_law import Stretch, TimeLaw
 
@@ -59,6 +66,7 @@ def along_runs(
     with_jerk: bool = True,
 ) -> JointTrajectory:
     """Every smooth run of the curve, timed from rest to rest, one after the other, as fast as the limits allow."""
+    require_short(float((np.abs(np.diff(control, axis=0)) / limits.velocity).max(axis=1).sum()))
     runs: list[States] = []
     clock = 0.0
     for run in smooth_runs(control, limits.velocity):
@@ -79,7 +87,11 @@ def at_limits(states: States, limits: JointLimits, with_jerk: bool) -> States:
     """The same way in the time in which the joint that is asked most of is just within its limits."""
     velocity, acceleration, jerk = peak_shares(*states, limits)
     most = max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0) if with_jerk else 0.0)
-    scale = MARGIN / most if most > 0.0 else math.inf
+    return states if most == 0.0 else at_speed(states, MARGIN / most)
+
+
+def at_speed(states: States, scale: float) -> States:
+    """The same way at `scale` times the speed."""
     times, positions, velocities, accelerations = states
     return States(times / scale, positions, velocities * scale, accelerations * scale * scale)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,19 +11,19 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory
-from schemas.planning import PlanCode, Refusal
+from schemas.planning import PlanCode, Refusal, Timing
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.refusals import NoPlan, not_verified
-from services.planner.scene.clearance import Checker
+from services.planner.scene.clearance import Sweeper
 from services.planner.search.way import Start
-from services.planner.timing.path_timing import demand_of, time_law
+from services.planner.timing.path_timing import Heed, law_along
 from services.planner.timing.profile import JointLimits, NoProfile
+from services.planner.timing.timing import States, at_limits, at_speed, trajectory_of
 from services.planner.tool.continuation import FINEST, Continuation, Followed, Stop
-from services.planner.tool.path_points import Run, between, normalised, trajectory_along
+from services.planner.tool.path_points import Run, between, states_of_runs
 from services.planner.tool.tool_limits import ToolLimits
 from services.planner.tool.tool_path import ToolPath
-from services.planner.verify.feasibility import slowed
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ DEEPER = 1.06  # share of the margin that the way keeps, so that samples taken e
 LEAST_LOOK = 0.1  # share of the margin by which the arm moves on at least from one look to the next
 SHORTEST_WAY = 1e-4  # of length: less is no way
 MOST_ROWS = 4000
-SPEED_LOOKS = 4  # in a segment, at which the tool's speed is measured
+MOMENT = 0.05  # share of the time between two points, by which the tool is looked at before and after a moment
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class CartesianWay:
 class CartesianPlanner:
     """Takes one arm along paths of its tool, among what `checker` knows."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, checker: Checker, holds_turn: bool) -> None:
+    def __init__(self, arm: Arm, kinematics: Kinematics, checker: Sweeper, holds_turn: bool) -> None:
         self._arm, self._kinematics, self._checker = arm, kinematics, checker
         self._continuation = Continuation(arm, kinematics, holds_turn)
 
@@ -58,18 +58,19 @@ class CartesianPlanner:
         limits: JointLimits,
         tool: ToolLimits,
         margin: float,
-        is_late: Callable[[], bool],
+        timing: Timing,
+        heed: Heed,
     ) -> CartesianWay:
-        """Along the paths one after the other, at rest between them; raises `NoPlan`."""
+        """Along the paths one after the other, at rest between them; raises `NoPlan`, and what `heed` raises."""
         whole, before = sum(path.length for path in paths), 0.0
         metres = sum(path.metres for path in paths)
         runs: list[Run] = []
         posture, refusal, gone = np.array(start), None, 0.0
         for path in paths:
-            followed = self._follow(path, posture, tool, margin, is_late)
+            followed = self._follow(path, posture, tool, margin, heed)
             stop = followed if isinstance(followed, Stop) else followed.stop
             if isinstance(followed, Followed):
-                runs.append(self._run(path, followed, limits, tool))
+                runs.append(self._run(path, followed, limits, tool, timing, heed))
                 posture, before = followed.postures[-1], before + float(followed.lengths[-1])
                 gone += path.metres_to(float(followed.lengths[-1]))
             if stop is not None:
@@ -78,33 +79,34 @@ class CartesianPlanner:
         fraction = 1.0 if refusal is None else before / whole
         if refusal is not None and (not runs or fraction < tool.least_fraction):
             raise NoPlan(_code(refusal), _too_little(refusal, fraction, tool.least_fraction))
-        trajectory = self._within(trajectory_along(self._arm.joint_names, runs), limits, tool)
-        return CartesianWay(trajectory, tuple(posture.tolist()), fraction, refusal)
+        states = self._within(states_of_runs(runs, heed), limits, tool, timing)
+        return CartesianWay(trajectory_of(self._arm.joint_names, states), tuple(posture.tolist()), fraction, refusal)
 
-    def _follow(
-        self, path: ToolPath, start: Array, tool: ToolLimits, margin: float, is_late: Callable[[], bool]
-    ) -> Followed | Stop:
+    def _follow(self, path: ToolPath, start: Array, tool: ToolLimits, margin: float, heed: Heed) -> Followed | Stop:
         """As far as the joints and what stands around let it."""
-        followed = self._continuation.follow(path, start, tool.max_step, tool.jump, is_late)
+        followed = self._continuation.follow(path, start, tool.max_step, tool.jump, heed)
         if isinstance(followed, Stop):
             return followed
-        free, touching = self._free(followed, margin)
+        free, touching = self._free(followed, margin, heed)
         if touching is None:
             return followed
         stop = self._touches(touching, margin)
         if free < SHORTEST_WAY:
             return stop
-        return self._continuation.shortened(path, followed, free, stop)
+        return self._continuation.shortened(path, followed, free, stop, heed)
 
-    def _free(self, followed: Followed, margin: float) -> tuple[float, Array | None]:
+    def _free(self, followed: Followed, margin: float, heed: Heed) -> tuple[float, Array | None]:
         """The length up to which everything keeps clear, and the posture that does not; looked at by conservative
         advancement, so that nothing is skipped."""
         end, joints = float(followed.lengths[-1]), followed.postures.shape[1]
         rows = np.linspace(0.0, end, min(MOST_ROWS, 8 * len(followed.lengths)))
         postures = followed.curve.at(rows).value[:, :joints]
+        if self._checker.touching(postures, DEEPER * margin) is None:
+            return end, None
         moved = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(postures, axis=0)) @ self._checker.reach)))
         along, free = 0.0, 0.0
         while True:
+            heed()
             length = float(np.interp(along, moved, rows))
             posture = followed.curve.at(np.array([length])).value[0, :joints]
             clearance = self._checker.distance(posture) - DEEPER * margin
@@ -115,12 +117,19 @@ class CartesianPlanner:
                 return end, None
             along = min(float(moved[-1]), along + max(clearance, LEAST_LOOK * margin))
 
-    def _run(self, path: ToolPath, followed: Followed, limits: JointLimits, tool: ToolLimits) -> Run:
+    def _run(
+        self,
+        path: ToolPath,
+        followed: Followed,
+        limits: JointLimits,
+        tool: ToolLimits,
+        timing: Timing,
+        heed: Heed,
+    ) -> Run:
         end = float(followed.lengths[-1])
         marks = np.array([0.0, *(mark for mark in path.marks if FINEST < mark < end - FINEST), end])
-        demand = demand_of(followed.curve, limits, (tool.speed, tool.acceleration), marks)
         try:
-            law = time_law(demand)
+            law = law_along(followed.curve, limits, (tool.speed, tool.acceleration), marks, timing, heed)
         except NoProfile as error:
             raise not_verified(str(error)) from error
         return Run(
@@ -128,23 +137,35 @@ class CartesianPlanner:
             law,
             followed.postures[0],
             followed.postures[-1],
+            marks[1:-1],
             lambda length, posture: self._continuation.solver.error(path.at(length), posture),
         )
 
-    def _within(self, trajectory: JointTrajectory, limits: JointLimits, tool: ToolLimits) -> JointTrajectory:
-        """Slower, where a joint or the tool would be a little faster than it may."""
-        even = normalised(trajectory, limits)
-        is_free = not tool.speed and not tool.acceleration
-        if is_free or even.points[-1].time_from_start > trajectory.points[-1].time_from_start:
-            trajectory = even
-        if not tool.speed:
-            return trajectory
-        rows = between(trajectory, SPEED_LOOKS)
-        fastest = max(
-            float(np.linalg.norm(self._kinematics.jacobian(q)[:3] @ v))
-            for q, v in zip(rows.positions, rows.velocities, strict=True)
+    def _within(self, states: States, limits: JointLimits, tool: ToolLimits, timing: Timing) -> States:
+        """As fast as the joints may; slower, where they or the tool would be a little faster than they may."""
+        even = at_limits(states, limits, timing is Timing.JERK_LIMITED)
+        if not tool.speed and not tool.acceleration:
+            return even
+        states = even if even.times[-1] > states.times[-1] else states
+        speed, acceleration = self._tool_peaks(states)
+        asked = max(
+            speed / tool.speed if tool.speed else 0.0,
+            (acceleration / tool.acceleration) ** 0.5 if tool.acceleration else 0.0,
         )
-        return trajectory if fastest <= tool.speed else slowed(trajectory, 0.999 * tool.speed / fastest)
+        return states if asked <= 1.0 else at_speed(states, 0.999 / asked)
+
+    def _tool_peaks(self, states: States) -> tuple[float, float]:
+        """The tool's highest speed [m/s] and acceleration [m/s^2] in the middle between points, by differences."""
+        rows, steps = between(states, 2), MOMENT * np.diff(states.times)
+        peaks = []
+        for q, v, a, h in zip(rows.positions, rows.velocities, rows.accelerations, steps.tolist(), strict=True):
+            now = self._kinematics.tool(q).position
+            before, after = (self._kinematics.tool(q + dt * (v + 0.5 * dt * a)).position for dt in (-h, h))
+            peaks.append(
+                (np.linalg.norm(after - before) / (2.0 * h), np.linalg.norm(after - 2.0 * now + before) / h**2)
+            )
+        speed, acceleration = np.array(peaks).max(axis=0)
+        return float(speed), float(acceleration)
 
     def _touches(self, posture: Array, margin: float) -> Stop:
         pairs = self._checker.pairs_within(posture, DEEPER * margin + 1e-9) or [("?", "?")]

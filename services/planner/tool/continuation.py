@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +10,12 @@ from numpy.typing import NDArray
 
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics, Pose
-from services.planner.goals.goals import timed_out
+from services.planner.timing.path_timing import Heed
 from services.planner.tool.path_curve import CubicSpline
 from services.planner.tool.tool_path import ToolPath
 from services.planner.tool.tool_solver import ToolSolver
 
 Array = NDArray[np.float64]
-Clock = Callable[[], bool]
 
 SPACING = 0.02  # of length between postures; halved until the spline between them is exact enough
 LEAST_POSTURES = 12
@@ -27,6 +25,7 @@ JUMP = 0.3  # [rad] or [m] a joint may move between two postures, before shorter
 CLOSE = 1e-5  # [m] by which the spline between postures may be off the way
 ROUNDING = 1e-9  # [rad] or [m] beyond a limit that is put back onto it
 ROUNDS = 8
+ORDER = 4  # postures by which the next one is guessed
 TOO_FINE = f"max_step is so fine that the way would have more than {MOST_POSTURES} postures"
 
 
@@ -62,7 +61,7 @@ class Continuation:
         self._lower = np.array([joint.lower for joint in arm.joints])
         self._upper = np.array([joint.upper for joint in arm.joints])
 
-    def follow(self, path: ToolPath, start: Array, max_step: float, jump: float, is_late: Clock) -> Followed | Stop:
+    def follow(self, path: ToolPath, start: Array, max_step: float, jump: float, heed: Heed) -> Followed | Stop:
         """As far as it goes from `start`, which is at the path's beginning; 0 for the default step and jump.
 
         A way of less than four postures of the finest spacing is none.
@@ -70,14 +69,14 @@ class Continuation:
         spacing = min(max_step or SPACING, path.length / LEAST_POSTURES)
         if path.length / spacing > MOST_POSTURES:
             return Stop("max_step", "max_step", max_step, path.length / MOST_POSTURES, TOO_FINE, "leave it at 0")
-        lengths, postures, stop = self._march(path, start, spacing, jump, is_late)
+        lengths, postures, stop = self._march(path, start, spacing, jump, heed)
         if stop is not None and lengths[-1] < 4 * FINEST:
             return stop
         if len(lengths) < 4:
             lengths, postures = self._four(path, lengths, postures)
-        return self._refined(path, lengths, postures, stop)
+        return self._refined(path, lengths, postures, stop, heed)
 
-    def shortened(self, path: ToolPath, followed: Followed, length: float, stop: Stop) -> Followed | Stop:
+    def shortened(self, path: ToolPath, followed: Followed, length: float, stop: Stop, heed: Heed) -> Followed | Stop:
         """The way up to `length`, because of `stop`."""
         kept = int(np.searchsorted(followed.lengths, length - FINEST))
         guess = followed.curve.at(np.array([length])).value[0, : followed.postures.shape[1]]
@@ -86,19 +85,18 @@ class Continuation:
         postures = [*followed.postures[:kept], self._clipped(guess if last is None else last)]
         if len(lengths) < 4:
             lengths, postures = self._four(path, lengths, postures)
-        return self._refined(path, lengths, postures, stop)
+        return self._refined(path, lengths, postures, stop, heed)
 
     def _march(
-        self, path: ToolPath, start: Array, spacing: float, jump: float, is_late: Clock
+        self, path: ToolPath, start: Array, spacing: float, jump: float, heed: Heed
     ) -> tuple[list[float], list[Array], Stop | None]:
         lengths, postures, step, marks = [0.0], [start], spacing, [*path.marks, path.length]
         while lengths[-1] < path.length:
-            if is_late():
-                raise timed_out()
+            heed()
             ahead = lengths[-1] + step
             mark = next(mark for mark in marks if mark > lengths[-1] + FINEST or mark == path.length)
             ahead = mark if ahead > mark - 0.1 * step else ahead
-            guess = postures[-1] if len(lengths) < 2 else _extrapolated(lengths, postures, ahead)
+            guess = _extrapolated(lengths, postures, ahead)
             found = self._next(path.at(ahead), postures[-1], guess, jump or math.inf)
             if not isinstance(found, Stop) and len(lengths) < MOST_POSTURES:
                 lengths.append(ahead)
@@ -134,10 +132,11 @@ class Continuation:
         return wanted, [postures[0], *found, postures[-1]]
 
     def _refined(
-        self, path: ToolPath, lengths: list[float], postures: list[Array], stop: Stop | None
+        self, path: ToolPath, lengths: list[float], postures: list[Array], stop: Stop | None, heed: Heed
     ) -> Followed | Stop:
         """With postures between, wherever the spline is off the way; it ends where even those do not help."""
         for _ in range(ROUNDS):
+            heed()
             curve = self._spline(lengths, postures)
             middles = self._off(path, curve)
             if not middles:
@@ -151,7 +150,7 @@ class Continuation:
             postures = [merged[length] for length in lengths]
         kept = sum(length < middles[0] for length in lengths)
         stop = stop or self._lost(postures[kept - 1])
-        return stop if kept < 4 else self._refined(path, lengths[:kept], postures[:kept], stop)
+        return stop if kept < 4 else self._refined(path, lengths[:kept], postures[:kept], stop, heed)
 
     def _off(self, path: ToolPath, curve: CubicSpline) -> list[float]:
         """The middles between knots at which the spline is off the way."""
@@ -198,6 +197,11 @@ def _is_jump(found: Array | Stop) -> bool:
 
 
 def _extrapolated(lengths: list[float], postures: list[Array], ahead: float) -> Array:
-    share = (ahead - lengths[-1]) / (lengths[-1] - lengths[-2])
-    guess: Array = postures[-1] + share * (postures[-1] - postures[-2])
-    return guess
+    """By the polynomial through the last few postures (Lagrange); nearby, lest it strays to another branch."""
+    knots = np.array(lengths[-ORDER:])
+    apart = knots[:, None] - knots + np.eye(len(knots))
+    gaps = (ahead - knots) / apart
+    np.fill_diagonal(gaps, 1.0)
+    guess: Array = gaps.prod(axis=1) @ np.array(postures[-ORDER:])
+    near = 0.5 * JUMP
+    return np.clip(guess, postures[-1] - near, postures[-1] + near)

@@ -9,17 +9,18 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from schemas.message import Vector
-from schemas.planning import CircularMotion, Goal, LinearMotion, PlanCode, PlanRequest, PoseGoal, WaypointGoal
+from schemas.planning import CircularMotion, Goal, LinearMotion, PlanCode, PlanRequest, PoseGoal, Timing, WaypointGoal
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics, Pose
 from services.arm.transforms import IDENTITY, compose
 from services.planner.goals.abilities import Abilities
-from services.planner.goals.goals import Goals
+from services.planner.goals.goals import Goals, timed_out
 from services.planner.goals.pose_goals import target_of
 from services.planner.goals.targets import ROTATION_TOLERANCE, Target, turn_between
 from services.planner.refusals import NoPlan, malformed
-from services.planner.scene.clearance import Checker
+from services.planner.scene.clearance import Sweeper
 from services.planner.search.way import Start
+from services.planner.timing.path_timing import Heed
 from services.planner.timing.profile import JointLimits, straight_line
 from services.planner.tool.arcs import arc_about, arc_through
 from services.planner.tool.cartesian import CartesianPlanner, CartesianWay
@@ -35,7 +36,7 @@ FARTHEST = 1e3  # [m] a blend beyond it is a mistake
 class ToolMotions:
     """Lines and arcs of one arm's tool."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, goals: Goals, checker: Checker) -> None:
+    def __init__(self, arm: Arm, kinematics: Kinematics, goals: Goals, checker: Sweeper) -> None:
         self._arm, self._kinematics, self._goals = arm, kinematics, goals
         self._abilities: Abilities = goals.abilities
         self._planner = CartesianPlanner(arm, kinematics, checker, self._abilities.is_full)
@@ -46,9 +47,14 @@ class ToolMotions:
         """The timed way, to be verified; raises `NoPlan`."""
         tool = _tool_limits(request.motion)
         require_tool_limits(tool)
+
+        def heed() -> None:
+            if is_late():
+                raise timed_out()
+
         try:
             paths = self._paths(request, start, is_late)
-            way = self._along(paths, start, limits, tool, margin, is_late)
+            way = self._along(paths, start, limits, tool, margin, request.timing, heed)
         except NoPlan:
             self._require_reachable(request.goal, start, tool, is_late)
             raise
@@ -63,10 +69,11 @@ class ToolMotions:
         limits: JointLimits,
         tool: ToolLimits,
         margin: float,
-        is_late: Callable[[], bool],
+        timing: Timing,
+        heed: Heed,
     ) -> CartesianWay:
         if paths:
-            return self._planner.plan(paths, start, limits, tool, margin, is_late)
+            return self._planner.plan(paths, start, limits, tool, margin, timing, heed)
         return CartesianWay(straight_line(self._arm.joint_names, start, start, limits), start, 1.0, None)
 
     def _paths(self, request: PlanRequest, start: Start, is_late: Callable[[], bool]) -> list[ToolPath]:
