@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import shutil
+import textwrap
+from collections.abc import Iterable
+
 import msgspec
 
-from schemas.planning import JogCommand, JogStatus
+from schemas.planning import JogCommand, JogLimit, JogStatus
 from schemas.topics import JOG, JOG_STATUS, JOINT_STATES
 from services.arm.kinematics import Kinematics
 from services.cli.exits import CommandError, ExitCode
 from services.cli.interrupt import two_stage_interrupt
-from services.cli.jog_keys import HELP, JogKeys
+from services.cli.jog_commands import HELP
+from services.cli.jog_keys import JogKeys
 from services.cli.keyboard import keyboard
 from services.cli.live import LiveBlock
 from services.cli.session import Session
@@ -29,7 +34,7 @@ class Jogging:
         self._commands = self.node.publisher(JOG)
         self._states = self.node.latest(JOINT_STATES)
         self.status: JogStatus | None = None
-        self.limited_by: list[str] = []  # all that did, in order
+        self.limits: dict[tuple[str, str], JogLimit] = {}  # all that did, as it was last
         self._kinematics = Kinematics(self.arm)
         self.node.subscribe(JOG_STATUS, self._on_status)
 
@@ -45,12 +50,11 @@ class Jogging:
             return "no joint_states: is the stepper_gateway running?"
         x, y, z = (1e3 * value for value in self._kinematics.tool([found[n] for n in self.arm.joint_names]).position)
         joints = ", ".join(f"{joint.name} {show(found[joint.name], joint.unit, 2)}" for joint in self.arm.joints)
-        return f"tool {x:.1f} {y:.1f} {z:.1f} mm; {joints}"
+        return f"tool x {x:z.1f}  y {y:z.1f}  z {z:z.1f} mm; {joints}"
 
     def _on_status(self, status: JogStatus) -> None:
         self.status = status
-        if status.limited_by and status.limited_by not in self.limited_by:
-            self.limited_by.append(status.limited_by)
+        self.limits |= {(limit.check, limit.subject): limit for limit in status.limits}
 
 
 def jog_for(session: Session, command: JogCommand, seconds: float) -> ExitCode:
@@ -63,13 +67,14 @@ def jog_for(session: Session, command: JogCommand, seconds: float) -> ExitCode:
             jogging.node.wait(PERIOD)
             _require_answer(jogging, jogging.node.monotonic() - began)
         _rest(jogging)
-    limits = f"; limited by {' and '.join(jogging.limited_by)}" if jogging.limited_by else ""
-    print(f"{jogging.place}{limits}")
+    print(jogging.place)
+    for limit in jogging.limits.values():
+        print(f"limited by {limit.message}")
     return ExitCode.CANCELLED if interrupt.is_set else ExitCode.OK
 
 
 def jog_by_hand(session: Session) -> ExitCode:
-    """Follows the keys until `x`; letting go stops."""
+    """Follows the keys until one that leaves; letting go stops."""
     with keyboard() as typed, two_stage_interrupt() as interrupt:
         jogging, keys, block = Jogging(session), JogKeys(session.arm.joints, session.arm.tool_frame), LiveBlock()
         block.say(HELP)
@@ -82,21 +87,29 @@ def jog_by_hand(session: Session) -> ExitCode:
                 jogging.say(command)
             if now - drawn >= DRAWN:
                 drawn = now
-                block.draw(f"{keys.line}\n{jogging.place}\n{limits_of(jogging.status)}")
+                block.draw(_folded([keys.line, jogging.place, *words_of(jogging.status)]))
             jogging.node.wait(PERIOD)
         _rest(jogging)
         block.say(jogging.place)
     return ExitCode.OK
 
 
-def limits_of(status: JogStatus | None) -> str:
-    """The newest word of the planner."""
-    if status is None:
-        return "at rest"
-    limits = f"limited by {status.limited_by}" if status.limited_by else "nothing limits it"
-    if status.active:
-        return f"{status.scale * 100.0:.0f} % of the asked speed, {limits}, manipulability {status.manipulability:.4g}"
-    return f"refused: {status.limited_by}" if status.limited_by else "at rest"
+def words_of(status: JogStatus | None) -> list[str]:
+    """The newest word of the planner, a line each."""
+    if status is None or not (status.active or status.limited_by):
+        return ["at rest"]
+    if not status.active:
+        return [f"refused: {status.limited_by}"]
+    share = f"{100.0 * status.scale:.0f} % of the asked speed"
+    if not status.limits:
+        return [share]
+    return [f"{share}, limited by", *(f"  {limit.message}" for limit in status.limits)]
+
+
+def _folded(lines: Iterable[str]) -> str:
+    """No line longer than the terminal is wide: a sentence that says what to do is not to be cut off."""
+    width = max(20, shutil.get_terminal_size().columns - 1)
+    return "\n".join(part for line in lines for part in textwrap.wrap(line, width, subsequent_indent="  "))
 
 
 def _require_answer(jogging: Jogging, waited: float) -> None:

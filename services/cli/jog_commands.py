@@ -13,23 +13,50 @@ if TYPE_CHECKING:
     from schemas.planning import JogCommand
     from services.arm.description import Arm
 
-EXAMPLES = """examples:
-  gemelo jog
+HELP = """Hold a key to move; letting go stops the arm.
+  tool    w/s +x -x      a/d +y -y      q/e +z -z      t axes of the base, or of the tool
+  turn    i/k about x    j/l about y    u/o about z
+  joint   1-9 choose     arrows move it
+  +/- faster, slower     space stop     x, Esc or Ctrl-C leave"""
+EXAMPLES = f"""{HELP}
+
+It slows down before joint limits, singularities and obstacles, and says which.
+
+examples:
+  gemelo jog                                              # with the keys
   gemelo jog --joint brazo_joint=10deg/s --for 0.5
-  gemelo jog --twist 0.05 0 0 --frame tool --for 1"""
+  gemelo jog --twist 0.05 0 0 --frame tool --for 1        # 50 mm/s along the tool's x"""
 
 
 def jog_options(parser: Parser) -> None:
     parser.epilog = EXAMPLES
-    parser.add_argument("--joint", nargs="+", default=[], metavar="JOINT=SPEED", help="10deg/s, 0.2rad/s, 5mm/s")
     parser.add_argument(
-        "--twist", nargs=3, type=finite_number, default=[], metavar=("VX", "VY", "VZ"), help="of the tool [m/s]"
+        "--joint", nargs="+", default=[], metavar="JOINT=SPEED", help="10deg/s, 0.2rad/s, 5mm/s; several move together"
     )
     parser.add_argument(
-        "--turn", nargs=3, type=finite_number, default=[], metavar=("WX", "WY", "WZ"), help="of the tool [deg/s]"
+        "--twist", nargs=3, type=finite_number, default=[], metavar=("VX", "VY", "VZ"), help="speed of the tool [m/s]"
     )
-    parser.add_argument("--frame", choices=("base", "tool"), default="base", help="in which the twist is given")
-    parser.add_argument("--for", dest="seconds", type=positive_number, metavar="SECONDS", help="then stop")
+    parser.add_argument(
+        "--turn",
+        nargs=3,
+        type=finite_number,
+        default=[],
+        metavar=("WX", "WY", "WZ"),
+        help="at which the tool turns [deg/s]",
+    )
+    parser.add_argument(
+        "--frame",
+        choices=("base", "tool"),
+        default="base",
+        help="whose axes --twist and --turn are along; the base's, if not said",
+    )
+    parser.add_argument(
+        "--for",
+        dest="seconds",
+        type=positive_number,
+        metavar="SECONDS",
+        help="how long it moves with --joint, --twist or --turn",
+    )
 
 
 def jog(options: Options) -> ExitCode:

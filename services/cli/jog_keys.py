@@ -19,8 +19,6 @@ AXES = {"w": (0, 1.0), "s": (0, -1.0), "a": (1, 1.0), "d": (1, -1.0), "q": (2, 1
 TURNS = {"i": (0, 1.0), "k": (0, -1.0), "j": (1, 1.0), "l": (1, -1.0), "u": (2, 1.0), "o": (2, -1.0)}
 ARROWS = {"\x1b[A": 1.0, "\x1b[C": 1.0, "\x1b[B": -1.0, "\x1b[D": -1.0}
 LEAVE = ("x", "\x1b", "\x03", "\x04")
-HELP = """w/s x, a/d y, q/e z of the tool    i/k j/l u/o turn it    t base or tool frame
-1-9 choose a joint, arrows move it    +/- speed    space stop    x leave"""
 
 _KEYS = re.compile(r"\x1b[\[O][A-Z]|\x1b\[[0-9;]*[~A-Za-z]|.", re.DOTALL)
 
@@ -58,7 +56,8 @@ class JogKeys:
         """The choices that were made, as a person reads them."""
         frame = "tool" if self.frame else "base"
         return (
-            f"speed {self.speed * 100.0:.0f} %, frame {frame}, joint {self.joint + 1} {self._joints[self.joint].name}"
+            f"speed {self.speed * 100.0:.0f} %, along the axes of the {frame}, "
+            f"joint {self.joint + 1}: {self._joints[self.joint].name}"
         )
 
     def _press(self, key: str, now: float) -> None:

@@ -48,7 +48,7 @@ def postures(arm: Arm, response: IkResponse) -> str:
     units = [SHOWN[arm.joint(name).unit] for name in response.name]
     headings = [f"{name} [{unit}]" for name, (unit, _) in zip(response.name, units, strict=True)]
     rows = [
-        [*(f"{v * factor:.4f}" for v, (_, factor) in zip(found.position, units, strict=True)), f"{found.distance:.3f}"]
+        [*(f"{v * factor:z.4f}" for v, (_, factor) in zip(found.position, units, strict=True)), f"{found.distance:.3f}"]
         for found in response.solutions
     ]
     return table([*headings, "away [s]"], rows)
@@ -58,7 +58,7 @@ def poses(response: FkResponse) -> str:
     """A row a link: position and unit quaternion."""
     headings = ["link", "x [m]", "y [m]", "z [m]", "qx", "qy", "qz", "qw"]
     rows = [
-        [link, *(f"{value:.6f}" for value in (*pose.translation, *pose.rotation))]
+        [link, *(f"{value:z.6f}" for value in (*pose.translation, *pose.rotation))]
         for link, pose in zip(response.links, response.poses, strict=True)
     ]
     return table(headings, rows)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
 
+from schemas.message import Vector
 from schemas.scene import (
     BoxShape,
     CylinderShape,
@@ -52,7 +54,7 @@ def present(session: Session) -> PlanningScene:
 
 def listing(scene: PlanningScene) -> str:
     """A table of the objects, and the pairs that may touch."""
-    headings = ("object", "shape", "x y z [mm]", "in", "touches", "padding [mm]")
+    headings = ("object", "shape [mm]", "x y z [mm]", "turned", "in", "touches", "padding [mm]")
     rows = [_row(item) for item in scene.objects]
     lines = [table(headings, rows)] if rows else ["nothing is around the arm"]
     lines += [f"{pair.first} and {pair.second} may touch" for pair in scene.allowed]
@@ -78,10 +80,27 @@ def load(path: Path) -> PlanningScene:
 
 
 def _row(item: SceneObject) -> tuple[str, ...]:
-    at = " ".join(f"{1000.0 * value:.1f}" for value in item.pose.translation)
+    at = " ".join(f"{1000.0 * value:z.1f}" for value in item.pose.translation)
     held = f"{item.frame} (attached)" if item.attached else item.frame or "base"
     touches = ", ".join(item.touch_links) or "-"
-    return item.name, shape_text(item.shape), at, held, touches, f"{1000.0 * item.padding:g}"
+    return (
+        item.name,
+        shape_text(item.shape),
+        at,
+        turn_text(item.pose.rotation),
+        held,
+        touches,
+        f"{1000.0 * item.padding:g}",
+    )
+
+
+def turn_text(rotation: Vector) -> str:
+    """How far [deg] and about which axis an object (x, y, z, w) is turned."""
+    sine = math.hypot(*rotation[:3])
+    angle = math.degrees(2.0 * math.atan2(sine, rotation[3]))
+    if abs(angle) < 0.05:
+        return "-"
+    return f"{angle:.1f} deg about {' '.join(f'{value / sine:z.2f}' for value in rotation[:3])}"
 
 
 def shape_text(shape: Shape) -> str:

@@ -85,13 +85,17 @@ def text_of(view: Snapshot) -> str:
     headings = ("joint", "position", "unit", "velocity [unit/s]", "commanded [steps]", "executed [steps]",
                 "error [steps]")  # fmt: skip
     rows = [_row(line) for line in view.joints]
-    tool = "unknown" if view.tool is None else "x {:.2f}  y {:.2f}  z {:.2f} mm".format(*(v * 1e3 for v in view.tool))
+    tool = (
+        "unknown" if view.tool is None else "x {:z.2f}  y {:z.2f}  z {:z.2f} mm".format(*(v * 1e3 for v in view.tool))
+    )
     link = "online" if view.online else f"offline: {view.reason}"
     if view.online and view.round_trip_ms is not None:
         link += f", round trip {view.round_trip_ms:.1f} ms"
     device = f"{view.device or 'unknown'}: {view.mode}"
     if view.time_scale is not None and view.buffered is not None:
         device += f", time scale {view.time_scale:.2f}, {view.buffered:.2f} s of path buffered"
+    if view.online and view.reason:
+        device += f"; {view.reason}"
     return f"{table(headings, rows)}\n\ntool {view.tool_frame}: {tool}\ndevice {device}\nlink   {link}"
 
 
@@ -104,4 +108,4 @@ def _row(line: JointLine) -> tuple[str, ...]:
 
 
 def _number(value: float | None, factor: float, digits: int) -> str:
-    return "-" if value is None else f"{value * factor:.{digits}f}"
+    return "-" if value is None else f"{value * factor:z.{digits}f}"

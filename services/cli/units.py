@@ -75,4 +75,4 @@ def parse_joints(assignments: Iterable[str], joints: Iterable[NamedJoint]) -> di
 def show(value: float, unit: str, digits: int = 3) -> str:
     """An SI value as a person reads it: degrees or millimetres."""
     shown, factor = SHOWN[unit]
-    return f"{value * factor:.{digits}f} {shown}"
+    return f"{value * factor:z.{digits}f} {shown}"  # z: no "-0.00"

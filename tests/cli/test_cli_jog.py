@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from schemas.planning import JogCommand, JogStatus
+from schemas.planning import JogCommand, JogLimit, JogStatus
 from schemas.topics import JOG, JOG_STATUS
 from services.cli import keyboard as keys_of_terminal
 from services.cli.exits import CommandError, ExitCode
@@ -136,7 +136,8 @@ class PretendPlanner:
 
     def __init__(self, node: Node) -> None:
         self.commands: list[JogCommand] = []
-        self.answer = JogStatus(active=True, limited_by="joint limit of brazo_joint")
+        limit = JogLimit(check="joint limit", subject="brazo_joint", message="joint limit of brazo_joint")
+        self.answer = JogStatus(active=True, limited_by=limit.message, limits=(limit,))
         self._heard = -1.0
         self._node, self._status = node, node.publisher(JOG_STATUS)
         node.subscribe(JOG, self._on_command)

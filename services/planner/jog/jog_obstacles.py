@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 LEAST_LOOK = 0.001  # [m] that two shapes move against one another at most between two looks at their distance
 SLACK = 0.0006  # [m] more than the clearance, for what happens between two looks
-MOST_LOOKS = 8  # at distances for one velocity: a longer way along an obstacle has to be gone slower
+MOST_LOOKS = 24  # at distances for one velocity: a longer way along an obstacle has to be gone slower
 LEVEL = 1e-7  # [m] that a depth may seem to grow between two looks where the motion is along the surface
 CONTACT_SPEED = 0.03  # [m/s] of what is nearer than the clearance already, on its way out
 
