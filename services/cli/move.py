@@ -9,24 +9,23 @@ from msgspec.structs import replace
 from schemas.actions import GoalStatusCode
 from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
 from schemas.planning import PlanRequest, PlanResponse
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY, PLAN
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY
 from services.cli.exits import CommandError, ExitCode
-from services.cli.goals import refusal_text
 from services.cli.interrupt import Interrupt, two_stage_interrupt
 from services.cli.move_report import MoveReport, summary, tool_error_mm
+from services.cli.planning import make_plan
 from services.cli.progress import progress
 from services.cli.session import Session
 from services.cli.units import show
 from services.runtime.actions import GoalHandle
 from services.runtime.errors import GoalRefused
 
-PLAN_MARGIN = 2.0  # [s] that a planner may take beyond its allowed time before it counts as gone
 LONGEST_HOLD = 3600.0  # [s] that a person may hold the arm on its way
 
 
 def move(session: Session, request: PlanRequest, plan_only: bool, as_json: bool) -> ExitCode:
     """Plans and, unless `plan_only`, executes; prints one line or one JSON object at the end."""
-    plan = make_plan(session, request)
+    plan = make_plan(session, request, quiet=as_json)
     if plan_only:
         report = MoveReport(robot=session.arm.name, planned_ms=plan.planning_time * 1e3, duration_s=plan.duration)
     else:
@@ -37,16 +36,6 @@ def move(session: Session, request: PlanRequest, plan_only: bool, as_json: bool)
     return report.exit_code
 
 
-def make_plan(session: Session, request: PlanRequest) -> PlanResponse:
-    """A verified trajectory; a refusal is raised with its reason and what would do."""
-    plan: PlanResponse = session.node.call(PLAN, request, timeout=request.allowed_time + PLAN_MARGIN)
-    if plan.refusal is not None:
-        raise CommandError(refusal_text(plan.refusal, request.goal, session.arm))
-    if not plan.trajectory.points:
-        raise CommandError(f"refused: the planner answered {plan.code.name} without a trajectory")
-    return plan
-
-
 def follow(session: Session, plan: PlanResponse, quiet: bool = False) -> MoveReport:
     """Executes `plan`; Ctrl-C cancels and waits for where the arm came to rest."""
     client = session.node.action(FOLLOW_JOINT_TRAJECTORY)
@@ -55,8 +44,9 @@ def follow(session: Session, plan: PlanResponse, quiet: bool = False) -> MoveRep
         def on_feedback(feedback: FollowJointTrajectoryFeedback) -> None:
             shown(feedback.elapsed, feedback.duration)
 
+        goal = FollowJointTrajectoryGoal(trajectory=plan.trajectory, scene_version=plan.scene_version)
         try:
-            handle = client.send(FollowJointTrajectoryGoal(trajectory=plan.trajectory), on_feedback=on_feedback)
+            handle = client.send(goal, on_feedback=on_feedback)
         except GoalRefused as error:
             raise CommandError(f"refused by {FOLLOW_JOINT_TRAJECTORY.server}: {error}") from error
         outcome = handle.wait(plan.duration + LONGEST_HOLD, on_tick=lambda: cancel_once(handle, interrupt, quiet))

@@ -85,7 +85,9 @@ class Performance:
             plan = self._node.call(PLAN, PlanRequest(goal=stop.goal), timeout=3.0)
             if plan.refusal is not None:
                 return Move(name=stop.name, succeeded=False, reason=plan.refusal.message)
-            handle = self._follow.send(FollowJointTrajectoryGoal(trajectory=plan.trajectory))
+            handle = self._follow.send(
+                FollowJointTrajectoryGoal(trajectory=plan.trajectory, scene_version=plan.scene_version)
+            )
             outcome = handle.wait(plan.duration + MOVE_MARGIN)
         except (GoalRefused, Refused, NoAnswer, ServerLost) as error:
             return Move(name=stop.name, succeeded=False, reason=str(error))

@@ -130,9 +130,17 @@ class Node:
         """As `serve`; the handler keeps the `Pending` and answers when it can, from any thread."""
         self._serve(request, handler)
 
-    def call(self, request: Request[Q, R], question: Q, timeout: float = 2.0) -> R:
-        """Asks and blocks; raises `Refused`, or `NoAnswer` after `timeout` [s] at most."""
-        return requests.call(self._bus, request, question, timeout)
+    def call(
+        self, request: Request[Q, R], question: Q, timeout: float = 2.0, on_tick: Callable[[], None] | None = None
+    ) -> R:
+        """Asks and blocks; raises `Refused`, or `NoAnswer` after `timeout` [s] at most.
+
+        With `on_tick` the inbox is handled meanwhile, and `on_tick` called 20 times a second: for scripts.
+        """
+        asked = requests.Asked(self._bus, request, question, timeout, self._loop.inbox.wake)
+        if on_tick is not None:
+            self._loop.wait_for(lambda: asked.is_over, timeout, on_tick)
+        return asked.response()
 
     def serve_action(self, action: Action[G, F, R], on_goal: OnGoal[G], on_cancel: OnCancel) -> ActionServer[G, F, R]:
         """Serves an action: `on_goal(goal_id, goal)` accepts or refuses, `on_cancel(goal_id)` says "" or why not."""

@@ -97,20 +97,42 @@ class Server(Generic[Q, R]):
             pending.refuse("internal error", f"{self.request.server} failed: {type(error).__name__}: {error}")
 
 
+class Asked(Generic[Q, R]):
+    """A question that was sent, and its answer when it comes."""
+
+    def __init__(self, bus: Bus, request: Request[Q, R], question: Q, timeout: float, wake: Task) -> None:
+        """`wake` is called when it comes, from another thread; raises `NoAnswer` where nobody serves the request."""
+        self._bus, self._request, self._wake = bus, request, wake
+        self._patience = timeout
+        self._answers: SimpleQueue[Answer | None] = SimpleQueue()
+        payload = to_payload(question)
+        if not bus.wait_served(request.key, min(timeout, PRESENCE_PATIENCE)):
+            raise NoAnswer(_nobody(bus, request))
+        bus.ask(request.key, schema_of(request.request), payload, timeout, self._on_answer)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether `response` would not block."""
+        return not self._answers.empty()
+
+    def response(self) -> R:
+        """Blocks up to the time-out; raises `Refused` or `NoAnswer`."""
+        try:
+            answer = self._answers.get(timeout=self._patience + 1.0)
+        except Empty:
+            answer = None
+        if answer is None:
+            raise NoAnswer(_silent(self._bus, self._request, self._patience))
+        return response_in(self._request, answer)
+
+    def _on_answer(self, answer: Answer | None) -> None:
+        self._answers.put(answer)
+        self._wake()
+
+
 def call(bus: Bus, request: Request[Q, R], question: Q, timeout: float) -> R:
     """The answer; blocks up to `timeout` [s]. Raises `Refused` or `NoAnswer`."""
-    answers: SimpleQueue[Answer | None] = SimpleQueue()
-    payload = to_payload(question)
-    if not bus.wait_served(request.key, min(timeout, PRESENCE_PATIENCE)):
-        raise NoAnswer(_nobody(bus, request))
-    bus.ask(request.key, schema_of(request.request), payload, timeout, answers.put)
-    try:
-        answer = answers.get(timeout=timeout + 1.0)
-    except Empty:
-        answer = None
-    if answer is None:
-        raise NoAnswer(_silent(bus, request, timeout))
-    return response_in(request, answer)
+    return Asked(bus, request, question, timeout, wake=lambda: None).response()
 
 
 def response_in(request: Request[Q, R], answer: Answer) -> R:

@@ -21,7 +21,7 @@ from services.runtime.bus import Answer
 from services.runtime.errors import NoAnswer, NodeNameTaken, Refused
 from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.requests import call
+from services.runtime.requests import Pending, call
 from tests.runtime.support import Buses, hear, spinning, until
 
 
@@ -199,6 +199,25 @@ def test_nobody_and_a_silent_server_are_told_apart(buses: Buses) -> None:
     server.serve(PLAN, lambda request: PlanResponse())  # and does not spin
     with pytest.raises(NoAnswer, match="did not answer plan within"):
         client.call(PLAN, PlanRequest(), timeout=0.3)
+
+
+def test_a_script_handles_its_inbox_while_it_waits_for_an_answer(buses: Buses) -> None:
+    server, client = buses.node("planner"), buses.node("client")
+    heard: list[JointState] = []
+    heard_at_ticks: list[int] = []
+    client.subscribe(JOINT_STATES, heard.append)
+    waiting: list[Pending[PlanResponse]] = []
+    server.serve_later(PLAN, lambda request, pending: waiting.append(pending))
+    states = server.publisher(JOINT_STATES)
+
+    def step(now: int) -> None:
+        states.put(JointState(stamp=now))
+        if waiting and any(heard_at_ticks):
+            waiting[0].reply(PlanResponse(code=PlanCode.SUCCESS))
+
+    with spinning(server, step):
+        answer = client.call(PLAN, PlanRequest(), timeout=10.0, on_tick=lambda: heard_at_ticks.append(len(heard)))
+    assert answer.code is PlanCode.SUCCESS
 
 
 def test_a_router_that_goes_while_an_answer_is_awaited_is_named_and_not_the_server() -> None:

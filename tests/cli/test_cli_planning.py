@@ -1,0 +1,124 @@
+"""`gemelo move` while a planner, with processes of its own, plans: what it shows, and what Ctrl-C ends."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from schemas.planning import NamedGoal, PlanPhase, PlanProgress, PlanRequest
+from schemas.scene import SceneAction, SceneRequest
+from schemas.topics import PLAN_PROGRESS, SCENE_EDIT
+from services.cli import planning
+from services.cli.exits import CommandError, ExitCode
+from services.cli.live import LiveBlock
+from services.cli.move import move
+from services.planner.main import run
+from services.runtime.errors import NoAnswer
+from services.runtime.memory_bus import MemoryBus
+from services.runtime.node import Node
+from services.runtime.stopping import StopRequest
+from tests.planner.walled import WALLED, past_the_wall
+
+PATIENCE = 60.0  # [s]
+
+
+@pytest.fixture
+def walled(session, network, deployment) -> Iterator[None]:
+    """A planner whose arm stands between walls."""
+    stop = StopRequest()
+
+    def serve() -> None:
+        with Node("planner", deployment, robot="rm1", bus=MemoryBus(network), stop=stop) as node:
+            run(node, deployment)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    request = SceneRequest(action=SceneAction.REPLACE, scene=WALLED)
+    assert session.node.call(SCENE_EDIT, request, PATIENCE).accepted
+    yield
+    stop.set()
+    thread.join(PATIENCE)
+    assert not thread.is_alive()
+
+
+@pytest.fixture
+def watcher(network, deployment) -> Iterator[Node]:
+    """Who sees from outside how plans stand."""
+    with Node("watcher", deployment, robot="rm1", bus=MemoryBus(network), stop=StopRequest()) as node:
+        yield node
+
+
+def press_when_it_searches(watcher: Node) -> None:
+    """Ctrl-C, once."""
+    pressed = threading.Event()
+
+    def on_progress(progress: PlanProgress) -> None:
+        if progress.phase is PlanPhase.SEARCH and not pressed.is_set():
+            pressed.set()
+            os.kill(os.getpid(), signal.SIGINT)
+
+    watcher.subscribe(PLAN_PROGRESS, on_progress)
+    threading.Thread(target=watcher.wait, args=(PATIENCE,), daemon=True).start()
+
+
+@pytest.mark.parametrize("plan_only", [False, True])
+def test_ctrl_c_while_planning_cancels_the_plan_and_nothing_moves(session, gateway, walled, watcher, plan_only):
+    press_when_it_searches(watcher)
+    gateway.refusal = "nothing is to be sent here"
+    with pytest.raises(
+        CommandError, match=r"^the plan was cancelled after .* s, while searching: nothing moves$"
+    ) as end:
+        move(session, past_the_wall(), plan_only, as_json=False)
+    assert end.value.code is ExitCode.CANCELLED
+
+
+def test_a_terminal_is_shown_how_planning_stands_and_nothing_of_it_stays(
+    session, gateway, walled, watcher, capsys, monkeypatch
+):
+    monkeypatch.setattr(planning, "LiveBlock", lambda _is_live: LiveBlock(is_live=True))
+    press_when_it_searches(watcher)
+    with pytest.raises(CommandError):
+        move(session, past_the_wall(), plan_only=True, as_json=False)
+    written = capsys.readouterr().out
+    assert re.search(r"planning: search, \d+\.\d of 30 s \(Ctrl-C cancels\)\n", written)
+    assert written.endswith("\x1b[1F\x1b[J")
+
+
+def test_a_pipe_hears_nothing_of_it(session, gateway, walled, watcher, capsys):
+    press_when_it_searches(watcher)
+    with pytest.raises(CommandError):
+        move(session, past_the_wall(), plan_only=True, as_json=False)
+    assert capsys.readouterr().out == ""
+
+
+def test_a_plan_that_comes_too_late_is_not_left_behind(session, gateway, walled, watcher, monkeypatch):
+    monkeypatch.setattr(planning, "MARGIN", -29.0)
+    heard: list[PlanProgress] = []
+    watcher.subscribe(PLAN_PROGRESS, heard.append)
+    with pytest.raises(NoAnswer, match="planner did not answer plan within 1 s"):
+        move(session, past_the_wall(), plan_only=True, as_json=False)
+    watcher.wait(0.5)
+    count = len(heard)
+    watcher.wait(0.5)
+    assert len(heard) == count
+
+
+def test_ctrl_c_just_as_the_plan_is_made_moves_nothing_either(session, gateway, planner, monkeypatch):
+    """The planner of this one answers at once, and knows no cancel."""
+    asked = planning._asked
+
+    def pressed_late(*arguments):
+        plan = asked(*arguments)
+        os.kill(os.getpid(), signal.SIGINT)
+        return plan
+
+    monkeypatch.setattr(planning, "_asked", pressed_late)
+    gateway.refusal = "nothing is to be sent here"
+    with pytest.raises(CommandError, match="nothing moves") as end:
+        move(session, PlanRequest(goal=NamedGoal(name="ready")), plan_only=False, as_json=False)
+    assert end.value.code is ExitCode.CANCELLED
