@@ -79,6 +79,10 @@ class ClockSync:
         at, offset, drift = self._line
         return (device_us - offset + drift * at) / (1.0 + drift) * 1e-6
 
+    def measured(self, device_us: int, arrival: float) -> float:
+        """[s] of our monotonic clock when the device measured what arrived then; the arrival, if no clock tells."""
+        return min(self.monotonic(device_us), arrival) if self.is_synchronised else arrival
+
 
 def _line(exchanges: deque[Exchange]) -> Line:
     shortest = min(exchange.round_trip for exchange in exchanges)

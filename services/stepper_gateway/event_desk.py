@@ -15,7 +15,6 @@ def pass_on(event: EventReport, mover: Mover, moment: Moment) -> None:
     """Say it on the bus and in the log."""
     is_trouble = event.event in TROUBLE and event.detail != BY_A_PERSON
     level = LogLevel.WARNING if is_trouble else LogLevel.INFO
-    clock = mover.session.clock
-    happened = clock.monotonic(event.t_us) if clock.is_synchronised and event.t_us else moment.monotonic
-    happened = min(happened, moment.monotonic)
+    now = moment.monotonic
+    happened = mover.session.clock.measured(event.t_us, now) if event.t_us else now
     mover.event(event.event, event.detail, Moment(moment.unix_at(happened), happened), level)

@@ -9,7 +9,7 @@ from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from schemas.system import LogLevel
 from services.stepper_gateway.execution import Ending, Execution
 from services.stepper_gateway.links.frames import State
-from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.moment import Moment, next_beat
 from services.stepper_gateway.motion import PlannedMotion
 from services.stepper_gateway.mover import Mover
 from services.stepper_gateway.outputs import GoalExecuting, GoalFinished, GoalProgress
@@ -162,8 +162,7 @@ class Goals:
         if moment.monotonic < execution.feedback_due or not execution.is_executing:
             return
         period = 1.0 / self._mover.parameters.feedback_rate
-        late = moment.monotonic - execution.feedback_due
-        execution.feedback_due = (execution.feedback_due if late < period else moment.monotonic) + period
+        execution.feedback_due = next_beat(execution.feedback_due, moment.monotonic, period)
         positions = (self._mover.reporter.positions(point.steps), self._mover.reporter.positions(state.steps))
         feedback = execution.feedback(point, state, positions, moment.unix)
         self._mover.out.put(GoalProgress(execution.goal_id, feedback))

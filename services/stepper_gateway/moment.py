@@ -19,3 +19,8 @@ class Moment(NamedTuple):
     def unix_at(self, monotonic: float) -> int:
         """[ns] UNIX time of another instant of the monotonic clock."""
         return self.unix + round((monotonic - self.monotonic) * 1e9)
+
+
+def next_beat(due: float, now: float, period: float) -> float:
+    """The next beat of a steady rhythm, or a new rhythm after a pause."""
+    return due + period if now - due < period else now + period

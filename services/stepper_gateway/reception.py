@@ -80,8 +80,7 @@ class Reception:
         self._parts.presses.on_event(event)
 
     def _on_shaft(self, report: ShaftReport, arrival: float, moment: Moment) -> None:
-        clock = self._mover.session.clock
-        measured = min(clock.monotonic(report.t_us), arrival) if clock.is_synchronised else arrival
+        measured = self._mover.session.clock.measured(report.t_us, arrival)
         self._mover.out.publish(DEVICE_SHAFT, self._mover.reporter.shaft(report, moment.unix_at(measured)))
 
     def _on_state(self, state: State, arrival: float, moment: Moment) -> None:
@@ -118,7 +117,6 @@ class Reception:
     def _publish_device(self, state: State, moment: Moment) -> int:
         """The state's stamp [ns]."""
         session = self._mover.session
-        measured = session.clock.monotonic(state.t_us) if session.clock.is_synchronised else session.state_arrival
-        stamp = moment.unix_at(min(measured, moment.monotonic))
+        stamp = moment.unix_at(session.clock.measured(state.t_us, session.state_arrival))
         self._mover.out.publish(DEVICE_STATE, self._mover.reporter.device_state(state, stamp, session.clock))
         return stamp

@@ -8,7 +8,7 @@ from schemas.device import SensorReadings
 from schemas.system import LogLevel
 from schemas.topics import SENSORS
 from services.stepper_gateway.links.reports import SensorReport
-from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.moment import Moment, next_beat
 from services.stepper_gateway.mover import Mover
 
 SILENCE = 2.0  # [s] without readings until nothing is republished
@@ -37,8 +37,7 @@ class SensorWatch:
     def on_readings(self, report: SensorReport, arrival: float, moment: Moment) -> None:
         """Take what the board has measured."""
         known = {name: value for name, value in report.values.items() if name in self._units}
-        clock = self._mover.session.clock
-        measured = min(clock.monotonic(report.t_us), arrival) if clock.is_synchronised else arrival
+        measured = self._mover.session.clock.measured(report.t_us, arrival)
         self._readings = Readings(known, moment.unix_at(measured), arrival)
         if self._is_silent:
             self._is_silent = False
@@ -55,8 +54,7 @@ class SensorWatch:
         if self._age(moment) > SILENCE:
             return self._fall_silent(moment)
         if self._readings is not None and self._readings.values and moment.monotonic >= self._due:
-            late = moment.monotonic - self._due
-            self._due = (self._due if late < PERIOD else moment.monotonic) + PERIOD
+            self._due = next_beat(self._due, moment.monotonic, PERIOD)
             self._publish(self._readings)
 
     def _age(self, moment: Moment) -> float:

@@ -8,7 +8,7 @@ from schemas.device import DeviceMode
 from services.stepper_gateway.clock import ClockSync
 from services.stepper_gateway.links.frames import BadFrame, Heartbeat, State, StateFlag, Sync, SyncReply
 from services.stepper_gateway.links.reports import StatusReport
-from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.moment import Moment, next_beat
 
 HEARTBEAT = 0.1  # [s] a cut of 0.4 s does not stop the arm yet
 SYNC = 0.5  # [s]
@@ -102,12 +102,12 @@ class DeviceSession:
         if not self.link_up:
             return frames
         if moment.monotonic >= self._heartbeat_due:
-            self._heartbeat_due = _next_beat(self._heartbeat_due, moment.monotonic, HEARTBEAT)
+            self._heartbeat_due = next_beat(self._heartbeat_due, moment.monotonic, HEARTBEAT)
             self._counter = (self._counter + 1) & 0xFFFFFFFF
             frames.append(Heartbeat(boot_id=self.boot_id, session=self._session_id, counter=self._counter))
         if moment.monotonic >= self._sync_due:
             period = SYNC if self.clock.is_synchronised else SYNC_AT_FIRST
-            self._sync_due = _next_beat(self._sync_due, moment.monotonic, period)
+            self._sync_due = next_beat(self._sync_due, moment.monotonic, period)
             self._questions.append(moment.micros)
             frames.append(Sync(boot_id=self.boot_id, t0=moment.micros))
         return frames
@@ -150,8 +150,3 @@ class DeviceSession:
         self.clock.reset()
         self._sync_due = 0.0
         return is_reboot
-
-
-def _next_beat(due: float, now: float, period: float) -> float:
-    """The next beat of a steady rhythm, or a new rhythm after a pause."""
-    return due + period if now - due < period else now + period
