@@ -25,10 +25,7 @@ def read_config(text: bytes) -> DeviceConfig:
     """The configuration as the core has understood it; raises Refused."""
     part, reason = c.create_string_buffer(PART_SIZE), c.create_string_buffer(REASON_SIZE)
     out = c.create_string_buffer(LARGEST)
-    function = load_library().gemelo_read_config
-    function.restype = c.c_int64
-    function.argtypes = [c.c_char_p, c.c_size_t, c.c_char_p, c.c_char_p, c.c_char_p, c.c_size_t]
-    size = function(text, len(text), part, reason, out, LARGEST)
+    size = load_library().gemelo_read_config(text, len(text), part, reason, out, LARGEST)
     if size < 0:
         raise Refused(part.value.decode(), reason.value.decode(errors="replace"))
     return msgspec.json.decode(out.raw[:size], type=DeviceConfig)

@@ -10,13 +10,13 @@ import msgspec
 
 from firmware.bindings.library import MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
 from firmware.bindings.motor import MotorError, motor_record
-from firmware.bindings.words import OUTPUTS, JsonFrame, Levels, OutFrame, PinChange, Request
+from firmware.bindings.words import OUTPUTS, Levels, OutFrame, PinChange, Request
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, config_text
 from schemas.robot import Motor
+from services.runtime.serial_frames import LARGEST, JsonFrame
 
 LARGEST_OUTPUT = 1024
-LARGEST_REQUEST = 8232  # a frame's length
 UNCONFIGURED = DeviceConfig(name="", joints=())
 
 
@@ -141,9 +141,9 @@ class Device:
     def take_requests(self) -> list[Request]:
         """What came over the serial line and is the platform's matter, oldest first."""
         requests: list[Request] = []
-        text = (c.c_uint8 * LARGEST_REQUEST)()
+        text = (c.c_uint8 * LARGEST)()
         while True:
-            size = self._library.gemelo_take_request(self._handle, c.byref(self._output), text, LARGEST_REQUEST)
+            size = self._library.gemelo_take_request(self._handle, c.byref(self._output), text, LARGEST)
             if size < 0:
                 return requests
             requests.append(Request(JsonFrame(self._output.value), c.string_at(text, size)))

@@ -79,6 +79,7 @@ def load_library(path: Path = LIBRARY) -> c.CDLL:
         "take_serial": (size, [device, u8, size]),
         "take_request": (c.c_int64, [device, u8, u8, size]),
         "say": (c.c_int, [device, c.c_uint8, text, size]),
+        "read_config": (c.c_int64, [text, size, text, text, text, size]),
         "check_provision": (c.c_int, [text, size, c.POINTER(c.c_int), text]),
         "kept": (size, [device, u8, size]),
         "advance": (None, [device, u64]),

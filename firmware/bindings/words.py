@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import NamedTuple
+
+from services.runtime.serial_frames import JsonFrame
 
 OUTPUTS = ("traj/ack", "cmd/ack", "sync/r", "state", "event", "status", "config/ack", "sensors", "text")
 
@@ -13,16 +14,6 @@ class OutFrame(NamedTuple):
 
     kind: str
     payload: bytes
-
-
-class JsonFrame(IntEnum):
-    """JSON that travels in a frame and is the platform's own matter."""
-
-    EVENT = 13
-    PROVISION = 14
-    PROVISION_ACK = 15
-    PRESS = 16
-    SHAFT = 17
 
 
 class Request(NamedTuple):
