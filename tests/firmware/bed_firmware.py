@@ -50,7 +50,7 @@ def wait_for(condition: Callable[[], bool], what: str, patience: float = PATIENC
 class Bed:
     """A broker, a client that listens to everything of the device, and the device's process."""
 
-    def __init__(self, folder: Path, device: str = "rm1", robot: str = "urdf/rm1") -> None:
+    def __init__(self, folder: Path, device: str, robot: str) -> None:
         self.folder, self.port = folder, free_port()
         self._topic, self._robot = f"gemelo/v1/{device}/", robot
         self.states: list[tuple[float, bytes]] = []  # arrival [s, monotonic] and frame
@@ -230,3 +230,15 @@ class SerialPort:
 
     def close(self) -> None:
         os.close(self._line)
+
+
+@contextlib.contextmanager
+def open_bed(folder: Path, device: str = "rm1", robot: str = "urdf/rm1") -> Iterator[Bed]:
+    """A broker with a client that listens; the device is still off."""
+    bed = Bed(folder, device, robot)
+    try:
+        bed.start_broker()
+        bed.listen()
+        yield bed
+    finally:
+        bed.close()

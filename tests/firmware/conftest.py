@@ -13,7 +13,7 @@ HERE = Path(__file__).resolve().parent
 if str(HERE) not in sys.path:
     sys.path.insert(0, str(HERE))
 
-from bed_firmware import Bed  # noqa: E402
+from bed_firmware import Bed, open_bed  # noqa: E402
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -23,11 +23,5 @@ def _core() -> None:
 
 @pytest.fixture
 def bed(tmp_path: Path) -> Iterator[Bed]:
-    """A broker with a client that listens; the device is still off."""
-    bed = Bed(tmp_path)
-    try:
-        bed.start_broker()
-        bed.listen()
+    with open_bed(tmp_path) as bed:
         yield bed
-    finally:
-        bed.close()

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from bed_firmware import Bed
+from bed_firmware import Bed, open_bed
 from bench_firmware import FIRST, LAST, Bench, Row, traj
 
 from schemas.device import DeviceMode
@@ -118,13 +118,8 @@ class Lateness:
 
 @pytest.fixture
 def six(tmp_path: Path) -> Iterator[Bed]:
-    bed = Bed(tmp_path, device="parol6", robot="urdf/parol6")
-    try:
-        bed.start_broker()
-        bed.listen()
+    with open_bed(tmp_path, "parol6", "urdf/parol6") as bed:
         yield bed
-    finally:
-        bed.close()
 
 
 def test_six_joints_in_real_time_through_mosquitto_make_every_step(six: Bed, parol6: Arm):
