@@ -74,7 +74,7 @@ class Operator:
     def send(self, plan):
         """The handle of a goal; joint states are kept from here on."""
         self.seen.clear()
-        goal = FollowJointTrajectoryGoal(trajectory=plan.trajectory)
+        goal = FollowJointTrajectoryGoal(trajectory=plan.trajectory, scene_version=plan.scene_version)
         return self.follow.send(goal)
 
     def move(self, speed=1.0):
