@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import logging
 import math
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.goals.targets import any_normal
+from services.planner.goals.turns import Turns
 
 if TYPE_CHECKING:
     from eaik.pybindings.EAIK import Robot
@@ -25,8 +25,6 @@ Array = NDArray[np.float64]
 JOINTS = 6  # with fewer, EAIK answers positions or pairs of turns only
 SAMPLES = 8  # postures at which EAIK's forward kinematics is held against ours
 AGREEMENT = 1e-9  # [m], and per entry of the rotation
-MOST_TURNS = 64  # combinations of full turns of one branch
-ROUNDING = 1e-9  # [rad] by which a solution may be beyond a limit before it is put onto it
 
 log = logging.getLogger(__name__)
 
@@ -37,8 +35,7 @@ class ClosedForm:
     def __init__(self, arm: Arm, robot: Robot, order: list[int]) -> None:
         self._robot = robot
         self._order = order  # the arm's joints from the base to the tool
-        self._lower = np.array([joint.lower - ROUNDING for joint in arm.joints])
-        self._upper = np.array([joint.upper + ROUNDING for joint in arm.joints])
+        self.turns = Turns(arm)
 
     def postures(self, position: Array, rotation: Array, near: Array) -> tuple[list[Array], list[Array]]:
         """The exact ones within the limits, with every full turn, in no order; and what EAIK calls least squares.
@@ -51,28 +48,9 @@ class ClosedForm:
         branches = np.empty_like(answer.Q)
         branches[:, self._order] = answer.Q
         is_guess = np.array(answer.is_LS, dtype=bool)
-        return self.within_limits(branches[~is_guess], near), [*branches[is_guess & np.isfinite(branches).all(axis=1)]]
-
-    def within_limits(self, branches: Array, near: Array) -> list[Array]:
-        """The branches (m, n) or one of them (n,) turned into the limits, in every way that there is."""
-        branches = np.atleast_2d(branches)
-        lower = np.where(np.isinf(self._lower), near - math.pi, self._lower)
-        upper = np.where(np.isinf(self._upper), near + math.pi, self._upper)
-        first = branches + math.tau * np.ceil((lower - branches) / math.tau)
-        more = np.floor((upper - first) / math.tau)
-        postures: list[Array] = []
-        for values, turns in zip(first, more, strict=True):
-            if turns.min() >= 0.0:  # false for what is not a number, too
-                postures.extend(_turned(values, turns) if turns.any() else [values])
-        return postures
-
-
-def _turned(values: Array, turns: Array) -> list[Array]:
-    """`values` with up to `turns` full turns added to each."""
-    while np.prod(turns + 1.0) > MOST_TURNS:
-        turns = np.minimum(turns, turns.max() - 1.0)
-    amounts = product(*(range(int(most) + 1) for most in turns))
-    return [values + math.tau * np.array(amount) for amount in amounts]
+        return self.turns.within_limits(branches[~is_guess], near), [
+            *branches[is_guess & np.isfinite(branches).all(axis=1)]
+        ]
 
 
 def closed_form(arm: Arm, kinematics: Kinematics) -> ClosedForm | None:

@@ -14,6 +14,7 @@ from services.planner.goals.centring import Centring
 from services.planner.goals.closed_form import ClosedForm, chain_order, closed_form, turns_about
 from services.planner.goals.coinciding import completed
 from services.planner.goals.descent import Attempt, Descent
+from services.planner.goals.parallel_axes import ParallelAxes, parallel_axes
 from services.planner.goals.starts import one_turn, spread
 from services.planner.goals.targets import Target
 
@@ -42,6 +43,7 @@ class InverseKinematics:
         self._descent = Descent(arm, kinematics)
         self._centring = Centring(arm, kinematics, self._descent)
         self._closed: ClosedForm | None = None if is_numeric else closed_form(arm, kinematics)
+        self._parallel: ParallelAxes | None = None if is_numeric else parallel_axes(arm, kinematics)
         self._lower, self._upper = one_turn(arm)
         self._speed = np.array([joint.velocity for joint in arm.joints])
         # The first joint of the chain turns the whole arm as it is: its mirror image is no other posture.
@@ -62,8 +64,9 @@ class InverseKinematics:
                 found.append(positions)
                 yield positions
         if not found:
-            is_known = self._closed is not None and target.rotation is not None and not target.is_tolerant
-            yield from self._searched(target, near, is_late, FEW if is_known else len(self._starts))
+            is_known = self._parallel is not None or (self._closed is not None and target.rotation is not None)
+            starts = FEW if is_known and not target.is_tolerant else len(self._starts)
+            yield from self._searched(target, near, is_late, starts)
 
     def nearest(self, target: Target, near: Array, is_late: Clock) -> list[Array]:
         """Postures that bring the tool as near to the target as their start allows, the best one first."""
@@ -87,6 +90,8 @@ class InverseKinematics:
                 yield attempt.positions
 
     def _closed_form_postures(self, target: Target, near: Array) -> list[Array]:
+        if self._parallel is not None:
+            return self._parallel.postures(target.position, near)
         if self._closed is None:
             return []
         postures: list[Array] = []
@@ -110,7 +115,7 @@ class InverseKinematics:
     def _from_guess(self, closed: ClosedForm, target: Target, guess: Array, near: Array) -> Iterator[Array]:
         """Where axes coincide, how two joints share one turn is free: as nearly as they can to how they stand now."""
         alike = completed(target, self._kinematics, guess)
-        for turned in closed.within_limits(np.array(alike), near) if alike else []:
+        for turned in closed.turns.within_limits(np.array(alike), near) if alike else []:
             attempt = self.descend(target, self._centring.drawn(target, turned, near))
             if attempt.is_solution:
                 yield attempt.positions
