@@ -76,10 +76,15 @@ class Inertial:
 
 @dataclass(frozen=True)
 class Geometry:
-    """A shape: its tag ("box", "cylinder", "sphere", "mesh", ...) and, for a mesh, its reference as written."""
+    """A shape: its tag ("box", "cylinder", "sphere", "mesh", ...) and, for a mesh, its reference as written.
+
+    `origin` is in the link; `scale` is of a mesh, in m for each of its units.
+    """
 
     shape: str
     mesh: str | None = None
+    origin: Origin = Origin()
+    scale: Triple = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -193,9 +198,11 @@ def _geometry(element: ET.Element, where: str) -> Geometry:
     if len(geometry) != 1:
         raise DescriptionError(f"{where}: a <geometry> has {len(geometry)} shapes, it must have one")
     shape = geometry[0]
+    origin = _origin(element, where)
     if shape.tag == "mesh":
-        return Geometry("mesh", _attribute(shape, "filename", f"{where}, <mesh>"))
-    return Geometry(shape.tag)
+        scale = _triple(shape.get("scale", "1 1 1"), f"{where}, <mesh>")
+        return Geometry("mesh", _attribute(shape, "filename", f"{where}, <mesh>"), origin, scale)
+    return Geometry(shape.tag, origin=origin)
 
 
 def _origin(element: ET.Element, where: str) -> Origin:

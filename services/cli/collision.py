@@ -1,9 +1,10 @@
-"""`gemelo collision`: the spheres of a robot's links, and the pairs of links that need no check."""
+"""`gemelo collision`: the shapes and spheres of a robot's links, and the pairs of links that need no check."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,9 +17,19 @@ if TYPE_CHECKING:
 FIT = "services.planner.covers.collision_fit"  # in a process of its own: the command line loads no planner
 
 
-def fit(folder: Path, bulge: float) -> ExitCode:
+def spheres(folder: Path, bulge: float) -> ExitCode:
     """Prints a line for each link; `bulge` [mm] is how far a sphere may reach beyond it."""
-    ended = subprocess.run([sys.executable, "-m", FIT, str(folder), "--bulge", f"{bulge:g}"], check=False)
+    return _fitted(folder, "--bulge", f"{bulge:g}")
+
+
+def shapes(folder: Path, most: int, links: Sequence[str], write: bool) -> ExitCode:
+    """Prints what fits the links' meshes, with at most so many shapes each; writes it into the URDF with `write`."""
+    only = [f"--link={link}" for link in links]
+    return _fitted(folder, "--meshes", f"--most={most}", *only, *(["--write"] if write else []))
+
+
+def _fitted(folder: Path, *options: str) -> ExitCode:
+    ended = subprocess.run([sys.executable, "-m", FIT, *options, "--", str(folder)], check=False)
     return ExitCode.OK if ended.returncode == 0 else ExitCode.FAILED
 
 

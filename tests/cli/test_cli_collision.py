@@ -57,6 +57,38 @@ def test_fit_says_spheres_and_bulge_of_every_link(folder: Path, capfd: pytest.Ca
     assert int(last.split()[1]) == sum(int(row.split()[2]) for row in rows)
 
 
+def test_fit_to_the_meshes_is_printed_and_written_only_when_asked(
+    folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    urdf = folder / "robot.urdf"
+    before = urdf.read_text()
+    line = ["collision", "fit", str(folder), "--meshes", "--most", "1", "--link", "antebrazo_link"]
+    assert run(line) is ExitCode.OK
+    heading, row, *elements, last = capfd.readouterr().out.splitlines()
+    assert heading.split() == ["link", "shapes", "of", "its", "hull", "[%]", "beyond", "[mm]"]
+    assert row.split()[:2] == ["antebrazo_link", "1"]
+    assert elements[:2] == ["antebrazo_link:", "<collision>"]
+    assert "--write" in last
+    assert urdf.read_text() == before
+    assert run([*line, "--write"]) is ExitCode.OK
+    said = capfd.readouterr().out
+    assert f"{urdf} is changed" in said
+    assert "gemelo collision matrix" in said
+    after = urdf.read_text()
+    assert "\n".join(f"    {element}" for element in elements[1:]) in after
+    assert after.count("<collision>") == before.count("<collision>")  # one box was there before
+
+
+def test_fit_says_what_it_cannot_do(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["collision", "fit", str(folder), "--write"]) is ExitCode.USAGE
+    assert "--meshes" in capfd.readouterr().err
+    assert run(["collision", "fit", str(folder), "--meshes", "--link", "brazo"]) is ExitCode.FAILED
+    assert 'no link "brazo"' in capfd.readouterr().err
+    (folder / "meshes" / "brazo_link.glb").unlink()
+    assert run(["collision", "fit", str(folder), "--meshes"]) is ExitCode.FAILED
+    assert "brazo_link.glb is not there" in capfd.readouterr().err
+
+
 def test_a_folder_that_is_no_robot_is_one_sentence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert run(["collision", "matrix", str(tmp_path)]) is ExitCode.USAGE
     assert "robot.toml" in capfd.readouterr().err

@@ -70,14 +70,15 @@ def _form_of(geometry: coal.CollisionGeometry, link: str) -> Form:
 
 
 def _placed(shape: Shape, bulge: float) -> Cover:
-    cover = mesh_cover(*shape.mesh.arrays, bulge) if shape.mesh else cover_of(_solid(shape), bulge)
+    cover = mesh_cover(*shape.mesh.arrays, bulge) if shape.mesh else cover_of(solid_of(shape), bulge)
     spheres = cover.spheres.copy()
     spheres[:, :3] = spheres[:, :3] @ shape.rotation.T + shape.pose[0]
     spheres[:, 3] += shape.padding
     return Cover(spheres, cover.bulge)
 
 
-def _solid(shape: Shape) -> Solid:
+def solid_of(shape: Shape) -> Solid:
+    """Its solid about its own origin; raises ValueError for a mesh and for what has no end."""
     size = shape.size
     match shape.kind:
         case ShapeKind.BOX:

@@ -1,0 +1,145 @@
+"""The smallest box, cylinder, capsule or ball around points, in numbers as a URDF has them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.transforms import from_rpy
+from services.arm.urdf import Origin, Triple
+from services.planner.covers.hull import corners_and_sides, smallest_ball, smallest_rectangle
+from services.planner.covers.shapes import Shape, ShapeKind, matrix_of
+
+Array = NDArray[np.float64]
+
+GRID, DIGITS = 1e-5, 5  # [m] to which places are rounded, and half sizes rounded up
+THINNEST = 2e-4  # [m] that an edge or a radius has at least
+# How much less one shape must hold than another to be taken: what stands along the link's axes is easier to read, and a
+# capsule is three elements of a URDF.
+TURNED, OBLIQUE, LONG = 1.002, 1.02, 1.05
+UPRIGHT = np.eye(3)[[2, 0, 1]]  # the link's axes; of equal shapes the one along its z is taken
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One shape that holds all its points."""
+
+    kind: ShapeKind
+    size: tuple[float, ...]  # as `Shape` has it
+    origin: Origin  # in the link
+
+    @property
+    def volume(self) -> float:
+        """[m^3]."""
+        match self.kind:
+            case ShapeKind.BOX:
+                return math.prod(self.size)
+            case ShapeKind.CYLINDER:
+                return math.pi * self.size[0] ** 2 * self.size[1]
+            case ShapeKind.CAPSULE:
+                return math.pi * self.size[0] ** 2 * (self.size[1] + 4.0 / 3.0 * self.size[0])
+            case _:
+                return 4.0 / 3.0 * math.pi * self.size[0] ** 3
+
+    @property
+    def shape(self) -> Shape:
+        """In the link's frame."""
+        return Shape(str(self.kind), self.kind, self.size, (self.origin.xyz, from_rpy(*self.origin.rpy)))
+
+
+def fitted(points: Array) -> Fitted:
+    """The shape of least volume that holds all `points` (n, 3) [m]; the same points give the same shape."""
+    corners, sides = corners_and_sides(points)
+    axes = np.vstack((UPRIGHT, spread(corners), sides))
+    return min((_ball(corners), *(each for axis in axes for each in _along(corners, axis))), key=_cost)
+
+
+def _cost(shape: Fitted) -> float:
+    is_oblique = any(abs(math.sin(2.0 * angle)) > 1e-5 for angle in shape.origin.rpy)
+    turned = OBLIQUE if is_oblique else TURNED if any(shape.origin.rpy) else 1.0
+    return shape.volume * turned * (LONG if shape.kind is ShapeKind.CAPSULE else 1.0)
+
+
+def spread(points: Array) -> Array:
+    """(3, 3) whose rows are the axes along which points (n, 3) spread most and least."""
+    return np.asarray(np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2])
+
+
+def _along(points: Array, axis: Array) -> Iterator[Fitted]:
+    """What is smallest of what has this axis as its z."""
+    turn = _frame(axis)
+    for angle in (0.0, smallest_rectangle(points @ turn[:2].T)):
+        cosine, sine = np.cos(angle), np.sin(angle)
+        yield _box(points, np.array(((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0))) @ turn)
+    yield from _round(points, turn)
+
+
+def _box(points: Array, turn: Array) -> Fitted:
+    rpy, axes = _rounded(turn)
+    there = points @ axes.T
+    xyz = _place(0.5 * (there.min(axis=0) + there.max(axis=0)) @ axes)
+    half = np.abs((points - xyz) @ axes.T).max(axis=0)
+    return Fitted(ShapeKind.BOX, tuple(2.0 * _up(value) for value in half), Origin(xyz, rpy))
+
+
+def _round(points: Array, turn: Array) -> Iterator[Fitted]:
+    """The cylinder, and the capsule where it is longer than a ball."""
+    rpy, axes = _rounded(turn)
+    there = points @ axes.T
+    centre, radius = smallest_ball(there[:, :2])
+    caps = _caps(there[:, :2] - centre, radius)
+    flat = 0.5 * (there[:, 2].min() + there[:, 2].max())
+    rounded = 0.5 * ((there[:, 2] + caps).min() + (there[:, 2] - caps).max())
+    xyz = _place(np.array([*centre, flat]) @ axes)
+    local = (points - xyz) @ axes.T
+    wide = _up(float(np.linalg.norm(local[:, :2], axis=1).max()))
+    yield Fitted(ShapeKind.CYLINDER, (wide, 2.0 * _up(float(np.abs(local[:, 2]).max()))), Origin(xyz, rpy))
+    xyz = _place(np.array([*centre, rounded]) @ axes)
+    local = (points - xyz) @ axes.T
+    wide = _up(float(np.linalg.norm(local[:, :2], axis=1).max()))
+    straight = float((np.abs(local[:, 2]) - _caps(local[:, :2], wide)).max())
+    if straight > 0.0:
+        yield Fitted(ShapeKind.CAPSULE, (wide, 2.0 * _up(straight)), Origin(xyz, rpy))
+
+
+def _caps(aside: Array, radius: float) -> Array:
+    """(n,) [m] by which a round end reaches beyond the straight part, so far from the axis."""
+    return np.asarray(np.sqrt(np.maximum(radius**2 - (aside**2).sum(axis=1), 0.0)))
+
+
+def _ball(points: Array) -> Fitted:
+    xyz = _place(smallest_ball(points)[0])
+    return Fitted(ShapeKind.SPHERE, (_up(float(np.linalg.norm(points - xyz, axis=1).max())),), Origin(xyz))
+
+
+def _up(half: float) -> float:
+    """Half a size, rounded up, and a little more for what floats lose."""
+    return round(max(math.ceil(half / GRID + 1e-4), 0.5 * THINNEST / GRID) * GRID, 9)
+
+
+def _place(point: Array) -> Triple:
+    x, y, z = (round(value, DIGITS) + 0.0 for value in point.tolist())
+    return x, y, z
+
+
+def _frame(axis: Array) -> Array:
+    """(3, 3) whose rows are axes, the last of them this one."""
+    first = np.eye(3)[(int(np.argmax(np.abs(axis))) + 1) % 3]
+    first = first - (first @ axis) * axis
+    first /= np.linalg.norm(first)
+    return np.array((first, np.cross(axis, first), axis))
+
+
+def _rounded(turn: Array) -> tuple[Triple, Array]:
+    """Roll, pitch and yaw [rad] of the frame with these axes, and its axes (3, 3) as they are then."""
+    x, y, z = turn
+    pitch = math.atan2(-x[2], math.hypot(x[0], x[1]))
+    upright = abs(x[2]) > 1.0 - 1e-9
+    roll = math.atan2(-z[1], y[1]) if upright else math.atan2(y[2], z[2])
+    yaw = 0.0 if upright else math.atan2(x[1], x[0])
+    rpy = (round(roll, 6) + 0.0, round(pitch, 6) + 0.0, round(yaw, 6) + 0.0)
+    return rpy, matrix_of(((0.0, 0.0, 0.0), from_rpy(*rpy)))[:3, :3].T

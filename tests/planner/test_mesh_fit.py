@@ -1,0 +1,293 @@
+"""Shapes fitted to meshes: they hold every corner, what is inside as well, and no more than they need."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from services.arm.collision_matrix import collision_matrix
+from services.arm.description import Arm, load_arm
+from services.arm.errors import DescriptionError
+from services.arm.kinematics import Kinematics
+from services.arm.srdf_edit import with_pairs
+from services.arm.urdf_edit import with_collisions
+from services.cli.collision import plan_of
+from services.planner.covers.fitting import Fitted, fitted
+from services.planner.covers.hull import smallest_ball
+from services.planner.covers.link_meshes import visual_mesh
+from services.planner.covers.mesh_fit import depths, fit_links, touching_states, write_fits
+from services.planner.covers.parts import shapes_around
+from services.planner.covers.shapes import Mesh, ShapeKind
+from services.planner.scene.solid_geometry import is_inside
+
+URDF = Path(__file__).parents[2] / "urdf"
+TOUCHING = {  # one box around a plate with round ends has corners
+    "rm1": [],
+    "parol6": ['in the state "forward" base_link and link_2 touch'],
+}
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+@pytest.fixture(params=["rm1", "parol6"])
+def copied(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """A robot that may be changed."""
+    shutil.copytree(URDF / request.param, tmp_path / request.param)
+    return tmp_path / request.param
+
+
+def turned(points: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """The same anywhere, in any direction."""
+    turn = trimesh.transformations.random_rotation_matrix(random.uniform(size=3))[:3, :3]
+    return points @ turn.T + random.uniform(-0.3, 0.3, 3)
+
+
+def depth(shapes: list[Fitted] | tuple[Fitted, ...], points: np.ndarray) -> np.ndarray:
+    """How deep each point is in the shape that holds it best."""
+    return np.max([depths(each.shape, points) for each in shapes], axis=0)
+
+
+def as_mesh(made: trimesh.Trimesh, points: np.ndarray | None = None) -> Mesh:
+    return Mesh(np.array(made.vertices if points is None else points), np.array(made.faces, dtype=np.int32))
+
+
+@given(SEEDS, st.integers(1, 3), st.integers(1, 60))
+@settings(max_examples=60, deadline=None)
+def test_the_smallest_ball_holds_all_and_no_other_place_needs_less(seed: int, dimension: int, count: int):
+    random = np.random.default_rng(seed)
+    points = np.round(random.normal(size=(count, dimension)), random.integers(0, 8))  # with some on one place or line
+    centre, radius = smallest_ball(points)
+    assert np.linalg.norm(points - centre, axis=1).max() <= radius + 1e-12
+    for _ in range(20):
+        moved = centre + 1e-3 * random.normal(size=dimension)
+        assert np.linalg.norm(points - moved, axis=1).max() >= radius - 1e-9
+
+
+@given(SEEDS, st.sampled_from(["box", "cylinder", "capsule", "sphere"]))
+@settings(max_examples=40, deadline=None)
+def test_what_is_a_box_a_cylinder_a_capsule_or_a_ball_is_found_as_one(seed: int, kind: str):
+    random = np.random.default_rng(seed)
+    size, long = random.uniform(0.02, 0.1, 3), random.uniform(0.15, 0.3)
+    made = {
+        "box": lambda: trimesh.creation.box(extents=size),
+        "cylinder": lambda: trimesh.creation.cylinder(radius=size[0], height=long, sections=64),
+        "capsule": lambda: trimesh.creation.capsule(radius=size[0], height=3.0 * size[0], count=(33, 32)),
+        "sphere": lambda: trimesh.creation.icosphere(radius=size[0], subdivisions=4),
+    }[kind]()
+    points = turned(made.vertices, random)
+    found = fitted(points)
+    assert found.kind is ShapeKind(kind)
+    assert depth([found], points).min() >= 0.0
+    assert found.volume < 1.03 * made.volume + 1e-7
+
+
+@given(SEEDS, st.integers(4, 300), st.floats(0.0, 1.0))
+@settings(max_examples=60, deadline=None)
+def test_whatever_the_points_are_the_shape_holds_them_all(seed: int, count: int, flat: float):
+    random = np.random.default_rng(seed)
+    points = turned(random.normal(size=(count, 3)) * (0.05, 0.05 * flat, 0.05 * flat**3), random)
+    assert depth([fitted(points)], points).min() >= 0.0
+
+
+@pytest.mark.parametrize("points", [np.zeros((3, 3)), np.eye(3), np.arange(9.0).reshape(3, 3), np.zeros((1, 3))])
+def test_points_without_a_volume_get_a_thin_shape(points: np.ndarray):
+    found = fitted(points)
+    assert depth([found], points).min() >= 0.0
+    assert min(found.size) > 0.0
+
+
+@given(SEEDS)
+@settings(max_examples=6, deadline=None)
+def test_what_is_inside_a_mesh_is_inside_its_shapes_wherever_it_was_cut(seed: int):
+    """Of bodies joined at random; the inside is told by the winding number, not by the shapes."""
+    random = np.random.default_rng(seed)
+    bodies = [
+        trimesh.creation.box(extents=random.uniform(0.02, 0.2, 3)),
+        trimesh.creation.cylinder(radius=random.uniform(0.01, 0.05), height=random.uniform(0.05, 0.2), sections=24),
+        trimesh.creation.torus(major_radius=0.08, minor_radius=random.uniform(0.01, 0.03)),
+    ]
+    parts = [as_mesh(body, turned(body.vertices, random)) for body in bodies]
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = np.vstack([part.faces + start for part, start in zip(parts, starts, strict=False)])
+    mesh = Mesh(np.vstack([part.vertices for part in parts]), faces)
+    most = int(random.integers(1, 12))
+    shapes = shapes_around(mesh, most)
+    assert 1 <= len(shapes) <= most
+    assert depth(shapes, mesh.vertices).min() >= 0.0
+    around = random.uniform(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0), (400, 3))
+    inner = np.array([point for point in around if any(is_inside(part, point) for part in parts)])
+    assert not len(inner) or depth(shapes, inner).min() >= 0.0
+    assert shapes_around(mesh, most) == shapes
+
+
+def test_an_angle_of_one_piece_is_cut_into_its_legs():
+    """Large triangles are halved first: the two legs of the outline have none of their own."""
+    outline = np.array([(0, 0), (0.2, 0), (0.2, 0.03), (0.03, 0.03), (0.03, 0.2), (0, 0.2)])
+    made = trimesh.creation.extrude_polygon(trimesh.path.polygons.Polygon(outline), 0.04)
+    one, two = shapes_around(as_mesh(made), 1), shapes_around(as_mesh(made), 2)
+    assert one[0].volume == pytest.approx(0.2 * 0.2 * 0.04, rel=0.01)
+    assert sum(each.volume for each in two) < 1.15 * made.volume
+    assert {each.kind for each in two} == {ShapeKind.BOX}
+
+
+def test_a_fitted_arm_loads_and_its_neighbours_do_not_touch_once_its_matrix_is_made(copied: Path):
+    before = load_arm(copied)
+    text, fits = before.urdf_path.read_text(), fit_links(before)
+    for fit in fits:
+        assert depth(fit.shapes, fit.mesh.vertices).min() >= 0.0
+        assert 1 <= len(fit.shapes) <= 6
+        assert (
+            0.15 < fit.share < 1.3
+        )  # of the hull: what is bent or hollow takes less, one box around a round thing more
+        assert 0.0 < fit.overshoot < 0.03
+
+    arm = write_fits(before, fits)
+    _require_only_collisions_changed(text, arm)
+    srdf = arm.srdf_path.read_text()
+    arm.srdf_path.write_text(with_pairs(srdf, plan_of(srdf, collision_matrix(arm))[0]))
+    kinematics = Kinematics(load_arm(copied))
+    assert kinematics.collisions.geometry_count == sum(len(link.collisions) for link in arm.model.links)
+    neighbours = {frozenset((joint.parent, joint.child)) for joint in arm.model.joints}
+    assert kinematics.collisions.pairs
+    assert not neighbours & {frozenset(pair) for pair in kinematics.collisions.pairs}
+    assert touching_states(kinematics.arm) == TOUCHING[kinematics.arm.name]
+
+
+def _require_only_collisions_changed(text: str, arm: Arm) -> None:
+    after = arm.urdf_path.read_text()
+    assert after != text
+    bare = {link.name: () for link in arm.model.links if link.visuals}
+    assert with_collisions(after, bare) == with_collisions(text, bare)
+    assert after.count("<!--") == text.count("<!--")
+
+
+def test_a_capsule_is_written_as_what_a_urdf_knows(copied: Path):
+    _replace_mesh(copied, trimesh.creation.capsule(radius=0.02, height=0.1))
+    arm = load_arm(copied)
+    link = _first_with_mesh(arm)
+    (fit,) = fit_links(arm, only=[link])
+    assert [each.kind for each in fit.shapes] == [ShapeKind.CAPSULE]
+    write_fits(arm, [fit])
+    (written,) = [each for each in load_arm(copied).model.links if each.name == link]
+    assert [each.shape for each in written.collisions] == ["cylinder", "sphere", "sphere"]
+
+
+def test_scale_and_origin_of_the_visual_count(copied: Path):
+    made = trimesh.creation.box(extents=(100.0, 50.0, 20.0))
+    _replace_mesh(copied, made)
+    urdf = load_arm(copied).urdf_path
+    name = _mesh_name(copied)
+    urdf.write_text(
+        urdf.read_text().replace(
+            f'<geometry><mesh filename="{name}"/></geometry>',
+            f'<origin xyz="0 0 0.5" rpy="0 0 1.5707963"/><geometry><mesh filename="{name}" scale="1e-3 1e-3 1e-3"/>'
+            "</geometry>",
+            1,
+        )
+    )
+    arm = load_arm(copied)
+    (fit,) = fit_links(arm, only=[_first_with_mesh(arm)])
+    assert fit.mesh.vertices.max(axis=0) == pytest.approx([0.025, 0.05, 0.51])
+
+
+def _first_with_mesh(arm: Arm) -> str:
+    return next(link.name for link in arm.model.links if link.visuals)
+
+
+def _mesh_name(folder: Path) -> str:
+    (visual,) = next(link for link in load_arm(folder).model.links if link.visuals).visuals
+    assert visual.mesh is not None
+    return visual.mesh
+
+
+def _replace_mesh(folder: Path, made: trimesh.Trimesh) -> None:
+    made.export(folder / _mesh_name(folder), file_type="glb")
+
+
+BOX = trimesh.creation.box(extents=(0.1, 0.1, 0.1))
+
+
+@pytest.mark.parametrize(
+    ("broken", "words"),
+    [
+        (trimesh.creation.box(extents=(100.0, 80.0, 60.0)), 'is 100 m long: if it is in mm, write scale="0.001'),
+        (trimesh.creation.box(extents=(1e-4, 1e-4, 1e-4)), "is 0.1 mm long: see its scale"),
+        (trimesh.Trimesh(np.eye(3) * 0.1, [[0, 1, 2]]), "is flat (0 mm thick)"),
+        (trimesh.creation.box(extents=(0.1, 0.1, 1e-6)), "is flat (0.001 mm thick)"),
+        (trimesh.Trimesh(np.array(BOX.vertices) * [[np.nan]] * 8, BOX.faces, process=False), "is not finite"),
+        (b"", "cannot be read"),
+        (b"glTF but not really", "cannot be read"),
+        (None, "is not there"),
+    ],
+)
+def test_a_mesh_that_bounds_no_link_is_refused_with_its_file(
+    copied: Path, broken: trimesh.Trimesh | bytes | None, words: str
+):
+    path = copied / _mesh_name(copied)
+    if isinstance(broken, trimesh.Trimesh):
+        _replace_mesh(copied, broken)
+    elif broken is None:
+        path.unlink()
+    else:
+        path.write_bytes(broken)
+    with pytest.raises(DescriptionError) as refused:
+        fit_links(load_arm(copied))
+    assert words in str(refused.value)
+    assert str(path) in str(refused.value)
+
+
+def test_a_link_without_a_mesh_and_one_that_is_not_there_are_said(copied: Path):
+    arm = load_arm(copied)
+    with pytest.raises(DescriptionError, match="there is no link"):
+        fit_links(arm, only=["nowhere"])
+    text = arm.urdf_path.read_text()
+    arm.urdf_path.write_text(text.replace("<visual>", "<!--").replace("</visual>", "-->"))
+    with pytest.raises(DescriptionError, match="its links have no visual mesh"):
+        fit_links(load_arm(copied))
+    with pytest.raises(DescriptionError, match=f'link "{arm.base_frame}" has no visual mesh'):
+        fit_links(load_arm(copied), only=[arm.base_frame])
+
+
+def test_a_file_that_would_not_load_again_stays_as_it_was(copied: Path):
+    arm = load_arm(copied)
+    fits = fit_links(arm, 1)
+    before = arm.urdf_path.read_bytes()
+    outside = Mesh(fits[0].mesh.vertices + 1.0, fits[0].mesh.faces)
+    wrong = type(fits[0])(fits[0].link, outside, fits[0].shapes, 1.0, 0.0)
+    with pytest.raises(DescriptionError, match=r"sticks .* mm out of its shapes"):
+        write_fits(arm, [wrong])
+    assert arm.urdf_path.read_bytes() == before
+
+
+def test_a_visual_mesh_is_all_of_them_in_the_links_frame(copied: Path):
+    arm = load_arm(copied)
+    for link in arm.model.links:
+        mesh = visual_mesh(link, copied)
+        assert (mesh is None) == (not link.visuals)
+        if mesh is not None:
+            low, high = trimesh.load(copied / link.visuals[0].mesh).bounds
+            assert mesh.vertices.min(axis=0) == pytest.approx(low)
+            assert mesh.vertices.max(axis=0) == pytest.approx(high)
+
+
+def test_edges_of_the_text_stay_as_they_are():
+    text = (
+        '<robot><!-- <link name="a"><visual/></link> -->\r\n'
+        "\t<link name='a'>\r\n\t\t<visual>x</visual>\r\n\t\t<!-- <collision/> -->\r\n\t\t<collision/>\r\n\t</link>\r\n"
+        '<link name="b"/><link name="c"><visual/><collision name="old"><geometry/></collision></link></robot>'
+    )
+    changed = with_collisions(text, {"a": ["<collision>\n  1\n</collision>"], "c": ["<new/>"]})
+    assert changed == (
+        '<robot><!-- <link name="a"><visual/></link> -->\r\n'
+        "\t<link name='a'>\r\n\t\t<visual>x</visual>\r\n\t\t<collision>\r\n\t\t  1\r\n\t\t</collision>\r\n"
+        "\t\t<!-- <collision/> -->\r\n\t</link>\r\n"
+        '<link name="b"/><link name="c"><visual/>\r\n<new/></link></robot>'
+    )
+    for link in ("b", "nowhere"):
+        with pytest.raises(ValueError, match=f'link "{link}" has no <visual>'):
+            with_collisions(text, {link: []})
