@@ -74,6 +74,9 @@ class CircularMotion(Message, frozen=True, kw_only=True, tag="circ"):
     center: Vector = ()  # (3,) [m] or its centre: then the shorter arc
     speed: float = 0.0  # [m/s] of the tool; 0: as fast as the joints can
     acceleration: float = 0.0  # [m/s^2] of the tool; 0: as the joints can
+    max_step: float = 0.0  # [m] between checked points; 0: the planner's own
+    jump_threshold: float = 0.0  # [rad] or [m] a joint may move between them; 0: the planner's own
+    least_fraction: float = 1.0  # of the way that must be possible; less is refused
 
 
 Motion = FreeMotion | PointToPoint | LinearMotion | CircularMotion
@@ -167,7 +170,7 @@ class PlanResponse(Message, frozen=True, kw_only=True):
     planning_time: float = 0.0  # [s]
     duration: float = 0.0  # [s] of the trajectory
     tool_goal: Vector = ()  # (3,) [m] where the tool will be
-    fraction: float = 1.0  # of a Cartesian way that the trajectory goes
+    fraction: float = 1.0  # of a Cartesian way that the trajectory goes, or, with a refusal, could have gone
     stopped_by: Refusal | None = None  # why it goes no further
     margins: tuple[StepMargin, ...] = ()
     slowed: float = 1.0  # the time scale that step_policy SLOW_DOWN has used; 1: none

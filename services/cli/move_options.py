@@ -75,7 +75,12 @@ def _way_options(group: Group) -> None:
     group.add_argument("--blend", type=finite_number, metavar="MM", help="around --via within which corners are cut")
     group.add_argument("--tool-speed", type=finite_number, metavar="MM/S", help="at most, on a line or an arc")
     group.add_argument("--tool-acceleration", type=finite_number, metavar="MM/S2", help="at most, on a line or an arc")
-    group.add_argument("--fraction", type=finite_number, metavar="F", help="of a line that will do, in [0, 1]")
+    group.add_argument("--fraction", type=finite_number, metavar="F", help="of a line or an arc that will do")
+    group.add_argument("--max-step", type=finite_number, metavar="MM", help="between two looks, on a line or an arc")
+    group.add_argument(
+        "--jump", type=finite_number, metavar="RAD", help="that a joint may move between them [rad] or [m]"
+    )
+    group.add_argument("--time-optimal", action="store_true", help="as fast as can be, without a limit of the jerk")
     group.add_argument("--planner", metavar="ID", help="native, RRTConnect, RRTstar, BITstar or PRM")
     group.add_argument("--seed", type=int, help="the same seed, the same plan")
 
@@ -84,32 +89,39 @@ def request_from(options: Options, arm: Arm) -> PlanRequest:
     """The request; what does not go together is refused by name."""
     from msgspec.structs import replace
 
+    from schemas.planning import Timing
     from services.cli.goals import goal_of, request_of
 
     goal = goal_of(arm, options.to, options.joints or (), options.named)
     request = request_of(_by_way_of(_turned(goal, options), options), options.speed)
     if not 0.0 < options.time <= 3600.0:
         raise usage(f"--time {options.time:g} is not in (0, 3600]")
-    return replace(request, motion=motion_of(options), allowed_time=options.time)
+    timing = Timing.TIME_OPTIMAL if options.time_optimal else Timing.JERK_LIMITED
+    return replace(request, motion=motion_of(options), allowed_time=options.time, timing=timing)
 
 
 def motion_of(options: Options) -> Motion:
     """The motion that the options name."""
+    from msgspec.structs import asdict
+
     from schemas.planning import CircularMotion, FreeMotion, LinearMotion, PointToPoint
 
     is_arc = options.arc is not None or options.center is not None
     is_tool = options.line or is_arc
-    _require(is_tool, options, ("tool_speed", "tool_acceleration"), "--line, --arc or --center")
-    _require(options.line, options, ("fraction",), "--line")
+    tool_options = ("tool_speed", "tool_acceleration", "fraction", "max_step", "jump")
+    _require(is_tool, options, tool_options, "--line, --arc or --center")
     _require(not is_tool and not options.ptp, options, ("planner", "seed"), "a free motion")
-    speed, acceleration = (_metres(options, name) for name in ("tool_speed", "tool_acceleration"))
-    if is_arc:
-        return CircularMotion(
-            interim=tuple(options.arc or ()), center=tuple(options.center or ()), speed=speed, acceleration=acceleration
+    if is_tool:
+        line = LinearMotion(
+            speed=_metres(options, "tool_speed"),
+            acceleration=_metres(options, "tool_acceleration"),
+            max_step=_metres(options, "max_step"),
+            jump_threshold=options.jump or 0.0,
+            least_fraction=1.0 if options.fraction is None else options.fraction,
         )
-    if options.line:
-        least = 1.0 if options.fraction is None else options.fraction
-        return LinearMotion(speed=speed, acceleration=acceleration, least_fraction=least)
+        if options.line:
+            return line
+        return CircularMotion(interim=tuple(options.arc or ()), center=tuple(options.center or ()), **asdict(line))
     if options.ptp:
         return PointToPoint()
     return FreeMotion(planner_id=options.planner or "", seed=options.seed or 0)

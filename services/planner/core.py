@@ -87,7 +87,7 @@ class Planner:
         try:
             response = self._plan(request, present, age, deadline, watch)
         except NoPlan as no_plan:
-            response = PlanResponse(code=no_plan.code, refusal=no_plan.refusal)
+            response = PlanResponse(code=no_plan.code, refusal=no_plan.refusal, fraction=no_plan.fraction)
         version = self.surroundings.world.version
         return msgspec.structs.replace(response, times=watch.times, scene_version=version)
 

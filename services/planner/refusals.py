@@ -14,12 +14,13 @@ Point = Sequence[float]
 
 
 class NoPlan(Exception):
-    """A refusal on its way out of the planner."""
+    """A refusal on its way out of the planner; `fraction` of a Cartesian way could have been gone."""
 
-    def __init__(self, code: PlanCode, refusal: Refusal) -> None:
+    def __init__(self, code: PlanCode, refusal: Refusal, fraction: float = 0.0) -> None:
         super().__init__(refusal.message)
         self.code = code
         self.refusal = refusal
+        self.fraction = fraction
 
 
 def scaling_refused(which: str, value: float) -> NoPlan:

@@ -72,7 +72,10 @@ def _require_way(name: str, point: Array, start: Array, end: Array) -> None:
         if distance < SAME_POINT:
             where = "start" if one is start else "goal"
             message = f"the {what} is where the {where} is, {1000 * distance:.3g} mm away: that is no arc"
-            raise _refused(what, distance, SAME_POINT, message, "give another point, or go by a line (LIN)")
+            remedy = "give another point, or go by a line (LIN)"
+            if end is other and what == "goal":
+                remedy = "for a full circle ask for one half, then for the other; else give another point"
+            raise _refused(what, distance, SAME_POINT, message, remedy)
 
 
 def _refused(subject: str, value: float, limit: float, message: str, remedy: str) -> NoPlan:

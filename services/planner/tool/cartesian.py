@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 DEEPER = 1.06  # share of the margin that the way keeps, so that samples taken elsewhere keep the margin itself
 LEAST_LOOK = 0.1  # share of the margin by which the arm moves on at least from one look to the next
 SHORTEST_WAY = 1e-4  # of length: less is no way
+SHORTEST_TOLD = 1e-6  # [m] of a way, of which a place is told in metres
 MOST_ROWS = 4000
 MOMENT = 0.05  # share of the time between two points, by which the tool is looked at before and after a moment
 
@@ -44,6 +45,17 @@ class CartesianWay:
     stopped_by: Refusal | None
 
 
+@dataclass(frozen=True)
+class Terms:
+    """On which a way is gone."""
+
+    limits: JointLimits
+    tool: ToolLimits
+    margin: float  # [m]
+    timing: Timing
+    heed: Heed
+
+
 class CartesianPlanner:
     """Takes one arm along paths of its tool, among what `checker` knows."""
 
@@ -51,53 +63,51 @@ class CartesianPlanner:
         self._arm, self._kinematics, self._checker = arm, kinematics, checker
         self._continuation = Continuation(arm, kinematics, holds_turn)
 
-    def plan(
-        self,
-        paths: Sequence[ToolPath],
-        start: Start,
-        limits: JointLimits,
-        tool: ToolLimits,
-        margin: float,
-        timing: Timing,
-        heed: Heed,
-    ) -> CartesianWay:
-        """Along the paths one after the other, at rest between them; raises `NoPlan`, and what `heed` raises."""
+    def plan(self, paths: Sequence[ToolPath], start: Start, end: Start | None, terms: Terms) -> CartesianWay:
+        """Along the paths one after the other, at rest between them; raises `NoPlan`, and what `terms.heed` raises.
+
+        Where it comes to `end` but for rounding, it ends there to the bit.
+        """
         whole, before = sum(path.length for path in paths), 0.0
         metres = sum(path.metres for path in paths)
         runs: list[Run] = []
         posture, refusal, gone = np.array(start), None, 0.0
         for path in paths:
-            followed = self._follow(path, posture, tool, margin, heed)
+            followed = self._follow(path, posture, terms)
             stop = followed if isinstance(followed, Stop) else followed.stop
             if isinstance(followed, Followed):
-                runs.append(self._run(path, followed, limits, tool, timing, heed))
+                if end is not None and stop is None and path is paths[-1]:
+                    followed = self._continuation.ending(followed, np.array(end))
+                runs.append(self._run(path, followed, terms))
                 posture, before = followed.postures[-1], before + float(followed.lengths[-1])
                 gone += path.metres_to(float(followed.lengths[-1]))
             if stop is not None:
                 refusal = _stopped(stop, gone, metres, before / whole)
                 break
         fraction = 1.0 if refusal is None else before / whole
-        if refusal is not None and (not runs or fraction < tool.least_fraction):
-            raise NoPlan(_code(refusal), _too_little(refusal, fraction, tool.least_fraction))
-        states = self._within(states_of_runs(runs, heed), limits, tool, timing)
+        least = terms.tool.least_fraction
+        if refusal is not None and (not runs or fraction < least):
+            raise NoPlan(_code(refusal), _too_little(refusal, fraction, least), fraction)
+        states = self._within(states_of_runs(runs, terms.heed), terms)
         return CartesianWay(trajectory_of(self._arm.joint_names, states), tuple(posture.tolist()), fraction, refusal)
 
-    def _follow(self, path: ToolPath, start: Array, tool: ToolLimits, margin: float, heed: Heed) -> Followed | Stop:
+    def _follow(self, path: ToolPath, start: Array, terms: Terms) -> Followed | Stop:
         """As far as the joints and what stands around let it."""
-        followed = self._continuation.follow(path, start, tool.max_step, tool.jump, heed)
+        followed = self._continuation.follow(path, start, terms.tool.max_step, terms.tool.jump, terms.heed)
         if isinstance(followed, Stop):
             return followed
-        free, touching = self._free(followed, margin, heed)
+        free, touching = self._free(followed, terms)
         if touching is None:
             return followed
-        stop = self._touches(touching, margin)
+        stop = self._touches(touching, terms.margin)
         if free < SHORTEST_WAY:
             return stop
-        return self._continuation.shortened(path, followed, free, stop, heed)
+        return self._continuation.shortened(path, followed, free, stop, terms.heed)
 
-    def _free(self, followed: Followed, margin: float, heed: Heed) -> tuple[float, Array | None]:
+    def _free(self, followed: Followed, terms: Terms) -> tuple[float, Array | None]:
         """The length up to which everything keeps clear, and the posture that does not; looked at by conservative
         advancement, so that nothing is skipped."""
+        margin = terms.margin
         end, joints = float(followed.lengths[-1]), followed.postures.shape[1]
         rows = np.linspace(0.0, end, min(MOST_ROWS, 8 * len(followed.lengths)))
         postures = followed.curve.at(rows).value[:, :joints]
@@ -106,7 +116,7 @@ class CartesianPlanner:
         moved = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(postures, axis=0)) @ self._checker.reach)))
         along, free = 0.0, 0.0
         while True:
-            heed()
+            terms.heed()
             length = float(np.interp(along, moved, rows))
             posture = followed.curve.at(np.array([length])).value[0, :joints]
             clearance = self._checker.distance(posture) - DEEPER * margin
@@ -117,19 +127,12 @@ class CartesianPlanner:
                 return end, None
             along = min(float(moved[-1]), along + max(clearance, LEAST_LOOK * margin))
 
-    def _run(
-        self,
-        path: ToolPath,
-        followed: Followed,
-        limits: JointLimits,
-        tool: ToolLimits,
-        timing: Timing,
-        heed: Heed,
-    ) -> Run:
+    def _run(self, path: ToolPath, followed: Followed, terms: Terms) -> Run:
+        tool = terms.tool.speed, terms.tool.acceleration
         end = float(followed.lengths[-1])
         marks = np.array([0.0, *(mark for mark in path.marks if FINEST < mark < end - FINEST), end])
         try:
-            law = law_along(followed.curve, limits, (tool.speed, tool.acceleration), marks, timing, heed)
+            law = law_along(followed.curve, terms.limits, tool, marks, terms.timing, terms.heed)
         except NoProfile as error:
             raise not_verified(str(error)) from error
         return Run(
@@ -141,9 +144,10 @@ class CartesianPlanner:
             lambda length, posture: self._continuation.solver.error(path.at(length), posture),
         )
 
-    def _within(self, states: States, limits: JointLimits, tool: ToolLimits, timing: Timing) -> States:
+    def _within(self, states: States, terms: Terms) -> States:
         """As fast as the joints may; slower, where they or the tool would be a little faster than they may."""
-        even = at_limits(states, limits, timing is Timing.JERK_LIMITED)
+        tool = terms.tool
+        even = at_limits(states, terms.limits, terms.timing is Timing.JERK_LIMITED)
         if not tool.speed and not tool.acceleration:
             return even
         states = even if even.times[-1] > states.times[-1] else states
@@ -176,7 +180,7 @@ class CartesianPlanner:
 
 
 def _stopped(stop: Stop, gone: float, metres: float, fraction: float) -> Refusal:
-    place = f"at {gone:.4f} m of {metres:.4f} m" if metres > SHORTEST_WAY else f"at {fraction:.1%} of the turn"
+    place = f"at {gone:.4f} m of {metres:.4f} m" if metres > SHORTEST_TOLD else f"at {fraction:.1%} of the turn"
     return Refusal(
         check=stop.check,
         subject=stop.subject,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,7 @@ MOST_POSTURES = 5000
 JUMP = 0.3  # [rad] or [m] a joint may move between two postures, before shorter steps are tried
 CLOSE = 1e-5  # [m] by which the spline between postures may be off the way
 ROUNDING = 1e-9  # [rad] or [m] beyond a limit that is put back onto it
+SAME = 1e-6  # [rad] or [m] by which postures differ that are meant to be one
 ROUNDS = 8
 ORDER = 4  # postures by which the next one is guessed
 TOO_FINE = f"max_step is so fine that the way would have more than {MOST_POSTURES} postures"
@@ -86,6 +88,14 @@ class Continuation:
         if len(lengths) < 4:
             lengths, postures = self._four(path, lengths, postures)
         return self._refined(path, lengths, postures, stop, heed)
+
+    def ending(self, followed: Followed, end: Array) -> Followed:
+        """The same, with `end` (n,) as its last posture where that is where it leads."""
+        if not is_same(followed.postures[-1], end):
+            return followed
+        postures = np.vstack((followed.postures[:-1], end))
+        curve = self._spline(followed.lengths.tolist(), list(postures))
+        return Followed(followed.lengths, postures, curve, followed.stop)
 
     def _march(
         self, path: ToolPath, start: Array, spacing: float, jump: float, heed: Heed
@@ -189,6 +199,11 @@ class Continuation:
         )
         remedy = "keep away from the singularity, or go there freely instead of on a given way"
         return Stop(check, joint.name, value, jump, what, remedy)
+
+
+def is_same(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:
+    """Postures that differ by no more than rounding."""
+    return float(np.abs(np.subtract(one, other)).max()) <= SAME
 
 
 def _is_jump(found: Array | Stop) -> bool:

@@ -9,8 +9,17 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from schemas.message import Vector
-from schemas.planning import CircularMotion, Goal, LinearMotion, PlanCode, PlanRequest, PoseGoal, Timing, WaypointGoal
-from services.arm.description import Arm
+from schemas.planning import (
+    CircularMotion,
+    Goal,
+    LinearMotion,
+    PlanCode,
+    PlanRequest,
+    PoseGoal,
+    Refusal,
+    WaypointGoal,
+)
+from services.arm.description import Arm, Joint
 from services.arm.kinematics import Kinematics, Pose
 from services.arm.transforms import IDENTITY, compose
 from services.planner.goals.abilities import Abilities
@@ -20,10 +29,10 @@ from services.planner.goals.targets import ROTATION_TOLERANCE, Target, turn_betw
 from services.planner.refusals import NoPlan, malformed
 from services.planner.scene.clearance import Sweeper
 from services.planner.search.way import Start
-from services.planner.timing.path_timing import Heed
 from services.planner.timing.profile import JointLimits, straight_line
 from services.planner.tool.arcs import arc_about, arc_through
-from services.planner.tool.cartesian import CartesianPlanner, CartesianWay
+from services.planner.tool.cartesian import CartesianPlanner, CartesianWay, Terms
+from services.planner.tool.continuation import is_same
 from services.planner.tool.tool_limits import ToolLimits, require_tool_limits
 from services.planner.tool.tool_path import ToolPath, polyline
 
@@ -53,47 +62,39 @@ class ToolMotions:
                 raise timed_out()
 
         try:
-            paths = self._paths(request, start, is_late)
-            way = self._along(paths, start, limits, tool, margin, request.timing, heed)
+            wanted = self._wanted(request.goal, start)
+            paths, end = self._paths(request, start, wanted), wanted[-1]
+            way = self._along(paths, start, end, Terms(limits, tool, margin, request.timing, heed))
         except NoPlan:
             self._require_reachable(request.goal, start, tool, is_late)
             raise
         if way.fraction == 1.0:
             self._require_turned(request.goal, start, way.end)
+            self._require_joints(way.end, end)
         return way
 
-    def _along(
-        self,
-        paths: list[ToolPath],
-        start: Start,
-        limits: JointLimits,
-        tool: ToolLimits,
-        margin: float,
-        timing: Timing,
-        heed: Heed,
-    ) -> CartesianWay:
+    def _along(self, paths: list[ToolPath], start: Start, end: Start | None, terms: Terms) -> CartesianWay:
         if paths:
-            return self._planner.plan(paths, start, limits, tool, margin, timing, heed)
-        return CartesianWay(straight_line(self._arm.joint_names, start, start, limits), start, 1.0, None)
+            return self._planner.plan(paths, start, end, terms)
+        end = end if end is not None and is_same(end, start) else start
+        return CartesianWay(straight_line(self._arm.joint_names, start, end, terms.limits), end, 1.0, None)
 
-    def _paths(self, request: PlanRequest, start: Start, is_late: Callable[[], bool]) -> list[ToolPath]:
+    def _paths(self, request: PlanRequest, start: Start, wanted: list[Start | None]) -> list[ToolPath]:
         goal, begin = request.goal, self._kinematics.tool(start)
         if isinstance(request.motion, CircularMotion):
-            return [self._arc(request.motion, goal, start, begin, is_late)]
+            return [self._arc(request.motion, goal, start, begin, wanted[-1])]
         poses = [begin]
-        for point in points_of(goal):
-            poses.append(self._pose(point, start, poses[-1], is_late))
+        for point, posture in zip(points_of(goal), wanted, strict=True):
+            poses.append(self._pose(point, start, poses[-1], posture))
         return polyline(poses, goal.blend if isinstance(goal, WaypointGoal) else 0.0)
 
-    def _arc(
-        self, motion: CircularMotion, goal: Goal, start: Start, begin: Pose, is_late: Callable[[], bool]
-    ) -> ToolPath:
+    def _arc(self, motion: CircularMotion, goal: Goal, start: Start, begin: Pose, wanted: Start | None) -> ToolPath:
         if isinstance(goal, WaypointGoal):
             raise malformed(INVALID, "goal", "an arc has one goal, not waypoints", "ask for one arc after the other")
         if bool(motion.interim) == bool(motion.center):
             given = "both an interim point and a center" if motion.interim else "neither an interim point nor a center"
             raise malformed(INVALID, "interim", f"the arc has {given}", "give one of them, x y z in m")
-        end = self._pose(goal, start, begin, is_late)
+        end = self._pose(goal, start, begin, wanted)
         name, values = ("interim", motion.interim) if motion.interim else ("center", motion.center)
         point = self._point(name, values, goal, start)
         return ToolPath([arc_through(begin, point, end) if motion.interim else arc_about(begin, point, end)])
@@ -106,10 +107,11 @@ class ToolMotions:
         x, y, z = values
         return np.array(compose(frame, ((x, y, z), IDENTITY[1]))[0])
 
-    def _pose(self, goal: Goal, start: Start, before: Pose, is_late: Callable[[], bool]) -> Pose:
+    def _pose(self, goal: Goal, start: Start, before: Pose, wanted: Start | None) -> Pose:
         """Where the tool is to be; as it was turned before, where the goal leaves that open."""
-        if not isinstance(goal, PoseGoal):
-            return self._kinematics.tool(next(self._goals.candidates(goal, start, is_late)))
+        if wanted is not None:
+            return self._kinematics.tool(wanted)
+        assert isinstance(goal, PoseGoal)
         target = self._target(goal, start)
         if target.rotation is not None:
             return Pose(target.position, target.rotation)
@@ -139,6 +141,22 @@ class ToolMotions:
             message = f"on this way the tool ends {np.degrees(missing):.3g} deg from the orientation that was asked for"
             raise malformed(INVALID, "orientation", message, self._abilities.remedy, check="orientation")
 
+    def _wanted(self, goal: Goal, start: Start) -> list[Start | None]:
+        """The postures of those points that are joint values, None for poses; a joint that is not named stays as the
+        last of them has it, or the start."""
+        wanted: list[Start | None] = []
+        for point in points_of(goal):
+            known = next((posture for posture in reversed(wanted) if posture is not None), start)
+            is_pose = isinstance(point, PoseGoal)
+            wanted.append(None if is_pose else next(self._goals.candidates(point, known, lambda: False)))
+        return wanted
+
+    def _require_joints(self, end: Start, wanted: Start | None) -> None:
+        """Joint values are what was asked for, not only the pose of the tool that belongs to them."""
+        if wanted is not None and end != wanted:
+            worst = int(np.argmax(np.abs(np.subtract(end, wanted))))
+            raise _other_posture(self._arm.joints[worst], end, wanted[worst], end[worst])
+
 
 def points_of(goal: Goal) -> tuple[Goal, ...]:
     """The goals to be passed in order; raises `NoPlan` where there is none, or the blend is no length."""
@@ -152,12 +170,21 @@ def points_of(goal: Goal) -> tuple[Goal, ...]:
     return goal.points
 
 
+def _other_posture(joint: Joint, end: Start, wanted: float, reached: float) -> NoPlan:
+    """The tool is where it should be, the joints are not."""
+    refusal = Refusal(
+        check="posture",
+        subject=joint.name,
+        value=reached,
+        limit=wanted,
+        nearest=end,
+        message=f'the tool can go there so, but "{joint.name}" ends at {reached:.4g} {joint.unit}, not at {wanted:.4g}',
+        remedy="ask for the pose of the tool instead of joint values, or go there freely",
+    )
+    return NoPlan(PlanCode.GOAL_VIOLATES_PATH_CONSTRAINTS, refusal)
+
+
 def _tool_limits(motion: object) -> ToolLimits:
-    match motion:
-        case LinearMotion():
-            return ToolLimits(
-                motion.speed, motion.acceleration, motion.max_step, motion.jump_threshold, motion.least_fraction
-            )
-        case CircularMotion():
-            return ToolLimits(motion.speed, motion.acceleration)
-    return ToolLimits()
+    if not isinstance(motion, LinearMotion | CircularMotion):
+        return ToolLimits()
+    return ToolLimits(motion.speed, motion.acceleration, motion.max_step, motion.jump_threshold, motion.least_fraction)
