@@ -65,8 +65,9 @@ class ToolMotions:
             wanted = self._wanted(request.goal, start)
             paths, end = self._paths(request, start, wanted), wanted[-1]
             way = self._along(paths, start, end, Terms(limits, tool, margin, request.timing, heed))
-        except NoPlan:
-            self._require_reachable(request.goal, start, tool, is_late)
+        except NoPlan as ended:
+            if tool.least_fraction == 1.0 and not is_late():
+                self._require_reachable(request.goal, start, ended.fraction, is_late)
             raise
         if way.fraction == 1.0:
             self._require_turned(request.goal, start, way.end)
@@ -123,11 +124,13 @@ class ToolMotions:
     def _target(self, goal: PoseGoal, start: Start) -> Target:
         return target_of(goal, self._goals.frame(goal, start))
 
-    def _require_reachable(self, goal: Goal, start: Start, tool: ToolLimits, is_late: Callable[[], bool]) -> None:
+    def _require_reachable(self, goal: Goal, start: Start, fraction: float, is_late: Callable[[], bool]) -> None:
         """Raises the better refusal of a goal that no posture meets, wherever the way to it ends."""
-        if tool.least_fraction == 1.0 and not is_late():
+        try:
             for point in points_of(goal):
                 next(self._goals.candidates(point, start, is_late), None)
+        except NoPlan as better:
+            raise NoPlan(better.code, better.refusal, fraction) from better
 
     def _require_turned(self, goal: Goal, start: Start, end: Start) -> None:
         """An arm whose tool turns as its position has it may end turned otherwise than asked."""
