@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from schemas.planning import NamedGoal, PlanCode, PlanPhase, PlanRequest, PlanResponse
 from schemas.scene import PlanningScene
-from services.planner.workers.workers import LONGEST_ID, MOST, Workers
+from services.planner.workers.workers import LONGEST_ID, MOST, MOST_PLANS, Workers
 from tests.planner.walled import WALLED, past_the_wall
 
 PROJECT = Path(__file__).parents[2]
@@ -163,6 +163,20 @@ def test_an_id_that_is_in_use_or_endless_is_refused(desk: Desk):
         assert response.refusal is not None
         assert response.refusal.message.startswith(said)
     assert desk.phases() == {"long": PlanPhase.SEARCH}
+
+
+def test_a_flood_of_plans_is_turned_away_and_leaves_nothing_behind(desk: Desk):
+    refused: SimpleQueue[PlanResponse] = SimpleQueue()
+    for number in range(MOST_PLANS):
+        desk.ask(past_the_wall(f"{number}"))
+    desk.workers.plan(past_the_wall("too much"), refused.put)
+    response = refused.get(timeout=PATIENCE)
+    assert response.refusal is not None
+    assert response.refusal.message == f"{MOST_PLANS} plans are waiting already"
+    for number in reversed(range(MOST_PLANS)):
+        assert desk.workers.cancel(f"{number}").found
+    assert {desk.answer(f"{number}").code for number in range(MOST_PLANS)} == {PlanCode.PREEMPTED}
+    assert desk.phases() == {}
 
 
 def test_plans_without_an_id_are_told_apart_by_ids_of_the_planners_own(desk: Desk):

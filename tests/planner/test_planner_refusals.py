@@ -214,9 +214,9 @@ def test_a_scaling_that_would_take_days_is_refused(planner: Planner, home: Joint
     assert "86400 s is the most" in refused(planner.plan(request, home), PlanCode.PLANNING_FAILED).message
 
 
-@pytest.mark.parametrize("allowed", [0.0, -1.0, -1e300])
+@pytest.mark.parametrize("allowed", [0.0, -1.0, -1e300, 120.5, 1e300])
 @pytest.mark.parametrize("motion", [FreeMotion(), PointToPoint(), LinearMotion()])
-def test_no_time_at_all_is_refused(planner: Planner, home: JointState, motion: Motion, allowed: float):
+def test_no_time_and_too_much_are_refused(planner: Planner, home: JointState, motion: Motion, allowed: float):
     request = PlanRequest(goal=NamedGoal(name="ready"), motion=motion, allowed_time=allowed)
     refusal = refused(planner.plan(request, home), PlanCode.INVALID_GOAL_CONSTRAINTS)
     assert refusal.subject == "allowed_time"

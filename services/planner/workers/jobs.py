@@ -15,13 +15,18 @@ T = TypeVar("T")
 LENGTH = struct.Struct("<I")
 
 
+class Show(msgspec.Struct, frozen=True, tag=True):
+    """What later plans are to heed: seconds of work where there is a large mesh, and none of a plan's time."""
+
+    scene: PlanningScene
+
+
 class Job(msgspec.Struct, frozen=True, kw_only=True, tag=True):
-    """One plan; `scene` is there where the worker does not have it yet."""
+    """One plan."""
 
     request: PlanRequest
     present: JointState | None = None
     age: float = 0.0  # [s] of `present`
-    scene: PlanningScene | None = None
 
 
 class Cancel(msgspec.Struct, frozen=True, tag=True):
@@ -36,6 +41,10 @@ class Ready(msgspec.Struct, frozen=True, tag=True):
     """The worker's first word: from now on it plans."""
 
 
+class Shown(msgspec.Struct, frozen=True, tag=True):
+    """What is answered to `Show`."""
+
+
 class At(msgspec.Struct, frozen=True, tag=True):
     """What is answered to `Ask`."""
 
@@ -48,8 +57,8 @@ class Planned(msgspec.Struct, frozen=True, tag=True):
     response: PlanResponse
 
 
-Order = Job | Cancel | Ask
-Report = Ready | At | Planned
+Order = Show | Job | Cancel | Ask
+Report = Ready | Shown | At | Planned
 
 ORDERS: msgspec.msgpack.Decoder[Order] = msgspec.msgpack.Decoder(Order)
 REPORTS: msgspec.msgpack.Decoder[Report] = msgspec.msgpack.Decoder(Report)

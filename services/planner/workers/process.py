@@ -12,19 +12,30 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TypeVar
 
-from msgspec.structs import replace
-
 from schemas.planning import PlanPhase, PlanResponse, Timing
 from schemas.scene import PlanningScene
 from services.planner.workers.assignment import Assignment, Cancelled
-from services.planner.workers.jobs import REPORTS, Ask, At, Cancel, Job, Order, Planned, Ready, receive, send
+from services.planner.workers.jobs import (
+    REPORTS,
+    Ask,
+    At,
+    Cancel,
+    Job,
+    Order,
+    Planned,
+    Ready,
+    Show,
+    Shown,
+    receive,
+    send,
+)
 
-START = 60.0  # [s] in which a worker must have started, or have imported toppra for the first time
+START = 60.0  # [s] in which a worker must have started, have a scene, or have imported toppra for the first time
 STOPS_WITHIN = 0.2  # [s] from a cancel to the answer of a process that lives on
 TICK = 0.05  # [s] between two looks whether the plan is still wanted
 CHILD = "services.planner.workers.worker"
 
-R = TypeVar("R", Ready, Planned)
+R = TypeVar("R", Ready, Shown, Planned)
 
 
 def nothing(*_: object) -> None:
@@ -51,11 +62,18 @@ class Process:
                 self._hear(Ready, START, on_tick)
                 self._is_ready = True
 
-    def plan(self, assignment: Assignment, job: Job, scene: PlanningScene, seconds: float) -> PlanResponse:
+    def show(self, scene: PlanningScene, on_tick: Callable[[], None] = nothing) -> None:
+        """Waits until it has the scene; raises as `be_ready`."""
+        with self._replaced_where_it_fails():
+            if self._told is not scene:
+                self._send(Show(scene))
+                self._hear(Shown, START, on_tick)
+                self._told = scene
+
+    def plan(self, assignment: Assignment, job: Job, seconds: float) -> PlanResponse:
         """Raises `TimeoutError` after `seconds`, `Cancelled` or `WorkerDied`; it is replaced where it did not end."""
         with self._replaced_where_it_fails():
-            self._send(job if self._told is scene else replace(job, scene=scene))
-            self._told = scene
+            self._send(job)
             needs_toppra = job.request.timing is Timing.TIME_OPTIMAL
             importing = START if needs_toppra and not self._has_toppra else 0.0
             try:

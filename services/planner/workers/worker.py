@@ -19,7 +19,20 @@ from services.planner.scene.world import World
 from services.planner.search.native_search import cancel_flag
 from services.planner.times import Stopwatch
 from services.planner.timing.time_optimal import load_toppra
-from services.planner.workers.jobs import ORDERS, Ask, At, Cancel, Job, Planned, Ready, Report, receive, send
+from services.planner.workers.jobs import (
+    ORDERS,
+    Ask,
+    At,
+    Cancel,
+    Job,
+    Planned,
+    Ready,
+    Report,
+    Show,
+    Shown,
+    receive,
+    send,
+)
 
 
 class AtHand:
@@ -53,18 +66,21 @@ def main() -> None:
     answers = Answers(os.fdopen(os.dup(1), "wb"))
     os.dup2(2, 1)  # what a library prints is no answer
     folder, project = Path(sys.argv[1]), Path(sys.argv[2])
-    jobs: SimpleQueue[AtHand] = SimpleQueue()
+    jobs: SimpleQueue[AtHand | Show] = SimpleQueue()
     threading.Thread(target=_read, args=(sys.stdin.buffer, jobs, answers), daemon=True).start()
     planner = Planner(load_arm(folder))
     planner.prepare()
     answers.put(Ready())
     while True:
-        at_hand = jobs.get()
-        if at_hand.job.scene is not None:
-            planner.set_world(World(planner.arm, planner.kinematics, at_hand.job.scene, (project, folder)))
-        if at_hand.job.request.timing is Timing.TIME_OPTIMAL:
-            load_toppra()  # seconds, the first time, which are not the plan's
-        answers.put(Planned(_planned(planner, at_hand)))
+        match jobs.get():
+            case Show(scene):
+                planner.set_world(World(planner.arm, planner.kinematics, scene, (project, folder)))
+                planner.prepare()
+                answers.put(Shown())
+            case AtHand() as at_hand:
+                if at_hand.job.request.timing is Timing.TIME_OPTIMAL:
+                    load_toppra()  # seconds, the first time, which are not the plan's
+                answers.put(Planned(_planned(planner, at_hand)))
 
 
 def _planned(planner: Planner, at_hand: AtHand) -> PlanResponse:
@@ -79,12 +95,14 @@ def _planned(planner: Planner, at_hand: AtHand) -> PlanResponse:
         return PlanResponse(refusal=Refusal(check="planner", subject="worker", message=message, remedy=remedy))
 
 
-def _read(pipe: IO[bytes], jobs: SimpleQueue[AtHand], answers: Answers) -> None:
+def _read(pipe: IO[bytes], jobs: SimpleQueue[AtHand | Show], answers: Answers) -> None:
     """Ends the process at the end of its input, whatever it is planning."""
     at_hand: AtHand | None = None
     try:
         while True:
             match receive(pipe, ORDERS):
+                case Show() as show:
+                    jobs.put(show)
                 case Job() as job:
                     at_hand = AtHand(job)
                     jobs.put(at_hand)

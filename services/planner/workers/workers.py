@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 
 from schemas.joints import JointState
 from schemas.planning import PlanCancelResult, PlanCode, PlanProgress, PlanRequest, PlanResponse, Refusal
@@ -21,8 +21,10 @@ MOST = 2  # processes: as many as small computers have cores for it
 GRACE = 1.0  # [s] beyond the allowed time in which a worker ends its plan by itself
 PATIENCE = 5.0  # [s] for a thread to see that its process is gone
 AGAIN = 3  # plans of one request, where the scene changes meanwhile
+LOOK = 0.2  # [s] between two looks whether the scene has changed
 SHORT = 0.1  # [s] until which nothing is said of a plan
 LONGEST_ID = 100  # characters
+MOST_PLANS = 64  # that wait or are being made
 
 Present = Callable[[], tuple[JointState | None, float]]
 Scene = Callable[[], PlanningScene]
@@ -48,14 +50,14 @@ class Workers:
         with self._lock:
             request_id = request.request_id or f"planner-{next(self._numbers)}"
             objection = self._objection(request_id)
-            if not objection:
+            if objection is None:
                 assignment = Assignment(request_id, request, lambda response: self._end(request_id, response, answer))
                 self._assignments[request_id] = assignment
                 self._tasks.put(assignment)
                 if len(self._assignments) > len(self._processes) < MOST:
                     self._start_one()
-        if objection:
-            answer(_refused("request_id", objection, "choose another request_id, or leave it empty"))
+        if objection is not None:
+            answer(PlanResponse(code=PlanCode.INVALID_GOAL_CONSTRAINTS, refusal=objection))
 
     def cancel(self, request_id: str) -> PlanCancelResult:
         """Ends a plan that waits now, one that is being made soon."""
@@ -81,10 +83,17 @@ class Workers:
         for thread in self._threads:
             thread.join(PATIENCE)
 
-    def _objection(self, request_id: str) -> str:
+    def _objection(self, request_id: str) -> Refusal | None:
+        if len(self._assignments) >= MOST_PLANS:
+            return _refused(
+                "plan", f"{MOST_PLANS} plans are waiting already", "plan again when some of them have ended"
+            )
+        remedy = "choose another request_id, or leave it empty"
         if len(request_id) > LONGEST_ID:
-            return f"request_id has {len(request_id)} characters: at most {LONGEST_ID}"
-        return f'a plan "{request_id}" is being made already' if request_id in self._assignments else ""
+            return _refused("request_id", f"request_id has {len(request_id)} characters: at most {LONGEST_ID}", remedy)
+        if request_id in self._assignments:
+            return _refused("request_id", f'a plan "{request_id}" is being made already', remedy)
+        return None
 
     def _end(self, request_id: str, response: PlanResponse, answer: Answer) -> None:
         with self._lock:
@@ -99,18 +108,29 @@ class Workers:
         thread.start()
 
     def _work(self, process: Process) -> None:
-        self._prepare(process)
-        while (assignment := self._tasks.get()) is not None:
+        prepared: PlanningScene | None = None
+        while True:
+            scene = self._scene()
+            if scene is not prepared:
+                self._prepare(process, scene)
+                prepared = scene
+            try:
+                assignment = self._tasks.get(timeout=LOOK)
+            except Empty:
+                continue
+            if assignment is None:
+                break
             if assignment.begin():
                 assignment.end(self._planned(process, assignment))
-                self._prepare(process)
+                prepared = None
         process.close()
 
-    def _prepare(self, process: Process) -> None:
-        """Waits for it, without a plan that would have to wait too; what keeps it from starting the next plan says."""
+    def _prepare(self, process: Process, scene: PlanningScene) -> None:
+        """Waits for it and its scene, before a plan would have to; what keeps it from that the next plan says."""
         with suppress(TimeoutError, WorkerDied):
             process.be_ready()
             self.have_started = True
+            process.show(scene)
 
     def _planned(self, process: Process, assignment: Assignment) -> PlanResponse | None:
         """A plan in the scene as it is at the plan's end; None for one that was cancelled."""
@@ -120,8 +140,9 @@ class Workers:
             try:
                 process.be_ready(assignment.require_wanted)
                 scene = self._scene()
+                process.show(scene, assignment.require_wanted)
                 present, age = self._present()
-                response = process.plan(assignment, Job(request=request, present=present, age=age), scene, seconds)
+                response = process.plan(assignment, Job(request=request, present=present, age=age), seconds)
             except Cancelled:
                 return None
             except TimeoutError:
@@ -152,6 +173,5 @@ def _failed(message: str, remedy: str) -> PlanResponse:
     return PlanResponse(code=PlanCode.FAILURE, refusal=refusal)
 
 
-def _refused(subject: str, message: str, remedy: str) -> PlanResponse:
-    refusal = Refusal(check="request", subject=subject, message=message, remedy=remedy)
-    return PlanResponse(code=PlanCode.INVALID_GOAL_CONSTRAINTS, refusal=refusal)
+def _refused(subject: str, message: str, remedy: str) -> Refusal:
+    return Refusal(check="request", subject=subject, message=message, remedy=remedy)
