@@ -25,14 +25,19 @@ class Blockade:
     def __init__(self, arm: Arm, goals: Goals, surroundings: Surroundings) -> None:
         self._arm, self._goals, self._surroundings = arm, goals, surroundings
 
-    def goal(self, asked: Goal, goal: Start, start: Start, is_late: Callable[[], bool]) -> NoPlan:
-        """The refusal of a goal at which links touch, with the last free posture on the way, in the goal's own form."""
+    def goal(
+        self, asked: Goal, goal: Start, start: Start, is_late: Callable[[], bool], standing: Start | None = None
+    ) -> NoPlan:
+        """The refusal of a goal at which links touch, with the last free posture on the way, in the goal's own form.
+
+        `standing` as in `Goals.candidates`.
+        """
         last = last_free(self._surroundings, np.array(start), np.array(goal))
         values = dict(zip(self._arm.joint_names, (round(value, 4) for value in last.tolist()), strict=True))
         named = ", ".join(f"{joint.name} {values[joint.name]:g} {joint.unit}" for joint in self._arm.joints)
         match asked:
             case PoseGoal():
-                nearest = self._goals.shown_point(asked, start, last, is_late)
+                nearest = self._goals.shown_point(asked, standing or start, last, is_late)
             case JointGoal():
                 nearest = tuple(values[name] for name in asked.name)
             case NamedGoal() | WaypointGoal():

@@ -41,15 +41,18 @@ class Goals:
         """[s] that the slowest joint takes between two postures at full speed."""
         return self._ik.travel(np.array(first), np.array(second))
 
-    def candidates(self, goal: Goal, start: Start, is_late: Clock) -> Iterator[Start]:
-        """Postures that fulfil the goal, lazily; raises `NoPlan` where there is none."""
+    def candidates(self, goal: Goal, start: Start, is_late: Clock, standing: Start | None = None) -> Iterator[Start]:
+        """Postures that fulfil the goal, lazily; raises `NoPlan` where there is none.
+
+        A link's frame is where the arm has it when it stands in `standing`: at the start, where that is absent.
+        """
         match goal:
             case NamedGoal():
                 return iter([self._named(goal)])
             case JointGoal():
                 return iter([self._joints(goal, start)])
             case PoseGoal():
-                return self._poses(goal, start, is_late)
+                return self._poses(goal, self.frame(goal, standing or start), start, is_late)
             case WaypointGoal():
                 raise malformed(
                     INVALID, "goal", "this planner takes one goal at a time", "ask for the first point alone"
@@ -81,8 +84,7 @@ class Goals:
             if not joint.is_within(position):
                 raise beyond_limit(self._arm, joint, position, nearest)
 
-    def _poses(self, goal: PoseGoal, start: Start, is_late: Clock) -> Iterator[Start]:
-        frame = self.frame(goal, start)
+    def _poses(self, goal: PoseGoal, frame: Rigid, start: Start, is_late: Clock) -> Iterator[Start]:
         target = target_of(goal, frame)
         near = np.array(start)
         if not self.abilities.allows(target):

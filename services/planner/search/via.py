@@ -81,7 +81,7 @@ class Via:
         chosen = [start]
         for point in points_of(goal):
             touching: Start | None = None
-            for posture in self._goals.candidates(point, chosen[-1], is_late):
+            for posture in self._goals.candidates(point, chosen[-1], is_late, start):
                 if self._surroundings.keeps(posture, CLEARANCE):
                     chosen.append(posture)
                     break
@@ -89,7 +89,7 @@ class Via:
             else:
                 if touching is None:
                     raise timed_out()
-                raise self._blockade.goal(point, touching, chosen[-1], is_late)
+                raise self._blockade.goal(point, touching, chosen[-1], is_late, start)
         return chosen
 
     def _corners(self, motion: FreeMotion, postures: list[Start], errand: Errand) -> tuple[Array, str]:
