@@ -163,7 +163,7 @@ class Workers:
             value=assignment.elapsed,
             limit=allowed,
             message=f"the plan was stopped {assignment.words}: {allowed:g} s were allowed",
-            remedy="allow more time, or ask for a goal nearer to where the arm is",
+            remedy="allow more time, a larger scaling, or a goal nearer to where the arm is",
         )
         return PlanResponse(code=PlanCode.TIMED_OUT, refusal=refusal, scene_version=self._scene().version)
 
