@@ -66,7 +66,9 @@ class Planner:
         self.surroundings.newest = world
 
     def prepare(self) -> None:
-        """Does now what the first search would wait for: seconds, in which the links are filled with spheres."""
+        """Does now what the first plan in the newest world would wait for: seconds, in which the links are filled with
+        spheres, and a large mesh with distances."""
+        self.surroundings.begin()
         self.surroundings.core(CLEARANCE)
 
     def plan(

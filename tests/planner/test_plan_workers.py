@@ -7,22 +7,26 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from queue import SimpleQueue
 
+import numpy as np
 import psutil
 import pytest
 
+from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Timing
-from schemas.scene import BoxShape, PlanningScene, SceneObject
+from schemas.scene import BoxShape, MeshShape, PlanningScene, SceneObject
 from services.arm.description import load_arm
 from services.planner.core import Planner
 from services.planner.workers import worker
 from services.planner.workers import workers as module
 from services.planner.workers.jobs import Job
+from services.planner.workers.process import Process
 from services.planner.workers.workers import Workers
+from tests.planner.native.scenes import star_mesh, stl_of
 
 PROJECT = Path(__file__).parents[2]
 HOME = JointState(name=("brazo_joint", "antebrazo_joint", "efector_joint"), position=(0.0, 0.0, 0.0))
@@ -78,6 +82,35 @@ def test_a_change_of_the_scene_reaches_the_process(stack: Stack):
     response = stack.answer()
     assert response.code is PlanCode.START_STATE_IN_COLLISION
     assert response.scene_version == 2
+
+
+def test_a_large_mesh_costs_no_plan_its_time(stack: Stack):
+    """Loading it takes longer than is allowed: it is done when the scene changes, or before the plan's time begins."""
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    mesh = star_mesh(np.random.default_rng(1), rings=224, sectors=224)
+    rock = SceneObject(name="rock", shape=MeshShape(data=stl_of(mesh)), pose=Transform(translation=(0.0, 0.0, 3.0)))
+    stack.scene = PlanningScene(version=2, objects=(rock,))
+    stack.ask(EASY)
+    response = stack.answer()
+    assert response.code is PlanCode.SUCCESS
+    assert response.scene_version == 2
+
+
+def test_a_change_of_the_scene_reaches_a_process_that_has_nothing_to_do(stack: Stack, monkeypatch: pytest.MonkeyPatch):
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    shown: SimpleQueue[PlanningScene] = SimpleQueue()
+    show = Process.show
+
+    def seen(process: Process, scene: PlanningScene, *others: Callable[[], None]) -> None:
+        show(process, scene, *others)
+        shown.put(scene)
+
+    monkeypatch.setattr(Process, "show", seen)
+    stack.scene = PlanningScene(version=2)
+    while shown.get(timeout=PATIENCE) is not stack.scene:
+        pass
 
 
 def test_a_change_while_a_process_plans_is_planned_for_again(stack: Stack):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import struct
 import time
 from collections.abc import Iterator
 from functools import cache
@@ -27,7 +26,7 @@ from services.planner.search.search import KNOWN
 from services.planner.timing.profile import joint_limits
 from services.planner.verify.verify import limit_shares, require_ends, sample
 from tests.planner.native.coal_truth import Truth
-from tests.planner.native.scenes import star_mesh
+from tests.planner.native.scenes import star_mesh, stl_of
 
 ARMS = ("rm1", "parol6")
 DENSER = 100  # samples between two points: ten times as many as the planner looks at
@@ -199,12 +198,11 @@ def test_a_mesh_of_a_hundred_thousand_triangles_is_gone_around(planner: Planner)
     request = between(planner)
     (post,) = planner.surroundings.newest.scene.objects
     mesh = star_mesh(np.random.default_rng(1), rings=224, sectors=224)
-    facets = np.zeros(len(mesh.faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
-    facets["corners"] = mesh.vertices[mesh.faces]
-    content = bytes(80) + struct.pack("<I", len(facets)) + facets.tobytes()
-    rock = msgspec.structs.replace(post, name="rock", shape=MeshShape(data=content, scale=(0.4, 0.4, 0.4)))
+    rock = msgspec.structs.replace(post, name="rock", shape=MeshShape(data=stl_of(mesh), scale=(0.4, 0.4, 0.4)))
     show(planner, PlanningScene(version=10, objects=(rock,)))
-    response = planner.plan(request, None)
+    planner.prepare()
+    request = msgspec.structs.replace(request, allowed_time=PlanRequest(goal=request.goal).allowed_time)
+    response = planner.plan(request, None, clock=time.process_time)
     require_sound(planner, request, response, looks=40)  # each takes the other checker a tenth of a second
     assert response.planner_id != "straight"
 

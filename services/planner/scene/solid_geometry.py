@@ -36,12 +36,10 @@ def geometry_of(shape: Shape) -> coal.CollisionGeometry:
 @lru_cache(maxsize=64)
 def tree_of(mesh: Mesh) -> coal.BVHModelOBBRSS:
     """The mesh's surface as a tree of boxes: built once for as long as it is among the newest."""
-    vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    vertices.extend(list(mesh.vertices))
-    triangles.extend([coal.Triangle(*face) for face in mesh.faces.tolist()])
     tree = coal.BVHModelOBBRSS()
-    tree.beginModel(len(triangles), len(vertices))
-    tree.addSubModel(vertices, triangles)
+    tree.beginModel(len(mesh.faces), len(mesh.vertices))
+    tree.addVertices(mesh.vertices)
+    tree.addTriangles(mesh.faces.astype(np.int64))
     tree.endModel()
     if tree.num_tris != len(mesh.faces):
         raise ValueError(f"coal took {tree.num_tris} of {len(mesh.faces)} triangles")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,6 +42,13 @@ def box_mesh(rng: np.random.Generator) -> Mesh:
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
     return Mesh(corners, np.array(faces, dtype=np.int32))
+
+
+def stl_of(mesh: Mesh) -> bytes:
+    """The mesh as a binary STL file."""
+    facets = np.zeros(len(mesh.faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+    facets["corners"] = mesh.vertices[mesh.faces]
+    return bytes(80) + struct.pack("<I", len(facets)) + facets.tobytes()
 
 
 def star_mesh(rng: np.random.Generator, rings: int = 8, sectors: int = 12) -> Mesh:
