@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pytest
 
 from services.arm.check import Severity, check
-
-
-@pytest.fixture
-def copy(rm1_folder: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(rm1_folder, tmp_path / "rm1"))
-
-
-def edit(file: Path, old: str, new: str) -> None:
-    text = file.read_text()
-    assert old in text
-    file.write_text(text.replace(old, new, 1))
+from tests.arm.editing import edit
 
 
 def test_rm1_is_clean(rm1_folder: Path):

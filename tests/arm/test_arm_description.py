@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 import warnings
 from pathlib import Path
 
@@ -12,17 +11,7 @@ import pytest
 
 from services.arm.description import Arm, load_arm
 from services.arm.errors import DescriptionError
-
-
-@pytest.fixture
-def copy(rm1_folder: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(rm1_folder, tmp_path / "rm1"))
-
-
-def edit(file: Path, old: str, new: str) -> None:
-    text = file.read_text()
-    assert old in text
-    file.write_text(text.replace(old, new, 1))
+from tests.arm.editing import edit
 
 
 def test_rm1_is_what_the_seed_says(rm1: Arm):

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
 from fractions import Fraction
 from functools import reduce
@@ -23,6 +20,7 @@ from services.arm.check import check
 from services.arm.description import load_arm
 from services.arm.kinematics import Kinematics
 from services.arm.speed import speed_limits
+from tests.urdf.nearness import nearest_distances
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")
 KINEMATICS = Kinematics(ARM)
@@ -159,7 +157,7 @@ def test_every_named_state_is_within_limits_and_free():
 
 def test_excused_pairs_never_come_near_and_checked_pairs_sometimes_touch():
     """What the SRDF says, by sampling: "Never" is never, and what is checked is worth checking."""
-    nearest = nearest_distances(4000)
+    nearest = nearest_distances(ARM, postures(4000))
     never = {frozenset(p) for p in combinations(LINKS, 2)} - {frozenset(p) for p in pairwise(LINKS)}
     checked = {pair for pair in never if pair not in ARM.disabled_collisions}
     assert {frozenset(pair) for pair in KINEMATICS.collisions.pairs} == checked
@@ -167,23 +165,8 @@ def test_excused_pairs_never_come_near_and_checked_pairs_sometimes_touch():
     assert {tuple(sorted(pair)) for pair in checked if nearest[pair] > 0.0} == set()
 
 
-def nearest_distances(count: int) -> dict[frozenset[str], float]:
-    """[m] of every pair of links over random postures, half of them with some joints at a limit."""
-    model = pin.buildModelFromUrdf(str(ARM.urdf_path))
-    geometry = pin.buildGeomFromUrdf(model, str(ARM.urdf_path), pin.GeometryType.COLLISION)
-    links = [model.frames[shape.parentFrame].name for shape in geometry.geometryObjects]
-    geometry.addAllCollisionPairs()
-    data, geometry_data = model.createData(), geometry.createData()
-    nearest: dict[frozenset[str], float] = {}
-    for q in postures(count):
-        pin.computeDistances(model, data, geometry, geometry_data, q)
-        for pair, result in zip(geometry.collisionPairs, geometry_data.distanceResults, strict=True):
-            key = frozenset((links[pair.first], links[pair.second]))
-            nearest[key] = min(nearest.get(key, 1.0), result.min_distance)
-    return nearest
-
-
 def postures(count: int) -> np.ndarray:
+    """(count, n) at random, every other one with some joints at a limit."""
     generator = np.random.default_rng(7)
     lower, upper = np.array([(joint.lower, joint.upper) for joint in ARM.joints]).T
     inside = generator.uniform(lower, upper, (count, len(lower)))
@@ -195,27 +178,12 @@ def test_the_check_finds_nothing():
     assert check(ARM.folder) == []
 
 
-def test_the_meshes_are_small_and_drawn_within_the_links_shapes():
+def test_the_meshes_are_drawn_within_the_links_shapes():
     shapes = shape_bounds()
     for link in LINKS:
-        mesh = ARM.folder / "meshes" / f"{link}.glb"
-        assert mesh.stat().st_size < 150_000
-        low, high = trimesh.load(mesh).bounds
+        low, high = trimesh.load(ARM.folder / "meshes" / f"{link}.glb").bounds
         assert (low > shapes[link][0] - 1e-3).all(), link
         assert (high < shapes[link][1] + 1e-3).all(), link
-
-
-def test_the_meshes_are_what_their_script_draws(tmp_path: Path):
-    command = [sys.executable, "-m", "urdf.parol6.make_meshes", str(tmp_path)]
-    subprocess.run(command, cwd=ARM.folder.parents[1], check=True, capture_output=True)
-    names = sorted(path.name for path in (ARM.folder / "meshes").iterdir())
-    assert names == sorted(path.name for path in tmp_path.iterdir())
-    for name in names:
-        assert (tmp_path / name).stat().st_size == (ARM.folder / "meshes" / name).stat().st_size
-
-
-def test_nothing_refers_to_a_ros_package():
-    assert not re.search(r"package://|file://", ARM.urdf_path.read_text())
 
 
 def test_the_readme_shows_the_dh_table():
