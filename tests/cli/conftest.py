@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -34,6 +33,7 @@ from services.planner.core import Planner
 from services.runtime.actions import accept, refuse
 from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
+from tests.runtime.support import spinning
 
 MOVE_TIME = 0.4  # [s] that every goal takes here
 
@@ -114,28 +114,23 @@ def deployment(tmp_path: Path) -> Deployment:
 def gateway(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[PretendGateway]:
     with Node("stepper_gateway", deployment, robot="rm1", bus=MemoryBus(network)) as node:
         made = PretendGateway(node, arm)
-        thread = threading.Thread(target=lambda: node.spin(made.step, rate=50.0))
-        thread.start()
-        yield made
-        node.stop()
-        thread.join()
+        with spinning(node, made.step):
+            yield made
 
 
 @pytest.fixture
 def planner(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[None]:
     core = Planner(arm)
     home = JointState(name=arm.joint_names, position=(0.0,) * len(arm.joints))
+    core.plan(PlanRequest(), home)  # the first one loads libraries, which may take longer than a caller waits
 
     def plan(request: PlanRequest) -> PlanResponse:
         return core.plan(request, home)
 
     with Node("planner", deployment, robot="rm1", bus=MemoryBus(network)) as node:
         node.serve(PLAN, plan)
-        thread = threading.Thread(target=lambda: node.spin(lambda now: None, rate=10.0))
-        thread.start()
-        yield
-        node.stop()
-        thread.join()
+        with spinning(node, rate=10.0):
+            yield
 
 
 @pytest.fixture

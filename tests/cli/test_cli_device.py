@@ -28,17 +28,15 @@ from services.cli.main import run
 from services.runtime.memory_bus import MemoryBus
 from services.runtime.node import Node
 from tests.cli.pretend_device import PretendDevice
+from tests.runtime.support import spinning
 
 
 @pytest.fixture
 def rm1_device(arm, network, deployment):
     with Node("stepper_gateway", deployment, robot="rm1", bus=MemoryBus(network)) as node:
         made = PretendDevice(node, arm)
-        thread = threading.Thread(target=lambda: node.spin(made.step, rate=50.0))
-        thread.start()
-        yield made
-        node.stop()
-        thread.join()
+        with spinning(node, made.step):
+            yield made
 
 
 def test_homing_tells_the_way_of_every_joint_and_ends_with_zero(session, rm1_device, capsys):
