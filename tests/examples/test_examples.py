@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 
@@ -18,7 +17,7 @@ from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryG
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, JOINT_TARGETS, STATIC_FRAMES
 from services.runtime.actions import ActionServer, GoalDecision, accept
 from services.runtime.node import Node
-from tests.runtime.support import ROOT, RouterProcess, spinning, until
+from tests.runtime.support import ROOT, RouterProcess, programs, spinning, until
 
 EXAMPLES = sorted(path.name for path in (ROOT / "examples").glob("*.py"))
 LONGEST = {"pick_and_place.py": 80}  # lines that do something
@@ -36,20 +35,8 @@ def router(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RouterProcess]:
 
 @pytest.fixture
 def start(router: RouterProcess) -> Iterator[Start]:
-    started: list[subprocess.Popen[str]] = []
-
-    def start_example(name: str) -> subprocess.Popen[str]:
-        process = subprocess.Popen(
-            [sys.executable, f"examples/{name}"], cwd=ROOT, env=router.environ, text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        )  # fmt: skip
-        started.append(process)
-        return process
-
-    yield start_example
-    for process in started:
-        process.kill()
-        process.communicate()
+    with programs(router) as run:
+        yield lambda name: run(f"examples/{name}")
 
 
 @pytest.fixture

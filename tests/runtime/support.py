@@ -125,3 +125,22 @@ def spinning(node: Node, step: Callable[[int], object] = lambda now: None, rate:
     thread.join(timeout=3.0)
     assert not thread.is_alive(), "the loop did not stop"
     assert not failures, failures
+
+
+@contextmanager
+def programs(router: RouterProcess) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Starts Python programs by their arguments, with more environment where that is given; ends all of them."""
+    started: list[subprocess.Popen[str]] = []
+
+    def start(*arguments: str, **environ: str) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [sys.executable, *arguments], cwd=ROOT, env=router.environ | environ, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import pytest
 
 from schemas.topics import JOINT_STATES
 from services.runtime.node import Node
-from tests.runtime.support import ROOT, RouterProcess, until
+from tests.runtime.support import ROOT, RouterProcess, programs, until
 
 PROMPT = 3.0  # [s] within which every process ends after SIGTERM
 
@@ -31,22 +32,15 @@ Start = Callable[..., subprocess.Popen[str]]
 
 @pytest.fixture
 def start(router: RouterProcess, tmp_path: Path) -> Iterator[Start]:
-    started: list[subprocess.Popen[str]] = []
+    numbers = itertools.count()
+    with programs(router) as run:
 
-    def start_program(text: str, *arguments: str, **environ: str) -> subprocess.Popen[str]:
-        file = tmp_path / f"program_{len(started)}.py"
-        file.write_text(HEAD + textwrap.dedent(text), encoding="utf-8")
-        process = subprocess.Popen(
-            [sys.executable, str(file), *arguments], cwd=ROOT, env=router.environ | environ, text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        )  # fmt: skip
-        started.append(process)
-        return process
+        def start_program(text: str, *arguments: str, **environ: str) -> subprocess.Popen[str]:
+            file = tmp_path / f"program_{next(numbers)}.py"
+            file.write_text(HEAD + textwrap.dedent(text), encoding="utf-8")
+            return run(str(file), *arguments, **environ)
 
-    yield start_program
-    for process in started:
-        process.kill()
-        process.communicate()
+        yield start_program
 
 
 def await_line(process: subprocess.Popen[str], wanted: str) -> None:
