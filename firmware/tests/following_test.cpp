@@ -10,13 +10,6 @@ using namespace rig;
 
 namespace {
 
-DeviceConfig open_field() {
-    DeviceConfig config = wired_joints();
-    config.joint[0].homing.position_q8 = -90000 * 256;
-    config.joint[1].homing.position_q8 = 90000 * 256;
-    return config;
-}
-
 void expect_within_limits(const Wired& wired) {
     for (size_t j = 0; j < 2; ++j) {
         EXPECT_LE(wired.fastest(j), 4000 * 1.01);

@@ -1,38 +1,13 @@
 #include "rig.h"
 
-#include <cstring>
-
 #include "bytes.h"
+#include "plain_joints.h"
 
 namespace rig {
-namespace {
-
-gemelo::JointConfig joint(const char* name, bool inverted) {
-    gemelo::JointConfig config{};
-    std::strncpy(config.name, name, sizeof config.name - 1);
-    config.lower_q8 = -100000 * 256;
-    config.upper_q8 = 100000 * 256;
-    config.max_velocity_q8 = 4000 * 256;
-    config.max_acceleration_q8 = 4000 * 256;
-    config.dir_setup_us = 5;
-    config.is_inverted = inverted;
-    return config;
-}
-
-}  // namespace
 
 gemelo::DeviceConfig two_joints() {
-    gemelo::DeviceConfig config{};
-    std::strncpy(config.name, "bench", sizeof config.name - 1);
-    config.tick_hz = 50000;
-    config.queue_capacity = 128;
-    config.state_hz = 50;
-    config.sensor_hz = 10;
-    config.is_armed_at_boot = 1;
-    config.hold_timeout_ms = 500;
-    config.joints = 2;
-    config.joint[0] = joint("q1", false);
-    config.joint[1] = joint("q2", true);
+    gemelo::DeviceConfig config = plain_joints("bench", 4000);
+    config.joint[1].is_inverted = true;
     return config;
 }
 

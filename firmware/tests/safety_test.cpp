@@ -19,14 +19,6 @@ void move(Wired& wired) {
 
 Mode mode_in_state(const Wired& wired) { return static_cast<Mode>(wired.state[16]); }
 
-// A switch of q1's upper end and of q2's, at far places, so that nothing closes by itself.
-DeviceConfig open_field() {
-    DeviceConfig config = wired_joints();
-    config.joint[0].homing.position_q8 = -90000 * 256;
-    config.joint[1].homing.position_q8 = 90000 * 256;
-    return config;
-}
-
 ChunkSpec start_chunk() {
     ChunkSpec chunk;
     chunk.first = true;

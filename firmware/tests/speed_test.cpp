@@ -11,10 +11,8 @@ using namespace rig;
 
 namespace {
 
-DeviceConfig open_field() {
-    DeviceConfig config = wired_joints();
-    config.joint[0].homing.position_q8 = -90000 * 256;
-    config.joint[1].homing.position_q8 = 90000 * 256;
+DeviceConfig quintic_field() {
+    DeviceConfig config = open_field();
     for (JointConfig& joint : config.joint) joint.max_acceleration_q8 = 4000 * 256;  // as quintic() has it
     return config;
 }
@@ -23,7 +21,7 @@ const Motion kLong = quintic({0, 0}, {6000, -3500});
 
 // Plays kLong, fed a second ahead, and watches that the path is not left.
 struct Player {
-    Wired wired{open_field(), {0, 0}, true};
+    Wired wired{quintic_field(), {0, 0}, true};
     size_t next = 0;
     uint32_t seq = 0;
     double farthest = 0;
@@ -163,7 +161,7 @@ TEST(Speed, AtZeroCanBeStoppedAndHeld) {
 }
 
 TEST(Speed, BoundsTextModeToo) {
-    Wired wired(open_field(), {0, 0}, true);
+    Wired wired(quintic_field(), {0, 0}, true);
     EXPECT_EQ(wired.command(Command::Speed, 250), Code::Ok);
     ASSERT_EQ(wired.follow(5000, 0), Code::Ok);
     wired.run_ms(2000);

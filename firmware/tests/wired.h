@@ -11,29 +11,23 @@
 #include "bytes.h"
 #include "frames.h"
 #include "machine.h"
+#include "plain_joints.h"
 
 namespace rig {
 
 constexpr uint8_t kButton = 0, kHome1 = 1, kEnd2 = 2, kUpper1 = 3;  // the inputs of wired_joints()
 
-inline gemelo::JointConfig wired_joint(const char* name, uint8_t input, int direction, int32_t position) {
-    gemelo::JointConfig joint{};
-    std::strncpy(joint.name, name, sizeof joint.name - 1);
-    joint.lower_q8 = -100000 * 256;
-    joint.upper_q8 = 100000 * 256;
-    joint.max_velocity_q8 = 4000 * 256;
-    joint.max_acceleration_q8 = 8000 * 256;
-    joint.dir_setup_us = 5;
-    joint.homing = gemelo::HomingConfig{};
-    joint.homing.input = input;
-    joint.homing.direction = static_cast<int8_t>(direction);
-    joint.homing.fast_q8 = 2000 * 256;
-    joint.homing.slow_q8 = 150 * 256;
-    joint.homing.back_off_q8 = 60 * 256;
-    joint.homing.position_q8 = position * 256;
-    joint.homing.max_travel_q8 = 12000 * 256;
-    joint.homing.timeout_ms = 30000;
-    return joint;
+inline gemelo::HomingConfig wired_homing(uint8_t input, int direction, int32_t position) {
+    gemelo::HomingConfig homing{};
+    homing.input = input;
+    homing.direction = static_cast<int8_t>(direction);
+    homing.fast_q8 = 2000 * 256;
+    homing.slow_q8 = 150 * 256;
+    homing.back_off_q8 = 60 * 256;
+    homing.position_q8 = position * 256;
+    homing.max_travel_q8 = 12000 * 256;
+    homing.timeout_ms = 30000;
+    return homing;
 }
 
 inline gemelo::InputConfig wired_input(const char* name, uint8_t pin, gemelo::InputRole role, uint8_t joint,
@@ -50,17 +44,9 @@ inline gemelo::InputConfig wired_input(const char* name, uint8_t pin, gemelo::In
 // q1 finds home_1 downwards at -5000; q2 finds its upper end upwards at 3000, with an inverted switch on a high pin.
 inline gemelo::DeviceConfig wired_joints() {
     using namespace gemelo;
-    DeviceConfig config{};
-    std::strncpy(config.name, "wired", sizeof config.name - 1);
-    config.tick_hz = 50000;
-    config.queue_capacity = 128;
-    config.state_hz = 50;
-    config.sensor_hz = 10;
-    config.is_armed_at_boot = 1;
-    config.hold_timeout_ms = 500;
-    config.joints = 2;
-    config.joint[0] = wired_joint("q1", kHome1, -1, -5000);
-    config.joint[1] = wired_joint("q2", kEnd2, 1, 3000);
+    DeviceConfig config = plain_joints("wired", 8000);
+    config.joint[0].homing = wired_homing(kHome1, -1, -5000);
+    config.joint[1].homing = wired_homing(kEnd2, 1, 3000);
     config.inputs = 4;
     config.input[kButton] = wired_input("stop_button", 0, InputRole::EStop, kNone, true);
     config.input[kHome1] = wired_input("home_1", 4, InputRole::Home, 0, false);
@@ -70,6 +56,14 @@ inline gemelo::DeviceConfig wired_joints() {
     std::strncpy(config.output[0].name, "avanzar", gemelo::kNameSize - 1);
     std::strncpy(config.output[1].name, "laser", gemelo::kNameSize - 1);
     config.output[1].at_boot = config.output[1].is_off_at_estop = 1;
+    return config;
+}
+
+// The same with the places of its switches far away, so that nothing closes by itself.
+inline gemelo::DeviceConfig open_field() {
+    gemelo::DeviceConfig config = wired_joints();
+    config.joint[0].homing.position_q8 = -90000 * 256;
+    config.joint[1].homing.position_q8 = 90000 * 256;
     return config;
 }
 

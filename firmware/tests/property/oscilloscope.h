@@ -27,7 +27,6 @@ class Oscilloscope {
     // Pulses forwards less pulses backwards.
     int64_t count(uint8_t joint) const { return line_[joint].count; }
     uint64_t pulses() const { return pulses_; }
-    bool is_any_high() const { return before_.step != 0; }
     // Since forget(): when STEP rose, and whether DIR turned.
     const std::vector<Rise>& rises(uint8_t joint) const { return line_[joint].rises; }
     bool has_turned(uint8_t joint) const { return line_[joint].has_turned; }

@@ -46,7 +46,6 @@ class Stand {
     void beat();
 
     uint64_t now_us() const;
-    uint64_t slot_us() const { return slot_us_; }
     gemelo::Mode mode() const { return machine.mode(); }
     int events(const std::string& name) const { return events_.count(name) ? events_.at(name) : 0; }
     // Of all changes of pins so far; and of all words, but for the counter of refused frames.
