@@ -1,6 +1,7 @@
 #include "config_text.h"
 
 #include "crc32.h"
+#include "phrase.h"
 #include "record_reader.h"
 
 namespace gemelo {

@@ -8,8 +8,6 @@ namespace {
 // Slots from a ramp's last movement to the last pulse of it and the reading of the switch there.
 constexpr uint8_t kSettled = 4;
 
-int64_t fine(int32_t q8) { return static_cast<int64_t>(q8) * (kFineStep / 256); }
-
 }  // namespace
 
 void Homing::begin(const DeviceConfig& config, Stepper& stepper, Ramp* ramps) {
@@ -86,8 +84,6 @@ FaultCode Homing::advance(uint8_t joint) {
                 arrived_ = static_cast<uint16_t>(arrived_ | 1u << joint);
             }
             break;
-        case Phase::Waiting:
-            break;
     }
     return FaultCode::None;
 }
@@ -98,7 +94,7 @@ void Homing::approach(uint8_t joint) {
     const HomingConfig& own = homing(joint);
     stepper_->forget(own.input);
     // Farther than it may travel, so that it does not slow down before.
-    const int64_t far = 4 * fine(own.max_travel_q8);
+    const int64_t far = 4 * as_q20(own.max_travel_q8);
     if (way_[joint].phase == Phase::BackingOff) {
         enter(joint, Phase::Slow, own.direction, far, own.slow_q8);
     } else if (is_active(joint)) {
@@ -121,12 +117,12 @@ void Homing::leave_switch(uint8_t joint, Phase phase) {
     const HomingConfig& own = homing(joint);
     way_[joint].closed_at = stepper_->closed_at(own.input);
     enter(joint, phase, 0, 0, own.fast_q8);
-    ramp_[joint].go(way_[joint].closed_at * kFineStep - own.direction * fine(own.back_off_q8));
+    ramp_[joint].go(way_[joint].closed_at * kFineStep - own.direction * as_q20(own.back_off_q8));
 }
 
 bool Homing::has_travelled(uint8_t joint) const {
     const int64_t travelled = ramp_[joint].position_q20() - way_[joint].began_q20;
-    return (travelled < 0 ? -travelled : travelled) >= fine(homing(joint).max_travel_q8);
+    return (travelled < 0 ? -travelled : travelled) >= as_q20(homing(joint).max_travel_q8);
 }
 
 bool Homing::stands(uint8_t joint) {

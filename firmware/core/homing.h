@@ -36,7 +36,7 @@ class Homing {
     uint32_t own_inputs() const { return own_inputs_; }
 
   private:
-    enum class Phase : uint8_t { Waiting, Releasing, Fast, BackingOff, Slow, Leaving };
+    enum class Phase : uint8_t { Releasing, Fast, BackingOff, Slow, Leaving };
     struct Way {
         Phase phase;
         uint8_t still;      // slots that the ramp has stood

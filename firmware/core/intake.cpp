@@ -5,12 +5,13 @@
 namespace gemelo {
 
 void Machine::receive(const Arrival& arrival, uint64_t now_us) {
-    now_us_ = now_us;
     const Frame frame = open_frame(arrival.bytes, arrival.size);
-    if (!frame.is_valid()) {
-        ++bad_frames_;
-        return;
-    }
+    if (!frame.is_valid()) return count_bad_frame();
+    receive(frame, arrival, now_us);
+}
+
+void Machine::receive(const Frame& frame, const Arrival& arrival, uint64_t now_us) {
+    now_us_ = now_us;
     switch (frame.type()) {
         case FrameType::Traj:
             return receive_chunk(frame, arrival);
@@ -55,8 +56,7 @@ Verdict Machine::judge(const Chunk& chunk, const Arrival& arrival) const {
     if (chunk.knots() > path_.space()) return refuse(Code::NoSpace, chunk.knots(), path_.space());
     Knot before = path_.newest();
     if (chunk.is_first()) {
-        for (uint8_t j = 0; j < rules_.joints; ++j)
-            before.position[j] = static_cast<int32_t>((present().position_q20[j] + 2048) >> 12);
+        for (uint8_t j = 0; j < rules_.joints; ++j) before.position[j] = as_q8(present().position_q20[j]);
     }
     return check_knots(chunk, rules_, before);
 }

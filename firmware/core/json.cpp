@@ -1,5 +1,7 @@
 #include "json.h"
 
+#include "digits.h"
+
 namespace gemelo {
 
 void JsonWriter::put(char c) {
@@ -16,17 +18,9 @@ void JsonWriter::put_escaped(char c) {
     put(static_cast<uint8_t>(c) < 0x20 ? '?' : c);
 }
 
-// In 32 bits as soon as they do: the chip has no division of 64.
 void JsonWriter::put_number(uint64_t number) {
-    char digits[20];
-    int count = 0;
-    for (; number > UINT32_MAX; number /= 10) digits[count++] = static_cast<char>('0' + number % 10);
-    uint32_t rest = static_cast<uint32_t>(number);
-    do {
-        digits[count++] = static_cast<char>('0' + rest % 10);
-        rest /= 10;
-    } while (rest != 0);
-    while (count > 0) put(digits[--count]);
+    char digits[kDigitsSize];
+    put(digits_of(number, digits));
 }
 
 void JsonWriter::key(const char* name) {

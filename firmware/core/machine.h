@@ -45,6 +45,8 @@ class Machine {
     void restart();
 
     void receive(const Arrival& arrival, uint64_t now_us);
+    // The same where the frame has been opened already.
+    void receive(const Frame& frame, const Arrival& arrival, uint64_t now_us);
     // The text of a configuration.
     void receive_config(const Arrival& arrival, uint64_t now_us);
     bool takes_config() const;
@@ -57,9 +59,10 @@ class Machine {
     // The platform is about to stop: slow down along the path.
     void halt();
 
-    // For what stands before the machine on a line: what it could not read, and what it says itself.
+    // For what stands around the machine: what it could not read, and what it says itself.
     void count_bad_frame() { ++bad_frames_; }
     void report_text_lost(uint32_t lines);
+    void event(const char* name, const char* detail = "");
     void say(Output output, const uint8_t* bytes, size_t size) const { reporter_.say(output, bytes, size); }
 
     const DeviceConfig& config() const { return *config_; }
@@ -146,7 +149,6 @@ class Machine {
     void report_due();
     void report_state(const Point& point);
     void report_sensors();
-    void event(const char* name, const char* detail = "");
     bool is_at_rest() const { return is_still_ && stepper_.is_quiet(); }
     uint16_t all_joints() const { return static_cast<uint16_t>((1u << rules_.joints) - 1); }
     uint32_t speed_q30() const;

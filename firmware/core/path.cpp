@@ -135,8 +135,7 @@ void Path::advance(uint32_t bound_q30, Point* point) {
     if (!is_active_) return;
     const uint32_t u_q24 = segment_.dt_us == 0 ? 0 : segment_.share(elapsed_, kUnitBits);
     for (uint8_t j = 0; j < joints_; ++j) {
-        point->position_q20[j] =
-            segment_.dt_us == 0 ? static_cast<int64_t>(from_.position[j]) * 4096 : segment_.cubic[j].at(u_q24);
+        point->position_q20[j] = segment_.dt_us == 0 ? as_q20(from_.position[j]) : segment_.cubic[j].at(u_q24);
     }
 }
 

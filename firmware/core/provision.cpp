@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "phrase.h"
 #include "record_reader.h"
 
 namespace gemelo {

@@ -1,9 +1,11 @@
 // Motion that is no stream: homing, and text mode's going to the newest target.
 #include "machine.h"
-#include "sentence.h"
+#include "phrase.h"
 
 namespace gemelo {
 namespace {
+
+constexpr size_t kDetailSize = kNameSize + 48;
 
 const char* sentence_of(FaultCode fault) {
     switch (fault) {
@@ -62,9 +64,9 @@ void Machine::watch_homing() {
     }
     const Mishap mishap = homing_.advance();
     if (mishap.fault != FaultCode::None) {
-        Sentence detail;
-        detail.add(config_->joint[mishap.joint].name).add(": ").add(sentence_of(mishap.fault));
-        return fail(mishap.fault, detail.text(), mishap.joint);
+        char detail[kDetailSize];
+        Phrase(detail, sizeof detail).add(config_->joint[mishap.joint].name).add(": ").add(sentence_of(mishap.fault));
+        return fail(mishap.fault, detail, mishap.joint);
     }
     if (homing_.arrived() != 0) note_homed();
     if (homing_.is_over()) finish_homing();
@@ -76,10 +78,11 @@ void Machine::note_homed() {
         const int32_t correction = homing_.correction(j);
         shift(j, correction);
         referenced_ = static_cast<uint16_t>(referenced_ | 1u << j);
-        Sentence detail;
-        detail.add(config_->joint[j].name);
-        if ((was_referenced_ >> j) & 1) detail.add(": ").add(correction).add(" steps off");
-        event("homed", detail.text());
+        char detail[kDetailSize];
+        Phrase phrase(detail, sizeof detail);
+        phrase.add(config_->joint[j].name);
+        if ((was_referenced_ >> j) & 1) phrase.add(": ").add_signed(correction).add(" steps off");
+        event("homed", detail);
     }
 }
 
@@ -110,7 +113,7 @@ Code Machine::follow(const int32_t* target_q8, uint64_t now_us) {
     is_following_ = true;
     mode_ = Mode::Run;
     bound_ramps();
-    for (uint8_t j = 0; j < rules_.joints; ++j) ramp_[j].go(static_cast<int64_t>(target_q8[j]) * 4096);
+    for (uint8_t j = 0; j < rules_.joints; ++j) ramp_[j].go(as_q20(target_q8[j]));
     return Code::Ok;
 }
 

@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "phrase.h"
+
 namespace gemelo {
 namespace {
 

@@ -43,7 +43,7 @@ struct StateReport {
     uint64_t play_us;
     uint32_t underruns, refused, bad_frames;
     uint16_t inputs;        // bit i: input i is active
-    uint8_t flags;          // kArmed, ...
+    uint8_t flags;          // bit 0: armed
     uint8_t fault_joint;    // or kNoJoint
     uint16_t outputs;       // bit i: output i is on
     uint16_t referenced;    // bit j: the place of joint j is known

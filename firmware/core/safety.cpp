@@ -146,7 +146,7 @@ Code Machine::reference(const Frame& frame, uint16_t joints) {
         const int32_t position_q8 = load_i32(frame.bytes + kCommandSize + 4 * j);
         const JointLimits& limits = rules_.limits[j];
         if (position_q8 < limits.lower_q8 || position_q8 > limits.upper_q8) return Code::PositionLimit;
-        position_q20[j] = static_cast<int64_t>(position_q8) * 4096;
+        position_q20[j] = as_q20(position_q8);
     }
     place(position_q20);
     referenced_ = static_cast<uint16_t>(referenced_ | chosen);

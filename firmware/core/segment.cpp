@@ -20,11 +20,11 @@ int64_t covered_q20(int32_t v_q8, uint32_t dt_us) {
 }  // namespace
 
 Cubic make_cubic(int32_t p0_q8, int32_t v0_q8, int32_t p1_q8, int32_t v1_q8, uint32_t dt_us) {
-    const int64_t distance = (static_cast<int64_t>(p1_q8) - p0_q8) * 4096;
+    const int64_t distance = as_q20(p1_q8) - as_q20(p0_q8);
     const int64_t m0 = covered_q20(v0_q8, dt_us);
     const int64_t m1 = covered_q20(v1_q8, dt_us);
     Cubic cubic;
-    cubic.origin_q20 = static_cast<int64_t>(p0_q8) * 4096;
+    cubic.origin_q20 = as_q20(p0_q8);
     cubic.c1 = m0;
     cubic.c2 = 3 * distance - 2 * m0 - m1;
     cubic.c3 = m0 + m1 - 2 * distance;

@@ -11,6 +11,10 @@ constexpr uint8_t kUnitBits = 24;  // the parameter u in [0, 1] is Q24
 constexpr uint8_t kFineBits = 20;  // positions on the path are Q20 steps in 64 bits
 constexpr int64_t kFineStep = 1ll << kFineBits;
 
+// Steps from Q24.8 to Q20, exactly, and to the nearest Q24.8.
+constexpr int64_t as_q20(int32_t q8) { return static_cast<int64_t>(q8) * (kFineStep / 256); }
+constexpr int32_t as_q8(int64_t q20) { return static_cast<int32_t>((q20 + 2048) >> 12); }
+
 // p(u) = origin + u (c1 + u (c2 + u c3)); u = 1 gives the second knot exactly.
 struct Cubic {
     int64_t origin_q20;

@@ -78,7 +78,7 @@ void SerialPort::take_frame(uint64_t received_us, uint64_t now_us) {
             return other_ == nullptr ? machine_->count_bad_frame() : other_(context_, frame.type(), text, text_size);
         default:
             if (is_sign_of_life(frame.type())) wire_ = Wire::Serial;
-            return machine_->receive(Arrival{packets_.bytes(), packets_.size(), false, received_us}, now_us);
+            return machine_->receive(frame, Arrival{packets_.bytes(), packets_.size(), false, received_us}, now_us);
     }
 }
 

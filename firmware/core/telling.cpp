@@ -1,14 +1,12 @@
 // What the machine tells of itself.
 #include "machine.h"
-#include "sentence.h"
+#include "phrase.h"
 
 namespace gemelo {
 namespace {
 
 // So often a reading is told if no other one comes: a sensor that is unplugged falls silent.
 constexpr uint8_t kTellings = 3;
-
-int32_t as_q8(int64_t q20) { return static_cast<int32_t>((q20 + 2048) >> 12); }
 
 int32_t saturate(int64_t value) {
     if (value > INT32_MAX) return INT32_MAX;
@@ -72,7 +70,11 @@ void Machine::report_sensors() {
         if (((heard_ >> i) & 1) != 0 && --sensor_tellings_[i] == 0) heard_ = static_cast<uint16_t>(heard_ & ~(1u << i));
 }
 
-void Machine::report_text_lost(uint32_t lines) { event("text_lost", Sentence().add(lines).text()); }
+void Machine::report_text_lost(uint32_t lines) {
+    char detail[11];
+    Phrase(detail, sizeof detail).add(lines);
+    event("text_lost", detail);
+}
 
 void Machine::event(const char* name, const char* detail) { reporter_.event(name, now_us_, streams_.stream(), detail); }
 

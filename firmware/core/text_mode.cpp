@@ -1,6 +1,6 @@
 #include "text_mode.h"
 
-#include "refusal.h"
+#include "phrase.h"
 
 namespace gemelo {
 namespace {

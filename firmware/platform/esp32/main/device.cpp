@@ -9,6 +9,7 @@
 #include "esp_system.h"
 #include "esp_task_wdt.h"
 #include "esp_timer.h"
+#include "phrase.h"
 #include "reset_cause.h"
 #include "sensors.h"
 #include "store.h"
@@ -47,8 +48,7 @@ void Device::run() {
     wake_up();
     for (;;) {
         ulTaskNotifyTake(pdTRUE, pdMS_TO_TICKS(kLongestWaitMs));
-        now_us_ = tick_.slot_start_us();
-        machine_.slot(now_us_);
+        machine_.slot(tick_.slot_start_us());
         pins_.drive(machine_);
         remember();
         serve();

@@ -55,7 +55,6 @@ class Device {
     uint32_t boot_id_ = 0;
     char reset_cause_[40] = "";
     Pose kept_{};
-    uint64_t now_us_ = 0;
     uint32_t slots_ = 0;
     size_t text_size_ = 0;  // of a configuration that is to be written
     char text_[kMaxConfigText];

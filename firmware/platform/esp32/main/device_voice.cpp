@@ -5,7 +5,7 @@
 #include "board_check.h"
 #include "device.h"
 #include "esp_timer.h"
-#include "json.h"
+#include "phrase.h"
 #include "this_chip.h"
 
 namespace gemelo {
@@ -46,14 +46,7 @@ void Device::warn() {
         if (warning.sentence == nullptr) return;
         char detail[120];
         Phrase(detail, sizeof detail).add(warning.part).add(": ").add(warning.sentence);
-        JsonWriter json;
-        json.field("event", "pin_warning");
-        json.field("t_us", now_us_);
-        json.field("boot_id", static_cast<uint64_t>(boot_id_));
-        json.field("stream", uint64_t{0});
-        json.field("detail", detail);
-        const size_t size = json.close();
-        machine_.say(Output::Event, json.bytes(), size);
+        machine_.event("pin_warning", detail);
     }
 }
 

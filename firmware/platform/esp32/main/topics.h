@@ -5,8 +5,8 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "phrase.h"
 #include "protocol.h"
-#include "refusal.h"
 #include "report.h"
 
 namespace gemelo {

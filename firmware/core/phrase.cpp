@@ -1,4 +1,6 @@
-#include "refusal.h"
+#include "phrase.h"
+
+#include "digits.h"
 
 namespace gemelo {
 
@@ -14,14 +16,8 @@ Phrase& Phrase::add(const char* text) {
 }
 
 Phrase& Phrase::add(uint64_t number) {
-    char digits[20];
-    uint8_t count = 0;
-    do {
-        digits[count++] = static_cast<char>('0' + number % 10);
-        number /= 10;
-    } while (number != 0);
-    while (count > 0) put(digits[--count]);
-    return *this;
+    char digits[kDigitsSize];
+    return add(digits_of(number, digits));
 }
 
 Phrase& Phrase::add_signed(int64_t number) {
