@@ -61,6 +61,7 @@ def look(
     seconds: float,
     cancel: CancelFlag | None,
 ) -> tuple[int, Array]: ...
+def doubts(world: World, kernel: Kernel, rows: Array, margin: float, finest: float) -> Array: ...
 def plan(
     world: World,
     kernel: Kernel,

@@ -98,6 +98,10 @@ class MotionCore:
         """Whether the uniform cubic B-spline of the control points (k, n) keeps the margin everywhere."""
         return self._look(self._rows(control), 3)
 
+    def doubts(self, rows: ArrayLike) -> Array:
+        """(k, 2) from where to where, in rows, the polyline through `rows` (m, n) is not known to keep the margin."""
+        return motion.doubts(self._setting.world, self._kernel, self._rows(rows), self.margin, FINEST)
+
     def touching(self, rows: ArrayLike) -> Array | None:
         """A posture (n,) on the polyline through `rows` (m, n) that does not keep the margin, however much bulges.
 

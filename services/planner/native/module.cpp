@@ -228,6 +228,25 @@ nb::tuple look(const World& world, const Kernel& kernel, const Rows& rows, int d
     return nb::make_tuple(static_cast<int>(verdict), array_of(Joints(rake.touching()), {rake.touching().size()}));
 }
 
+// The ranges (k, 2) of a polyline, in rows, that are not known to be free.
+nb::ndarray<nb::numpy, double> doubts(const World& world, const Kernel& kernel, const Rows& rows, double margin,
+                                      double finest) {
+    require_columns(rows.shape(1), static_cast<size_t>(world.dof()), "joint values");
+    require_usable(rows.data(), rows.size());
+    require(rows.shape(0) > 1, "a polyline needs two rows");
+    Tolerances tolerances;
+    tolerances.margin = margin;
+    tolerances.finest = finest;
+    Rake rake(world, kernel, tolerances);
+    const Polyline course(rows.data(), rows.shape(0), rows.shape(1));
+    std::vector<double> ranges;
+    for (const auto& range : rake.doubts(course, Stop(std::numeric_limits<double>::infinity(), nullptr))) {
+        ranges.insert(ranges.end(), range.begin(), range.end());
+    }
+    const size_t count = ranges.size() / 2;
+    return array_of(std::move(ranges), {count, size_t{2}});
+}
+
 std::vector<Joints> each_row(const Rows& rows, const World& world, const char* what) {
     require_columns(rows.shape(1), static_cast<size_t>(world.dof()), what);
     require_usable(rows.data(), rows.size());
@@ -318,6 +337,7 @@ NB_MODULE(_motion, module) {
     module.def("first_contact", &first_contact, "world"_a, "kernel"_a, "row"_a, "margin"_a);
     module.def("look", &look, "world"_a, "kernel"_a, "rows"_a, "degree"_a, "margin"_a, "finest"_a, "seconds"_a,
                "cancel"_a.none());
+    module.def("doubts", &doubts, "world"_a, "kernel"_a, "rows"_a, "margin"_a, "finest"_a);
     module.def("plan", &find, "world"_a, "kernel"_a, "bounds"_a, "start"_a, "goals"_a, "seed"_a, "margin"_a,
                "seconds"_a, "cancel"_a.none());
     module.def("centres", &centres, "world"_a, "kernel"_a, "rows"_a);

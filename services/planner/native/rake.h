@@ -65,7 +65,35 @@ class Rake {
         return Verdict::kFree;
     }
 
+    // From where to where, in spans, the course is not known to be free; empty where all of it is.
+    std::vector<std::array<double, 2>> doubts(const Course& course, const Stop& stop) {
+        begin(course);
+        std::vector<std::array<double, 2>> found;
+        for (size_t next = 0, count = 0; next < stretches_.size(); next += count) {
+            count = std::min<size_t>(kLanes, stretches_.size() - next);
+            const uint32_t hits = ask(course, next, count, false);
+            for (size_t lane = 0; lane < count; ++lane) {
+                const Stretch stretch = stretches_[next + lane];
+                if (((hits | answer_.near) >> lane & 1u) == 0 || (!stop() && cut(stretch))) continue;
+                const double middle = static_cast<double>(stretch.span) + stretch.middle;
+                found.push_back({middle - stretch.half, middle + stretch.half});
+            }
+        }
+        return joined(std::move(found));
+    }
+
   private:
+    // In order, and those that meet as one.
+    static std::vector<std::array<double, 2>> joined(std::vector<std::array<double, 2>> ranges) {
+        std::sort(ranges.begin(), ranges.end());
+        std::vector<std::array<double, 2>> result;
+        for (const auto& range : ranges) {
+            if (result.empty() || range[0] > result.back()[1] + 1e-9) result.push_back(range);
+            result.back()[1] = range[1];
+        }
+        return result;
+    }
+
     struct Stretch {
         size_t span;
         double middle, half;
@@ -114,8 +142,8 @@ class Rake {
         }
     }
 
-    // The lanes that touch.
-    uint32_t ask(const Course& course, size_t next, size_t count) {
+    // The lanes that touch; the others are not looked at where one does and `is_one_enough`.
+    uint32_t ask(const Course& course, size_t next, size_t count, bool is_one_enough = true) {
         float joints[kMaxDof * kLanes], half[kLanes];
         double row[kMaxDof];
         for (size_t lane = 0; lane < kLanes; ++lane) {
@@ -126,8 +154,8 @@ class Rake {
         }
         const uint32_t lanes = (1u << count) - 1;
         const float margin = static_cast<float>(tolerances_.margin);
-        kernel_.check(world_.view(), {joints, half, part_motion_.data(), pair_motion_.data(), margin, lanes, true},
-                      answer_);
+        kernel_.check(world_.view(),
+                      {joints, half, part_motion_.data(), pair_motion_.data(), margin, lanes, is_one_enough}, answer_);
         checks_ += count;
         return answer_.hits;
     }

@@ -5,6 +5,7 @@ The compiled core is asked first: what its spheres let be is free on the exact s
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Positions = Sequence[float] | Array
-
-STRETCH = 40  # rows of a way that the core judges at once, where it does not let all of it be
 
 
 class Surroundings:
@@ -78,7 +77,7 @@ class Surroundings:
         if core.way_free(positions):
             return None
         surely = core.touching(positions)
-        return self._touching_in_doubt(core, positions, margin) if surely is None else surely
+        return self._touching_in_doubt(positions, core.doubts(positions), margin) if surely is None else surely
 
     def pairs_within(self, positions: Positions, margin: float = 0.0) -> list[LinkPair]:
         """As `World.pairs_within`."""
@@ -88,11 +87,17 @@ class Surroundings:
         """As `World.contacts`."""
         return self.world.contacts(positions, margin)
 
-    def _touching_in_doubt(self, core: MotionCore, rows: Array, margin: float) -> Array | None:
-        """By coal, on the stretches of the polyline through `rows` (m, n) that the core does not let be."""
-        for first in range(0, len(rows) - 1, STRETCH):
-            stretch = rows[first : first + STRETCH + 1]
-            posture = None if core.way_free(stretch) else self.world.touching(stretch, margin)
+    def _touching_in_doubt(self, rows: Array, doubts: Array, margin: float) -> Array | None:
+        """By coal, within `doubts` (k, 2) of the polyline through `rows` (m, n)."""
+        for begin, end in doubts.tolist():
+            posture = self.world.touching(rows_between(rows, begin, end), margin)
             if posture is not None:
                 return posture
         return None
+
+
+def rows_between(rows: Array, begin: float, end: float) -> Array:
+    """The part of the polyline through `rows` (m, n) from one place to another, both in rows."""
+    begin, end = max(begin, 0.0), min(end, len(rows) - 1.0)
+    ends = [(1.0 - place % 1.0) * rows[int(place)] + place % 1.0 * rows[math.ceil(place)] for place in (begin, end)]
+    return np.vstack((ends[0], rows[int(begin) + 1 : math.ceil(end)], ends[1]))

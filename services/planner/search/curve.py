@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 PARTS = 8  # of a piece, within which its length is integrated and looked up
-NEWTON = 4  # steps from the look-up to the parameter
+NEWTON = 3  # steps from the look-up to the parameter
 SMALLEST = 1e-12  # of a way's whole length: a piece that is shorter is none
 CORNER = 1e-6  # between two unit tangents: beyond it the way has a corner
 SLOWEST = 1e-3  # of the mean speed in the parameter: below it a piece turns on the spot
@@ -51,12 +51,7 @@ def smooth_runs(control: Array, scale: Array) -> list[Curve]:
     pieces = _straightened(control / scale)
     lengths = np.linalg.norm(pieces[:, 1:].sum(axis=1), axis=1)
     pieces = pieces[lengths > SMALLEST * max(float(lengths.sum()), 1.0)]
-    runs, first = [], 0
-    for index in range(1, len(pieces) + 1):
-        if index == len(pieces) or _is_corner(pieces[index - 1], pieces[index]):
-            runs.append(Curve(pieces[first:index]))
-            first = index
-    return runs
+    return [Curve(run) for run in np.split(pieces, _corners(pieces)) if len(run)]
 
 
 class Curve:
@@ -157,7 +152,8 @@ def _straightened(control: Array) -> Array:
     return pieces
 
 
-def _is_corner(one: Array, other: Array) -> bool:
-    leaving, coming = one[1] + 2.0 * one[2] + 3.0 * one[3], other[1]
-    turn = leaving / np.linalg.norm(leaving) - coming / np.linalg.norm(coming)
-    return float(np.linalg.norm(turn)) > CORNER
+def _corners(pieces: Array) -> Indices:
+    """The numbers of the pieces that begin in another direction than the one before ends in."""
+    leaving, coming = pieces[:-1, 1] + 2.0 * pieces[:-1, 2] + 3.0 * pieces[:-1, 3], pieces[1:, 1]
+    one, other = (rows / np.linalg.norm(rows, axis=1)[:, None] for rows in (leaving, coming))
+    return np.flatnonzero(np.linalg.norm(one - other, axis=1) > CORNER) + 1

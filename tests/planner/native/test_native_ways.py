@@ -64,6 +64,26 @@ def test_what_surely_touches_is_within_the_margin_by_coal_too(arm, core, posture
     assert sure > 10 * unsure
 
 
+def test_what_is_not_in_doubt_is_free_by_coal_too(arm, core, postures):
+    rng = np.random.default_rng(14)
+    scene = [random_shape(rng, kind, kind) for kind in ShapeKind if kind is not ShapeKind.MESH]
+    core.set_scene(scene)
+    truth, wholly = Truth(arm, scene), 0
+    for corners in postures(90, 50).reshape(30, 3, -1):
+        rows = corners[0] + 0.3 * (corners - corners[0])
+        doubts = core.doubts(rows)
+        assert (len(doubts) == 0) == core.way_free(rows)
+        assert (doubts[:, 0] < doubts[:, 1]).all()
+        assert (doubts[:-1, 1] < doubts[1:, 0]).all()
+        wholly += len(doubts) == 0
+        for place in np.linspace(0.0, 2.0, 80):
+            if not ((doubts[:, 0] - 1e-9 <= place) & (place <= doubts[:, 1] + 1e-9)).any():
+                first = min(int(place), 1)
+                posture = rows[first] + (place - first) * (rows[first + 1] - rows[first])
+                assert truth.distance(posture) > core.margin - UNSURE
+    assert 0 < wholly < 30
+
+
 @pytest.mark.parametrize("thickness", [0.02, 0.002, 0.0002, 0.00002])
 def test_the_thinnest_sheet_is_not_tunnelled_through(thickness):
     core = MotionCore(load("rm1"))
