@@ -36,7 +36,7 @@ class Visualizer:
         """`load` reads the mesh files of the scene."""
         self.model = model
         self.scene = SceneView(model, load)
-        self._preview = Preview(model)
+        self._preview = Preview(model, self.scene.carried)
         self._tool = tool
         self._names = [joint.name for joint in model.moving]
         width = len(self._names)

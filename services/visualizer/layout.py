@@ -36,7 +36,7 @@ def _scene(model: Model, trail: float) -> rrb.Spatial3DView:
     size, waist = max(model.reach, 2.1 * model.height), 0.6 * model.height  # an arm that stands needs a step back
     return rrb.Spatial3DView(
         origin=entities.WORLD,
-        name="Twin: measured (solid), commanded (blue), planned way of the tool, what touches (red) [m]",
+        name="Twin: measured (solid), commanded (blue), planned arm and way (cyan), what touches (red) [m]",
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.1, color=palette.GRID),
         background=rrb.Background(kind="SolidColor", color=palette.BACKGROUND),
         eye_controls=rrb.EyeControls3D(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from schemas.joints import JointState
@@ -17,12 +19,19 @@ TIMES = 3  # that a motion is played
 REST = 0.7  # [s] at its end
 MOVING = 1e-3  # [rad/s] or [m/s]
 
+Carried = Callable[[str, palette.Rgba, int], list[Update]]  # under which arm, in which colour, when [ns]
+
+
+def empty_handed(root: str, color: palette.Rgba, now: int) -> list[Update]:
+    """For a view that has no scene."""
+    return []
+
 
 class Preview:
-    """Of the newest plan; without joint positions in it there is none."""
+    """Of the newest plan; without joint positions in it there is none. `carried` draws what is in the arm's hand."""
 
-    def __init__(self, model: Model) -> None:
-        self._model = model
+    def __init__(self, model: Model, carried: Carried = empty_handed) -> None:
+        self._model, self._carried = model, carried
         self._rows: Array = np.empty((0, 0))
         self._times: Array = np.empty(0)
         self._began: int | None = None  # [ns] None: it has not been drawn
@@ -57,7 +66,8 @@ class Preview:
         drawn: list[Update] = []
         if self._began is None:
             self._began = now
-            drawn = [Gone(entities.PLANNED, now - 1), Shadow(entities.PLANNED, now, frozenset(), palette.PLANNED)]
+            drawn = [Gone(entities.PLANNED, now - 1), Shadow(entities.PLANNED, now, frozenset(), palette.PLANNED),
+                     *self._carried(entities.PLANNED, palette.PLANNED, now)]  # fmt: skip
         played, phase = divmod((now - self._began) / 1e9, float(self._times[-1]) + REST)
         self._is_over = played >= TIMES
         posture = np.array([np.interp(phase, self._times, column) for column in self._rows.T])

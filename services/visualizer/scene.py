@@ -111,19 +111,26 @@ class SceneView:
         touching = self._touching()
         updates.append(Shadow(entities.REFUSED, now, touching, palette.SHADOW))
         updates += arm_at(self._model, entities.REFUSED, now, np.array([posture[name] for name in names]))
+        updates += self.carried(entities.REFUSED, palette.SHADOW, now)
+        return [*updates, *self._labels(now)]
+
+    def carried(self, root: str, color: palette.Rgba, now: int) -> list[Update]:
+        """What the arm carries, in the hand of another arm under `root`; what touches in a refused posture is red."""
+        red = self._touching() if root == entities.REFUSED else frozenset()
+        updates: list[Update] = []
         for item in self._scene.objects:
             if item.attached and self._has_place(item):
-                root = entities.carried(entities.REFUSED, self._model.paths[item.frame])
-                color = palette.TOUCHING if item.name in touching else palette.SHADOW
-                updates += self._thing(item, f"{root}/{entities.part(item.name)}", color, now)
-        return [*updates, *self._labels(now)]
+                hand = entities.carried(root, self._model.paths[item.frame])
+                shown = palette.TOUCHING if item.name in red else color
+                updates += self._thing(item, f"{hand}/{entities.part(item.name)}", shown, now)
+        return updates
 
     def _labels(self, now: int) -> list[Update]:
         """A dot for each pair, and all their names at the nearest: several labels would hide one another."""
         placed = [contact for contact in self._contacts.contacts if len(contact.point) == 3]
         if not placed:
             return []
-        lines = [f"{each.first} - {each.second}: {1000.0 * each.distance:.1f} mm" for each in placed]
+        lines = [f"{each.first} and {each.second}: {_gap(each.distance)}" for each in placed]
         points = np.array([contact.point for contact in placed], dtype=float)
         return [Labels(entities.CONTACTS, now, points, ("\n".join(lines), *("" for _ in lines[1:])))]
 
@@ -146,6 +153,11 @@ class SceneView:
         if shape not in self._meshes:
             self._meshes[shape] = self._load(shape)
         return self._meshes[shape]
+
+
+def _gap(distance: float) -> str:
+    """[m] in words: a minus sign between two names would be read as a dash."""
+    return f"{1000.0 * distance:.1f} mm apart" if distance > 0.0 else f"{-1000.0 * distance:z.1f} mm inside one another"
 
 
 def _below(mesh: Mesh, padding: float) -> Mesh:

@@ -59,7 +59,7 @@ def said(model, tmp_path: Path) -> dict[str, list[Any]]:
 def test_arm_device_mode_and_log_have_their_views(named):
     assert (
         named[entities.WORLD]
-        == "Twin: measured (solid), commanded (blue), planned way of the tool, what touches (red) [m]"
+        == "Twin: measured (solid), commanded (blue), planned arm and way (cyan), what touches (red) [m]"
     )
     assert (named[entities.PANEL], named[entities.MODE]) == ("Device", "Mode of the device")
     assert named[entities.LOG] == "Log"

@@ -8,9 +8,11 @@ import pytest
 
 from schemas.joints import JointState
 from schemas.planning import PlannedPath
+from schemas.scene import PlanningScene, SceneObject, SphereShape
 from services.visualizer import entities
+from services.visualizer.core import Visualizer
 from services.visualizer.preview import REST, TIMES, Preview
-from services.visualizer.updates import Gone, Poses, Shadow
+from services.visualizer.updates import Gone, Poses, Shadow, Thing
 
 NOW = 1_795_000_000_000_000_000
 SECOND = 1_000_000_000
@@ -78,3 +80,13 @@ def test_a_path_without_a_motion_is_not_played(model, path):
     preview = Preview(model)
     preview.on_planned_path(path)
     assert preview.take(NOW) == []
+
+
+def test_the_arm_that_plays_the_plan_carries_what_the_real_one_does(model):
+    core = Visualizer(model, "rm1", "efector_link")
+    cup = SceneObject(name="cup", shape=SphereShape(radius=0.02), frame="efector_link", attached=True)
+    core.scene.on_scene(PlanningScene(objects=(cup,)))
+    core.on_planned_path(PATH)
+    hands = [update.entity for update in core.step(NOW) if isinstance(update, Thing)]
+    assert sorted(hand.split("/")[1] for hand in hands) == ["measured", "planned"]
+    assert all(hand.endswith("efector_link/carried/cup") for hand in hands)

@@ -132,7 +132,10 @@ def test_a_refused_posture_shows_what_touches_in_red_with_its_names(view):
     poses = [update.entity for update in updates if isinstance(update, Poses)]
     assert f"world/refused/{TOOL}" in poses
     [labels] = [update for update in updates if isinstance(update, Labels)]
-    assert labels.texts == ("efector_link - table: -1.0 mm\ncup - table: -1.0 mm", "")
+    assert labels.texts == (
+        "efector_link and table: 1.0 mm inside one another\ncup and table: 1.0 mm inside one another",
+        "",
+    )
 
 
 def test_when_nothing_touches_any_more_the_shadow_goes_and_the_red_too(view):
