@@ -15,6 +15,7 @@ from services.planner.refusals import NoPlan, in_collision
 from services.planner.scene.clearance import CLEARANCE, ROUNDING, first_collision, last_free
 from services.planner.scene.surroundings import Surroundings
 from services.planner.search.way import Start
+from services.planner.way_out import jog_words, way_out
 
 Array = NDArray[np.float64]
 
@@ -45,10 +46,16 @@ class Blockade:
         remedy = f"the farthest it can go on the straight way there: {named}"
         return self.refusal(PlanCode.GOAL_IN_COLLISION, "at the goal", np.array(goal), CLEARANCE, nearest, remedy)
 
-    def start(self, start: Start) -> NoPlan:
-        """The refusal of a start in which something touches."""
-        remedy = self._way_out(start)
-        return self.refusal(PlanCode.START_STATE_IN_COLLISION, "where the arm stands", np.array(start), 0.0, (), remedy)
+    def start(self, start: Start, is_late: Callable[[], bool]) -> NoPlan:
+        """The refusal of a start in which something touches, with the nearest posture that touches nothing."""
+        remedy, nearest = self._remedy(start), way_out(self._arm, self._surroundings, start, is_late)
+        if nearest is not None and nearest.can_be_jogged:
+            remedy = (
+                f"`{jog_words(self._arm, self._surroundings.reach, start, nearest.posture)}` leads out; or {remedy}"
+            )
+        shown = () if nearest is None else nearest.posture
+        where = "where the arm stands"
+        return self.refusal(PlanCode.START_STATE_IN_COLLISION, where, np.array(start), 0.0, shown, remedy)
 
     def line(self, start: Start, goal: Start, margin: float) -> NoPlan:
         """The refusal of a straight line on which something touches, where it does so first."""
@@ -77,8 +84,8 @@ class Blockade:
         standing = tuple(posture.tolist())
         return in_collision(code, where, pairs, margin, nearest, remedy, standing, world.objects)
 
-    def _way_out(self, start: Start) -> str:
-        """What a person can do for an arm that touches something."""
+    def _remedy(self, start: Start) -> str:
+        """What a person can do for an arm that touches something, besides moving it."""
         world = self._surroundings.world
         touched = [name for pair in world.pairs_within(start) for name in pair if name in world.objects]
         carried = [shown.name for shown in world.scene.objects if shown.attached and shown.name in touched]

@@ -70,6 +70,7 @@ class Planner:
         spheres, and a large mesh with distances."""
         self.surroundings.begin()
         self.surroundings.core(CLEARANCE)
+        self._search.prepare()
 
     def plan(
         self,
@@ -114,7 +115,7 @@ class Planner:
         _require_known(request)
         limits = self._limits(request)
         start = resolve_start(self.arm, request.start, present, age)
-        margin = self._start_margin(start)
+        margin = self._start_margin(start, deadline)
         finisher = Finisher(self.arm, self.surroundings, request, limits, margin, watch)
         fraction, stopped_by = 1.0, None
         if isinstance(request.motion, LinearMotion | CircularMotion):
@@ -127,7 +128,7 @@ class Planner:
             finished, planner_id = self._via.plan(request.goal, errand)
         else:
             finished, planner_id = self._found(request, start, margin, finisher, deadline, watch)
-        self._hold_against_newest(finished.trajectory)
+        self._hold_against_newest(finished.trajectory, deadline)
         return PlanResponse(
             code=PlanCode.SUCCESS,
             trajectory=finished.trajectory,
@@ -218,12 +219,12 @@ class Planner:
                 break
         raise refusal or timed_out()
 
-    def _hold_against_newest(self, trajectory: JointTrajectory) -> None:
+    def _hold_against_newest(self, trajectory: JointTrajectory, deadline: Deadline) -> None:
         """Raises `NoPlan` where the scene has changed since the plan was begun and is in its way now."""
         if self.surroundings.newest is self.surroundings.world:
             return
         world = self.surroundings.begin()
-        margin = self._start_margin(trajectory.points[0].positions)
+        margin = self._start_margin(trajectory.points[0].positions, deadline)
         touching = first_collision(world, sample(trajectory).positions, margin)
         if touching is not None:
             where = "in the scene as it has become meanwhile"
@@ -236,13 +237,13 @@ class Planner:
                 raise scaling_refused(name, value)
         return joint_limits(self.arm, request.velocity_scaling, request.acceleration_scaling)
 
-    def _start_margin(self, start: Start) -> float:
+    def _start_margin(self, start: Start, deadline: Deadline) -> float:
         """[m] to keep on the way: an arm that already stands nearer than the clearance may come away from there."""
         if self.surroundings.keeps(start, CLEARANCE / NEAR_START):
             return CLEARANCE
         distance = self.surroundings.distance(start)
         if distance <= 0.0:
-            raise self._blockade.start(start)
+            raise self._blockade.start(start, deadline.is_late)
         return min(CLEARANCE, NEAR_START * distance)
 
 
