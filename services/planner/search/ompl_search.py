@@ -41,6 +41,13 @@ def ompl_corners(
     return corners
 
 
+def load_ompl() -> None:
+    """Now, what the first search would wait for."""
+    from ompl import base, geometric, util  # noqa: F401
+
+    _motions_class()
+
+
 class _Problem:
     """One question in OMPL's terms; states are joint values divided by the speed limits."""
 

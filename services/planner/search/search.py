@@ -13,7 +13,7 @@ from services.arm.description import Arm
 from services.planner.refusals import NoPlan, unknown_name
 from services.planner.scene.surroundings import Surroundings
 from services.planner.search.native_search import NATIVE, native_way
-from services.planner.search.ompl_search import PLANNERS, ompl_corners
+from services.planner.search.ompl_search import PLANNERS, load_ompl, ompl_corners
 from services.planner.search.room import with_room
 from services.planner.search.smoothing import continued, shorten, smooth
 from services.planner.search.validity import Validity
@@ -36,6 +36,10 @@ class Search:
 
     def __init__(self, arm: Arm, surroundings: Surroundings) -> None:
         self._arm, self._surroundings = arm, surroundings
+
+    def prepare(self) -> None:
+        """Loads what the first search would wait for."""
+        load_ompl()
 
     def find(
         self,
