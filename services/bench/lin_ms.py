@@ -11,6 +11,7 @@ from schemas.planning import LinearMotion, PlanCode, PlanRequest, PoseGoal
 from services.arm.description import Arm
 from services.bench.arms import parol6, rm1
 from services.bench.figure import Figure, of_samples, quantile
+from services.bench.plain_lines import PlainLines
 from services.planner.core import Planner
 
 UNIT = "ms"
@@ -30,10 +31,15 @@ def measure() -> Figure:
         samples += took
         reference[f"{arm.name} median"] = quantile(took, 0.5)
         reference[f"{arm.name} p99"] = quantile(took, 0.99)
+        line = PlainLines(arm)
+        plain = [line.solving_ms(request) for request in problems(arm, Planner(arm))][WARMING:]
+        reference[f"{arm.name}, plain way, median"] = quantile(plain, 0.5)
+        reference[f"{arm.name}, plain way, p99"] = quantile(plain, 0.99)
         told.append(f"{arm.name} {sum(fraction == 1.0 for fraction in fractions)} whole")
     note = (
         f"{PROBLEMS} random lines an arm of up to {LONGEST} m (seed {SEED}), no obstacles but the arm itself; "
-        f"{', '.join(told)}, the others go as far as a limit, a singularity or a contact lets them, and count"
+        f"{', '.join(told)}, the others go as far as a limit, a singularity or a contact lets them, and count; the "
+        "plain way is a posture every 5 mm and toppra, neither looked at in between nor verified"
     )
     return of_samples(samples, UNIT, reference=reference, note=note)
 

@@ -1,0 +1,26 @@
+"""What lines of the tool are held against."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from services.bench.arms import parol6, rm1
+from services.bench.lin_ms import problems
+from services.bench.plain_lines import STEP, PlainLines
+from services.planner.core import Planner
+
+
+@pytest.mark.parametrize("arm", [rm1(), parol6()], ids=lambda arm: arm.name)
+def test_the_plain_way_is_on_the_line_as_far_as_it_goes(arm):
+    planner, plain = Planner(arm), PlainLines(arm)
+    whole = 0
+    for request in problems(arm, planner)[:10]:
+        rows = plain.rows(request)
+        places = np.array([planner.kinematics.tool(row).position for row in rows])
+        start, goal = places[0], np.array(request.goal.position)
+        away = np.linalg.norm(np.cross(places - start, goal - start), axis=1) / np.linalg.norm(goal - start)
+        assert away.max() < 1e-4
+        assert np.linalg.norm(np.diff(places, axis=0), axis=1).max(initial=0.0) <= STEP + 1e-4
+        whole += bool(np.linalg.norm(places[-1] - goal) < 1e-4)
+    assert whole >= 4

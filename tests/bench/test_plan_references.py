@@ -1,0 +1,68 @@
+"""What the planner is held against in the same run: the same arm, the same scene, other planners."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from services.arm.kinematics import Kinematics
+from services.bench import plan_references
+from services.bench.arms import parol6, rm1
+from services.bench.figure import NotMeasured
+from services.bench.plan_references import PlainOmpl, Roboplan
+from services.bench.plan_scenes import SCENES
+from services.bench.postures import CoalChecker, random_postures
+from services.bench.problem_sets import problem_set
+from services.planner.scene.world import World
+
+ARMS = {arm.name: arm for arm in (rm1(), parol6())}
+
+
+@pytest.mark.parametrize("scene", list(SCENES))
+@pytest.mark.parametrize("name", list(ARMS))
+def test_all_are_asked_about_the_same_arm_in_the_same_scene(name: str, scene: str):
+    arm = ARMS[name]
+    ours = World(arm, Kinematics(arm), SCENES[scene])
+    coal, roboplan = CoalChecker(arm, SCENES[scene]), Roboplan(arm, SCENES[scene])
+    free = 0
+    for posture in random_postures(arm, 300):
+        is_free = ours.distance(posture) > 0.0
+        assert coal.is_free(posture) is is_free
+        assert roboplan.is_free(posture) is is_free
+        free += is_free
+    assert 0 < free < 300
+
+
+@pytest.mark.parametrize("kind", [PlainOmpl, Roboplan])
+def test_a_reference_solves_what_can_be_solved(kind, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(plan_references, "ALLOWED", 20.0)
+    planner = kind(ARMS["rm1"], SCENES["cage"])
+    problems = [problem for problem in problem_set("rm1", "cage").problems if problem.found_by != "straight"]
+    assert all((planner.solving_ms(each.start, each.goal, seed=1) or 0.0) > 0.0 for each in problems[:3])
+
+
+@pytest.mark.parametrize("kind", [PlainOmpl, Roboplan])
+def test_a_reference_says_where_it_finds_nothing(kind, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(plan_references, "ALLOWED", 0.05)
+    arm = ARMS["rm1"]
+    planner, world = kind(arm, SCENES["cage"]), World(arm, Kinematics(arm), SCENES["cage"])
+    touching = next(row for row in random_postures(arm, 300) if world.distance(row) <= 0.0)
+    start = problem_set("rm1", "cage").problems[0].start
+    assert planner.solving_ms(start, tuple(touching.tolist()), seed=1) is None
+
+
+def test_a_missing_reference_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "roboplan", None)
+    with pytest.raises(NotMeasured, match="make setup"):
+        Roboplan(ARMS["rm1"], SCENES["empty"])
+
+
+@pytest.mark.parametrize("name", list(ARMS))
+def test_postures_are_drawn_from_the_whole_of_every_joint(name: str):
+    joints = ARMS[name].joints
+    rows = random_postures(ARMS[name], 2000)
+    travel = np.array([joint.upper - joint.lower for joint in joints])
+    assert ((rows >= [joint.lower for joint in joints]) & (rows <= [joint.upper for joint in joints])).all()
+    assert (np.ptp(rows, axis=0) > 0.99 * travel).all()
