@@ -137,6 +137,7 @@ class Refusal(Message, frozen=True, kw_only=True):
     limit: float | None = None
     nearest: Vector = ()  # the nearest goal that can be reached, in the goal's own form
     posture: Vector = ()  # [rad] or [m] of all joints, where the arm would touch something
+    way_out: Vector = ()  # [rad] or [m] of all joints, the nearest to a start that touches at which nothing does
     message: str = ""  # one sentence for a person
     remedy: str = ""
 

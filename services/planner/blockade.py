@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,7 +36,6 @@ class Blockade:
         """
         last = last_free(self._surroundings, np.array(start), np.array(goal))
         values = dict(zip(self._arm.joint_names, (round(value, 4) for value in last.tolist()), strict=True))
-        named = ", ".join(f"{joint.name} {values[joint.name]:g} {joint.unit}" for joint in self._arm.joints)
         match asked:
             case PoseGoal():
                 nearest = self._goals.shown_point(asked, standing or start, last, is_late)
@@ -43,7 +43,7 @@ class Blockade:
                 nearest = tuple(values[name] for name in asked.name)
             case NamedGoal() | WaypointGoal():
                 nearest = tuple(values.values())
-        remedy = f"the farthest it can go on the straight way there: {named}"
+        remedy = f"the farthest it can go on the straight way there: {self._named(tuple(values.values()))}"
         return self.refusal(PlanCode.GOAL_IN_COLLISION, "at the goal", np.array(goal), CLEARANCE, nearest, remedy)
 
     def start(self, start: Start, is_late: Callable[[], bool]) -> NoPlan:
@@ -53,9 +53,11 @@ class Blockade:
             remedy = (
                 f"`{jog_words(self._arm, self._surroundings.reach, start, nearest.posture)}` leads out; or {remedy}"
             )
-        shown = () if nearest is None else nearest.posture
-        where = "where the arm stands"
-        return self.refusal(PlanCode.START_STATE_IN_COLLISION, where, np.array(start), 0.0, shown, remedy)
+        elif nearest is not None:
+            remedy = f"nothing touches at {self._named(nearest.posture)}; {remedy}"
+        where, shown = "where the arm stands", () if nearest is None else nearest.posture
+        no_plan = self.refusal(PlanCode.START_STATE_IN_COLLISION, where, np.array(start), 0.0, (), remedy)
+        return NoPlan(no_plan.code, msgspec.structs.replace(no_plan.refusal, way_out=shown))
 
     def line(self, start: Start, goal: Start, margin: float) -> NoPlan:
         """The refusal of a straight line on which something touches, where it does so first."""
@@ -83,6 +85,10 @@ class Blockade:
         pairs = world.pairs_within(posture, margin + ROUNDING) or [("?", "?")]
         standing = tuple(posture.tolist())
         return in_collision(code, where, pairs, margin, nearest, remedy, standing, world.objects)
+
+    def _named(self, posture: Start) -> str:
+        pairs = zip(self._arm.joints, posture, strict=True)
+        return ", ".join(f"{joint.name} {value:g} {joint.unit}" for joint, value in pairs)
 
     def _remedy(self, start: Start) -> str:
         """What a person can do for an arm that touches something, besides moving it."""

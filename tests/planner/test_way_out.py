@@ -80,7 +80,7 @@ def test_who_touches_is_told_how_to_jog_out_and_that_leads_out(name: str, kind: 
     refused = planner.plan(home_from(planner, posture), None)
     assert refused.code is PlanCode.START_STATE_IN_COLLISION
     assert refused.refusal is not None
-    assert world.distance(refused.refusal.nearest) > CLEARANCE
+    assert world.distance(refused.refusal.way_out) > CLEARANCE
     left = jogged_as_told(name, world, posture, refused.refusal.remedy)
     assert world.distance(left) > 0.0
     assert planner.plan(home_from(planner, left), None).code is PlanCode.SUCCESS
@@ -94,7 +94,7 @@ def test_who_is_buried_is_told_of_no_way():
     refused = planner.plan(home_from(planner, np.zeros(3)), None)
     assert refused.code is PlanCode.START_STATE_IN_COLLISION
     assert refused.refusal is not None
-    assert refused.refusal.nearest == ()
+    assert refused.refusal.way_out == ()
     assert "gemelo jog" not in refused.refusal.remedy
     assert "gemelo scene remove room" in refused.refusal.remedy
 
