@@ -5,15 +5,14 @@ from __future__ import annotations
 from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse, DeviceMode
 from services.stepper_gateway.arguments import arguments_of
 from services.stepper_gateway.commands import INTERNAL, PendingCommand
-from services.stepper_gateway.links.frames import Code, CommandReply, encode
+from services.stepper_gateway.links.frames import Code, CommandReply, code_name, encode
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.mover import Mover
 from services.stepper_gateway.outputs import Answer
 from services.stepper_gateway.refusals import GoalRejected, invalid
-from services.stepper_gateway.reporting import code_name
 
-REMEDIES = {
+REMEDIES: dict[int, str] = {
     Code.NOT_READY: "it does not do that in this mode",
     Code.POSITION_LIMIT: "the position is beyond its soft limits",
     Code.NOT_ARMED: "its drivers are off, or only just on: run `gemelo device arm`, and wait a second",
@@ -113,7 +112,7 @@ class CommandDesk:
                 self._mover.transmission.forget()
 
     def _complaint(self, command: PendingCommand, reply: CommandReply) -> str:
-        remedy = REMEDIES.get(Code(reply.code)) if reply.code in Code._value2member_map_ else None
+        remedy = REMEDIES.get(reply.code)
         if reply.code == Code.NOT_READY:
             remedy = NOT_NOW.get(command.kind, remedy)
         mode = DeviceMode(reply.mode).name if reply.mode in DeviceMode._value2member_map_ else str(reply.mode)

@@ -8,7 +8,7 @@ from schemas.message import Vector
 from services.arm.description import Arm, Joint
 from services.stepper_gateway.clock import ClockSync
 from services.stepper_gateway.hindrance import input_names, joint_name
-from services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, State, StateFlag
+from services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, State, StateFlag, code_name
 from services.stepper_gateway.links.reports import ShaftReport
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.path_log import PathPoint
@@ -144,8 +144,3 @@ def _position(joint: Joint, count: float) -> float:
     position = joint.steps.to_position(count)
     nearest = min(max(position, joint.lower), joint.upper)
     return nearest if abs(position - nearest) * joint.steps.per_unit <= HALF_STEP else position
-
-
-def code_name(code: int) -> str:
-    """The name in PROTOCOL.md."""
-    return Code(code).name if code in Code._value2member_map_ else f"code {code}"

@@ -9,7 +9,7 @@ from schemas.device import DeviceMode
 from services.arm.description import Joint
 from services.stepper_gateway.clock import ClockSync
 from services.stepper_gateway.knots import Knot, StepEncoder, StepKnot
-from services.stepper_gateway.links.frames import NO_JOINT, Ack, Chunk, ChunkFlag, Code, State
+from services.stepper_gateway.links.frames import NO_JOINT, Ack, Chunk, ChunkFlag, Code, State, code_name
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.path_log import PathLog, PathPoint
 
@@ -17,6 +17,12 @@ TIME_TO_LIVE = 1_000_000  # [us] after which the device is to refuse a chunk
 RETRY_MIN, RETRY_MAX = 0.06, 0.3  # [s] until an unacknowledged chunk is sent again
 GAP_RETRY = 0.02  # [s] until a gap that the device still reports is filled once more
 TRANSIENT = (Code.GAP, Code.NO_SPACE, Code.EXPIRED, Code.NOT_ARMED)  # NOT_ARMED: the drivers are only just on
+
+UNITS: dict[int, str] = {  # of a refusal's value and limit, where they are no positions
+    Code.VELOCITY_LIMIT: "steps/s",
+    Code.NOT_AT_REST: "steps/s",
+    Code.ACCELERATION_LIMIT: "steps/s^2",
+}
 
 
 @dataclass
@@ -165,11 +171,11 @@ class Stream:
 
 def refusal(ack: Ack, joints: tuple[Joint, ...]) -> str:
     """The device's refusal of a chunk as a sentence."""
-    code = Code(ack.code).name if ack.code in Code._value2member_map_ else str(ack.code)
+    code = code_name(ack.code)
     if ack.joint == NO_JOINT or ack.joint >= len(joints):
         return f"the device refuses chunk {ack.seq} ({code}: {ack.value}, limit {ack.limit})"
     joint = joints[ack.joint]
-    unit = "steps/s" if ack.code == Code.VELOCITY_LIMIT else "steps"
+    unit = UNITS.get(ack.code, "steps")
     return (
         f'the device refuses chunk {ack.seq}, knot {ack.knot} ({code}): joint "{joint.name}" {ack.value / 256.0:.2f} '
         f"{unit}, limit {ack.limit / 256.0:.2f}"

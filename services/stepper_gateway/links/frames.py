@@ -74,6 +74,11 @@ class Code(IntEnum):
     ACCELERATION_LIMIT = 21
 
 
+def code_name(code: int) -> str:
+    """The name in PROTOCOL.md; a newer firmware may have codes without one here."""
+    return Code(code).name if code in Code._value2member_map_ else f"code {code}"
+
+
 class StateFlag(IntFlag):
     """What is true of the device besides its mode."""
 
