@@ -51,6 +51,7 @@ def watcher(network, deployment) -> Iterator[Node]:
     """Who sees from outside how plans stand."""
     with Node("watcher", deployment, robot="rm1", bus=MemoryBus(network), stop=StopRequest()) as node:
         yield node
+        node.stop()
 
 
 def press_when_it_searches(watcher: Node) -> None:
