@@ -122,16 +122,17 @@ class Packets:
 
 def json_frame(kind: JsonFrame, text: bytes, boot_id: int = 0) -> bytes:
     """The frame that carries `text`."""
-    return _frame(kind, text, boot_id)
+    return sealed(kind, text, boot_id)
 
 
 def sync_frame(t0: int) -> bytes:
     """A SYNC: any device answers it and does nothing, so it is a knock at the door."""
-    return _frame(SYNC, _SYNC.pack(t0), 0)
+    return sealed(SYNC, _SYNC.pack(t0))
 
 
-def _frame(kind: int, body: bytes, boot_id: int) -> bytes:
-    frame = _HEADER.pack(MAGIC, VERSION, kind, 0, boot_id) + body
+def sealed(kind: int, body: bytes, boot_id: int = 0, joints: int = 0) -> bytes:
+    """A frame of any kind: header, body and CRC."""
+    frame = _HEADER.pack(MAGIC, VERSION, kind, joints, boot_id) + body
     return frame + _CRC.pack(zlib.crc32(frame))
 
 

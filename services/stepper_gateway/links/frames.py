@@ -12,8 +12,8 @@ from enum import IntEnum, IntFlag
 
 import msgspec
 
-MAGIC = 0x67
-VERSION = 1
+from services.runtime.serial_frames import MAGIC, VERSION, sealed
+
 NO_JOINT = 255
 
 Row = tuple[int, ...]
@@ -232,8 +232,7 @@ def encode(frame: AnyFrame) -> bytes:
                 frame.flags, frame.fault_joint, frame.outputs, frame.referenced, frame.speed,
             )  # fmt: skip
             body += _rows((*frame.steps, *frame.velocity))
-    head = _HEADER.pack(MAGIC, VERSION, kind, joints, frame.boot_id) + body
-    return head + _CRC.pack(zlib.crc32(head))
+    return sealed(kind, body, frame.boot_id, joints)
 
 
 def decode(payload: bytes) -> AnyFrame:
