@@ -327,3 +327,23 @@ def test_a_joint_that_a_waypoint_does_not_name_stays_as_the_one_before_has_it():
         response = planned("parol6", start, WaypointGoal(points=points), motion)
         assert response.code is PlanCode.SUCCESS
         assert response.trajectory.points[-1].positions == (start[0] + 0.1, *start[1:5], start[5] + 0.1)
+
+
+@pytest.mark.parametrize("beyond", [0.0, 1e-10, 1e-8, 1e-6, 1e-5, 3e-5, 1e-4, 1e-3])
+def test_a_line_that_ends_just_beyond_a_limit_ends_at_it(beyond: float):
+    start = (0.3, 0.8, 0.1)
+    begin = planner_of("rm1").kinematics.tool(start).position
+    goal = PoseGoal(position=tuple(np.add(begin, (0.0, 0.0, 0.1 + beyond)).tolist()))
+    response = planned("rm1", start, goal, LinearMotion(least_fraction=0.0))
+    assert response.code is PlanCode.SUCCESS
+    assert seen("rm1", response)[0].positions[-1, 2] == pytest.approx(0.2, abs=3e-5)
+    assert (response.fraction < 1.0) == (beyond > 1e-9)
+
+
+def test_a_line_along_a_joints_limit_goes_all_the_way():
+    start = (0.3, 0.8, 0.2)
+    begin = planner_of("rm1").kinematics.tool(start).position
+    goal = PoseGoal(position=tuple(np.add(begin, (-0.03, 0.02, 0.0)).tolist()))
+    response = planned("rm1", start, goal, LinearMotion())
+    assert response.code is PlanCode.SUCCESS
+    assert (seen("rm1", response)[0].positions[:, 2] <= 0.2).all()

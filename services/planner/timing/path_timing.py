@@ -28,7 +28,7 @@ Heed = Callable[[], None]  # raises where the time is up
 
 NEAR = 1e-4  # share of the length: marks that are nearer to one another are one
 ASIDE = 1e-6  # share of the length from a mark at which the way is that of one side
-ROWS = 512  # of length at which limits are looked at, besides the knots and the marks
+ROWS = 128  # of length at which limits are looked at, besides the knots and the marks
 COUNTS = (1, 4, 16)  # of even stretches that are tried; they divide ROWS
 PARTS = 4  # of a stretch of one kind
 SHARES = (1.0, 0.7, 0.45)  # of the speed that the way allows: slower leaves more for acceleration
@@ -111,18 +111,23 @@ def demand_of(curve: PathCurve, limits: JointLimits, tool: tuple[float, float], 
 def time_law(demand: Demand, heed: Heed) -> TimeLaw:
     """The fastest of several divisions into stretches; raises `NoProfile`."""
     whole, *finer = _divisions(demand)
-    tries = [(whole, share) for share in SHARES] + [(edges, share) for edges in finer for share in SHARES[:2]]
-    laws: list[TimeLaw] = []
+    tries = [(edges, share) for edges in reversed(finer) for share in SHARES[:2]]
+    tries += [(whole, share) for share in SHARES]
+    best: TimeLaw | None = None
     why = NoProfile(f"no jerk-limited profile for a way of {float(demand.along[-1]):.3g}")
     for edges, share in tries:
         heed()
         try:
-            laws.append(TimeLaw(stretches_through(_sections(demand, edges, share))))
+            sections = _sections(demand, edges, share)
+            if best is not None and sum(section.length / section.speed for section in sections) >= best.duration:
+                continue
+            law = TimeLaw(stretches_through(sections))
+            best = law if best is None or law.duration < best.duration else best
         except NoProfile as error:
             why = error
-    if not laws:
+    if best is None:
         raise why
-    return min(laws, key=lambda law: law.duration)
+    return best
 
 
 def _apart(marks: Array, least: float) -> Array:

@@ -23,7 +23,7 @@ from services.planner.timing.timing import States, at_limits, at_speed, trajecto
 from services.planner.tool.continuation import FINEST, Continuation, Followed, Stop
 from services.planner.tool.path_points import Run, between, states_of_runs
 from services.planner.tool.tool_limits import ToolLimits
-from services.planner.tool.tool_path import ToolPath
+from services.planner.tool.tool_path import METRES_PER_RADIAN, ToolPath
 
 Array = NDArray[np.float64]
 
@@ -142,6 +142,7 @@ class CartesianPlanner:
             followed.postures[-1],
             marks[1:-1],
             lambda length, posture: self._continuation.solver.error(path.at(length), posture),
+            np.maximum(self._checker.reach, METRES_PER_RADIAN),
         )
 
     def _within(self, states: States, terms: Terms) -> States:

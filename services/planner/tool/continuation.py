@@ -24,6 +24,8 @@ FINEST = 2e-5  # of length: nearer postures are not tried, and a place is not to
 MOST_POSTURES = 5000
 JUMP = 0.3  # [rad] or [m] a joint may move between two postures, before shorter steps are tried
 CLOSE = 1e-5  # [m] by which the spline between postures may be off the way
+NEARLY = 0.98  # of the way to a limit, as it seems from before it
+LEAST = 0.05  # of a step is tried, where it seems to be none of it
 ROUNDING = 1e-9  # [rad] or [m] beyond a limit that is put back onto it
 SAME = 1e-6  # [rad] or [m] by which postures differ that are meant to be one
 ROUNDS = 8
@@ -33,7 +35,10 @@ TOO_FINE = f"max_step is so fine that the way would have more than {MOST_POSTURE
 
 @dataclass(frozen=True)
 class Stop:
-    """What is in the way of the next posture; `subject` is a joint, a link pair or the tool."""
+    """What is in the way of the next posture; `subject` is a joint, a link pair or the tool.
+
+    About `share` of the step to it can be gone.
+    """
 
     check: str
     subject: str
@@ -41,6 +46,7 @@ class Stop:
     limit: float
     what: str  # completes "at 0.123 m of 0.300 m ..."
     remedy: str
+    share: float = 0.5
 
 
 @dataclass(frozen=True)
@@ -113,7 +119,8 @@ class Continuation:
                 postures.append(found)
                 step = min(2.0 * step, spacing)
             elif step > FINEST and len(lengths) < MOST_POSTURES and not _is_jump(found):
-                step *= 0.5
+                share = found.share if isinstance(found, Stop) else 0.5
+                step = max(0.999 * FINEST, min(0.9 * step, share * (ahead - lengths[-1])))
             else:
                 return lengths, postures, found if isinstance(found, Stop) else self._lost(postures[-1])
         return lengths, postures, None
@@ -125,7 +132,7 @@ class Continuation:
         excess = np.maximum(found - self._upper, self._lower - found)
         worst = int(np.argmax(excess))
         if excess[worst] > ROUNDING:
-            return self._beyond(worst, float(found[worst]))
+            return self._beyond(worst, last, found)
         farthest = float(np.abs(found - last).max())
         if farthest > jump:
             return self._jump("jump", last, found, jump)
@@ -177,12 +184,14 @@ class Continuation:
         clipped: Array = np.minimum(np.maximum(posture, self._lower), self._upper)
         return clipped
 
-    def _beyond(self, index: int, value: float) -> Stop:
-        joint = self._arm.joints[index]
+    def _beyond(self, index: int, last: Array, found: Array) -> Stop:
+        joint, value = self._arm.joints[index], float(found[index])
         limit = joint.clamp(value)
         side = "upper" if value > joint.upper else "lower"
         what = f'joint "{joint.name}" is at its {side} limit of {limit:g} {joint.unit}'
-        return Stop("joint limit", joint.name, value, limit, what, "go around by another posture, or end before it")
+        share = max(LEAST, NEARLY * float((self._clipped(found) - last)[index] / (found - last)[index]))
+        remedy = "go around by another posture, or end before it"
+        return Stop("joint limit", joint.name, value, limit, what, remedy, share)
 
     def _lost(self, last: Array) -> Stop:
         value = self.solver.manipulability(last)

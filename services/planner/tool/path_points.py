@@ -20,6 +20,7 @@ Error = Callable[[float, Array], float]  # [m] that the posture (n,) at a length
 SPACING = 0.04  # [s] between points, before it is halved where that is too much
 HALVINGS = 6
 OFF = 5e-5  # [m] by which the finished motion may leave the way
+SURE = 3e-5  # [m] by which it may leave the curve, which is nearly the way, without being looked at
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class Run:
     end: Array  # (n,) exact
     marks: Array = field(default_factory=lambda: np.empty(0))  # lengths inside at which there is to be a point
     error: Error | None = None  # absent: any quintic through the points will do
+    reach: Array | None = None  # (n,) [m] that the tool moves at most per unit of a joint
 
 
 def states_of_runs(runs: Sequence[Run], heed: Heed) -> States:
@@ -76,6 +78,9 @@ def _off(run: Run, states: States, segments: NDArray[np.int64], heed: Heed) -> N
     assert run.error is not None
     middles = between(states, 2)
     lengths, _, _ = run.law.at(middles.times[segments])
+    if run.reach is not None:
+        strays = np.abs(run.curve.at(lengths).value[:, : len(run.start)] - middles.positions[segments]) @ run.reach
+        segments, lengths = segments[strays > SURE], lengths[strays > SURE]
     off = []
     for segment, length in zip(segments.tolist(), lengths.tolist(), strict=True):
         heed()
