@@ -5,7 +5,17 @@ from __future__ import annotations
 import math
 
 from services.cli.exits import ExitCode
-from services.cli.parser import Command, Options, Parser, Words, finite_number, json_option, positive_integer
+from services.cli.parser import (
+    Command,
+    Options,
+    Parser,
+    Words,
+    finite_number,
+    json_option,
+    length,
+    positive_integer,
+    turn,
+)
 
 XYZ = ("X", "Y", "Z")
 IK_EXAMPLES = """examples:
@@ -16,15 +26,19 @@ IK_EXAMPLES = """examples:
 
 def ik_options(parser: Parser) -> None:
     parser.epilog = IK_EXAMPLES
-    parser.add_argument("--to", nargs=3, type=finite_number, metavar=XYZ, required=True, help="tool position [m]")
-    turn = parser.add_mutually_exclusive_group()
-    turn.add_argument(
+    parser.add_argument("--to", nargs=3, type=length, metavar=XYZ, required=True, help="the tool, as 300mm or 0.3")
+    turned = parser.add_mutually_exclusive_group()
+    turned.add_argument(
         "--quaternion", nargs=4, type=finite_number, metavar=(*XYZ, "W"), default=(), help="orientation of the tool"
     )
-    turn.add_argument(
-        "--rpy", nargs=3, type=finite_number, metavar=("R", "P", "Y"), help="the same as roll, pitch, yaw [deg]"
+    turned.add_argument(
+        "--rpy",
+        nargs=3,
+        type=turn,
+        metavar=("R", "P", "Y"),
+        help="the same as roll, pitch, yaw: 90deg, 1.57rad or 90",
     )
-    turn.add_argument(
+    turned.add_argument(
         "--axis", nargs=3, type=finite_number, metavar=XYZ, default=(), help="of the tool, to point --along"
     )
     vector(parser, "--along", "direction in which --axis is to point")
@@ -59,7 +73,7 @@ def ik(options: Options) -> ExitCode:
     near = parse_joints(options.near, load()[1].joints)
     orientation = options.quaternion
     if options.rpy is not None:
-        orientation = from_rpy(*(math.radians(value) for value in options.rpy))
+        orientation = from_rpy(*options.rpy)
     goal = PoseGoal(
         position=tuple(options.to),
         orientation=tuple(orientation),

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from services.cli.exits import usage
-from services.cli.parser import Options, Parser, finite_number
+from services.cli.parser import Options, Parser, finite_number, length, turn
 
 if TYPE_CHECKING:
     from argparse import _ArgumentGroup as Group
@@ -39,17 +38,17 @@ def move_options(parser: Parser) -> None:
 
 def _goal_options(group: Group) -> None:
     goal = group.add_mutually_exclusive_group(required=True)
-    goal.add_argument("--to", nargs=3, type=finite_number, metavar=XYZ, help="tool position in the base frame [m]")
+    goal.add_argument("--to", nargs=3, type=length, metavar=XYZ, help="the tool in the base frame, as 300mm or 0.3")
     goal.add_argument(
         "--joints", nargs="+", metavar="JOINT=VALUE", help="30deg, 0.5rad, 40mm, 0.04m; a bare number is rad or m"
     )
     goal.add_argument("--named", metavar="STATE", help="a named state of the SRDF")
-    turn = group.add_mutually_exclusive_group()
-    turn.add_argument(
+    turned = group.add_mutually_exclusive_group()
+    turned.add_argument(
         "--quaternion", "--quat", nargs=4, type=finite_number, metavar=(*XYZ, "W"), help="orientation of the tool"
     )
-    turn.add_argument("--rpy", nargs=3, type=finite_number, metavar=("R", "P", "Y"), help="the same in degrees")
-    turn.add_argument("--axis", nargs=3, type=finite_number, metavar=XYZ, help="of the tool, to point --along")
+    turned.add_argument("--rpy", nargs=3, type=turn, metavar=("R", "P", "Y"), help="the same, as 90deg, 1.57rad or 90")
+    turned.add_argument("--axis", nargs=3, type=finite_number, metavar=XYZ, help="of the tool, to point --along")
     group.add_argument("--along", nargs=3, type=finite_number, metavar=XYZ, help="where --axis is to point; it is z")
     group.add_argument(
         "--free-axis", nargs=3, type=finite_number, metavar=XYZ, help="of the tool: turning about it does not matter"
@@ -60,13 +59,13 @@ def _goal_options(group: Group) -> None:
 def _way_options(group: Group) -> None:
     way = group.add_mutually_exclusive_group()
     way.add_argument("--line", action="store_true", help="the tool on a straight line")
-    way.add_argument("--arc", nargs=3, type=finite_number, metavar=XYZ, help="the tool on an arc through this point")
-    way.add_argument("--center", nargs=3, type=finite_number, metavar=XYZ, help="on the shorter arc about this point")
+    way.add_argument("--arc", nargs=3, type=length, metavar=XYZ, help="the tool on an arc through this point")
+    way.add_argument("--center", nargs=3, type=length, metavar=XYZ, help="on the shorter arc about this point")
     way.add_argument("--ptp", action="store_true", help="the joints on a straight line")
     group.add_argument(
         "--via",
         nargs=3,
-        type=finite_number,
+        type=length,
         metavar=XYZ,
         action="append",
         default=[],
@@ -139,7 +138,7 @@ def _turned(goal: Goal, options: Options) -> Goal:
         return goal
     orientation = tuple(options.quaternion or ())
     if options.rpy is not None:
-        orientation = from_rpy(*(math.radians(value) for value in options.rpy))
+        orientation = from_rpy(*options.rpy)
     axis = tuple(options.axis or ((0.0, 0.0, 1.0) if options.along else ()))
     return replace(
         goal,

@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
-from services.cli.exits import ExitCode
+from services.cli.exits import CommandError, ExitCode
 from services.cli.names import nearest
+from services.cli.units import parse_value
 
 Options = argparse.Namespace
 _NEGATIVE_NUMBER = re.compile(r"^-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:deg|rad|mm|m|°)?$")
@@ -94,6 +95,23 @@ def positive_number(text: str) -> float:
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not above 0 and finite")
     return value
+
+
+def length(text: str) -> float:
+    """[m], from 0.3 or 300mm."""
+    return _measured(text, "m")
+
+
+def turn(text: str) -> float:
+    """[rad], from 90deg or 1.57rad; a bare number is in degrees."""
+    return _measured(f"{text}deg" if text[-1:].isdecimal() else text, "rad")
+
+
+def _measured(text: str, unit: str) -> float:
+    try:
+        return parse_value(text, unit, "it")
+    except CommandError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def finite_number(text: str) -> float:

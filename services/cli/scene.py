@@ -115,4 +115,5 @@ def shape_text(shape: Shape) -> str:
         case PlaneShape():
             return "plane, solid below"
         case MeshShape():
-            return f"mesh {shape.path or f'of {len(shape.data)} bytes'}"
+            scale = "" if set(shape.scale) == {1.0} else f", scale {shape.scale[0]:g}"
+            return f"mesh {shape.path or f'of {len(shape.data)} bytes'}{scale}"

@@ -36,7 +36,9 @@ def shape_options(parser: Parser) -> None:
 
 def place_options(parser: Parser, required: bool = False) -> None:
     parser.add_argument("--at", nargs=3, default=ZEROS, required=required, metavar=XYZ, help="where, as 300mm or 0.3")
-    parser.add_argument("--rpy", nargs=3, default=ZEROS, metavar=("R", "P", "Y"), help="how turned, as 90deg or 1.57")
+    parser.add_argument(
+        "--rpy", nargs=3, default=ZEROS, metavar=("R", "P", "Y"), help="how turned, as 90deg or 1.57rad"
+    )
     parser.add_argument("--frame", default="", metavar=LINK, help="in which this is given, as it is now; else the base")
 
 

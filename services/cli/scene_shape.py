@@ -15,6 +15,7 @@ from services.cli.units import parse_value
 from services.runtime.deployment import project_root
 
 LARGEST_TURN = 2.0 * math.pi  # [rad]
+LARGEST_MESH = 10.0  # [m]; what is larger was drawn in mm
 
 
 def object_of(options: Options) -> SceneObject:
@@ -49,6 +50,7 @@ def mesh_of(path: Path, scale: float) -> MeshShape:
     """By its path where it lies in the project, as every process finds it there; else by its content."""
     if not path.is_file():
         raise usage(f'there is no file "{path}"')
+    _require_size(path, scale)
     inside = path.resolve()
     if inside.is_relative_to(project_root()):
         return MeshShape(path=str(inside.relative_to(project_root())), scale=(scale,) * 3)
@@ -56,6 +58,19 @@ def mesh_of(path: Path, scale: float) -> MeshShape:
         return MeshShape(data=path.read_bytes(), scale=(scale,) * 3)
     except OSError as error:
         raise usage(f'"{path}" cannot be read: {error.strerror}') from error
+
+
+def _require_size(path: Path, scale: float) -> None:
+    """Refuses what is far too large; what is no mesh at all the planner says."""
+    from services.arm.stl import BadMesh, read_stl
+
+    try:
+        vertices = read_stl(path.read_bytes()).vertices
+    except (BadMesh, OSError):
+        return
+    longest = scale * float((vertices.max(axis=0) - vertices.min(axis=0)).max())
+    if longest > LARGEST_MESH:
+        raise usage(f'"{path}" would be {longest:.4g} m long: if it is drawn in mm, give --scale 0.001')
 
 
 def pose_of(at: Sequence[str], rpy: Sequence[str]) -> Transform:
@@ -75,8 +90,10 @@ def length(text: str, owner: str) -> float:
 
 
 def angle(text: str) -> float:
-    """[rad]; a bare number of more than a turn was meant in degrees."""
+    """[rad]; a bare number would be degrees elsewhere, and radians where joints are given."""
     value = parse_value(text, "rad", "--rpy")
+    if value and text[-1].isdecimal():
+        raise usage(f"--rpy {text} has no unit: write {text}deg for degrees, or {text}rad for radians")
     if abs(value) > LARGEST_TURN and "deg" not in text and "°" not in text:
         raise usage(f"--rpy {text} is {value:g} rad, more than a turn: write {text.removesuffix('rad')}deg for degrees")
     return value

@@ -104,6 +104,17 @@ def test_a_mesh_outside_the_project_travels_by_its_content(scene, tmp_path):
     assert scene().objects[0].shape == MeshShape(data=TRIANGLE.encode(), scale=(0.001, 0.001, 0.001))
 
 
+def test_a_mesh_in_millimetres_is_noticed_and_its_scale_is_listed(scene, tmp_path, capsys):
+    path = tmp_path / "plate.stl"
+    path.write_text(TRIANGLE.replace("1", "92"))
+    assert said(f"scene add plate --mesh {path}") is ExitCode.USAGE
+    assert "would be 92 m long: if it is drawn in mm, give --scale 0.001" in capsys.readouterr().err
+    assert said(f"scene add plate --mesh {path} --scale 0.001") is ExitCode.OK
+    assert scene().objects[0].shape.scale == (0.001,) * 3
+    assert said("scene list") is ExitCode.OK
+    assert f"mesh of {path.stat().st_size} bytes, scale 0.001" in capsys.readouterr().out
+
+
 def test_an_object_is_carried_moved_and_let_go(scene):
     said("scene add cup --sphere 20mm --at 0.3 0 0.1")
     assert said("scene attach cup efector_link --touch antebrazo_link brazo_link") is ExitCode.OK
@@ -174,6 +185,7 @@ def test_an_empty_scene_is_said_to_be_empty(scene, capsys):
         ("scene add ball --sphere 0", ExitCode.FAILED, 'refused: object "ball": radius of the sphere is 0 m'),
         ("scene add ball --sphere 3deg", ExitCode.USAGE, "--sphere slides: 3deg must be in m or mm"),
         ("scene add ball --sphere 1 --rpy 0 0 90", ExitCode.USAGE, "write 90deg for degrees"),
+        ("scene add ball --sphere 1 --rpy 0 0 1.5", ExitCode.USAGE, "write 1.5deg for degrees, or 1.5rad for radians"),
         ("scene add ball --mesh nowhere.stl", ExitCode.USAGE, 'there is no file "nowhere.stl"'),
         ("scene load nowhere.json", ExitCode.USAGE, "nowhere.json cannot be read"),
         ("scene attach table efector_link", ExitCode.FAILED, 'refused: object "table" is a plane'),

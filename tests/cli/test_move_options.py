@@ -118,3 +118,17 @@ def test_a_line_that_stops_short_says_so():
     assert summary(report, plan_only=True) == (
         "planned in 5.0 ms 50.0% of the way (at 0.1 m of 0.2 m, the crate), would take 2.00 s"
     )
+
+
+def test_lengths_and_turns_take_the_units_that_scenes_take():
+    plain = request("--via 0.1 0 0.1 --to 0.2 0.1 -0.1 --rpy 180 0 -90 --line")
+    assert request("--via 100mm 0 0.1m --to 200mm 0.1 -100mm --rpy 180deg 0 -90deg --line") == plain
+    radians = request("--to 0.2 0.1 -0.1 --rpy 3.141592653589793rad 0 0").goal
+    assert radians.orientation == pytest.approx(request("--to 0.2 0.1 -0.1 --rpy 180 0 0").goal.orientation)
+
+
+@pytest.mark.parametrize("words", ["--to 1deg 0 0", "--to 0.1 0 0 --rpy 1mm 0 0", "--to far 0 0", "--to 0 0 nan"])
+def test_what_is_no_length_or_turn_is_refused(words, capsys):
+    with pytest.raises(SystemExit):
+        request(words)
+    assert "argument --" in capsys.readouterr().err
