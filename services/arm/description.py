@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,6 +62,7 @@ class Arm:
     outputs: tuple[Output, ...]
     sensors: tuple[Sensor, ...]
     named_states: dict[str, tuple[float, ...]]  # [rad] or [m]
+    partial_states: dict[str, dict[str, float]]  # of groups that have only some of the joints
     disabled_collisions: frozenset[frozenset[str]]  # pairs of links
     model: UrdfModel
 
@@ -79,6 +81,20 @@ class Arm:
             if joint.name == name:
                 return joint
         raise DescriptionError(f'{self.name} has no joint "{name}"{suggestion(name, self.joint_names)}')
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Of all joints, and of some."""
+        return (*self.named_states, *self.partial_states)
+
+    def named_state(self, name: str, standing: Sequence[float]) -> tuple[float, ...] | None:
+        """Its values; joints that it does not name stand as in `standing`. None where there is no such state."""
+        if name in self.named_states:
+            return self.named_states[name]
+        values = self.partial_states.get(name)
+        if values is None:
+            return None
+        return tuple(values.get(joint, value) for joint, value in zip(self.joint_names, standing, strict=True))
 
     def collisions_are_disabled(self, first: str, second: str) -> bool:
         """Whether the SRDF says that this pair of links is not to be checked."""
@@ -110,6 +126,7 @@ def load_arm(folder: Path) -> Arm:
         outputs=robot.output,
         sensors=robot.sensor,
         named_states=_named_states(srdf, robot.group, joints, srdf_path),
+        partial_states=_partial_states(srdf, robot.group, joints),
         disabled_collisions=frozenset(frozenset(pair) for pair in srdf.disabled),
         model=model,
     )
@@ -205,3 +222,14 @@ def _named_states(srdf: SrdfModel, group: str, joints: tuple[Joint, ...], path: 
             raise DescriptionError(f'{path}: state "{state.name}" has no value for {", ".join(missing)}')
         states[state.name] = tuple(state.values[joint.name] for joint in joints)
     return states
+
+
+def _partial_states(srdf: SrdfModel, group: str, joints: tuple[Joint, ...]) -> dict[str, dict[str, float]]:
+    """The states of the other groups whose joints are all driven, by names that the arm's own group does not have."""
+    names = {joint.name for joint in joints}
+    own = {state.name for state in srdf.states if state.group == group}
+    return {
+        state.name: state.values
+        for state in srdf.states
+        if state.group != group and state.name not in own and state.values and names >= set(state.values)
+    }

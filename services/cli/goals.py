@@ -25,8 +25,8 @@ def goal_of(arm: Arm, to: Sequence[float] | None, joints: Sequence[str], named: 
         values = parse_joints(joints, arm.joints)
         return JointGoal(name=tuple(values), position=tuple(values.values()))
     assert named is not None
-    if named not in arm.named_states:
-        raise unknown("named state", named, arm.named_states)
+    if named not in arm.state_names:
+        raise unknown("named state", named, arm.state_names)
     return NamedGoal(name=named)
 
 

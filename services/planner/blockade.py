@@ -63,7 +63,7 @@ class Blockade:
         """The refusal of a straight line on which something touches, where it does so first."""
         found = first_collision(self._surroundings, np.array((start, goal)), margin)
         touching = np.array(goal) if found is None else found
-        named = ", ".join(self._arm.named_states)
+        named = ", ".join(self._arm.state_names)
         remedy = f"go by way of another posture, for example a named one ({named})"
         return self.refusal(PlanCode.PLANNING_FAILED, "on the straight way to the goal", touching, margin, (), remedy)
 

@@ -346,4 +346,4 @@ def test_a_line_along_a_joints_limit_goes_all_the_way():
     goal = PoseGoal(position=tuple(np.add(begin, (-0.03, 0.02, 0.0)).tolist()))
     response = planned("rm1", start, goal, LinearMotion())
     assert response.code is PlanCode.SUCCESS
-    assert (seen("rm1", response)[0].positions[:, 2] <= 0.2).all()
+    assert seen("rm1", response)[0].positions[:, 2].max() <= 0.2 + 1e-9

@@ -18,7 +18,7 @@ from services.planner.goals.pose_goals import target_of
 from services.planner.goals.unreachable import Unreachable
 from services.planner.refusals import NoPlan, beyond_limit, malformed, unknown_name
 from services.planner.scene.clearance import Checker
-from services.planner.start import require_parallel
+from services.planner.start import require_parallel, require_unwound
 
 Array = NDArray[np.float64]
 Start = tuple[float, ...]
@@ -48,7 +48,7 @@ class Goals:
         """
         match goal:
             case NamedGoal():
-                return iter([self._named(goal)])
+                return iter([self._named(goal, start)])
             case JointGoal():
                 return iter([self._joints(goal, start)])
             case PoseGoal():
@@ -58,11 +58,11 @@ class Goals:
                     INVALID, "goal", "this planner takes one goal at a time", "ask for the first point alone"
                 )
 
-    def _named(self, goal: NamedGoal) -> Start:
-        values = self._arm.named_states.get(goal.name)
+    def _named(self, goal: NamedGoal, start: Start) -> Start:
+        values = self._arm.named_state(goal.name, start)
         if values is None:
             where = f"{self._arm.srdf_path.name} of {self._arm.name}"
-            raise unknown_name(INVALID, "unknown state", goal.name, self._arm.named_states, where)
+            raise unknown_name(INVALID, "unknown state", goal.name, self._arm.state_names, where)
         self._require_limits(self._arm.joint_names, values)
         return values
 
@@ -81,6 +81,7 @@ class Goals:
         joints = [self._arm.joint(name) for name in names]
         nearest = tuple(joint.clamp(position) for joint, position in zip(joints, positions, strict=True))
         for joint, position in zip(joints, positions, strict=True):
+            require_unwound(INVALID, joint, position)
             if not joint.is_within(position):
                 raise beyond_limit(self._arm, joint, position, nearest)
 
