@@ -16,6 +16,7 @@ CUTS = 60  # tried; each costs the check of a line
 FRUITLESS = 15  # of them in a row are enough
 WIDEST = 0.5  # share of an edge that its corner may be rounded over
 LEAST = 1.0 / 64.0
+SHARED = 2  # control points from one corner to the next, where these share the one between them
 
 
 def shorten(corners: Array, validity: Validity, seed: int, is_late: Callable[[], bool]) -> Array:
@@ -46,11 +47,7 @@ def smooth(corners: Array, validity: Validity, is_late: Callable[[], bool]) -> A
     waiting = set(range(1, len(corners) - 1))
     control, places = _lay(corners, shares)
     while waiting and not is_late():
-        touching = {
-            corner
-            for corner in sorted(waiting)
-            if not validity.is_curve_free(control[places[corner] - 3 : places[corner] + 4])
-        }
+        touching = {corner for corner in sorted(waiting) if not validity.is_curve_free(control[_bent(places, corner)])}
         for corner in touching:
             shares[corner] = 0.5 * shares[corner] if shares[corner] > LEAST else 0.0
         near = touching | {corner + side for corner in touching for side in (-1, 1)}  # they share its edges
@@ -92,6 +89,13 @@ def _cut(corners: Array, low: float, high: float, validity: Validity) -> Array |
     moving = np.concatenate(([True], np.any(np.abs(np.diff(rows, axis=0)) > 1e-9, axis=1)))
     moving[-1] = True
     return np.asarray(rows[moving])
+
+
+def _bent(places: list[int], corner: int) -> slice:
+    """The control points of the spans that bend at this corner; others that it has a part in lie on one edge."""
+    before, here, after = places[corner - 1 : corner + 2]
+    shares_before, shares_after = here - before == SHARED, after - here == SHARED and corner + 2 < len(places)
+    return slice(here - (3 if shares_before else 2), here + (4 if shares_after else 3))
 
 
 def _lay(corners: Array, shares: Array) -> tuple[Array, list[int]]:
