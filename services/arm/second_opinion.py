@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from services.arm.chain import link_transforms
@@ -23,7 +24,7 @@ def second_opinion(arm: Arm) -> list[Finding]:
         other = yourdfpy.URDF.load(str(arm.urdf_path))
     except Exception as problem:  # of any mesh format's reader
         return [error(file, "meshes", f"yourdfpy cannot load it: {problem}", _suspects(arm.folder))]
-    middle = [(joint.lower + joint.upper) / 2 for joint in arm.joints]
+    middle = [(joint.lower + joint.upper) / 2 if math.isfinite(joint.lower) else 0.0 for joint in arm.joints]
     other.update_cfg(dict(zip(arm.joint_names, middle, strict=True)))
     theirs = other.get_transform(arm.tool_frame, arm.base_frame)[:3, 3]
     poses = link_transforms(arm.model, dict(zip(arm.joint_names, middle, strict=True)))

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from schemas.joints import JointState
 from schemas.planning import PlanCode
-from services.arm.description import Arm
+from services.arm.description import Arm, Joint
 from services.planner.refusals import malformed, moving_start, stale_state, start_beyond_limit, unknown_name
 
 STALE_AFTER = 0.5  # [s] without a joint state: as long as the device waits for a heartbeat
 REST = 0.01  # share of a joint's velocity limit below which it stands
+MOST_TURNED = 90.0  # [rad] of a joint without limits: the compiled core takes 100, and a search goes half a turn more
 ROUNDING = 0.51  # [steps] executed positions are whole steps, so they may be this far beyond a limit
 
 
@@ -21,6 +23,7 @@ def resolve_start(arm: Arm, given: JointState | None, present: JointState | None
         values = {**_present(arm, present, age), **values}
     for joint in arm.joints:
         value = values[joint.name]
+        require_unwound(PlanCode.INVALID_ROBOT_STATE, joint, value)
         if abs(value - joint.clamp(value)) > ROUNDING * joint.steps.resolution:
             raise start_beyond_limit(joint, value)
     return tuple(joint.clamp(values[joint.name]) for joint in arm.joints)
@@ -55,6 +58,18 @@ def _values(arm: Arm, state: JointState) -> dict[str, float]:
         if abs(velocity) > REST * joint.velocity:
             raise moving_start(joint, velocity, REST * joint.velocity)
     return dict(zip(state.name, state.position, strict=True))
+
+
+def require_unwound(code: PlanCode, joint: Joint, value: float) -> None:
+    """Raises `NoPlan` for a joint without limits that has turned, or is to turn, too often."""
+    if math.isinf(joint.upper) and abs(value) > MOST_TURNED:
+        raise malformed(
+            code,
+            joint.name,
+            f'"{joint.name}" at {value:.6g} rad is more than {MOST_TURNED:g} rad from 0, where angles lose digits',
+            "count from where it is now (`gemelo reference`), or give the same angle with fewer turns",
+            check="joint limit",
+        )
 
 
 def require_parallel(names: Sequence[str], positions: Sequence[float], where: str) -> None:

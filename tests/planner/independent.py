@@ -37,7 +37,7 @@ class Judge:
         self._model, self._owners = built.model, built.owners
         self._data = mujoco.MjData(self._model)
         self._places = [int(self._model.joint(name).qposadr[0]) for name in arm.joint_names]
-        self._base, self._tool = (self._model.body(name).id for name in (arm.base_frame, arm.tool_frame))
+        self._base, self._tool = arm.base_frame, arm.tool_frame
         excused = _excused(arm, scene)
         pairs = [pair for pair in combinations(range(self._model.ngeom), 2) if self._is_checked(*pair, excused)]
         self._pairs = np.array(pairs, dtype=int).reshape(-1, 2)
@@ -79,11 +79,16 @@ class Judge:
             row = max(row + 1, int(np.searchsorted(moved, moved[row] + found.distance)))
         return None
 
-    def tool(self, positions: Array) -> tuple[Array, Array]:
-        """Position (3,) [m] and rotation (3, 3) of the tool in the base frame."""
+    def pose(self, link: str, positions: Array) -> tuple[Array, Array]:
+        """Position (3,) [m] and rotation (3, 3) of a link in the base frame."""
         self._place(positions)
-        base, turn = self._data.xpos[self._base], self._data.xmat[self._base].reshape(3, 3)
-        return turn.T @ (self._data.xpos[self._tool] - base), turn.T @ self._data.xmat[self._tool].reshape(3, 3)
+        base, found = self._data.body(self._base), self._data.body(link)
+        turn = base.xmat.reshape(3, 3).T
+        return turn @ (found.xpos - base.xpos), turn @ found.xmat.reshape(3, 3)
+
+    def tool(self, positions: Array) -> tuple[Array, Array]:
+        """Of the tool."""
+        return self.pose(self._tool, positions)
 
     def tool_way(self, rows: Array) -> Array:
         """(m, 3) [m] the tool's positions."""

@@ -144,8 +144,8 @@ class MotionCore:
         time at full speed. The interpreter's lock is released; `cancel` may be set from another thread.
         """
         rows = self._rows(np.atleast_2d(np.asarray(goals, dtype=np.float64)))
-        bounds = np.array([self._lower(), self._upper(), [1.0 / joint.velocity for joint in self.arm.joints]])
         at = self._row(start)
+        bounds = np.array([*self._span(np.vstack((at, rows))), [1.0 / joint.velocity for joint in self.arm.joints]])
         done = motion.plan(self._setting.world, self._kernel, bounds, at, rows, seed, self.margin, time_limit, cancel)
         effort = Effort(done.search_s, done.shorten_s, done.smooth_s, done.iterations, done.checks)
         if done.outcome != FOUND:
@@ -156,11 +156,11 @@ class MotionCore:
         """(rows, spheres, 3) [m] in the base, in the order of the trees: for tests and pictures."""
         return motion.centres(self._setting.world, self._kernel, self._rows(positions))
 
-    def _lower(self) -> list[float]:
-        return [joint.lower if math.isfinite(joint.lower) else -math.pi for joint in self.arm.joints]
-
-    def _upper(self) -> list[float]:
-        return [joint.upper if math.isfinite(joint.upper) else math.pi for joint in self.arm.joints]
+    def _span(self, ends: Array) -> tuple[Array, Array]:
+        """Where is searched: within the limits, and half a turn around `ends` (m, n) where a joint has none."""
+        lower, upper = np.array([(joint.lower, joint.upper) for joint in self.arm.joints]).T
+        around = ends.min(axis=0) - math.pi, ends.max(axis=0) + math.pi
+        return np.where(np.isfinite(lower), lower, around[0]), np.where(np.isfinite(upper), upper, around[1])
 
     def _rows(self, values: ArrayLike) -> Array:
         rows = np.ascontiguousarray(values, dtype=np.float64)

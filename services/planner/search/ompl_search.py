@@ -26,14 +26,14 @@ BETTERING = {"RRTstar": 600, "BITstar": 3000}  # questions "are we done?" after 
 RANGE = 0.4  # [s] at full speed that a tree grows by at most
 BATCH = 60  # "are we done?" while the roadmap grows, until it is looked at
 SEEDS = 2**32 - 2
-CIRCLE = math.pi  # [rad] a joint without limits is searched within a turn
+AROUND = math.pi  # [rad] about start and goals that a joint without limits is searched in
 
 
 def ompl_corners(
     arm: Arm, planner_id: str, start: Array, goals: Array, validity: Validity, seed: int, deadline: Deadline
 ) -> Array:
     """Corners (m, n) of a polyline from `start` (n,) to one of `goals` (k, n), exact at both ends; raises `NoWay`."""
-    problem = _Problem(arm, validity)
+    problem = _Problem(arm, validity, np.vstack((start, goals)))
     problem.set_ends(start, goals, seed)
     corners = problem.roadmap(deadline) if planner_id == "PRM" else problem.tree(planner_id, deadline)
     nearest = int(np.argmin(np.abs(goals - corners[-1]).max(axis=1)))
@@ -51,7 +51,7 @@ def load_ompl() -> None:
 class _Problem:
     """One question in OMPL's terms; states are joint values divided by the speed limits."""
 
-    def __init__(self, arm: Arm, validity: Validity) -> None:
+    def __init__(self, arm: Arm, validity: Validity, ends: Array) -> None:
         from ompl import base
 
         self._scale = np.array([joint.velocity for joint in arm.joints])
@@ -59,9 +59,10 @@ class _Problem:
         self._base: Any = base
         space = base.RealVectorStateSpace(len(arm.joints))
         bounds = base.RealVectorBounds(len(arm.joints))
-        for index, joint in enumerate(arm.joints):
-            bounds.setLow(index, (joint.lower if math.isfinite(joint.lower) else -CIRCLE) / joint.velocity)
-            bounds.setHigh(index, (joint.upper if math.isfinite(joint.upper) else CIRCLE) / joint.velocity)
+        for index, (joint, column) in enumerate(zip(arm.joints, ends.T, strict=True)):
+            low, high = float(column.min()) - AROUND, float(column.max()) + AROUND
+            bounds.setLow(index, (joint.lower if math.isfinite(joint.lower) else low) / joint.velocity)
+            bounds.setHigh(index, (joint.upper if math.isfinite(joint.upper) else high) / joint.velocity)
         space.setBounds(bounds)
         self.information: Any = base.SpaceInformation(space)
         self.information.setStateValidityChecker(_states(validity, self._scale))
