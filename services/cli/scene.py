@@ -67,6 +67,7 @@ def save(scene: PlanningScene, path: Path) -> None:
         path.write_bytes(msgspec.json.format(msgspec.json.encode(scene)) + b"\n")
     except OSError as error:
         raise CommandError(f"{path} cannot be written: {error.strerror}") from error
+    print(f"{path} has the scene, version {scene.version}")
 
 
 def load(path: Path) -> PlanningScene:

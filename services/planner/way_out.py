@@ -22,7 +22,7 @@ DIRECTIONS = 24  # of all joints together, at each distance, besides those of on
 LEAST_REACH = 0.02  # [m/rad] of a joint that moves hardly anything
 LOOKS = 8  # at what touches, along a way
 SPEED = 0.02  # [m/s] of any point at most: jogging is not faster than 30 mm/s in a contact
-LEAST_SECONDS = 0.5
+LEAST_SECONDS, SHARE = 0.5, 0.7  # and of a joint's velocity limit at most
 DECIMALS, TINY = 4, 1e-4  # of [rad] or [m], in which a posture is told; what moves less does not move
 
 
@@ -52,8 +52,9 @@ def way_out(arm: Arm, surroundings: Surroundings, start: Start, is_late: Callabl
 def jog_words(arm: Arm, reach: Array, start: Start, posture: Start) -> str:
     """The command that moves from `start` to `posture`; `reach` as a world's."""
     moves = [after - before for before, after in zip(start, posture, strict=True)]
-    moved = float(np.abs(moves) @ reach)
-    seconds = max(LEAST_SECONDS, math.ceil(10.0 * moved / SPEED) / 10.0)
+    fastest = max(abs(move) / joint.velocity for joint, move in zip(arm.joints, moves, strict=True))
+    needed = max(LEAST_SECONDS, float(np.abs(moves) @ reach) / SPEED, fastest / SHARE)
+    seconds = math.ceil(10.0 * needed) / 10.0
     speeds = (_speed(joint, move / seconds) for joint, move in zip(arm.joints, moves, strict=True) if abs(move) > TINY)
     return f"gemelo jog --joint {' '.join(speeds)} --for {seconds:g}"
 

@@ -146,12 +146,13 @@ def test_pairs_are_allowed_and_disallowed(scene):
     assert scene().allowed == ()
 
 
-def test_a_saved_scene_is_loaded_again(scene, tmp_path):
+def test_a_saved_scene_is_loaded_again(scene, tmp_path, capsys):
     said("scene add table --box 1 1 0.1")
     said("scene add cup --sphere 20mm --attach efector_link")
     said("scene allow table cup")
     before = scene()
     assert said(f"scene save {tmp_path / 'cell.json'}") is ExitCode.OK
+    assert f"cell.json has the scene, version {before.version}" in capsys.readouterr().out
     assert said("scene clear") is ExitCode.OK
     assert scene().objects == ()
     assert said(f"scene load {tmp_path / 'cell.json'}") is ExitCode.OK

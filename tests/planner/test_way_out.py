@@ -118,6 +118,9 @@ def jogged_as_told(name: str, world: World, posture: Array, remedy: str) -> Arra
     jogged.tracker = Tracker(Limits.of(jogged.arm.joints), PERIOD, Knot.at_rest(tuple(posture.tolist())))
     jogged.world = world
     jogged.jog.set_world(world)
-    jogged.hold(command_of(arm_of(name), shlex.split(told[1]), (), (), False), float(told[2]))
+    command = command_of(arm_of(name), shlex.split(told[1]), (), (), False)
+    for joint, velocity in zip(command.name, command.velocity, strict=True):
+        assert abs(velocity) < jogged.arm.joint(joint).velocity
+    jogged.hold(command, float(told[2]))
     jogged.let_go()
     return np.array(jogged.tracker.knot.position)
