@@ -12,6 +12,7 @@ from services.arm.description import Arm
 
 Array = NDArray[np.float64]
 
+NEVER = 1e9  # [m] after which a slide would be where it was
 MOST_TURNS = 64  # combinations of full turns of one branch
 ROUNDING = 1e-9  # [rad] or [m] by which a solution may be beyond a limit before it is put onto it
 
@@ -22,16 +23,15 @@ class Turns:
     def __init__(self, arm: Arm) -> None:
         self._lower = np.array([joint.lower - ROUNDING for joint in arm.joints])
         self._upper = np.array([joint.upper + ROUNDING for joint in arm.joints])
-        self._does_turn = np.array([joint.unit == "rad" for joint in arm.joints])
+        self._period = np.array([math.tau if joint.unit == "rad" else NEVER for joint in arm.joints])
 
     def within_limits(self, branches: Array, near: Array) -> list[Array]:
         """The branches (m, n) or one of them (n,) with every full turn; joints without limits as near as they can."""
         branches = np.atleast_2d(branches)
         lower = np.where(np.isinf(self._lower), near - math.pi, self._lower)
         upper = np.where(np.isinf(self._upper), near + math.pi, self._upper)
-        first = branches + math.tau * np.where(self._does_turn, np.ceil((lower - branches) / math.tau), 0.0)
-        more = np.floor((upper - first) / math.tau)
-        more = np.where(self._does_turn, more, np.where((first >= lower) & (first <= upper), 0.0, -1.0))
+        first = branches + self._period * np.ceil((lower - branches) / self._period)
+        more = np.floor((upper - first) / self._period)
         postures: list[Array] = []
         for values, turns in zip(first, more, strict=True):
             if turns.min() >= 0.0:  # false for what is not a number, too
