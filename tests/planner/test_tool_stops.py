@@ -21,6 +21,7 @@ from schemas.planning import (
     PlanResponse,
     PointToPoint,
     PoseGoal,
+    Timing,
     WaypointGoal,
 )
 from schemas.scene import BoxShape, PlanningScene, SceneObject
@@ -347,3 +348,34 @@ def test_a_line_along_a_joints_limit_goes_all_the_way():
     response = planned("rm1", start, goal, LinearMotion())
     assert response.code is PlanCode.SUCCESS
     assert seen("rm1", response)[0].positions[:, 2].max() <= 0.2 + 1e-9
+
+
+class CountingClock:
+    """Every look at it takes a millisecond."""
+
+    def __init__(self) -> None:
+        self.looks = 0
+
+    def __call__(self) -> float:
+        self.looks += 1
+        return 1e-3 * self.looks
+
+
+@KINDS
+@pytest.mark.parametrize("timing", Timing)
+def test_the_time_that_is_allowed_ends_a_way_wherever_it_is(kind: str, timing: Timing):
+    planner = planner_of("parol6")
+    start = planner.arm.named_states["ready"]
+    begin = planner.kinematics.tool(start).position
+    goal, motion = way(kind, begin, np.add(begin, (0.0, 0.05, 0.0)), 1.0)
+    request = asked(planner, start, goal, motion=replace(motion, max_step=0.001), timing=timing, allowed_time=100.0)
+    needed = CountingClock()
+    assert planner.plan(request, None, clock=needed).code is PlanCode.SUCCESS
+    assert needed.looks > 50  # once for each posture at least
+    late = 0
+    for share in (0.05, 0.2, 0.4, 0.6, 0.8, 0.95):
+        clock = CountingClock()
+        response = planner.plan(replace(request, allowed_time=1e-3 * share * needed.looks), None, clock=clock)
+        late += response.code is PlanCode.TIMED_OUT
+        assert response.code is PlanCode.SUCCESS or clock.looks < share * needed.looks + 20
+    assert late >= 4

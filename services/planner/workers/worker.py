@@ -18,7 +18,7 @@ from services.planner.core import Planner
 from services.planner.scene.world import World
 from services.planner.search.native_search import cancel_flag
 from services.planner.times import Stopwatch
-from services.planner.timing.time_optimal import load_toppra
+from services.planner.timing.speeds import load_toppra
 from services.planner.workers.jobs import (
     ORDERS,
     Ask,
