@@ -147,7 +147,7 @@ void gemelo_snapshot(VirtualDevice* device, GemeloSnapshot* snapshot) {
         snapshot->steps[j] = machine.stepper().executed(j);
         snapshot->shaft[j] = device->world().shaft(j);
         snapshot->commanded_q20[j] = point.position_q20[j];
-        snapshot->commanded_q8[j] = static_cast<int32_t>((point.position_q20[j] + 2048) >> 12);
+        snapshot->commanded_q8[j] = gemelo::as_q8(point.position_q20[j]);
     }
 }
 

@@ -23,7 +23,7 @@ void Gateway::open_stream() {
     for (uint8_t j = 0; j < stand_.bench.config.joints; ++j) {
         const int64_t q20 = stand_.machine.present().position_q20[j];
         const int64_t whole = ((q20 + kFineStep / 2) >> kFineBits) * 256;
-        start.push_back(static_cast<int32_t>(knows_better ? (q20 + 2048) >> 12 : whole));
+        start.push_back(knows_better ? as_q8(q20) : static_cast<int32_t>(whole));
     }
     path_.emplace(stand_.bench.config, start, static_cast<uint64_t>(dice_.between(0, INT64_MAX / 2)));
     chunks_.clear();
