@@ -14,7 +14,7 @@ up: setup ## start the twin (setup first); Ctrl-C stops it
 	@deploy/up
 
 down: ## stop a twin that runs elsewhere
-	@$(bin)/process-compose down
+	@PROC_COMP_CONFIG=.gemelo $(bin)/process-compose down
 
 test: setup ## all tests: Python, firmware, whole stack
 	@deploy/test_firmware
