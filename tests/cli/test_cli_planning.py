@@ -86,7 +86,7 @@ def test_a_terminal_is_shown_how_planning_stands_and_nothing_of_it_stays(
     with pytest.raises(CommandError):
         move(session, past_the_wall(), plan_only=True, as_json=False)
     written = capsys.readouterr().out
-    assert re.search(r"planning: search, \d+\.\d of 30 s \(Ctrl-C cancels\)\n", written)
+    assert re.search(r"planning: search, \d+\.\d of 100 s \(Ctrl-C cancels\)\n", written)
     assert written.endswith("\x1b[1F\x1b[J")
 
 
@@ -98,7 +98,7 @@ def test_a_pipe_hears_nothing_of_it(session, gateway, walled, watcher, capsys):
 
 
 def test_a_plan_that_comes_too_late_is_not_left_behind(session, gateway, walled, watcher, monkeypatch):
-    monkeypatch.setattr(planning, "MARGIN", -29.0)
+    monkeypatch.setattr(planning, "MARGIN", -99.0)
     heard: list[PlanProgress] = []
     watcher.subscribe(PLAN_PROGRESS, heard.append)
     with pytest.raises(NoAnswer, match="planner did not answer plan within 1 s"):

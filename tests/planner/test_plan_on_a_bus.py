@@ -116,9 +116,10 @@ def test_two_clients_plan_side_by_side_and_each_ends_its_own(bus: Bus) -> None:
             watcher.sees_search_of("one", "two")
             assert cancel(second, "two")
             assert two.get(timeout=PATIENCE).code is PlanCode.PREEMPTED
+            third.wait(0.3)  # what was said before lies in the inbox
             heard = len(watcher.heard)
             watcher.until(lambda: len(watcher.heard) > heard + 3)
-            assert {each.request_id for each in watcher.heard[heard + 1 :]} == {"one"}
+            assert {each.request_id for each in watcher.heard[heard:]} == {"one"}
             assert cancel(third, "one")
             response = one.get(timeout=PATIENCE)
         assert response.code is PlanCode.PREEMPTED
@@ -126,7 +127,7 @@ def test_two_clients_plan_side_by_side_and_each_ends_its_own(bus: Bus) -> None:
         stands = [each.elapsed for each in watcher.heard if each.request_id == "one"]
         assert stands == sorted(stands)
         assert stands[0] > 0.1
-        assert {each.allowed for each in watcher.heard} == {30.0}
+        assert {each.allowed for each in watcher.heard} == {100.0}
         assert not cancel(first, "one")
 
 

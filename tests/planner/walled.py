@@ -24,7 +24,7 @@ def wall(name: str, angle: float) -> SceneObject:
 WALLED = PlanningScene(version=8, objects=(wall("left wall", 0.6), wall("right wall", -1.6)))
 
 
-def past_the_wall(request_id: str = "", planner_id: str = "", allowed: float = 30.0) -> PlanRequest:
+def past_the_wall(request_id: str = "", planner_id: str = "", allowed: float = 100.0) -> PlanRequest:
     """There is no way."""
     return PlanRequest(
         start=JointState(name=NAMES, position=(0.0, 0.3, 0.05)),
