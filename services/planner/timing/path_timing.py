@@ -69,6 +69,15 @@ class Demand:
             twisted = np.cbrt(_least(JERK_OF_SPEED * self.jerk / self.third))
         return np.fmin(np.fmin(straight, bent), twisted)
 
+    def rows(self, edges: Array) -> NDArray[np.int64]:
+        """(j, 2) which of them are in each stretch between edges, from one up to another."""
+        inside = 0.5 * ASIDE * float(self.along[-1])
+        return np.searchsorted(self.along, np.column_stack((edges[:-1] + inside, edges[1:] - inside)))
+
+    def least_duration(self, edges: Array) -> float:
+        """[s] at the speeds that the stretches allow."""
+        return float(np.sum(np.diff(edges) / _least_in(self.speeds, self.rows(edges))))
+
 
 def law_along(
     curve: PathCurve, limits: JointLimits, tool: tuple[float, float], marks: Array, timing: Timing, heed: Heed
@@ -118,11 +127,9 @@ def time_law(demand: Demand, heed: Heed) -> TimeLaw:
     for edges, share in tries:
         heed()
         try:
-            sections = _sections(demand, edges, share)
-            if best is not None and sum(section.length / section.speed for section in sections) >= best.duration:
-                continue
-            law = TimeLaw(stretches_through(sections))
-            best = law if best is None or law.duration < best.duration else best
+            if best is None or demand.least_duration(edges) < share * best.duration:
+                law = TimeLaw(stretches_through(_sections(demand, edges, share)))
+                best = law if best is None or law.duration < best.duration else best
         except NoProfile as error:
             why = error
     if best is None:
@@ -152,8 +159,7 @@ def _divisions(demand: Demand) -> list[Array]:
 def _sections(demand: Demand, edges: Array, share: float) -> list[Section]:
     """With what every row in each of them allows at every speed up to the one given; raises `NoProfile`."""
     end = float(demand.along[-1])
-    inside = 0.5 * ASIDE * end
-    bounds = np.searchsorted(demand.along, np.column_stack((edges[:-1] + inside, edges[1:] - inside)))
+    bounds = demand.rows(edges)
     first, second, third = demand.first, demand.second, demand.third
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         speed = np.fmin(share * _least_in(demand.speeds, bounds), FASTEST * end)

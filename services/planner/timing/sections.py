@@ -6,6 +6,7 @@ q' = y' v, q'' = y'' v^2 + y' a, q''' = y''' v^3 + 3 y'' v a + y' j.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -25,7 +26,7 @@ SHARES = np.linspace(1e-6, 1.0 - 1e-6, 5)  # of a section, at which its bounds a
 ALIKE = 1.08  # sections whose speeds differ by less are one
 STRAIGHT = 1e-9  # 1/s of bend below which a piece is straight
 TINY = 1e-12
-HALVINGS = 30
+NEARLY = 1.0 - 1e-9  # of a change of speed, lest rounding leaves no profile for it
 
 
 @dataclass(frozen=True)
@@ -90,18 +91,20 @@ def _merged(sections: list[Section]) -> list[Section]:
 
 
 def _reachable(speed: float, section: Section) -> float:
-    """The fastest steady speed at the other end of the section, by bisection."""
-    low, high = speed, max(speed, section.speed)
-    if _distance(low, high, section) <= section.length:
-        return high
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if _distance(speed, middle, section) <= section.length else (low, middle)
-    return low
+    """The fastest steady speed at the other end of the section.
 
-
-def _distance(low: float, high: float, section: Section) -> float:
-    """What a jerk-limited change of speed takes, steady before and after."""
-    change, a, j = high - low, section.acceleration, section.jerk
-    duration = change / a + a / j if change * j >= a * a else 2.0 * (change / j) ** 0.5
-    return 0.5 * (low + high) * duration
+    A change c of the speed v takes the length (2 v + c) (c / j)^0.5, or (2 v + c) (c / a + a / j) / 2 where it is so
+    large that the acceleration's limit is reached: a cubic in c^0.5 (Cardano's formula), and a quadratic in c.
+    """
+    a, j, length = section.acceleration, section.jerk, section.length
+    third, half = 2.0 * speed / 3.0, 0.5 * length * math.sqrt(j)
+    if third > TINY * math.cbrt(half) ** 2:
+        root = 2.0 * math.sqrt(third) * math.sinh(math.asinh(half / (third * math.sqrt(third))) / 3.0)
+    else:
+        root = math.cbrt(2.0 * half)
+    change = root * root
+    if change * j > a * a:
+        b = a / j + 2.0 * speed / a
+        c = 2.0 * (length - speed * a / j)
+        change = 2.0 * c / (b + math.sqrt(b * b + 4.0 * c / a))
+    return min(speed + NEARLY * change, max(speed, section.speed))
