@@ -52,10 +52,18 @@ class Obstacles:
         floor = CLEARANCE + SLACK + self._straying(velocity)
         pairs = self._nearness.pairs_within(floor, way)
         before = self._nearness.distances(pairs)
-        closing = self._closing(way, pairs, before, floor)
+        closing = self._hardly_known(way, pairs, before, floor)
+        if closing is None:
+            closing = self._closing(way, pairs, before, floor)
         if closing is None:
             closing = self._closing_before(way, pairs, before, floor)
         return None if closing is None else self._said(closing, self._nearness.distances(closing))
+
+    def _hardly_known(self, way: Array, pairs: Pairs, before: Array, floor: float) -> Pairs | None:
+        """The pairs that are clear now, dear to look at, and moved farther than one look on the way answers for."""
+        free = np.maximum(before - floor, LEAST_LOOK)
+        unseen = self._nearness.are_dear(pairs) & (before >= floor) & (self._nearness.speeds(way, pairs) > free)
+        return pairs[unseen] if unseen.any() else None
 
     def _closing(self, way: Array, pairs: Pairs, before: Array, floor: float) -> Pairs | None:
         """The pairs that are too near at the end of the way, and not farther than before."""

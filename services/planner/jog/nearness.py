@@ -23,13 +23,16 @@ class Nearness:
     def __init__(self, world: World) -> None:
         self._world = world
         self._reach: Array = world.pair_reach
-        self._least: Array = np.full(len(self._reach), -np.inf)  # [m] that they are apart at least
+        self._least: Array = np.empty(0)  # [m] that they are apart at least
+        self._is_dear = world.is_dear
         self._is_exact = np.zeros(len(self._reach), dtype=bool)
         self._here: Array | None = None
 
     def move_to(self, posture: Array) -> None:
         """From now on it is about this posture."""
-        if self._here is not None:
+        if self._here is None:
+            self._least = self._world.least_distances(posture)
+        else:
             self._least -= self._moved(posture - self._here)
         self._is_exact[:] = False
         self._here = posture
@@ -44,6 +47,10 @@ class Nearness:
     def distances(self, pairs: Pairs) -> Array:
         """(k,) [m] here; exact for pairs that are not known to be farther."""
         return self._least[pairs]
+
+    def are_dear(self, pairs: Pairs) -> NDArray[np.bool_]:
+        """(k,) whether a look at them takes too long to be done often."""
+        return self._is_dear[pairs]
 
     def distances_at(self, posture: Array, pairs: Pairs) -> Array:
         """(k,) [m] somewhere else."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -23,7 +24,16 @@ from services.planner.scene.world_bounds import LowerBounds
 from services.planner.scene.world_geometry import WorldGeometry
 
 Array = NDArray[np.float64]
+MANY = 2000  # triangles
 Positions = Sequence[float] | Array
+
+
+class Side(NamedTuple):
+    """A point (3,) in a mesh's frame, how far [m] its shape was from the surface, and on which side of it."""
+
+    point: Array
+    distance: float
+    is_inside: bool
 
 
 class World:
@@ -47,6 +57,7 @@ class World:
         for index in self._bounds.pairs:
             self._placed.deactivateCollisionPair(index)
         self.reach: Array = self._geometry.reach
+        self._sides: dict[tuple[int, int], Side] = {}  # the shapes' numbers, outer first
         self._sweep = Sweep(arm, kinematics, self._geometry, self.distances)
 
     @property
@@ -85,6 +96,19 @@ class World:
         q = self._kinematics.configuration.to_pinocchio(positions)
         pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
         return np.array([self._exact(index) for index in numbers])
+
+    def least_distances(self, positions: Positions) -> Array:
+        """(pairs,) [m] that each pair is apart at least, cheaply; minus infinity where that says nothing."""
+        q = self._kinematics.configuration.to_pinocchio(positions)
+        pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
+        bounds = self._bounds.of(self._placed)
+        return np.concatenate((np.full(len(self._geometry.pairs) - len(bounds), -np.inf), bounds))
+
+    @property
+    def is_dear(self) -> NDArray[np.bool_]:
+        """(pairs,) where a look takes as long as a thousand others: meshes of many triangles."""
+        sizes = [0 if mesh is None else len(mesh.faces) for mesh in self._geometry.meshes]
+        return np.array([sizes[one] + sizes[other] > MANY for one, other in self._geometry.pairs], dtype=bool)
 
     @property
     def pair_names(self) -> Sequence[LinkPair]:
@@ -140,23 +164,28 @@ class World:
         """[m] between the two shapes of a pair, less their padding."""
         result = pin.computeDistance(self._geometry.model, self._placed, index)
         distance = float(result.min_distance)
-        if distance > 0.0 and self._is_swallowed(index):
+        if distance > 0.0 and self._is_swallowed(index, distance):
             distance = -distance
         return distance - self._geometry.padding[index]
 
-    def _is_swallowed(self, index: int) -> bool:
-        """Whether one shape of the pair is wholly inside the other, a mesh: coal sees surfaces only."""
+    def _is_swallowed(self, index: int, distance: float) -> bool:
+        """Whether one shape is wholly inside the other, a mesh: coal sees only its surface, `distance` [m] away."""
         one, other = self._geometry.pairs[index]
-        return self._holds(one, other) or self._holds(other, one)
+        return self._holds(one, other, distance) or self._holds(other, one, distance)
 
-    def _holds(self, outer: int, inner: int) -> bool:
+    def _holds(self, outer: int, inner: int, distance: float) -> bool:
+        """No point that moves less than the surface was and is away from it has changed sides."""
         mesh = self._geometry.meshes[outer]
         if mesh is None or not np.isfinite(self._geometry.boxes[inner]).all():
             return False
         filling = self._geometry.meshes[inner]
         point = self._geometry.boxes[inner][0] if filling is None else filling.vertices[0]
         there = self._placed.oMg[outer].actInv(self._placed.oMg[inner].act(point))
-        return is_inside(mesh, there)
+        known = self._sides.get((outer, inner))
+        if known is None or float(np.linalg.norm(there - known.point)) >= distance + known.distance:
+            known = Side(there, distance, is_inside(mesh, there))
+        self._sides[outer, inner] = Side(there, distance, known.is_inside)
+        return known.is_inside
 
     def _point_between(self, index: int) -> tuple[float, ...]:
         """(3,) [m] in the base frame, of the distance that was computed last for this pair."""
