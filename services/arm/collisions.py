@@ -76,7 +76,12 @@ def load_shapes(arm: Arm, model: pin.Model) -> pin.GeometryModel:
     geometry = pin.buildGeomFromUrdf(
         model, str(arm.urdf_path), pin.GeometryType.COLLISION, package_dirs=[str(arm.folder)]
     )
-    if geometry.ngeoms != expected or expected == 0:
+    if expected == 0:
+        raise DescriptionError(
+            f"{arm.urdf_path}: no link has a <collision>, so nothing would ever touch; "
+            f"`gemelo collision fit {arm.folder} --meshes --write` makes some from the meshes"
+        )
+    if geometry.ngeoms != expected:
         raise DescriptionError(
             f"{arm.urdf_path}: {geometry.ngeoms} of {expected} collision shapes could be loaded; use box, cylinder, "
             "sphere or mesh (<capsule> is not URDF)"

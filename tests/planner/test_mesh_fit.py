@@ -166,6 +166,19 @@ def _require_only_collisions_changed(text: str, arm: Arm) -> None:
     assert after.count("<!--") == text.count("<!--")
 
 
+def test_an_arm_that_has_meshes_alone_is_told_what_makes_shapes_and_gets_them(copied: Path):
+    arm = load_arm(copied)
+    before = arm.urdf_path.read_text()
+    arm.urdf_path.write_text(with_collisions(before, {link.name: () for link in arm.model.links if link.visuals}))
+    bare = load_arm(copied)
+    with pytest.raises(DescriptionError, match=r"gemelo collision fit .* --meshes --write"):
+        Kinematics(bare)
+    write_fits(bare, fit_links(bare, 1))
+    assert Kinematics(load_arm(copied)).collisions.geometry_count == sum(
+        bool(link.visuals) for link in bare.model.links
+    )
+
+
 def test_a_capsule_is_written_as_what_a_urdf_knows(copied: Path):
     _replace_mesh(copied, trimesh.creation.capsule(radius=0.02, height=0.1))
     arm = load_arm(copied)

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from services.arm.collisions import load_shapes
 from services.arm.description import Arm
 from services.arm.errors import DescriptionError
 from services.planner.covers.shapes import Mesh, Shape, ShapeKind
@@ -20,19 +21,11 @@ Form = tuple[ShapeKind, tuple[float, ...], Mesh | None]
 
 
 def link_shapes(arm: Arm) -> dict[str, tuple[Shape, ...]]:
-    """The collision shapes of every link that has any, in the link's frame; pinocchio drops what it does not know
-    WITHOUT an error, so they are counted, and `DescriptionError` is raised where one is missing."""
+    """The collision shapes of every link that has any, in the link's frame; raises `DescriptionError` where one could
+    not be loaded."""
     model = pin.buildModelFromUrdf(str(arm.urdf_path))
-    kind = pin.GeometryType.COLLISION
-    geometry = pin.buildGeomFromUrdf(model, str(arm.urdf_path), kind, package_dirs=[str(arm.folder)])
-    expected = sum(len(link.collisions) for link in arm.model.links)
-    if geometry.ngeoms != expected or expected == 0:
-        raise DescriptionError(
-            f"{arm.urdf_path}: {geometry.ngeoms} of {expected} collision shapes could be loaded; use box, cylinder, "
-            "sphere or mesh"
-        )
     shapes: dict[str, tuple[Shape, ...]] = {}
-    for item in geometry.geometryObjects:
+    for item in load_shapes(arm, model).geometryObjects:
         frame = model.frames[item.parentFrame]
         placement = frame.placement.actInv(item.placement)
         x, y, z, w = pin.Quaternion(placement.rotation).coeffs().tolist()
