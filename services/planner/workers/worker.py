@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -70,6 +71,7 @@ def main() -> None:
     threading.Thread(target=_read, args=(sys.stdin.buffer, jobs, answers), daemon=True).start()
     planner = Planner(load_arm(folder))
     planner.prepare()
+    gc.freeze()  # else a collection looks through all that was loaded, 20 ms in the middle of a plan
     answers.put(Ready())
     while True:
         match jobs.get():
