@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,29 +52,37 @@ class Finisher:
     def line(self, start: Start, goal: Start) -> Finished:
         """The straight line of the joints; raises `Touching` or `NoPlan`."""
         if self._request.timing is Timing.TIME_OPTIMAL:
-            return self.curve(stopping(np.array((start, goal))))
-        with self._watch.phase("timing"):
-            trajectory = _timed(lambda: straight_line(self._arm.joint_names, start, goal, self._limits))
+            trajectory = self._along(stopping(np.array((start, goal))))
+        else:
+            with self._watch.phase("timing"):
+                trajectory = _timed(lambda: straight_line(self._arm.joint_names, start, goal, self._limits))
         return self.finish(trajectory, start, goal)
 
     def way(self, way: Way) -> Finished:
-        """The curve, or, where that fails, the polyline with a stop at every corner; raises `Touching` or `NoPlan`."""
-        try:
-            return self.curve(way.control)
-        except (Touching, TurnsOnTheSpot):
-            return self.curve(stopping(way.corners))
+        """Around its corners or with a stop at each, whichever is faster and free; raises `Touching` or `NoPlan`.
 
-    def curve(self, control: Array) -> Finished:
-        """The uniform cubic B-spline of `control`, timed as asked; raises `Touching`, `TurnsOnTheSpot` or `NoPlan`."""
+        A joint that must turn back at a corner has to stop there in any case, and so do tight corners cost less time.
+        """
+        trajectories = [self._along(stopping(way.corners))]
+        with suppress(TurnsOnTheSpot):
+            trajectories.append(self._along(way.control))
+        faster, *slower = sorted(trajectories, key=_duration)
+        try:
+            return self.finish(faster, way.start, way.goal)
+        except Touching:
+            if not slower:
+                raise
+        return self.finish(slower[0], way.start, way.goal)
+
+    def _along(self, control: Array) -> JointTrajectory:
+        """On the uniform cubic B-spline of `control`, timed as asked; raises `TurnsOnTheSpot` or `NoPlan`."""
         names = self._arm.joint_names
         with self._watch.phase("timing"):
             if self._request.timing is Timing.TIME_OPTIMAL:
                 from services.planner.timing.time_optimal import time_optimal_way
 
-                trajectory = _timed(lambda: time_optimal_way(names, control, self._limits))
-            else:
-                trajectory = _timed(lambda: timed_way(names, control, self._limits))
-        return self.finish(trajectory, tuple(control[0].tolist()), tuple(control[-1].tolist()))
+                return _timed(lambda: time_optimal_way(names, control, self._limits))
+            return _timed(lambda: timed_way(names, control, self._limits))
 
     def finish(self, trajectory: JointTrajectory, start: Start, goal: Start) -> Finished:
         """Slower where the steppers cannot, then verified as it will be played; raises `Touching` or `NoPlan`."""
@@ -107,6 +116,10 @@ class Finisher:
         scale = feasible_scale(self._arm, trajectory)
         slower = slowed(trajectory, scale) if scale else trajectory
         return slower, require_feasible(self._arm, slower), scale
+
+
+def _duration(trajectory: JointTrajectory) -> float:
+    return trajectory.points[-1].time_from_start
 
 
 def _timed(time: Callable[[], JointTrajectory]) -> JointTrajectory:

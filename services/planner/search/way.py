@@ -45,6 +45,11 @@ class Way:
     planner_id: str
 
     @property
+    def start(self) -> Start:
+        """Where it begins, to the bit."""
+        return tuple(self.control[0].tolist())
+
+    @property
     def goal(self) -> Start:
         """Where it ends, to the bit."""
         return tuple(self.control[-1].tolist())
