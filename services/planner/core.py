@@ -25,7 +25,7 @@ from services.arm.kinematics import Kinematics
 from services.planner.blockade import Blockade
 from services.planner.finish import Finished, Finisher, Touching
 from services.planner.goals.goals import Goals, timed_out
-from services.planner.refusals import NoPlan, malformed, no_way_around, scaling_refused
+from services.planner.refusals import LEAST_SCALING, NoPlan, malformed, no_way_around, scaling_refused
 from services.planner.scene.clearance import CLEARANCE, first_collision
 from services.planner.scene.surroundings import Surroundings
 from services.planner.scene.world import World
@@ -233,7 +233,7 @@ class Planner:
     def _limits(self, request: PlanRequest) -> JointLimits:
         for name in ("velocity_scaling", "acceleration_scaling"):
             value = getattr(request, name)
-            if not 0.0 < value <= 1.0:
+            if not LEAST_SCALING <= value <= 1.0:
                 raise scaling_refused(name, value)
         return joint_limits(self.arm, request.velocity_scaling, request.acceleration_scaling)
 

@@ -12,6 +12,9 @@ from services.planner.search.way import Why
 
 Point = Sequence[float]
 
+LEAST_SCALING = 1e-12  # with less, times and their squares are no longer numbers
+LONGEST_NAME = 64  # characters of a name that is not known, which a person is shown
+
 
 class NoPlan(Exception):
     """A refusal on its way out of the planner; `fraction` of a Cartesian way could have been gone."""
@@ -25,6 +28,7 @@ class NoPlan(Exception):
 
 def scaling_refused(which: str, value: float) -> NoPlan:
     """0 is not 1: it is refused."""
+    must = f"below {LEAST_SCALING:g} no way ends" if 0.0 < value < 1.0 else "it must be above 0 and at most 1"
     return NoPlan(
         PlanCode.INVALID_GOAL_CONSTRAINTS,
         Refusal(
@@ -33,7 +37,7 @@ def scaling_refused(which: str, value: float) -> NoPlan:
             value=value if value == value and abs(value) < 1e300 else None,
             limit=1.0,
             nearest=(1.0 if value > 1.0 else 0.1,),
-            message=f"{which} is {value}: it must be above 0 and at most 1",
+            message=f"{which} is {value}: {must}",
             remedy=f"give {which} in (0, 1]; 1 is the arm's full speed",
         ),
     )
@@ -42,6 +46,7 @@ def scaling_refused(which: str, value: float) -> NoPlan:
 def unknown_name(code: PlanCode, check: str, name: str, known: Iterable[str], where: str) -> NoPlan:
     """A joint, state or frame that is not there."""
     names = sorted(known)
+    name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     near = nearest_name(name, names)
     meant = suggestion(name, names) if near else ""  # else the remedy names them all
     return NoPlan(
