@@ -21,8 +21,11 @@ from services.bench.plan_scenes import SCENES, box
 from services.planner.core import Planner
 from services.planner.scene.clearance import CLEARANCE
 from services.planner.scene.world import World
+from services.planner.search.curve import spline_rows
 from services.planner.search.native_scene import native_scene
-from services.planner.search.search import KNOWN
+from services.planner.search.search import KNOWN, Search
+from services.planner.search.way import Deadline, NoWay, Way
+from services.planner.times import Stopwatch
 from services.planner.timing.profile import joint_limits
 from services.planner.verify.verify import limit_shares, require_ends, sample
 from tests.planner.native.coal_truth import Truth
@@ -177,6 +180,29 @@ def test_a_way_from_where_only_coal_lets_the_arm_be_to_such_a_place_is_found_twi
         require_sound(planner, request, first)
         assert first.planner_id in {planner_id or "native", "straight"}
         assert first.trajectory == second.trajectory
+
+
+def test_a_gap_too_narrow_for_the_spheres_is_found_by_another_search():
+    """A plate 7.5 mm above the forearm: the compiled core lets it pass nowhere, though it keeps the clearance."""
+    planner, angle = planner_of("rm1"), 0.65
+    place = (0.2 * float(np.cos(angle)), 0.2 * float(np.sin(angle)), 0.2364)
+    show(planner, PlanningScene(version=1, objects=(turned(box("plate", (0.3, 0.08, 0.02), place), angle),)))
+    planner.surroundings.begin()
+    search, start, goals = (
+        Search(planner.arm, planner.surroundings),
+        np.array((0, 0.1, 0.05)),
+        np.array([(1.2, 0.1, 0.05)]),
+    )
+
+    def found(planner_id: str) -> Way:
+        deadline = Deadline(time.monotonic, 1.0, time.monotonic())
+        return search.find(start, goals, CLEARANCE, planner_id, 1, deadline, Stopwatch(time.monotonic))
+
+    with pytest.raises(NoWay):
+        found("native")
+    way = found("")
+    assert way.planner_id == "RRTConnect"
+    assert planner.surroundings.world.touching(spline_rows(way.control, 50), CLEARANCE) is None
 
 
 def test_two_hundred_obstacles_are_gone_between(planner: Planner):
