@@ -23,6 +23,7 @@ from services.cli.units import show
 PERIOD = 0.02  # [s] between two commands
 ANSWER = 3.0  # [s] that the planner may take to its first word
 REST = 5.0  # [s] that the arm may take to come to rest
+FIRST_STATE = 1.0  # [s]
 DRAWN = 0.1  # [s]
 
 
@@ -52,6 +53,12 @@ class Jogging:
         joints = ", ".join(f"{joint.name} {show(found[joint.name], joint.unit, 2)}" for joint in self.arm.joints)
         return f"tool x {x:z.1f}  y {y:z.1f}  z {z:z.1f} mm; {joints}"
 
+    def await_state(self) -> None:
+        """Until it is known where the arm stands; not for long, for without the stack it never will be."""
+        end = self.node.monotonic() + FIRST_STATE
+        while self._states.message is None and self.node.monotonic() < end:
+            self.node.wait(PERIOD)
+
     def _on_status(self, status: JogStatus) -> None:
         self.status = status
         self.limits |= {(limit.check, limit.subject): limit for limit in status.limits}
@@ -78,6 +85,7 @@ def jog_by_hand(session: Session) -> ExitCode:
     with keyboard() as typed, two_stage_interrupt() as interrupt:
         jogging, keys, block = Jogging(session), JogKeys(session.arm.joints, session.arm.tool_frame), LiveBlock()
         block.say(HELP)
+        jogging.await_state()
         drawn = 0.0
         while not (keys.wants_to_leave or interrupt.is_set):
             now = jogging.node.monotonic()

@@ -56,7 +56,7 @@ def summary(report: MoveReport, plan_only: bool = False) -> str:
     if not report.succeeded:
         reason = report.reason or "no reason was given"
         return f"{report.status.lower()} after {report.took_s:.2f} s: {reason}" + (f"; now at {where}" if where else "")
-    steps = ", ".join(f"{name} {error:+.2f}" for name, error in report.final_error_steps.items())
+    steps = ", ".join(f"{name} {error:+z.2f}" for name, error in report.final_error_steps.items())
     millimetres = "unknown" if report.final_error_mm is None else f"{report.final_error_mm:.3f} mm"
     return f"{planned}, took {report.took_s:.2f} s, final error {millimetres}, steps: {steps}"
 

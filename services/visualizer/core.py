@@ -19,7 +19,7 @@ from services.visualizer.arm_poses import arm_poses
 from services.visualizer.journal import Journal, bounded
 from services.visualizer.model import Joint, Model
 from services.visualizer.panel import Facts, is_lost, panel, shaft_errors
-from services.visualizer.preview import Preview
+from services.visualizer.preview import MOVING, Preview
 from services.visualizer.rotations import Array
 from services.visualizer.scene import Loader, SceneView, no_mesh
 from services.visualizer.thinning import Thinned
@@ -55,6 +55,8 @@ class Visualizer:
         """What the arm did."""
         self._facts = replace(self._facts, joints=message)
         self._preview.on_joint_state(message)
+        if any(abs(speed) > MOVING for speed in message.velocity):
+            self.scene.on_motion()
         self._executed.add(message.stamp, self._row(message.name, message.position, self._executed))
 
     def on_joint_command(self, message: JointState) -> None:

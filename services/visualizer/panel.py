@@ -111,8 +111,8 @@ def _table(facts: Facts) -> str:
         return ""
     positions = dict(zip(facts.joints.name, facts.joints.position, strict=False)) if facts.joints else {}
     rows = [
-        f"| {name} | {_position(facts, name, positions.get(name))} | {commanded:.2f} | {executed} | **{error:+.2f}** |"
-        f" {worst:.2f} |"
+        f"| {name} | {_position(facts, name, positions.get(name))} | {commanded:z.2f} | {executed} |"
+        f" **{error:+z.2f}** | {worst:.2f} |"
         for name, commanded, executed, error, worst in zip(
             errors.name, errors.commanded, errors.executed, errors.error, errors.max_error, strict=False
         )
@@ -124,7 +124,7 @@ def _table(facts: Facts) -> str:
 def _position(facts: Facts, name: str, value: float | None) -> str:
     if value is None:
         return "?"
-    return f"{value * 1e3:.2f} mm" if name in facts.prismatic else f"{math.degrees(value):.2f}°"
+    return f"{value * 1e3:z.2f} mm" if name in facts.prismatic else f"{math.degrees(value):z.2f}°"
 
 
 def _numbers(facts: Facts) -> str:

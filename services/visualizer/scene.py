@@ -60,6 +60,11 @@ class SceneView:
         """What touches in the posture that was refused last."""
         self._contacts, self._is_new = message, True
 
+    def on_motion(self) -> None:
+        """The real arm goes: a posture that was refused is of the past."""
+        if self._contacts.contacts:
+            self._contacts, self._is_new = Contacts(), True
+
     def restart(self) -> None:
         """Say everything again: the viewer is a new one."""
         self._drawn, self._is_new = {}, True

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from schemas.deployment import Deployment, PathsSection
@@ -120,6 +121,21 @@ def test_what_touches_is_shown_until_a_plan_succeeds(asker: Node, rm1: Arm) -> N
     plan(asker, rm1)
     asker.wait(0.2)
     assert contacts.message.contacts == ()
+
+
+def test_what_is_put_onto_the_arm_is_shown_to_touch_it_until_it_is_taken_away(asker: Node, rm1: Arm) -> None:
+    contacts, states = asker.latest(CONTACTS), asker.publisher(JOINT_STATES)
+    standing = JointState(name=rm1.joint_names, position=(0.6, 0.0, 0.0))
+    edit(asker, SceneAction.CLEAR)  # answered: the planner is there and hears where the arm stands
+    for action, name, item in ((SceneAction.ADD, "", block(rm1)), (SceneAction.REMOVE, "block", None)):
+        states.put(msgspec.structs.replace(standing, stamp=asker.now()))
+        asker.wait(0.1)
+        edit(asker, action, name, item=item)
+        asker.wait(0.2)
+        assert contacts.message is not None
+        touching = [contact.second for contact in contacts.message.contacts]
+        assert touching == (["block"] if action is SceneAction.ADD else [])
+        assert contacts.message.position == (standing.position if touching else ())
 
 
 def test_a_bad_edit_is_refused_by_name_and_changes_nothing(asker: Node) -> None:

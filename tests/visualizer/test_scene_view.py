@@ -5,11 +5,13 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 import rerun as rr
 
 from schemas.frames import Transform
+from schemas.joints import JointState
 from schemas.scene import (
     BoxShape,
     Contact,
@@ -147,6 +149,20 @@ def test_when_nothing_touches_any_more_the_shadow_goes_and_the_red_too(view):
     [table] = [update for update in updates if isinstance(update, Thing)]
     assert table.color == palette.OBJECT
     assert [update.entity for update in updates if isinstance(update, Gone)] == [entities.REFUSED]
+    assert not any(isinstance(update, Shadow | Labels) for update in updates)
+
+
+def test_the_posture_that_was_refused_is_gone_as_soon_as_the_arm_goes(model):
+    shown = Visualizer(model, "rm1", "efector_link")
+    shown.scene.on_scene(PlanningScene(objects=(TABLE,)))
+    shown.scene.on_contacts(touching(("efector_link", "table")))
+    names = tuple(joint.name for joint in model.moving)
+    still = JointState(stamp=NOW, name=names, position=(0.0,) * len(names), velocity=(0.0,) * len(names))
+    shown.on_joint_state(still)
+    assert any(isinstance(update, Labels) for update in shown.step(NOW))
+    shown.on_joint_state(msgspec.structs.replace(still, velocity=(0.1,) * len(names)))
+    updates = shown.step(NOW + 1)
+    assert entities.REFUSED in [update.entity for update in updates if isinstance(update, Gone)]
     assert not any(isinstance(update, Shadow | Labels) for update in updates)
 
 

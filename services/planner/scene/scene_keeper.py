@@ -9,6 +9,7 @@ import msgspec
 
 from schemas.frames import Transform
 from schemas.joints import JointState
+from schemas.message import Vector
 from schemas.planning import PlanCode, PlanResponse
 from schemas.scene import Contacts, PlanningScene, SceneRequest, SceneResponse
 from schemas.topics import CONTACTS, SCENE, SCENE_EDIT
@@ -73,7 +74,20 @@ class SceneKeeper:
             return SceneResponse(reason=str(error), version=before.version)
         self.world = world
         self._show()
+        self._tell_what_touches_here()
         return msgspec.structs.replace(response, reason=self._save(world.scene))
+
+    def _tell_what_touches_here(self) -> None:
+        """After an edit: what touches where the arm stands; what a refused plan has shown was of another scene."""
+        posture = self._posture()
+        touching = () if posture is None else tuple(self.world.contacts(posture))
+        if posture is not None and touching:
+            self._contacts.put(
+                Contacts(stamp=self._node.now(), name=self._arm.joint_names, position=posture, contacts=touching)
+            )
+        elif self._is_touching:
+            self._contacts.put(Contacts(stamp=self._node.now()))
+        self._is_touching = bool(touching)
 
     def _built(self, scene: PlanningScene) -> World:
         return World(self._arm, self._kinematics, scene, self._folders)
@@ -84,14 +98,19 @@ class SceneKeeper:
         self._scene.put(self.world.scene)
 
     def _links(self) -> Mapping[str, Transform] | None:
-        """Where the links are, or None without a fresh joint state of all joints."""
+        """Where the links are, or None where that is not known."""
+        posture = self._posture()
+        return None if posture is None else self._kinematics.link_poses(posture)
+
+    def _posture(self) -> Vector | None:
+        """Where the arm stands, or None without a fresh joint state of all joints."""
         state = self._states.message
         if state is None or self._states.age() > STALE_AFTER:
             return None
         values = dict(zip(state.name, state.position, strict=False))
         if any(name not in values for name in self._arm.joint_names):
             return None
-        return self._kinematics.link_poses([values[name] for name in self._arm.joint_names])
+        return tuple(values[name] for name in self._arm.joint_names)
 
     def _save(self, scene: PlanningScene) -> str:
         """What went wrong; the scene is changed nevertheless."""
