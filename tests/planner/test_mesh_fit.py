@@ -18,10 +18,11 @@ from services.arm.kinematics import Kinematics
 from services.arm.srdf_edit import with_pairs
 from services.arm.urdf_edit import with_collisions
 from services.cli.collision import plan_of
+from services.planner.covers.fit_writing import touching_states, write_fits
 from services.planner.covers.fitting import Fitted, fitted
 from services.planner.covers.hull import smallest_ball
 from services.planner.covers.link_meshes import visual_mesh
-from services.planner.covers.mesh_fit import depths, fit_links, touching_states, write_fits
+from services.planner.covers.mesh_fit import depths, fit_links
 from services.planner.covers.parts import shapes_around
 from services.planner.covers.shapes import Mesh, ShapeKind
 from services.planner.scene.solid_geometry import is_inside

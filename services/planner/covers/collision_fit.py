@@ -31,12 +31,9 @@ def report(folder: Path, bulge: float = BULGE) -> str:
 
 def fit_meshes(folder: Path, most: int, only: Sequence[str], write: bool) -> str:
     """What is fitted to each link, and its elements for the URDF, or that they are written there."""
-    from services.planner.covers.mesh_fit import (
-        elements_of,
-        fit_links,
-        touching_states,
-        write_fits,
-    )  # trimesh: half a second
+    # Not above: trimesh takes half a second.
+    from services.planner.covers.fit_writing import elements_of, touching_states, write_fits
+    from services.planner.covers.mesh_fit import fit_links
 
     arm = load_arm(folder)
     fits = fit_links(arm, most, only)
