@@ -30,7 +30,7 @@ class Smoother {
                 is_done = false;
             }
         }
-        if (stop_() || rake_.look(Spline(points_.data(), count(), dof_), stop_) != Verdict::kFree) {
+        if (stop_()) {
             shares_.assign(way.size(), 0.0);
             lay(way);
         }
@@ -39,6 +39,7 @@ class Smoother {
 
   private:
     static constexpr double kLeast = 1.0 / 64.0;
+    static constexpr size_t kShared = 2;  // control points between two corners that share the one between them
 
     size_t count() const { return points_.size() / dof_; }
 
@@ -58,6 +59,7 @@ class Smoother {
             if (is_sharp) push(way[corner], way[corner], 0.0);
             if (!is_sharp) push(way[corner], way[corner + 1], share);
         }
+        places_.back() = count();
         for (int i = 0; i < 3; ++i) push(way.back(), way.back(), 0.0);
     }
 
@@ -65,11 +67,14 @@ class Smoother {
         for (size_t i = 0; i < dof_; ++i) points_.push_back(from[i] + share * (to[i] - from[i]));
     }
 
-    // The four spans that the corner's control point has a part in.
+    // The spans that bend at the corner; others that its control point has a part in lie on an edge of the polyline.
     bool is_free(size_t corner) {
         if (shares_[corner] == 0.0) return true;
-        const size_t first = places_[corner] - 3;
-        return rake_.look(Spline(points_.data() + first * dof_, 7, dof_), stop_) == Verdict::kFree;
+        const size_t here = places_[corner];
+        const bool shares_before = here - places_[corner - 1] == kShared;
+        const bool shares_after = places_[corner + 1] - here == kShared && corner + 2 < places_.size();
+        const size_t first = here - (shares_before ? 3 : 2), last = here + (shares_after ? 3 : 2);
+        return rake_.look(Spline(points_.data() + first * dof_, last - first + 1, dof_), stop_) == Verdict::kFree;
     }
 
     Rake& rake_;
