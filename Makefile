@@ -3,6 +3,8 @@
 .PHONY: help setup up down test check coverage format demo bench lock clean
 MAKEFLAGS += --no-print-directory
 bin := .venv/bin
+# Tests of pure functions, on every core at once; those of processes and clocks come after them, one by one.
+pure := tests/arm tests/bench tests/planner tests/schemas tests/urdf
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' Makefile | column -t -s '|'
@@ -18,7 +20,8 @@ down: ## stop a twin that runs elsewhere
 
 test: setup ## all tests: Python, firmware, whole stack
 	@deploy/test_firmware
-	@$(bin)/pytest
+	@$(bin)/pytest -n auto --maxprocesses 4 --dist worksteal $(pure)
+	@$(bin)/pytest $(filter-out $(pure),$(patsubst %/,%,$(wildcard tests/*/)))
 
 check: setup ## ruff, mypy, import-linter, clang-format
 	@$(bin)/ruff check --quiet .
