@@ -182,6 +182,29 @@ def test_a_way_from_where_only_coal_lets_the_arm_be_to_such_a_place_is_found_twi
         assert first.trajectory == second.trajectory
 
 
+def test_an_arm_that_stands_at_the_very_margin_is_led_away_at_once(planner: Planner):
+    """So near, by the spheres, that none of the compiled core's lines may begin there."""
+    show(planner, SCENES["cage"])
+    planner.surroundings.begin()
+    core = planner.surroundings.core(CLEARANCE)
+    assert core is not None
+    random = np.random.default_rng(2)
+    lower, upper = np.array([(joint.lower, joint.upper) for joint in planner.arm.joints]).T
+    free, touching = ([], [])
+    for row in random.uniform(lower, upper, (60, len(lower))):
+        (free if core.distance(row) > 2.0 * CLEARANCE else touching).append(row)
+    for one, other in zip(free[:4], touching[:4], strict=True):
+        low, high = 0.0, 1.0
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            is_near = core.distance(one + middle * (other - one)) < CLEARANCE + 3e-6
+            low, high = (low, middle) if is_near else (middle, high)
+        request = asked(planner, one + low * (other - one), free[-1], allowed_time=10.0)
+        response = planner.plan(request, None)
+        require_sound(planner, request, response)
+        assert response.planner_id in {"native", "straight"}
+
+
 def test_a_gap_too_narrow_for_the_spheres_is_found_by_another_search():
     """A plate 7.5 mm above the forearm: the compiled core lets it pass nowhere, though it keeps the clearance."""
     planner, angle = planner_of("rm1"), 0.65

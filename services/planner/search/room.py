@@ -18,22 +18,28 @@ Array = NDArray[np.float64]
 
 NEAREST, FARTHEST = 0.02, 1.3  # [s] at full speed: how far from the posture is looked first and last
 SAMPLES = 64  # postures at each distance, which doubles
+SPARE = 0.0003  # [m] beyond the margin: with none the core finds no line free that begins there
 TRIED = 3  # of them, the nearest, to which the straight way is looked at
 
 
 def with_room(
     arm: Arm, core: MotionCore, posture: Array, validity: Validity, seed: int, is_late: Callable[[], bool]
 ) -> Array | None:
-    """`posture` (n,) itself where the core lets it be, else a near one that it does, None where none was found."""
-    if core.free(posture[None, :])[0]:
+    """`posture` (n,) itself where the core lets it move, else a near one where it does, None where none was found."""
+    if _can_move(core, posture):
         return posture
     for rows in _around(arm, posture, seed):
         for row in rows[core.free(rows)][:TRIED]:
-            if validity.is_line_free(posture, row):
+            if _can_move(core, row) and validity.is_line_free(posture, row):
                 return np.asarray(row)
         if is_late():
             break
     return None
+
+
+def _can_move(core: MotionCore, posture: Array) -> bool:
+    most = core.margin + SPARE
+    return core.distance(posture, most) >= most
 
 
 def _around(arm: Arm, posture: Array, seed: int) -> Iterator[Array]:
