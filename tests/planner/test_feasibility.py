@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import tracemalloc
 
 import msgspec
 import numpy as np
@@ -165,3 +166,24 @@ def test_slowing_down_keeps_the_way(ideal: Arm) -> None:
 def test_what_the_planner_makes_is_feasible_as_it_is(rm1: Arm) -> None:
     found = margins(rm1, step_stream(rm1, line(rm1)))
     assert max(margin.share for margin in found) <= 1.001, [sentence(margin) for margin in found]
+
+
+@pytest.mark.parametrize("most", [7, 60, 10_000])
+def test_the_margins_are_the_same_however_many_knots_are_looked_at_at_once(
+    rm1: Arm, monkeypatch: pytest.MonkeyPatch, most: int
+) -> None:
+    trajectory = line(rm1)
+    whole = margins(rm1, step_stream(rm1, trajectory))
+    monkeypatch.setattr("services.planner.verify.feasibility.MOST_KNOTS", most)
+    assert require_feasible(rm1, trajectory) == whole
+
+
+def test_a_plan_of_hours_is_looked_at_in_little_memory(rm1: Arm) -> None:
+    tracemalloc.start()
+    try:
+        found = require_feasible(rm1, line(rm1, scaling=3e-4))
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert max(margin.peak_rate / margin.rate_limit for margin in found) < 0.01  # a knot is rounded to 1/256 step
+    assert peak < 200e6  # [bytes]

@@ -18,7 +18,7 @@ from services.planner.refusals import NoPlan, not_verified
 from services.planner.scene.clearance import Sweeper
 from services.planner.search.way import Start
 from services.planner.timing.path_timing import Heed, law_along
-from services.planner.timing.profile import JointLimits, NoProfile
+from services.planner.timing.profile import JointLimits, NoProfile, require_short
 from services.planner.timing.timing import States, at_limits, at_speed, trajectory_of
 from services.planner.tool.continuation import FINEST, Continuation, Followed, Stop
 from services.planner.tool.path_points import Run, between, states_of_runs
@@ -89,6 +89,10 @@ class CartesianPlanner:
         if refusal is not None and (not runs or fraction < least):
             raise NoPlan(_code(refusal), _too_little(refusal, fraction, least), fraction)
         states = self._within(states_of_runs(runs, terms.heed), terms)
+        try:
+            require_short(float(states.times[-1]))
+        except NoProfile as error:
+            raise not_verified(str(error)) from error
         return CartesianWay(trajectory_of(self._arm.joint_names, states), tuple(posture.tolist()), fraction, refusal)
 
     def _follow(self, path: ToolPath, start: Array, terms: Terms) -> Followed | Stop:

@@ -10,12 +10,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.planning import PlanCode, Refusal, StepMargin
 from services.arm.description import Arm, Joint
 from services.planner.refusals import NoPlan
+from services.planner.timing.profile import LONGEST
 from services.planner.verify.verify import at_times
 
 Array = NDArray[np.float64]
@@ -26,6 +28,7 @@ SLOT = 0.001  # [s] in which the device spreads its steps evenly
 LEAD = 0.30  # [s] of path that the gateway keeps in the queue, besides half of what braking takes
 Q8 = 256
 FULL = 1.0 + 1e-3  # knots are rounded to 1/256 step, so a profile that touches its limit may look so much beyond
+MOST_KNOTS = 30_000  # that are looked at at once
 SLOWEST = 0.01  # time scale below which slowing down is no remedy
 HALVINGS = 24
 
@@ -39,15 +42,20 @@ class StepStream:
     accelerations: Array  # (m, n) [steps/s^2]
 
 
-def step_stream(arm: Arm, trajectory: JointTrajectory) -> StepStream:
-    """The integer steps of `trajectory`, whose points have velocities and accelerations, played as planned."""
+def step_stream(arm: Arm, trajectory: JointTrajectory, part: tuple[int, int] | None = None) -> StepStream:
+    """The integer steps of `trajectory`, whose points have velocities and accelerations, played as planned.
+
+    Of all of it, or from one knot to another.
+    """
     duration = trajectory.points[-1].time_from_start
-    knots = max(1, math.ceil(duration / KNOT - 1e-9))
-    samples = at_times(trajectory, np.minimum(np.arange(knots + 1) * KNOT, duration))
+    last = _knots(trajectory)
+    begin, end = part or (0, last)
+    samples = at_times(trajectory, np.minimum(np.arange(begin, end + 1) * KNOT, duration))
     scale = np.array([joint.steps.per_unit * Q8 for joint in arm.joints])
     position = np.rint(samples.positions * scale)
     slope = np.rint(samples.velocities * scale) * KNOT
-    slope[-1] = 0.0
+    if end == last:
+        slope[-1] = 0.0
     u = (np.arange(1, round(KNOT / SLOT) + 1) * SLOT / KNOT)[None, :, None]
     first, start, end = position[:-1, None], slope[:-1, None], slope[1:, None]
     rise = position[1:, None] - first
@@ -63,6 +71,20 @@ def step_stream(arm: Arm, trajectory: JointTrajectory) -> StepStream:
 def margins(arm: Arm, stream: StepStream) -> tuple[StepMargin, ...]:
     """How near each stepper comes to what it can do."""
     return tuple(_margin(arm, joint, index, stream) for index, joint in enumerate(arm.joints))
+
+
+def _margins(arm: Arm, trajectory: JointTrajectory) -> tuple[StepMargin, ...]:
+    """Of all of it, by parts that the memory holds."""
+    knots = _knots(trajectory)
+    parts = [(begin, min(begin + MOST_KNOTS, knots)) for begin in range(0, knots, MOST_KNOTS)]
+    found = [margins(arm, step_stream(arm, trajectory, part)) for part in parts]
+    worst = (max(of_joint, key=lambda margin: margin.share) for of_joint in zip(*found, strict=True))
+    peaks = np.max([[margin.peak_rate for margin in part] for part in found], axis=0).tolist()
+    return tuple(replace(margin, peak_rate=peak) for margin, peak in zip(worst, peaks, strict=True))
+
+
+def _knots(trajectory: JointTrajectory) -> int:
+    return max(1, math.ceil(trajectory.points[-1].time_from_start / KNOT - 1e-9))
 
 
 def queue_share(arm: Arm, trajectory: JointTrajectory) -> float:
@@ -81,7 +103,7 @@ def sentence(margin: StepMargin) -> str:
 
 def require_feasible(arm: Arm, trajectory: JointTrajectory) -> tuple[StepMargin, ...]:
     """The margins; raises `NoPlan` with the joint that cannot, and the scaling that would do."""
-    found = margins(arm, step_stream(arm, trajectory))
+    found = _margins(arm, trajectory)
     worst = max(found, key=lambda margin: margin.share)
     filled = queue_share(arm, trajectory)
     if worst.share <= FULL and filled <= 1.0:
@@ -114,12 +136,14 @@ def require_feasible(arm: Arm, trajectory: JointTrajectory) -> tuple[StepMargin,
 
 
 def feasible_scale(arm: Arm, trajectory: JointTrajectory) -> float:
-    """The largest time scale in (0, 1] at which the steppers can, by bisection; 0.0 where none above 1 % does."""
-    if not _can(arm, slowed(trajectory, SLOWEST)):
+    """The largest time scale in (0, 1] at which the steppers can, by bisection; 0.0 where none above 1 % does, or none
+    in a time that a plan may take."""
+    slowest = max(SLOWEST, trajectory.points[-1].time_from_start / LONGEST)
+    if slowest >= 1.0 or not _can(arm, slowed(trajectory, slowest)):
         return 0.0
     if _can(arm, trajectory):
         return 1.0
-    low, high = SLOWEST, 1.0
+    low, high = slowest, 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if _can(arm, slowed(trajectory, middle)) else (low, middle)
@@ -143,7 +167,7 @@ def slowed(trajectory: JointTrajectory, scale: float) -> JointTrajectory:
 
 
 def _can(arm: Arm, trajectory: JointTrajectory) -> bool:
-    found = margins(arm, step_stream(arm, trajectory))
+    found = _margins(arm, trajectory)
     return max(margin.share for margin in found) <= FULL and queue_share(arm, trajectory) <= 1.0
 
 
