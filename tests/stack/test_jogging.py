@@ -166,11 +166,14 @@ def test_keys_stop_before_an_obstacle_and_lead_out_of_one_that_is_put_onto_the_a
         gemelo(stack, "scene", "add", "post", *post, "--at", "360mm", "180mm", "200mm")
         with Typist(stack, "jog", pause=operator.node.wait) as typist:
             typist.hold(UP, 0.5)
-            last = typist.hold_while(UP, operator.is_moving)
+            typist.hold_while(UP, operator.is_moving)
+            typist.hold(UP, 1.0)  # the last millimetre takes its time
             assert "collision of antebrazo_link and post" in typist.shown
             assert "mm apart, 4 mm stay free)" in typist.shown
-            assert rest(operator, last) < STOPPED
+            typist.forget()
+            assert typist.until("at rest", STOPPED)
             gemelo(stack, "scene", "move", "post", "--at", "350mm", "160mm", "200mm")
+            operator.node.wait(0.2)
             before = operator.seen[-1].position[0]
             typist.forget()
             typist.hold(UP, 0.6)
