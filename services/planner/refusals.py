@@ -12,7 +12,7 @@ from services.planner.search.way import Why
 
 Point = Sequence[float]
 
-LEAST_SCALING = 1e-12  # with less, times and their squares are no longer numbers
+LEAST_SCALING = 1e-300  # with less, a time is no longer a number
 LONGEST_NAME = 64  # characters of a name that is not known, which a person is shown
 
 
