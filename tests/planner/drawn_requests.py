@@ -142,9 +142,9 @@ def cases(draw: st.DrawFn, planner: Planner) -> tuple[PlanningScene, PlanRequest
 def tool_cases(draw: st.DrawFn, planner: Planner, is_arc: bool) -> tuple[PlanningScene, PlanRequest]:
     """Lines of up to 15 cm, and arcs of a few, from where the tool is."""
     scene = draw(scenes())
-    start = draw(free_postures(planner, scene))
+    start = draw(free_postures(planner, scene, INNER))
     position, rotation = Judge(planner.arm).tool(np.array(start))
-    reach = 0.05 if is_arc else 0.15
+    reach = 0.04 if is_arc else 0.15
     places = [tuple((position + draw(st.floats(0.005, reach)) * np.array(unit(draw(WAYS)))).tolist()) for _ in range(2)]
     turned = {"orientation": quaternion_of(rotation)} if draw(st.booleans()) and planner.arm.name == "parol6" else {}
     goal: Goal = PoseGoal(position=places[0], **turned)
@@ -159,10 +159,12 @@ def tool_cases(draw: st.DrawFn, planner: Planner, is_arc: bool) -> tuple[Plannin
 
 
 @st.composite
-def free_postures(draw: st.DrawFn, planner: Planner, scene: PlanningScene) -> Numbers:
+def free_postures(
+    draw: st.DrawFn, planner: Planner, scene: PlanningScene, shares: st.SearchStrategy[Numbers] = SHARES
+) -> Numbers:
     """The first of some that touches nothing, or the last of them."""
     judge = Judge(planner.arm, scene)
-    postures = [posture_at(planner, draw(SHARES)) for _ in range(4)]
+    postures = [posture_at(planner, draw(shares)) for _ in range(4)]
     free = (posture for posture in postures if judge.nearest(np.array(posture)).distance > 0.0)
     return next(free, postures[-1])
 

@@ -29,6 +29,7 @@ LEAST = 0.05  # of a step is tried, where it seems to be none of it
 ROUNDING = 1e-9  # [rad] or [m] beyond a limit that is put back onto it
 SAME = 1e-6  # [rad] or [m] by which postures differ that are meant to be one
 ROUNDS = 8
+LOOKS = 8  # at the joints' limits between two postures
 ORDER = 4  # postures by which the next one is guessed
 TOO_FINE = f"max_step is so fine that the way would have more than {MOST_POSTURES} postures"
 
@@ -157,7 +158,8 @@ class Continuation:
             curve = self._spline(lengths, postures)
             middles = self._off(path, curve)
             if not middles:
-                return Followed(np.array(lengths), np.array(postures), curve, stop)
+                followed = Followed(np.array(lengths), np.array(postures), curve, stop)
+                return self._within_limits(path, followed, heed)
             # The spline may have strayed to where another branch is nearer; a mean of the neighbours has not.
             guesses = np.array([np.interp(middles, lengths, column) for column in np.array(postures).T]).T
             solved = [self.solver.solve(path.at(middle), guess) for middle, guess in zip(middles, guesses, strict=True)]
@@ -168,6 +170,21 @@ class Continuation:
         kept = sum(length < middles[0] for length in lengths)
         stop = stop or self._lost(postures[kept - 1])
         return stop if kept < 4 else self._refined(path, lengths[:kept], postures[:kept], stop, heed)
+
+    def _within_limits(self, path: ToolPath, followed: Followed, heed: Heed) -> Followed | Stop:
+        """Only as far as no joint is beyond its limit between two postures that are within it."""
+        knots = np.arange(len(followed.lengths))
+        looked = np.interp(np.linspace(0, knots[-1], LOOKS * int(knots[-1]) + 1), knots, followed.lengths)
+        rows = followed.curve.at(looked).value[:, : len(self._lower)]
+        excess = np.maximum(rows - self._upper, self._lower - rows)
+        beyond = np.flatnonzero(excess.max(axis=1) > ROUNDING)
+        if not len(beyond):
+            return followed
+        first = int(beyond[0])
+        last = max(0, first - 1)
+        stop = self._beyond(int(np.argmax(excess[first])), rows[last], rows[first])
+        within = float(looked[last])
+        return stop if within < 4 * FINEST else self.shortened(path, followed, within, stop, heed)
 
     def _off(self, path: ToolPath, curve: CubicSpline) -> list[float]:
         """The middles between knots at which the spline is off the way."""
