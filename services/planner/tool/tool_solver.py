@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 LARGEST_STEP = 0.3  # [rad] or [m] of a joint in one iteration
 EXACT = 1e-11  # [m] at which the tool is where it should be; as much for its turn
-LAST_STEP = 1e-6  # [rad] or [m]: what is left after a step so small is its square
+LAST_STEP = 1e-5  # [rad] or [m]: what is left after a step so small is its square
 ITERATIONS = 10
 DAMPING = 1e-12
 NULL_DAMPING = 1e-6
