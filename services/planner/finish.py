@@ -17,7 +17,7 @@ from services.planner.search.curve import TurnsOnTheSpot
 from services.planner.search.smoothing import stopping
 from services.planner.search.way import Array, Start, Way
 from services.planner.times import Stopwatch
-from services.planner.timing.profile import JointLimits, NoProfile, straight_line
+from services.planner.timing.profile import JointLimits, NoProfile, stop_and_go
 from services.planner.timing.timing import timed_way
 from services.planner.verify.feasibility import feasible_scale, require_feasible, slowed
 from services.planner.verify.verify import BadTrajectory, require_ends, require_jerk, require_within_limits, sample
@@ -51,19 +51,14 @@ class Finisher:
 
     def line(self, start: Start, goal: Start) -> Finished:
         """The straight line of the joints; raises `Touching` or `NoPlan`."""
-        if self._request.timing is Timing.TIME_OPTIMAL:
-            trajectory = self._along(stopping(np.array((start, goal))))
-        else:
-            with self._watch.phase("timing"):
-                trajectory = _timed(lambda: straight_line(self._arm.joint_names, start, goal, self._limits))
-        return self.finish(trajectory, start, goal)
+        return self.finish(self._stopping(np.array((start, goal))), start, goal)
 
     def way(self, way: Way) -> Finished:
         """Around its corners or with a stop at each, whichever is faster and free; raises `Touching` or `NoPlan`.
 
         A joint that must turn back at a corner has to stop there in any case, and so do tight corners cost less time.
         """
-        trajectories = [self._along(stopping(way.corners))]
+        trajectories = [self._stopping(way.corners)]
         with suppress(TurnsOnTheSpot):
             trajectories.append(self._along(way.control))
         faster, *slower = sorted(trajectories, key=_duration)
@@ -73,6 +68,13 @@ class Finisher:
             if not slower:
                 raise
         return self.finish(slower[0], way.start, way.goal)
+
+    def _stopping(self, corners: Array) -> JointTrajectory:
+        """Straight from corner to corner (m, n), with a stop at each, timed as asked; raises `NoPlan`."""
+        if self._request.timing is Timing.TIME_OPTIMAL:
+            return self._along(stopping(corners))
+        with self._watch.phase("timing"):
+            return _timed(lambda: stop_and_go(self._arm.joint_names, corners.tolist(), self._limits))
 
     def _along(self, control: Array) -> JointTrajectory:
         """On the uniform cubic B-spline of `control`, timed as asked; raises `TurnsOnTheSpot` or `NoPlan`."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from services.planner.timing.peaks import peak_shares
-from services.planner.timing.profile import JointLimits
+from services.planner.timing.profile import JointLimits, stop_and_go, straight_line
 from services.planner.timing.time_law import TimeLaw
 from services.planner.verify.verify import limit_shares, sample_between
 
@@ -60,3 +62,14 @@ def test_the_times_go_from_the_begin_to_the_end_with_every_change_of_the_jerk_an
     assert np.diff(times).max() <= 0.2 + 1e-12
     for wanted in (0.5, 0.75, 1.25, 2.25, 2.75, 3.0, float(law.reached(np.array([0.3]))[0])):
         assert np.abs(times - wanted).min() < 1e-12
+
+
+def test_a_way_with_stops_takes_as_long_as_its_legs_one_by_one_and_rests_at_every_corner():
+    corners = np.random.default_rng(2).uniform(-1.0, 1.0, (5, 3)).tolist()
+    whole = stop_and_go(("a", "b", "c"), corners, UNIT)
+    legs = [straight_line(("a", "b", "c"), start, goal, UNIT) for start, goal in pairwise(corners)]
+    ends = [leg.points[-1].time_from_start for leg in legs]
+    resting = [point for point in whole.points if not any(point.velocities + point.accelerations)]
+    assert [point.positions for point in resting] == [tuple(corner) for corner in corners]
+    assert [point.time_from_start for point in resting] == pytest.approx(np.cumsum([0.0, *ends]).tolist())
+    assert len(whole.points) == sum(len(leg.points) for leg in legs) - len(legs) + 1

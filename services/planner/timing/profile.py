@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,15 +58,28 @@ def straight_line(
 
     The points stand wherever the profile's jerk changes, and between, so that the quintic through them IS the profile.
     """
+    return stop_and_go(names, (start, goal), limits)
+
+
+def stop_and_go(names: Sequence[str], corners: Sequence[Sequence[float]], limits: JointLimits) -> JointTrajectory:
+    """From corner to corner, each leg as `straight_line`, at rest at all of them; raises `NoProfile`."""
+    points = [_rest(corners[0], 0.0)]
+    for start, goal in pairwise(corners):
+        points += _leg(start, goal, limits, points[-1].time_from_start)
+    return JointTrajectory(joint_names=tuple(names), points=tuple(points))
+
+
+def _leg(start: Sequence[float], goal: Sequence[float], limits: JointLimits, began: float) -> list[TrajectoryPoint]:
+    """The points after the one at `start`, where the leg begins at the time `began` [s]."""
     way = np.subtract(goal, start)
     length = float(np.max(np.abs(way) / limits.velocity))  # [s] at full speed
     if length < STANDSTILL:
-        return _trajectory(names, [_rest(start, 0.0), _rest(goal, HOLD)])
+        return [_rest(goal, began + HOLD)]
     require_short(max(length, float(np.max(np.abs(way) / limits.acceleration)) ** 0.5))
     direction = way / length
     profile, changes = _time_way(length, direction, limits)
-    inner = _inner_points(start, direction, profile, _times(changes, profile.duration))
-    return _trajectory(names, [_rest(start, 0.0), *inner, _rest(goal, profile.duration)])
+    inner = _inner_points(start, direction, profile, _times(changes, profile.duration), began)
+    return [*inner, _rest(goal, began + profile.duration)]
 
 
 def require_short(lasts: float) -> None:
@@ -108,13 +122,13 @@ def _times(changes: Sequence[float], duration: float) -> list[float]:
 
 
 def _inner_points(
-    start: Sequence[float], direction: Array, profile: Trajectory, times: list[float]
+    start: Sequence[float], direction: Array, profile: Trajectory, times: list[float], began: float
 ) -> list[TrajectoryPoint]:
-    """The profile at `times` [s], spread over the joints."""
+    """The profile at `times` [s], spread over the joints; as points they are later by `began`."""
     ways = np.array([profile.at_time(t) for t in times]).reshape(len(times), 3, 1) * direction  # (m, 3, n)
     ways[:, 0] += start
     return [
-        TrajectoryPoint(positions=tuple(p), velocities=tuple(v), accelerations=tuple(a), time_from_start=t)
+        TrajectoryPoint(positions=tuple(p), velocities=tuple(v), accelerations=tuple(a), time_from_start=began + t)
         for t, (p, v, a) in zip(times, ways.tolist(), strict=True)
     ]
 
@@ -124,7 +138,3 @@ def _rest(positions: Sequence[float], t: float) -> TrajectoryPoint:
     return TrajectoryPoint(
         positions=tuple(float(p) for p in positions), velocities=zeros, accelerations=zeros, time_from_start=t
     )
-
-
-def _trajectory(names: Sequence[str], points: list[TrajectoryPoint]) -> JointTrajectory:
-    return JointTrajectory(joint_names=tuple(names), points=tuple(points))
