@@ -26,7 +26,7 @@ def fit_options(parser: Parser) -> None:
     parser.add_argument(
         "--bulge", type=positive_number, default=5.0, metavar="MM", help="that a sphere may reach beyond its link"
     )
-    parser.add_argument("--meshes", action="store_true", help="fit boxes, cylinders, capsules and balls to the meshes")
+    parser.add_argument("--meshes", action="store_true", help="fit boxes, cylinders, plates, capsules and balls")
     parser.add_argument(
         "--most", type=positive_integer, default=6, metavar="N", help="shapes for a link, with --meshes"
     )

@@ -19,19 +19,16 @@ from services.arm.srdf_edit import with_pairs
 from services.arm.urdf_edit import with_collisions
 from services.cli.collision import plan_of
 from services.planner.covers.fit_writing import touching_states, write_fits
-from services.planner.covers.fitting import Fitted, fitted
+from services.planner.covers.fitting import Fitted, Kind, fitted
 from services.planner.covers.hull import smallest_ball
 from services.planner.covers.link_meshes import visual_mesh
 from services.planner.covers.mesh_fit import depths, fit_links
 from services.planner.covers.parts import shapes_around
-from services.planner.covers.shapes import Mesh, ShapeKind
+from services.planner.covers.shapes import Mesh
+from services.planner.scene.clearance import CLEARANCE
 from services.planner.scene.solid_geometry import is_inside
 
 URDF = Path(__file__).parents[2] / "urdf"
-TOUCHING = {  # one box around a plate with round ends has corners
-    "rm1": [],
-    "parol6": ['in the state "forward" base_link and link_2 touch'],
-}
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -50,7 +47,7 @@ def turned(points: np.ndarray, random: np.random.Generator) -> np.ndarray:
 
 def depth(shapes: list[Fitted] | tuple[Fitted, ...], points: np.ndarray) -> np.ndarray:
     """How deep each point is in the shape that holds it best."""
-    return np.max([depths(each.shape, points) for each in shapes], axis=0)
+    return np.max([depths(shape, points) for each in shapes for shape in each.shapes], axis=0)
 
 
 def as_mesh(made: trimesh.Trimesh, points: np.ndarray | None = None) -> Mesh:
@@ -69,20 +66,30 @@ def test_the_smallest_ball_holds_all_and_no_other_place_needs_less(seed: int, di
         assert np.linalg.norm(points - moved, axis=1).max() >= radius - 1e-9
 
 
-@given(SEEDS, st.sampled_from(["box", "cylinder", "capsule", "sphere"]))
+@given(SEEDS, st.sampled_from(list(Kind)))
 @settings(max_examples=40, deadline=None)
-def test_what_is_a_box_a_cylinder_a_capsule_or_a_ball_is_found_as_one(seed: int, kind: str):
+def test_what_has_one_of_the_shapes_is_found_to_have_it(seed: int, kind: Kind):
     random = np.random.default_rng(seed)
     size, long = random.uniform(0.02, 0.1, 3), random.uniform(0.15, 0.3)
     made = {
-        "box": lambda: trimesh.creation.box(extents=size),
-        "cylinder": lambda: trimesh.creation.cylinder(radius=size[0], height=long, sections=64),
-        "capsule": lambda: trimesh.creation.capsule(radius=size[0], height=3.0 * size[0], count=(33, 32)),
-        "sphere": lambda: trimesh.creation.icosphere(radius=size[0], subdivisions=4),
+        Kind.BOX: lambda: trimesh.creation.box(extents=size),
+        Kind.CYLINDER: lambda: trimesh.creation.cylinder(radius=size[0], height=long, sections=64),
+        Kind.CAPSULE: lambda: trimesh.creation.capsule(radius=size[0], height=3.0 * size[0], count=(33, 32)),
+        Kind.PLATE: lambda: (
+            trimesh.Scene(
+                [
+                    trimesh.creation.cylinder(0.03, 0.02, sections=64, transform=np.eye(4) + at * np.eye(4, k=3))
+                    for at in (-0.06, 0.06)
+                ]
+            )
+            .to_mesh()
+            .convex_hull
+        ),
+        Kind.SPHERE: lambda: trimesh.creation.icosphere(radius=size[0], subdivisions=4),
     }[kind]()
     points = turned(made.vertices, random)
     found = fitted(points)
-    assert found.kind is ShapeKind(kind)
+    assert found.kind is kind
     assert depth([found], points).min() >= 0.0
     assert found.volume < 1.03 * made.volume + 1e-7
 
@@ -133,7 +140,7 @@ def test_an_angle_of_one_piece_is_cut_into_its_legs():
     one, two = shapes_around(as_mesh(made), 1), shapes_around(as_mesh(made), 2)
     assert one[0].volume == pytest.approx(0.2 * 0.2 * 0.04, rel=0.01)
     assert sum(each.volume for each in two) < 1.15 * made.volume
-    assert {each.kind for each in two} == {ShapeKind.BOX}
+    assert {each.kind for each in two} == {Kind.BOX}
 
 
 def test_a_fitted_arm_loads_and_its_neighbours_do_not_touch_once_its_matrix_is_made(copied: Path):
@@ -156,7 +163,9 @@ def test_a_fitted_arm_loads_and_its_neighbours_do_not_touch_once_its_matrix_is_m
     neighbours = {frozenset((joint.parent, joint.child)) for joint in arm.model.joints}
     assert kinematics.collisions.pairs
     assert not neighbours & {frozenset(pair) for pair in kinematics.collisions.pairs}
-    assert touching_states(kinematics.arm) == TOUCHING[kinematics.arm.name]
+    for name, posture in kinematics.arm.named_states.items():
+        assert kinematics.collisions.distance(posture) > CLEARANCE, name
+    assert touching_states(kinematics.arm) == []
 
 
 def _require_only_collisions_changed(text: str, arm: Arm) -> None:
@@ -174,10 +183,21 @@ def test_an_arm_that_has_meshes_alone_is_told_what_makes_shapes_and_gets_them(co
     bare = load_arm(copied)
     with pytest.raises(DescriptionError, match=r"gemelo collision fit .* --meshes --write"):
         Kinematics(bare)
-    write_fits(bare, fit_links(bare, 1))
-    assert Kinematics(load_arm(copied)).collisions.geometry_count == sum(
-        bool(link.visuals) for link in bare.model.links
-    )
+    fits = fit_links(bare, 1)
+    write_fits(bare, fits)
+    elements = sum(len(shape.shapes) for fit in fits for shape in fit.shapes)
+    assert Kinematics(load_arm(copied)).collisions.geometry_count == elements
+
+
+def test_a_named_state_in_which_the_shapes_touch_is_said(copied: Path):
+    arm = load_arm(copied)
+    text = arm.srdf_path.read_text()
+    arm.srdf_path.write_text(with_pairs(text, plan_of(text, collision_matrix(arm))[0]))
+    first, last = arm.model.links[0].name, [link.name for link in arm.model.links if link.collisions][-1]
+    block = '<collision><geometry><box size="3 3 3"/></geometry></collision>'
+    arm.urdf_path.write_text(with_collisions(arm.urdf_path.read_text(), {first: [block]}))
+    said = touching_states(load_arm(copied))
+    assert f'in the state "home" {first} and {last} touch' in said
 
 
 def test_a_capsule_is_written_as_what_a_urdf_knows(copied: Path):
@@ -185,7 +205,7 @@ def test_a_capsule_is_written_as_what_a_urdf_knows(copied: Path):
     arm = load_arm(copied)
     link = _first_with_mesh(arm)
     (fit,) = fit_links(arm, only=[link])
-    assert [each.kind for each in fit.shapes] == [ShapeKind.CAPSULE]
+    assert [each.kind for each in fit.shapes] == [Kind.CAPSULE]
     write_fits(arm, [fit])
     (written,) = [each for each in load_arm(copied).model.links if each.name == link]
     assert [each.shape for each in written.collisions] == ["cylinder", "sphere", "sphere"]

@@ -9,36 +9,33 @@ import numpy as np
 from services.arm.description import Arm, load_arm
 from services.arm.errors import DescriptionError
 from services.arm.kinematics import Kinematics
-from services.arm.transforms import from_rpy
+from services.arm.urdf import Triple
 from services.arm.urdf_edit import with_collisions
 from services.planner.covers.fitting import Fitted
 from services.planner.covers.link_spheres import link_shapes
 from services.planner.covers.mesh_fit import LinkFit, depths
-from services.planner.covers.shapes import ShapeKind, matrix_of
+from services.planner.covers.shapes import Shape, ShapeKind
 
 OUTSIDE = 1e-6  # [m] that a corner may be outside the shapes as they are loaded again: a rounding
 
 
-def elements_of(shape: Fitted) -> list[str]:
-    """The shape as <collision> elements; a capsule, which is not URDF, is a cylinder with a ball at either end."""
-    size, origin = shape.size, shape.origin
+def elements_of(fitted: Fitted) -> list[str]:
+    """As <collision> elements; URDF knows no capsule, so that it and a plate are three."""
+    return [_element(shape, fitted.origin.rpy) for shape in fitted.shapes]
+
+
+def _element(shape: Shape, rpy: Triple) -> str:
+    origin = f'<origin xyz="{_words(shape.pose[0])}" rpy="{_words(rpy)}"/>'
+    return f"<collision>\n  {origin}\n  <geometry>{_geometry(shape)}</geometry>\n</collision>"
+
+
+def _geometry(shape: Shape) -> str:
     match shape.kind:
         case ShapeKind.BOX:
-            return [_element(origin.xyz, origin.rpy, f'<box size="{_words(size)}"/>')]
-        case ShapeKind.SPHERE:
-            return [_element(origin.xyz, origin.rpy, f'<sphere radius="{_words(size)}"/>')]
-    radius, length = _words(size[:1]), _words(size[1:])
-    found = [_element(origin.xyz, origin.rpy, f'<cylinder radius="{radius}" length="{length}"/>')]
-    if shape.kind is ShapeKind.CAPSULE:
-        along = 0.5 * size[1] * matrix_of(((0.0, 0.0, 0.0), from_rpy(*origin.rpy)))[:3, 2]
-        ends = [(np.array(origin.xyz) + side * along).tolist() for side in (-1.0, 1.0)]
-        found += [_element(end, (0.0, 0.0, 0.0), f'<sphere radius="{radius}"/>') for end in ends]
-    return found
-
-
-def _element(xyz: Sequence[float], rpy: Sequence[float], geometry: str) -> str:
-    origin = f'<origin xyz="{_words(xyz)}" rpy="{_words(rpy)}"/>'
-    return f"<collision>\n  {origin}\n  <geometry>{geometry}</geometry>\n</collision>"
+            return f'<box size="{_words(shape.size)}"/>'
+        case ShapeKind.CYLINDER:
+            return f'<cylinder radius="{_words(shape.size[:1])}" length="{_words(shape.size[1:])}"/>'
+    return f'<sphere radius="{_words(shape.size)}"/>'
 
 
 def _words(values: Sequence[float]) -> str:

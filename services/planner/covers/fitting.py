@@ -1,15 +1,16 @@
-"""The smallest box, cylinder, capsule or ball around points, in numbers as a URDF has them."""
+"""The smallest box, cylinder, capsule, plate or ball around points, in numbers as a URDF has them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.transforms import from_rpy
+from services.arm.transforms import compose, from_rpy
 from services.arm.urdf import Origin, Triple
 from services.planner.covers.hull import corners_and_sides, smallest_ball, smallest_rectangle
 from services.planner.covers.shapes import Shape, ShapeKind, matrix_of
@@ -18,37 +19,62 @@ Array = NDArray[np.float64]
 
 GRID, DIGITS = 1e-5, 5  # [m] to which places are rounded, and half sizes rounded up
 THINNEST = 2e-4  # [m] that an edge or a radius has at least
-# How much less one shape must hold than another to be taken: what stands along the link's axes is easier to read, and a
-# capsule is three elements of a URDF.
-TURNED, OBLIQUE, LONG = 1.002, 1.02, 1.05
+# How much less one shape must hold than another to be taken: what stands along the link's axes is easier to read, and
+# what is one element of a URDF.
+TURNED, OBLIQUE, SEVERAL = 1.002, 1.02, 1.05
 UPRIGHT = np.eye(3)[[2, 0, 1]]  # the link's axes; of equal shapes the one along its z is taken
+
+
+class Kind(StrEnum):
+    """And what `Fitted.size` means for each, in m; along z."""
+
+    BOX = "box"  # x, y, z: whole lengths of the edges
+    SPHERE = "sphere"  # radius
+    CYLINDER = "cylinder"  # radius, length
+    CAPSULE = "capsule"  # radius, length of the straight part
+    PLATE = "plate with round ends"  # radius of the ends, distance of their middles along x, thickness
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """One shape that holds all its points."""
+    """What holds all its points."""
 
-    kind: ShapeKind
-    size: tuple[float, ...]  # as `Shape` has it
+    kind: Kind
+    size: tuple[float, ...]
     origin: Origin  # in the link
 
     @property
     def volume(self) -> float:
         """[m^3]."""
-        match self.kind:
-            case ShapeKind.BOX:
-                return math.prod(self.size)
-            case ShapeKind.CYLINDER:
-                return math.pi * self.size[0] ** 2 * self.size[1]
-            case ShapeKind.CAPSULE:
-                return math.pi * self.size[0] ** 2 * (self.size[1] + 4.0 / 3.0 * self.size[0])
-            case _:
-                return 4.0 / 3.0 * math.pi * self.size[0] ** 3
+        match self.kind, self.size:
+            case Kind.BOX, (x, y, z):
+                return x * y * z
+            case Kind.CYLINDER, (radius, length):
+                return math.pi * radius**2 * length
+            case Kind.CAPSULE, (radius, length):
+                return math.pi * radius**2 * (length + 4.0 / 3.0 * radius)
+            case Kind.PLATE, (radius, length, thickness):
+                return (math.pi * radius + 2.0 * length) * radius * thickness
+        return 4.0 / 3.0 * math.pi * self.size[0] ** 3
 
     @property
-    def shape(self) -> Shape:
-        """In the link's frame."""
-        return Shape(str(self.kind), self.kind, self.size, (self.origin.xyz, from_rpy(*self.origin.rpy)))
+    def shapes(self) -> tuple[Shape, ...]:
+        """It in the link's frame, as what a URDF knows: a capsule and a plate are three."""
+        match self.kind, self.size:
+            case Kind.CAPSULE, (radius, length):
+                balls = (self._shape(ShapeKind.SPHERE, (radius,), (0.0, 0.0, side * length)) for side in (-0.5, 0.5))
+                return self._shape(ShapeKind.CYLINDER, (radius, length)), *balls
+            case Kind.PLATE, (radius, length, thickness):
+                ends = (
+                    self._shape(ShapeKind.CYLINDER, (radius, thickness), (side * length, 0.0, 0.0))
+                    for side in (-0.5, 0.5)
+                )
+                return self._shape(ShapeKind.BOX, (length, 2.0 * radius, thickness)), *ends
+        return (self._shape(ShapeKind(self.kind), self.size),)
+
+    def _shape(self, kind: ShapeKind, size: tuple[float, ...], at: Triple = (0.0, 0.0, 0.0)) -> Shape:
+        turn = from_rpy(*self.origin.rpy)
+        return Shape(str(kind), kind, size, compose((self.origin.xyz, turn), (at, (0.0, 0.0, 0.0, 1.0))))
 
 
 def fitted(points: Array) -> Fitted:
@@ -61,7 +87,7 @@ def fitted(points: Array) -> Fitted:
 def _cost(shape: Fitted) -> float:
     is_oblique = any(abs(math.sin(2.0 * angle)) > 1e-5 for angle in shape.origin.rpy)
     turned = OBLIQUE if is_oblique else TURNED if any(shape.origin.rpy) else 1.0
-    return shape.volume * turned * (LONG if shape.kind is ShapeKind.CAPSULE else 1.0)
+    return shape.volume * turned * (SEVERAL if len(shape.shapes) > 1 else 1.0)
 
 
 def spread(points: Array) -> Array:
@@ -74,7 +100,9 @@ def _along(points: Array, axis: Array) -> Iterator[Fitted]:
     turn = _frame(axis)
     for angle in (0.0, smallest_rectangle(points @ turn[:2].T)):
         cosine, sine = np.cos(angle), np.sin(angle)
-        yield _box(points, np.array(((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0))) @ turn)
+        along = np.array(((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0))) @ turn
+        yield _box(points, along)
+        yield from _plate(points, along)
     yield from _round(points, turn)
 
 
@@ -83,7 +111,26 @@ def _box(points: Array, turn: Array) -> Fitted:
     there = points @ axes.T
     xyz = _place(0.5 * (there.min(axis=0) + there.max(axis=0)) @ axes)
     half = np.abs((points - xyz) @ axes.T).max(axis=0)
-    return Fitted(ShapeKind.BOX, tuple(2.0 * _up(value) for value in half), Origin(xyz, rpy))
+    return Fitted(Kind.BOX, tuple(2.0 * _up(value) for value in half), Origin(xyz, rpy))
+
+
+def _plate(points: Array, turn: Array) -> Iterator[Fitted]:
+    """With its ends where it is longest, if that is across its z."""
+    sizes = np.ptp(points @ turn.T, axis=0)
+    if sizes[1] > sizes[0]:
+        turn = np.array((turn[1], -turn[0], turn[2]))
+    rpy, axes = _rounded(turn)
+    there = points @ axes.T
+    middle = 0.5 * (there.min(axis=0) + there.max(axis=0))
+    caps = _caps(there[:, 1:2] - middle[1], 0.5 * float(np.ptp(there[:, 1])))
+    middle[0] = 0.5 * ((there[:, 0] + caps).min() + (there[:, 0] - caps).max())
+    xyz = _place(middle @ axes)
+    local = (points - xyz) @ axes.T
+    half = np.abs(local).max(axis=0)
+    radius = _up(float(half[1]))
+    straight = float((np.abs(local[:, 0]) - _caps(local[:, 1:2], radius)).max())
+    if straight > 0.0:
+        yield Fitted(Kind.PLATE, (radius, 2.0 * _up(straight), 2.0 * _up(float(half[2]))), Origin(xyz, rpy))
 
 
 def _round(points: Array, turn: Array) -> Iterator[Fitted]:
@@ -97,13 +144,13 @@ def _round(points: Array, turn: Array) -> Iterator[Fitted]:
     xyz = _place(np.array([*centre, flat]) @ axes)
     local = (points - xyz) @ axes.T
     wide = _up(float(np.linalg.norm(local[:, :2], axis=1).max()))
-    yield Fitted(ShapeKind.CYLINDER, (wide, 2.0 * _up(float(np.abs(local[:, 2]).max()))), Origin(xyz, rpy))
+    yield Fitted(Kind.CYLINDER, (wide, 2.0 * _up(float(np.abs(local[:, 2]).max()))), Origin(xyz, rpy))
     xyz = _place(np.array([*centre, rounded]) @ axes)
     local = (points - xyz) @ axes.T
     wide = _up(float(np.linalg.norm(local[:, :2], axis=1).max()))
     straight = float((np.abs(local[:, 2]) - _caps(local[:, :2], wide)).max())
     if straight > 0.0:
-        yield Fitted(ShapeKind.CAPSULE, (wide, 2.0 * _up(straight)), Origin(xyz, rpy))
+        yield Fitted(Kind.CAPSULE, (wide, 2.0 * _up(straight)), Origin(xyz, rpy))
 
 
 def _caps(aside: Array, radius: float) -> Array:
@@ -113,7 +160,7 @@ def _caps(aside: Array, radius: float) -> Array:
 
 def _ball(points: Array) -> Fitted:
     xyz = _place(smallest_ball(points)[0])
-    return Fitted(ShapeKind.SPHERE, (_up(float(np.linalg.norm(points - xyz, axis=1).max())),), Origin(xyz))
+    return Fitted(Kind.SPHERE, (_up(float(np.linalg.norm(points - xyz, axis=1).max())),), Origin(xyz))
 
 
 def _up(half: float) -> float:

@@ -17,7 +17,6 @@ from services.planner.covers.link_meshes import visual_mesh
 from services.planner.covers.link_spheres import solid_of
 from services.planner.covers.parts import shapes_around
 from services.planner.covers.shapes import Mesh, Shape
-from services.planner.covers.solids import Solid
 from services.planner.scene.solid_geometry import tree_of
 
 Array = NDArray[np.float64]
@@ -59,35 +58,33 @@ def _fit(link: str, mesh: Mesh, most: int) -> LinkFit:
     return LinkFit(link, mesh, shapes, sum(shape.volume for shape in shapes) / hull, overshoot(shapes, mesh))
 
 
-def overshoot(shapes: Sequence[Fitted], mesh: Mesh) -> float:
+def overshoot(fitted: Sequence[Fitted], mesh: Mesh) -> float:
     """[m] from the mesh to the farthest point of the shapes' surface, of those that are in no other shape."""
     tree, point = tree_of(mesh), coal.Sphere(1e-9)
+    shapes = [shape for each in fitted for shape in each.shapes]
     farthest = 0.0
     for shape in shapes:
         there = _surface(shape)
         for other in shapes:
             if other is not shape:
-                there = there[depths(other.shape, there) <= 0.0]
+                there = there[depths(other, there) <= 0.0]
         for place in there:
-            result = coal.DistanceResult()
             pose = coal.Transform3s(np.eye(3), place)
-            away = coal.distance(tree, coal.Transform3s(), point, pose, coal.DistanceRequest(), result)
-            farthest = max(farthest, float(away))
+            request, result = coal.DistanceRequest(), coal.DistanceResult()
+            farthest = max(farthest, float(coal.distance(tree, coal.Transform3s(), point, pose, request, result)))
     return farthest
 
 
-def _surface(shape: Fitted) -> Array:
+def _surface(shape: Shape) -> Array:
     """(k, 3) points on it, its corners and rims among them: nearest to those of a box around it."""
-    solid = solid_of(shape.shape)
+    solid = solid_of(shape)
     steps = np.linspace(-1.0, 1.0, FACETS + 1)
     across = np.array([(x, y) for x in steps for y in steps])
     sides = [np.insert(across, axis, side, axis=1) for axis in range(3) for side in (-1.0, 1.0)]
     local = solid.nearest(np.vstack(sides) * (solid.half * 1.01))
-    pose = shape.shape.matrix
-    return local @ pose[:3, :3].T + pose[:3, 3]
+    return local @ shape.rotation.T + shape.pose[0]
 
 
 def depths(shape: Shape, points: Array) -> Array:
     """(n,) [m] that points (n, 3) are inside the shape, below 0 outside."""
-    solid: Solid = solid_of(shape)
-    return solid.depth((points - shape.pose[0]) @ shape.rotation)
+    return solid_of(shape).depth((points - shape.pose[0]) @ shape.rotation)
