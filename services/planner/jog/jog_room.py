@@ -69,7 +69,7 @@ class Room:
         if np.all(outside <= 0.0):
             return 1.0, None
         worst = int(np.argmax(outside))
-        limit = joint_limit(self._joints[worst], float(positions[worst]), float(wanted[worst]))
+        limit = joint_limit(self._joints[worst], float(positions[worst]), float(wanted[worst] or velocity[worst]))
         least, width = 0.0, 1.0  # 0, which is braking, always is allowed
         for _ in range(LIMIT_ROUNDS):
             shares = least + width * np.arange(1, LIMIT_SHARES) / LIMIT_SHARES
