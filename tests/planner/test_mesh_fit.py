@@ -19,7 +19,8 @@ from services.arm.srdf_edit import with_pairs
 from services.arm.urdf_edit import with_collisions
 from services.cli.collision import plan_of
 from services.planner.covers.fit_writing import touching_states, write_fits
-from services.planner.covers.fitting import Fitted, Kind, fitted
+from services.planner.covers.fitted_shape import Fitted, Kind
+from services.planner.covers.fitting import fitted
 from services.planner.covers.hull import smallest_ball
 from services.planner.covers.link_meshes import visual_mesh
 from services.planner.covers.mesh_fit import depths, fit_links

@@ -11,7 +11,7 @@ from services.arm.errors import DescriptionError
 from services.arm.kinematics import Kinematics
 from services.arm.urdf import Triple
 from services.arm.urdf_edit import with_collisions
-from services.planner.covers.fitting import Fitted
+from services.planner.covers.fitted_shape import Fitted
 from services.planner.covers.link_spheres import link_shapes
 from services.planner.covers.mesh_fit import LinkFit, depths
 from services.planner.covers.shapes import Shape, ShapeKind

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from services.arm.description import Arm
 from services.arm.errors import DescriptionError, suggestion
-from services.planner.covers.fitting import Fitted
+from services.planner.covers.fitted_shape import Fitted
 from services.planner.covers.link_meshes import visual_mesh
 from services.planner.covers.link_spheres import solid_of
 from services.planner.covers.parts import shapes_around

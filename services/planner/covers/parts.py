@@ -14,7 +14,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from services.planner.covers.fitting import Fitted, fitted, spread
+from services.planner.covers.fitted_shape import Fitted
+from services.planner.covers.fitting import fitted, spread
 from services.planner.covers.shapes import Mesh
 
 Array = NDArray[np.float64]
