@@ -8,19 +8,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.description import Arm
 from services.bench.problem_sets import way_length
-from services.planner.native import MotionCore, NoPath
 from services.planner.scene.clearance import CLEARANCE
 from services.planner.scene.surroundings import Surroundings
 from services.planner.search.ompl_search import ompl_corners
 from services.planner.search.smoothing import shorten
 from services.planner.search.validity import Validity
 from services.planner.search.way import Deadline, NoWay
+
+if TYPE_CHECKING:
+    from services.planner.native import MotionCore
 
 Array = NDArray[np.float64]
 
@@ -43,10 +46,11 @@ class Spheres:
         return None if self._core.way_free(positions) else np.asarray(positions[0])
 
 
-def shortest(
-    arm: Arm, core: MotionCore, surroundings: Surroundings, start: Array, goals: Array
-) -> tuple[Array, str] | None:
+def shortest(arm: Arm, surroundings: Surroundings, start: Array, goals: Array) -> tuple[Array, str] | None:
     """A polyline (m, n) from `start` to one of `goals` (k, n), and what found it; None where nothing did."""
+    core = surroundings.core(CLEARANCE)
+    if core is None:
+        raise RuntimeError("the compiled motion core is needed to look for the shortest ways: run `make setup`")
     speeds = np.array([joint.velocity for joint in arm.joints])
     cautious, exact = Validity(Spheres(core), CLEARANCE), Validity(surroundings, CLEARANCE)
     found = _by_core(core, start, goals)
@@ -73,15 +77,16 @@ def tightened(rows: Array, speeds: Array, seed: int, validity: Validity, pushes:
         before, here, after = rows[corner - 1 : corner + 2]
         inwards = random.uniform() * (0.5 * (before + after) - here)
         pushed = here + inwards + random.normal(0.0, width, len(speeds)) * speeds
-        is_shorter = way_length(np.array([before, pushed, after]), speeds) < way_length(
-            rows[corner - 1 : corner + 2], speeds
-        )
+        now, then = np.array([before, here, after]), np.array([before, pushed, after])
+        is_shorter = way_length(then, speeds) < way_length(now, speeds)
         if is_shorter and validity.is_line_free(before, pushed) and validity.is_line_free(pushed, after):
             rows[corner] = pushed
     return rows
 
 
 def _by_core(core: MotionCore, start: Array, goals: Array) -> list[tuple[Array, str]]:
+    from services.planner.native import NoPath
+
     paths = []
     for seed in range(SEEDS):
         path = core.plan(start, goals, seed=seed, time_limit=PATIENCE)

@@ -22,12 +22,10 @@ from services.bench.known_ways import shortest
 from services.bench.plan_scenes import SCENES
 from services.bench.problem_sets import COUNT, FILE, Problem, ProblemSet, problem_sets, request_of, text_of, way_length
 from services.planner.goals.goals import Goals
-from services.planner.native import MotionCore
 from services.planner.scene.clearance import CLEARANCE
 from services.planner.scene.surroundings import Surroundings
 from services.planner.scene.world import World
-from services.planner.search.native_scene import native_scene
-from services.planner.search.native_search import NATIVE, show_scene
+from services.planner.search.native_search import NATIVE
 from services.planner.search.search import Search
 from services.planner.search.validity import Validity
 from services.planner.search.way import Deadline, NoWay, endless
@@ -51,8 +49,6 @@ class Maker:
         self._around = Surroundings(World(arm, self.kinematics, SCENES[scene]))
         self._validity = Validity(self._around, CLEARANCE)
         self._speeds = np.array([joint.velocity for joint in arm.joints])
-        self._core = MotionCore(arm, margin=CLEARANCE)
-        show_scene(self._core, *native_scene(arm, SCENES[scene]))
         self._search = Search(arm, self._around)
         is_small = len(arm.joints) <= FEW_JOINTS
         self._grid = JointGrid(arm, self._around.reach, self._validity) if is_small else None
@@ -111,7 +107,7 @@ class Maker:
         least = min(way_length(np.array([start, goal]), self._speeds) for goal in goals)
         ways = [(line, "straight") for line in lines[:1]]
         if not lines or way_length(lines[0], self._speeds) > least:
-            found = shortest(self.arm, self._core, self._around, start, np.array(goals))
+            found = shortest(self.arm, self._around, start, np.array(goals))
             ways += [] if found is None else [found]
         return ways
 
