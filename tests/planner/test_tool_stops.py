@@ -252,6 +252,18 @@ def test_an_arm_that_cannot_turn_its_tool_says_so_instead_of_turning():
     assert "28.65 deg are missing" in refused.refusal.message
 
 
+@pytest.mark.parametrize("timing", Timing)
+@pytest.mark.parametrize("motion", [LinearMotion(), LinearMotion(speed=0.01, acceleration=0.1)])
+def test_an_arm_that_cannot_turn_its_tool_stands_where_any_turn_will_do(timing: Timing, motion: LinearMotion):
+    start = planner_of("rm1").arm.named_states["ready"]
+    place, rotation = Judge(planner_of("rm1").arm).tool(np.array(start))
+    turn = turned(rotation, np.array((0.0, 0.0, 0.3)))
+    goal = PoseGoal(position=tuple(place.tolist()), orientation=turn, orientation_tolerance=0.5)
+    response = planned("rm1", start, goal, motion, timing=timing)
+    assert response.code is PlanCode.SUCCESS
+    assert (response.duration, response.trajectory.points[-1].positions) == (0.1, start)
+
+
 @ARMS
 @pytest.mark.parametrize("motion", [LinearMotion(), PointToPoint()])
 def test_a_way_to_where_the_arm_is_stands_whatever_the_goals_form(name: str, motion: object):

@@ -18,9 +18,9 @@ from services.planner.refusals import NoPlan, not_verified
 from services.planner.scene.clearance import Sweeper
 from services.planner.search.way import Start
 from services.planner.timing.path_timing import Heed, law_along
-from services.planner.timing.profile import JointLimits, NoProfile, require_short
+from services.planner.timing.profile import JointLimits, NoProfile, require_short, straight_line
 from services.planner.timing.timing import States, at_limits, at_speed, trajectory_of
-from services.planner.tool.continuation import FINEST, Continuation, Followed, Stop
+from services.planner.tool.continuation import FINEST, Continuation, Followed, Stop, is_same
 from services.planner.tool.path_points import Run, between, states_of_runs
 from services.planner.tool.tool_limits import ToolLimits
 from services.planner.tool.tool_path import METRES_PER_RADIAN, ToolPath
@@ -66,7 +66,7 @@ class CartesianPlanner:
     def plan(self, paths: Sequence[ToolPath], start: Start, end: Start | None, terms: Terms) -> CartesianWay:
         """Along the paths one after the other, at rest between them; raises `NoPlan`, and what `terms.heed` raises.
 
-        Where it comes to `end` but for rounding, it ends there to the bit.
+        Where it comes to `end` but for rounding, it ends there to the bit. On a path that moves no joint it stands.
         """
         whole, before = sum(path.length for path in paths), 0.0
         metres = sum(path.metres for path in paths)
@@ -78,8 +78,10 @@ class CartesianPlanner:
             if isinstance(followed, Followed):
                 if end is not None and stop is None and path is paths[-1]:
                     followed = self._continuation.ending(followed, np.array(end))
-                runs.append(self._run(path, followed, terms))
-                posture, before = followed.postures[-1], before + float(followed.lengths[-1])
+                if not all(is_same(row, posture) for row in followed.postures):
+                    runs.append(self._run(path, followed, terms))
+                    posture = followed.postures[-1]
+                before += float(followed.lengths[-1])
                 gone += path.metres_to(float(followed.lengths[-1]))
             if stop is not None:
                 refusal = _stopped(stop, gone, metres, before / whole)
@@ -88,12 +90,11 @@ class CartesianPlanner:
         least = terms.tool.least_fraction
         if refusal is not None and (not runs or fraction < least):
             raise NoPlan(_code(refusal), _too_little(refusal, fraction, least), fraction)
-        states = self._within(states_of_runs(runs, terms.heed), terms)
-        try:
-            require_short(float(states.times[-1]))
-        except NoProfile as error:
-            raise not_verified(str(error)) from error
-        return CartesianWay(trajectory_of(self._arm.joint_names, states), tuple(posture.tolist()), fraction, refusal)
+        if not runs:
+            last = end if end is not None and is_same(end, start) else start
+            standing = straight_line(self._arm.joint_names, start, last, terms.limits)
+            return CartesianWay(standing, last, fraction, refusal)
+        return CartesianWay(self._timed(runs, terms), tuple(posture.tolist()), fraction, refusal)
 
     def _follow(self, path: ToolPath, start: Array, terms: Terms) -> Followed | Stop:
         """As far as the joints and what stands around let it."""
@@ -148,6 +149,14 @@ class CartesianPlanner:
             lambda length, posture: self._continuation.solver.error(path.at(length), posture),
             np.maximum(self._checker.reach, METRES_PER_RADIAN),
         )
+
+    def _timed(self, runs: list[Run], terms: Terms) -> JointTrajectory:
+        states = self._within(states_of_runs(runs, terms.heed), terms)
+        try:
+            require_short(float(states.times[-1]))
+        except NoProfile as error:
+            raise not_verified(str(error)) from error
+        return trajectory_of(self._arm.joint_names, states)
 
     def _within(self, states: States, terms: Terms) -> States:
         """As fast as the joints may; slower, where they or the tool would be a little faster than they may."""

@@ -29,10 +29,9 @@ from services.planner.goals.targets import ROTATION_TOLERANCE, Target, turn_betw
 from services.planner.refusals import NoPlan, malformed
 from services.planner.scene.clearance import Sweeper
 from services.planner.search.way import Start
-from services.planner.timing.profile import JointLimits, straight_line
+from services.planner.timing.profile import JointLimits
 from services.planner.tool.arcs import arc_about, arc_through
 from services.planner.tool.cartesian import CartesianPlanner, CartesianWay, Terms
-from services.planner.tool.continuation import is_same
 from services.planner.tool.tool_limits import ToolLimits, require_tool_limits
 from services.planner.tool.tool_path import ToolPath, polyline
 
@@ -64,7 +63,7 @@ class ToolMotions:
         try:
             wanted = self._wanted(request.goal, start)
             paths, end = self._paths(request, start, wanted), wanted[-1]
-            way = self._along(paths, start, end, Terms(limits, tool, margin, request.timing, heed))
+            way = self._planner.plan(paths, start, end, Terms(limits, tool, margin, request.timing, heed))
         except NoPlan as ended:
             if tool.least_fraction == 1.0 and not is_late():
                 self._require_reachable(request.goal, start, ended.fraction, is_late)
@@ -73,12 +72,6 @@ class ToolMotions:
             self._require_turned(request.goal, start, way.end)
             self._require_joints(way.end, end)
         return way
-
-    def _along(self, paths: list[ToolPath], start: Start, end: Start | None, terms: Terms) -> CartesianWay:
-        if paths:
-            return self._planner.plan(paths, start, end, terms)
-        end = end if end is not None and is_same(end, start) else start
-        return CartesianWay(straight_line(self._arm.joint_names, start, end, terms.limits), end, 1.0, None)
 
     def _paths(self, request: PlanRequest, start: Start, wanted: list[Start | None]) -> list[ToolPath]:
         goal, begin = request.goal, self._kinematics.tool(start)
