@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 from services.bench.arms import parol6, rm1
 from services.bench.figure import Figure, Goal, NotMeasured, of_samples
-from services.bench.plan_references import ALLOWED, PlainOmpl, Reference, Roboplan
+from services.bench.plan_references import PlainOmpl, Reference, Roboplan
 from services.bench.plan_scenes import SCENES
 from services.bench.plan_trials import PHASES, Trial, every_trial, spread
-from services.bench.problem_sets import COUNT, problem_set
+from services.bench.problem_sets import ALLOWED, COUNT, problem_set
 
 UNIT = "ms"
 GOAL = Goal(median=2.0, p99=20.0)

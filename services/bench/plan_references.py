@@ -18,11 +18,11 @@ from schemas.scene import BoxShape, CylinderShape, PlanningScene
 from services.arm.description import Arm
 from services.bench.figure import NotMeasured
 from services.bench.postures import CoalChecker
+from services.bench.problem_sets import ALLOWED
 
 Array = NDArray[np.float64]
 Posture = tuple[float, ...]
 
-ALLOWED = 1.0  # [s]
 STEP = 0.02  # [rad], [m] between two postures that are looked at
 MOST_NODES = 100_000
 GROUP = "bench"
@@ -86,21 +86,11 @@ class Roboplan:
             from roboplan import core, rrt
         except ImportError as error:
             raise NotMeasured(f"{error}: it is among the packages of requirements.lock, run `make setup`") from error
-        self._core, self._rrt = core, rrt
+        self._core = core
         self._scene = core.Scene(arm.name, core.loadUrdfSceneDescription(str(arm.urdf_path), [str(arm.folder)]))
         self._scene.importSrdf(arm.srdf_path.read_text())
         self._scene.addGroup(GROUP, list(arm.joint_names))
-        for item in scene.objects:
-            match item.shape:
-                case BoxShape(size=size):
-                    add, shape = self._scene.addBoxGeometry, core.Box(*size)
-                case CylinderShape(radius=radius, length=length):
-                    add, shape = self._scene.addCylinderGeometry, core.Cylinder(radius, length)
-                case _:
-                    raise NotMeasured(f'roboplan is given no such shape as "{item.name}"')
-            add(item.name, "universe", shape, placed(item.pose), np.ones(4))
-        names = [item.name for item in scene.objects]
-        self._scene.setCollisions(list(combinations(names, 2)), False)  # or boards that touch end every search
+        self._show(scene)
         options = rrt.RRTOptions(
             group_name=GROUP,
             max_nodes=MOST_NODES,
@@ -122,6 +112,19 @@ class Roboplan:
             return None
         self._core.PathShortcutter(self._scene, options).shortcut(path)
         return (time.perf_counter() - began) * 1e3
+
+    def _show(self, scene: PlanningScene) -> None:
+        for item in scene.objects:
+            match item.shape:
+                case BoxShape(size=size):
+                    add, shape = self._scene.addBoxGeometry, self._core.Box(*size)
+                case CylinderShape(radius=radius, length=length):
+                    add, shape = self._scene.addCylinderGeometry, self._core.Cylinder(radius, length)
+                case _:
+                    raise NotMeasured(f'roboplan is given no such shape as "{item.name}"')
+            add(item.name, "universe", shape, placed(item.pose), np.ones(4))
+        names = [item.name for item in scene.objects]
+        self._scene.setCollisions(list(combinations(names, 2)), False)  # or boards that touch end every search
 
     def is_free(self, posture: Array) -> bool:
         return not self._scene.hasCollisions(posture)
