@@ -5,6 +5,7 @@ In a process of its own, which cannot import the core: `python -m services.bench
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
 
@@ -61,9 +62,11 @@ def main(count: int) -> None:
     from services.bench.plan_trials import trials
     from services.planner.core import Planner
 
+    planners = (Planner(rm1()), Planner(parol6()))
+    gc.freeze()  # as the planner's workers do
     runs = [
         Run(trial.took, trial.worked, trial.is_solved, trial.response.planner_id)
-        for planner in (Planner(rm1()), Planner(parol6()))
+        for planner in planners
         for name in SCENES
         for trial in trials(planner, name, count)
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -57,6 +58,7 @@ def every_trial() -> dict[str, list[Trial]]:
     for arm in (rm1(), parol6()):
         planner = Planner(arm)
         planner.prepare()
+        gc.freeze()  # as the planner's workers do
         for name in SCENES:
             by_scene[f"{arm.name} {name}"] = trials(planner, name)
     return by_scene
