@@ -61,6 +61,7 @@ def every_trial() -> dict[str, list[Trial]]:
         gc.freeze()  # as the planner's workers do
         for name in SCENES:
             by_scene[f"{arm.name} {name}"] = trials(planner, name)
+        gc.unfreeze()
     return by_scene
 
 
