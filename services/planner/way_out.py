@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.description import Arm, Joint
+from services.planner.jog.jog_obstacles import CONTACT_SPEED, comes_away
 from services.planner.scene.clearance import CLEARANCE
 from services.planner.scene.surroundings import Surroundings
 from services.planner.search.way import Start
@@ -21,7 +22,6 @@ NEAREST, FARTHEST, GROWTH = 0.003, 0.15, 1.25  # [m] that any point of the arm m
 DIRECTIONS = 24  # of all joints together, at each distance, besides those of one joint
 LEAST_REACH = 0.02  # [m/rad] of a joint that moves hardly anything
 LOOKS = 8  # at what touches, along a way
-SPEED = 0.02  # [m/s] of any point at most: jogging is not faster than 30 mm/s in a contact
 LEAST_SECONDS, SHARE = 0.5, 0.7  # and of a joint's velocity limit at most
 DECIMALS, TINY = 4, 1e-4  # of [rad] or [m], in which a posture is told; what moves less does not move
 
@@ -53,7 +53,7 @@ def jog_words(arm: Arm, reach: Array, start: Start, posture: Start) -> str:
     """The command that moves from `start` to `posture`; `reach` as a world's."""
     moves = [after - before for before, after in zip(start, posture, strict=True)]
     fastest = max(abs(move) / joint.velocity for joint, move in zip(arm.joints, moves, strict=True))
-    needed = max(LEAST_SECONDS, float(np.abs(moves) @ reach) / SPEED, fastest / SHARE)
+    needed = max(LEAST_SECONDS, float(np.abs(moves) @ reach) / CONTACT_SPEED, fastest / SHARE)
     seconds = math.ceil(10.0 * needed) / 10.0
     speeds = (_speed(joint, move / seconds) for joint, move in zip(arm.joints, moves, strict=True) if abs(move) > TINY)
     return f"gemelo jog --joint {' '.join(speeds)} --for {seconds:g}"
@@ -86,7 +86,9 @@ def _comes_away(surroundings: Surroundings, start: Array, end: Array) -> bool:
     for share in np.linspace(0.0, 1.0, LOOKS + 1).tolist():
         near = surroundings.contacts(start + share * (end - start), CLEARANCE)
         now = {(each.first, each.second): each.distance for each in near}
-        if before is not None and any(distance <= before.get(pair, math.inf) for pair, distance in now.items()):
+        if before is not None and any(
+            not comes_away(before.get(pair, math.inf), distance) for pair, distance in now.items()
+        ):
             return False
         before = now
     return True

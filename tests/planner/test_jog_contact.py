@@ -67,7 +67,7 @@ def test_one_way_leads_out_of_a_contact_and_the_other_does_not_begin(name: str, 
 @pytest.mark.parametrize(("name", "aside"), [("rm1", 0.035), ("parol6", 0.04)])
 def test_the_way_out_is_slow_until_the_clearance_is_won_and_it_is_said(name: str, aside: float) -> None:
     jogged = touched(name, aside=np.array([0.0, aside, 0.0]))
-    jogged.hold(JogCommand(linear=(0.0, -0.1, 0.0)), 3.0)
+    jogged.hold(JogCommand(linear=(0.0, -0.1, 0.0)), 4.0)
     distances = np.array([jogged.world.distance(positions) for positions in jogged.commanded])
     within = distances < CLEARANCE
     speeds = [

@@ -18,7 +18,7 @@ LEAST_LOOK = 0.001  # [m] that two shapes move against one another at most betwe
 SLACK = 0.0006  # [m] more than the clearance, for what happens between two looks
 MOST_LOOKS = 24  # at distances for one velocity: a longer way along an obstacle has to be gone slower
 LEVEL = 1e-7  # [m] that a depth may seem to grow between two looks where the motion is along the surface
-CONTACT_SPEED = 0.03  # [m/s] of what is nearer than the clearance already, on its way out
+CONTACT_SPEED = 0.02  # [m/s] of what is nearer than the clearance already, on its way out
 
 
 class Obstacles:
@@ -70,7 +70,7 @@ class Obstacles:
         if not pairs.size:
             return None
         after = self._nearness.distances_at(self._here + way, pairs)
-        too_near = _closer(before, after, floor)
+        too_near = (after < floor) & ~comes_away(before, after)
         return pairs[too_near] if too_near.any() else None
 
     def _closing_before(self, way: Array, pairs: Pairs, before: Array, floor: float) -> Pairs | None:
@@ -84,7 +84,7 @@ class Obstacles:
                 return None
             along = min(1.0, along + float(np.min(free / moved)))
             after = self._nearness.distances_at(self._here + along * way, pairs)
-            too_near = _closer(before, after, floor)
+            too_near = (after < floor) & ~comes_away(before, after)
             if too_near.any():
                 return pairs[too_near]
             if along == 1.0:
@@ -106,7 +106,7 @@ class Obstacles:
         return collision(self._nearness.names(int(pairs[nearest])), float(distances[nearest]))
 
 
-def _closer(before: Array, after: Array, floor: float) -> NDArray[np.bool_]:
-    """Which are nearer than `floor` [m] and did not come away; from inside, a way along the surface leads out too."""
-    come_away = (after > before) | ((before < 0.0) & (after > before - LEVEL))
-    return (after < floor) & ~come_away
+def comes_away(before: Array | float, after: Array | float) -> NDArray[np.bool_]:
+    """Whether two that were so near [m] are farther apart; from inside, a way along the surface leads out too."""
+    slack = np.where(np.less(before, 0.0), LEVEL, 0.0)
+    return np.greater(after, np.subtract(before, slack))
