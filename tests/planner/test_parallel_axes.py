@@ -89,6 +89,17 @@ def test_the_order_of_the_joints_in_robot_toml_does_not_matter():
     assert np.allclose(found[0], posture[::-1])
 
 
+def test_a_slide_without_limits_goes_as_far_as_it_takes():
+    arm = load_arm(RM1)
+    joints = [dataclasses.replace(j, lower=-math.inf, upper=math.inf) if j.unit == "m" else j for j in arm.joints]
+    kinematics = Kinematics(arm)
+    solver = parallel_axes(dataclasses.replace(arm, joints=tuple(joints)), kinematics)
+    assert solver is not None
+    far = np.array((0.5, -1.2, 40.0))
+    position = kinematics.tool(far).position
+    assert min(np.abs(each - far).max() for each in solver.postures(position, np.zeros(3))) < 1e-9
+
+
 def test_it_finds_what_a_search_finds_and_no_less():
     arm = load_arm(RM1)
     kinematics = Kinematics(arm)

@@ -28,8 +28,8 @@ class Turns:
     def within_limits(self, branches: Array, near: Array) -> list[Array]:
         """The branches (m, n) or one of them (n,) with every full turn; joints without limits as near as they can."""
         branches = np.atleast_2d(branches)
-        lower = np.where(np.isinf(self._lower), near - math.pi, self._lower)
-        upper = np.where(np.isinf(self._upper), near + math.pi, self._upper)
+        lower = np.where(np.isinf(self._lower), near - 0.5 * self._period, self._lower)
+        upper = np.where(np.isinf(self._upper), near + 0.5 * self._period, self._upper)
         first = branches + self._period * np.ceil((lower - branches) / self._period)
         more = np.floor((upper - first) / self._period)
         postures: list[Array] = []
