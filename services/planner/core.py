@@ -23,6 +23,7 @@ from schemas.planning import (
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.blockade import Blockade
+from services.planner.errand import Errand
 from services.planner.finish import Finished, Finisher, Touching
 from services.planner.goals.goals import Goals, timed_out
 from services.planner.refusals import LEAST_SCALING, NoPlan, malformed, no_way_around, scaling_refused
@@ -30,7 +31,7 @@ from services.planner.scene.clearance import CLEARANCE, first_collision
 from services.planner.scene.surroundings import Surroundings
 from services.planner.scene.world import World
 from services.planner.search.search import Search, require_known
-from services.planner.search.via import Errand, Via
+from services.planner.search.via import Via
 from services.planner.search.way import STRAIGHT, Deadline, Flag, NoWay, Start, endless
 from services.planner.start import resolve_start
 from services.planner.times import Stopwatch
@@ -117,17 +118,17 @@ class Planner:
         start = resolve_start(self.arm, request.start, present, age)
         margin = self._start_margin(start, deadline)
         finisher = Finisher(self.arm, self.surroundings, request, limits, margin, watch)
+        errand = Errand(request, start, limits, margin, finisher, deadline, watch)
         fraction, stopped_by = 1.0, None
         if isinstance(request.motion, LinearMotion | CircularMotion):
             with watch.phase("search"):
                 way = self._tool_motions.plan(request, start, limits, margin, deadline.is_late)
-            finished, planner_id = self._verified(way.trajectory, start, way.end, finisher, margin), TOOL
+            finished, planner_id = self._verified(way.trajectory, way.end, errand), TOOL
             fraction, stopped_by = way.fraction, way.stopped_by
         elif isinstance(request.goal, WaypointGoal):
-            errand = Errand(request.motion, request.timing, start, limits, margin, finisher, deadline, watch)
             finished, planner_id = self._via.plan(request.goal, errand)
         else:
-            finished, planner_id = self._found(request, start, margin, finisher, deadline, watch)
+            finished, planner_id = self._found(errand)
         self._hold_against_newest(finished.trajectory, deadline)
         return PlanResponse(
             code=PlanCode.SUCCESS,
@@ -141,81 +142,70 @@ class Planner:
             stopped_by=stopped_by,
         )
 
-    def _verified(
-        self, trajectory: JointTrajectory, start: Start, end: Start, finisher: Finisher, margin: float
-    ) -> Finished:
+    def _verified(self, trajectory: JointTrajectory, end: Start, errand: Errand) -> Finished:
         try:
-            return finisher.finish(trajectory, start, end)
+            return errand.finisher.finish(trajectory, errand.start, end)
         except Touching as touching:
-            raise self._blockade.way(touching.posture, margin) from touching
+            raise self._blockade.way(touching.posture, errand.margin) from touching
 
-    def _found(
-        self,
-        request: PlanRequest,
-        start: Start,
-        margin: float,
-        finisher: Finisher,
-        deadline: Deadline,
-        watch: Stopwatch,
-    ) -> tuple[Finished, str]:
+    def _found(self, errand: Errand) -> tuple[Finished, str]:
         """The straight line to the first posture to which there is one, or else a way around to any."""
         touching: list[Start] = []
         goals: list[Start] = []
-        for goal in self._postures(request, start, deadline, watch):
+        for goal in self._postures(errand):
             if not self.surroundings.keeps(goal, CLEARANCE):
                 touching.append(goal)
             else:
                 try:
-                    return finisher.line(start, goal), STRAIGHT
+                    return errand.finisher.line(errand.start, goal), STRAIGHT
                 except Touching:
                     goals.append(goal)
-            if deadline.is_late() or len(goals) == MOST_GOALS:
+            if errand.deadline.is_late() or len(goals) == MOST_GOALS:
                 break
+        request = errand.request
         if goals:
             if isinstance(request.motion, FreeMotion):
-                return self._around(request.motion, start, np.array(goals), margin, finisher, deadline, watch)
-            raise self._blockade.line(start, goals[0], margin)
+                return self._around(request.motion, np.array(goals), errand)
+            raise self._blockade.line(errand.start, goals[0], errand.margin)
         if touching:
-            raise self._blockade.goal(request.goal, touching[0], start, deadline.is_late)
+            raise self._blockade.goal(request.goal, touching[0], errand.start, errand.deadline.is_late)
         raise timed_out()
 
-    def _postures(self, request: PlanRequest, start: Start, deadline: Deadline, watch: Stopwatch) -> Iterator[Start]:
+    def _postures(self, errand: Errand) -> Iterator[Start]:
         """The goal's postures, nearest first, on the clock of the kinematics."""
-        with watch.phase("ik"):
-            postures = self._goals.candidates(request.goal, start, deadline.is_late)
+        with errand.watch.phase("ik"):
+            postures = self._goals.candidates(errand.request.goal, errand.start, errand.deadline.is_late)
         while True:
-            with watch.phase("ik"):
+            with errand.watch.phase("ik"):
                 posture = next(postures, None)
             if posture is None:
                 return
             yield posture
 
-    def _around(
-        self,
-        motion: FreeMotion,
-        start: Start,
-        goals: Array,
-        margin: float,
-        finisher: Finisher,
-        deadline: Deadline,
-        watch: Stopwatch,
-    ) -> tuple[Finished, str]:
+    def _around(self, motion: FreeMotion, goals: Array, errand: Errand) -> tuple[Finished, str]:
         """A way around what is on the straight one; another one, where the finished trajectory touches."""
+        start, margin = errand.start, errand.margin
         refusal: NoPlan | None = None
         for attempt in range(ATTEMPTS):
             try:
-                with watch.phase("search"):
+                with errand.watch.phase("search"):
                     way = self._search.find(
-                        np.array(start), goals, margin, motion.planner_id, motion.seed + attempt, deadline, watch
+                        np.array(start),
+                        goals,
+                        margin,
+                        motion.planner_id,
+                        motion.seed + attempt,
+                        errand.deadline,
+                        errand.watch,
                     )
-                return finisher.way(way), way.planner_id
+                return errand.finisher.way(way), way.planner_id
             except NoWay as no_way:
                 raise no_way_around(
                     no_way.why, self._blockade.line(start, tuple(goals[0].tolist()), margin)
                 ) from no_way
             except Touching as touching:
                 refusal = self._blockade.way(touching.posture, margin)
-            if deadline.is_late():
+            if errand.deadline.is_late():
                 break
         raise refusal or timed_out()
 

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory
-from schemas.planning import FreeMotion, Motion, Timing, WaypointGoal
+from schemas.planning import FreeMotion, Timing, WaypointGoal
 from services.arm.description import Arm
 from services.planner.blockade import Blockade
-from services.planner.finish import Finished, Finisher, Touching
+from services.planner.errand import Errand
+from services.planner.finish import Finished, Touching
 from services.planner.goals.goals import Goals, timed_out
 from services.planner.refusals import NoPlan, no_way_around, not_verified
 from services.planner.scene.clearance import CLEARANCE
 from services.planner.scene.surroundings import Surroundings
 from services.planner.search.search import Search
-from services.planner.search.way import STRAIGHT, Deadline, NoWay, Start
-from services.planner.times import Stopwatch
+from services.planner.search.way import STRAIGHT, NoWay, Start
 from services.planner.timing.path_timing import law_along
-from services.planner.timing.profile import JointLimits, NoProfile, straight_line
+from services.planner.timing.profile import NoProfile, straight_line
 from services.planner.timing.timing import at_limits, trajectory_of
 from services.planner.tool.path_curve import RoundedLines, rounded_runs
 from services.planner.tool.path_points import Run, states_of_runs
@@ -31,25 +30,6 @@ from services.planner.tool.tool_motions import points_of
 Array = NDArray[np.float64]
 
 BLENDS = 4  # times that the blend is halved where a cut corner touches, before the arm stops at every one
-
-
-@dataclass(frozen=True)
-class Errand:
-    """What a request by waypoints has besides its goal."""
-
-    motion: Motion
-    timing: Timing
-    start: Start
-    limits: JointLimits
-    margin: float  # [m]
-    finisher: Finisher
-    deadline: Deadline
-    watch: Stopwatch
-
-    def heed(self) -> None:
-        """Raises `NoPlan` where the time is up."""
-        if self.deadline.is_late():
-            raise timed_out()
 
 
 class Via:
@@ -64,8 +44,8 @@ class Via:
         with errand.watch.phase("ik"):
             postures = self._postures(goal, errand.start, errand.deadline.is_late)
         corners, planner_id = np.array(postures), STRAIGHT
-        if isinstance(errand.motion, FreeMotion):
-            corners, planner_id = self._corners(errand.motion, postures, errand)
+        if isinstance(errand.request.motion, FreeMotion):
+            corners, planner_id = self._corners(errand.request.motion, postures, errand)
         refusal: NoPlan | None = None
         for trajectory in self._trajectories(corners, goal.blend, errand):
             try:
@@ -126,11 +106,11 @@ class Via:
             if not lines:
                 return straight_line(names, corners[0].tolist(), corners[-1].tolist(), limits)
             states = states_of_runs([_run(line, errand) for line in lines], errand.heed)
-            return trajectory_of(names, at_limits(states, limits, errand.timing is Timing.JERK_LIMITED))
+            return trajectory_of(names, at_limits(states, limits, errand.request.timing is Timing.JERK_LIMITED))
         except NoProfile as error:
             raise not_verified(str(error)) from error
 
 
 def _run(line: RoundedLines, errand: Errand) -> Run:
-    law = law_along(line, errand.limits, (0.0, 0.0), line.marks, errand.timing, errand.heed)
+    law = law_along(line, errand.limits, (0.0, 0.0), line.marks, errand.request.timing, errand.heed)
     return Run(line, law, line.start, line.end, line.marks[1:-1])
