@@ -292,6 +292,7 @@ nb::ndarray<nb::numpy, float> centres(const World& world, const Kernel& kernel, 
 }  // namespace gemelo
 
 NB_MODULE(_motion, module) {
+    nb::set_leak_warnings(false);  // what Python keeps until the process ends is no leak
     using namespace gemelo;
     using namespace nb::literals;
     nb::class_<Chain>(module, "Chain");
