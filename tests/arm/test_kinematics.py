@@ -72,7 +72,7 @@ def test_travel_lifts_the_tool_which_is_below_the_forearm():
 
 
 def test_all_collision_shapes_are_there():
-    assert KINEMATICS.collisions.geometry_count == 10
+    assert KINEMATICS.collisions.geometry_count == 11
     assert set(KINEMATICS.collisions.pairs) == {("base_link", "efector_link"), ("brazo_link", "efector_link")}
 
 

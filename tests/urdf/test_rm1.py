@@ -7,9 +7,14 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+import trimesh
 
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
+from services.planner.covers.link_spheres import link_shapes
+from services.planner.covers.shapes import ShapeKind
+from services.planner.covers.solids import Box, Cylinder
+from services.planner.scene.clearance import CLEARANCE
 from tests.urdf.nearness import nearest_distances
 
 SEED = {
@@ -82,3 +87,19 @@ def test_the_meshes_load(rm1: Arm):
         robot = yourdfpy.URDF.load(str(rm1.urdf_path))
         low, high = robot.scene.bounds
     assert (high - low).tolist() == pytest.approx((0.508, 0.18, 0.259), abs=0.01)
+
+
+def test_what_is_drawn_lies_within_the_collision_shapes_but_for_screws_and_corners(rm1: Arm):
+    """A motor that can be seen and not be touched would go through what the planner keeps clear of."""
+    solids = {
+        ShapeKind.BOX: lambda size: Box(tuple(0.5 * edge for edge in size)),
+        ShapeKind.CYLINDER: lambda size: Cylinder(size[0], 0.5 * size[1]),
+    }
+    for link, shapes in link_shapes(rm1).items():
+        vertices = trimesh.load(rm1.folder / "meshes" / f"{link}.glb", force="mesh").vertices
+        away = np.full(len(vertices), np.inf)
+        for shape in shapes:
+            inner = (vertices - shape.pose[0]) @ shape.rotation
+            nearest = solids[shape.kind](shape.size).nearest(inner)
+            away = np.minimum(away, np.linalg.norm(inner - nearest, axis=1))
+        assert away.max() < CLEARANCE, link
