@@ -206,7 +206,7 @@ def test_an_arm_that_stands_at_the_very_margin_is_led_away_at_once(planner: Plan
 
 
 def test_a_gap_too_narrow_for_the_spheres_is_found_by_another_search():
-    """A plate 7.5 mm above the forearm's motor: the compiled core lets it pass nowhere, though it keeps the clearance."""
+    """A plate 7.5 mm above the forearm's motor: the core lets it pass nowhere, though it keeps the clearance."""
     planner, angle = planner_of("rm1"), 0.65
     place = (0.2 * float(np.cos(angle)), 0.2 * float(np.sin(angle)), 0.2764)
     show(planner, PlanningScene(version=1, objects=(turned(box("plate", (0.3, 0.08, 0.02), place), angle),)))

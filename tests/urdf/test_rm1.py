@@ -102,4 +102,4 @@ def test_what_is_drawn_lies_within_the_collision_shapes_but_for_screws_and_corne
             inner = (vertices - shape.pose[0]) @ shape.rotation
             nearest = solids[shape.kind](shape.size).nearest(inner)
             away = np.minimum(away, np.linalg.norm(inner - nearest, axis=1))
-        assert away.max() < CLEARANCE, link
+        assert away.max() <= CLEARANCE + 1e-6, link  # GLB holds floats of 32 bits
