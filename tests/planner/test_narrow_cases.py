@@ -219,3 +219,30 @@ def test_an_arm_in_a_singular_posture_gets_out_of_it(name: str, start: str | Pos
         else:
             assert require_refused(response).check in ("singularity", "reach", "joint limit")
     assert drawn
+
+
+@ARMS
+def test_the_arm_as_it_is_drawn_goes_around_too(name: str):
+    """Its meshes, in convex pieces, keep clear of what its collision shapes were planned around."""
+    planner = planner_of(name)
+    start, goal = SWING[name]
+    middle = planner.kinematics.tool(0.5 * np.add(start, goal)).position
+    show(planner, PlanningScene(version=2, objects=(box("crate", (0.06, 0.06, 0.06), middle),)))
+    request = asked(planner, start, joints(planner, goal))
+    motion = require_sound(planner, request, planner.plan(request, None))
+    assert Judge(planner.arm, planner.surroundings.newest.scene, is_drawn=True).touch(motion.positions) is None
+
+
+def test_a_lid_over_the_motor_of_rm1s_forearm_is_seen():
+    planner = planner_of("rm1")
+    start, goal = (-0.8, 0.0, 0.1), (0.8, 0.0, 0.1)
+    origin, turned = Judge(planner.arm).pose("antebrazo_link", np.array((0.0, 0.0, 0.1)))
+    place = origin + turned @ np.array((0.15, 0.001, 0.107))
+    show(planner, PlanningScene(version=1, objects=(box("lid", (0.03, 0.03, 0.02), place),)))
+    assert "lid" in require_refused(planned(planner, start, goal, PointToPoint())).subject
+    motion = require_sound(
+        planner,
+        asked(planner, start, joints(planner, goal)),
+        planner.plan(asked(planner, start, joints(planner, goal)), None),
+    )
+    assert Judge(planner.arm, planner.surroundings.newest.scene, is_drawn=True).touch(motion.positions) is None
