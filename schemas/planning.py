@@ -177,7 +177,7 @@ class PlanResponse(Message, frozen=True, kw_only=True):
     slowed: float = 1.0  # the time scale that step_policy SLOW_DOWN has used; 1: none
     times: PlanningTimes = PlanningTimes()
     planner_id: str = ""  # that found the way
-    scene_version: int = 0  # that it is free of
+    scene_version: int | None = None  # of the planning scene it is free of; absent: of a planner that knows none
 
 
 class PlanCancel(Message, frozen=True, kw_only=True):

@@ -14,13 +14,14 @@ from schemas.actions import GoalStatusCode
 from schemas.frames import FrameTransform, FrameTransforms, Transform
 from schemas.joints import JointState, JointTargets
 from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, JOINT_TARGETS, STATIC_FRAMES
+from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, JOINT_TARGETS, PLAN, STATIC_FRAMES
 from services.runtime.actions import ActionServer, GoalDecision, accept
 from services.runtime.node import Node
 from tests.runtime.support import ROOT, RouterProcess, programs, spinning, until
 
 EXAMPLES = sorted(path.name for path in (ROOT / "examples").glob("*.py"))
-LONGEST = {"pick_and_place.py": 80}  # lines that do something
+LONGEST = {"pick_and_place.py": 80, "straight_planner.py": 29}  # lines that do something
 LONGEST_FIRST_NODE = 20
 
 Start = Callable[[str], subprocess.Popen[str]]
@@ -167,6 +168,23 @@ def test_ctrl_c_in_custom_planner_cancels_its_move(start: Start, robot: Node) ->
     assert (planner.returncode, errors, output) == (0, "", "CANCELED  (3,)\n")
 
 
+def test_straight_planner_takes_the_place_of_ours(start: Start, router: RouterProcess, robot: Node) -> None:
+    states = robot.publisher(JOINT_STATES)
+    joints = JointState(name=("q1", "q2"), position=(0.5, -0.25))
+    with spinning(robot, lambda now: states.put(joints)):
+        process = start("straight_planner.py")
+        with Node("person", router.deployment, robot="rm1") as person:
+            assert until(lambda: "planner" in person.alive(), 10.0)
+            time.sleep(0.3)  # for its first joint state
+            there = person.call(PLAN, PlanRequest(goal=JointGoal(name=("q2",), position=(0.1,))))
+            refused = person.call(PLAN, PlanRequest(goal=NamedGoal(name="home")))
+        end(process)
+    assert (there.code, there.duration, there.scene_version) == (PlanCode.SUCCESS, 10.0, None)
+    assert [point.positions for point in there.trajectory.points] == [(0.5, -0.25), (0.5, 0.1)]
+    assert refused.refusal is not None
+    assert "joint values alone" in refused.refusal.message
+
+
 def test_demo_sine_streams_targets_about_where_the_arm_stands(start: Start, robot: Node) -> None:
     heard: list[JointTargets] = []
     robot.subscribe(JOINT_TARGETS, heard.append)
@@ -189,4 +207,4 @@ def test_an_example_is_short(name: str) -> None:
 
 def test_the_examples_that_are_promised_are_there() -> None:
     first_nodes = {"joint_monitor.py", "custom_planner.py", "feedback_monitor.py", "tool_pose.py"}
-    assert first_nodes | {"pick_and_place.py"} <= set(EXAMPLES)
+    assert first_nodes | {"pick_and_place.py", "straight_planner.py"} <= set(EXAMPLES)
