@@ -158,6 +158,19 @@ def test_an_arm_that_does_not_follow_ends_the_jog_by_name():
     assert jog.commanded is None
 
 
+@pytest.mark.parametrize("name", ["rm1", "parol6"])
+def test_an_arm_may_still_stand_until_its_first_targets_have_come_through(name: str):
+    arm = arm_of(name)
+    jog = Jog(arm, kinematics_of(name), world_of(name, crowded=False))
+    rest = (0.0,) * len(arm.joints)
+    state = JointState(name=arm.joint_names, position=arm.named_states["ready"], velocity=rest)
+    fast = JogCommand(name=arm.joint_names, velocity=tuple(0.5 * joint.velocity for joint in arm.joints))
+    for index in range(round(0.4 / PERIOD)):
+        jog.on_command(fast, index * PERIOD)
+        output = jog.step(index * PERIOD, 0, state, 0.0, goal_is_active=False)
+        assert output.targets is not None, output.said
+
+
 def test_without_a_fresh_state_it_is_refused():
     arm = arm_of("rm1")
     jog = Jog(arm, kinematics_of("rm1"), world_of("rm1", crowded=False))

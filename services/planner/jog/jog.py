@@ -123,6 +123,7 @@ class Jog:
         self._positions = np.array(standing_position(self._arm, present, age))
         self._velocity = np.zeros(len(self._arm.joints))
         self._trail.clear()
+        self._trail.append((now, self._positions))  # it stands there until its first target has come through
         self._rested = self._on_way = now
 
     def _lead(self, now: float) -> str:
