@@ -6,12 +6,16 @@ HYPOTHESIS_PROFILE=explore looks for new examples.
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 from services.arm.description import Arm, load_arm
+
+# A run in the background begins with Ctrl-C ignored, and every process that a test starts would inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # No deadline: two cores, shared; time is measured by the bench.
 settings.register_profile("same", derandomize=True, deadline=None)
