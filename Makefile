@@ -3,8 +3,8 @@
 .PHONY: help setup up down test check coverage format demo bench lock clean
 MAKEFLAGS += --no-print-directory
 bin := .venv/bin
-# Tests of pure functions, on every core at once; those of processes and clocks come after them, one by one.
-pure := tests/arm tests/bench tests/planner tests/schemas tests/urdf
+# On every core at once; the tests of whole stacks and of what their processes do in time come after them, one by one.
+side_by_side := $(addprefix tests/,arm bench demo firmware logger planner schemas stepper_gateway urdf visualizer)
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' Makefile | column -t -s '|'
@@ -20,8 +20,8 @@ down: ## stop a twin that runs elsewhere
 
 test: setup ## all tests: Python, firmware, whole stack
 	@deploy/test_firmware
-	@$(bin)/pytest -n auto --maxprocesses 4 --dist worksteal $(pure)
-	@$(bin)/pytest $(filter-out $(pure),$(patsubst %/,%,$(wildcard tests/*/)))
+	@$(bin)/pytest -n auto --maxprocesses 4 --dist worksteal $(side_by_side)
+	@$(bin)/pytest $(filter-out $(side_by_side),$(patsubst %/,%,$(wildcard tests/*/)))
 
 check: setup ## ruff, mypy, import-linter, clang-format
 	@$(bin)/ruff check --quiet .
