@@ -104,6 +104,18 @@ def test_fk_of_ik_is_the_goal_in_every_form(
         assert all(j.is_within(value) for j, value in zip(bench.arm.joints, posture, strict=True))
 
 
+@pytest.mark.parametrize("form", ["free axis", "pointing"])
+@pytest.mark.parametrize("where", [(1.0, 0.0, 0.0, 0.0, 0.0, 0.375), (0.0, 1.0, 1.0, 0.0, 1.0, 0.5)])
+def test_a_goal_that_one_posture_alone_meets_in_a_corner_of_the_limits_is_found(form: str, where: tuple[float, ...]):
+    axis = np.array([0.0, -0.125, 1.0]) / math.hypot(0.125, 1.0)
+    pose = PAROL6.kinematics.tool(posture_of(PAROL6, [*where]))
+    (posture, *_) = PAROL6.postures(goal_of(form, pose, axis), posture_of(PAROL6, [0.0] * 6), most=1)
+    far, turned = missing(form, pose, PAROL6.kinematics.tool(posture), axis)
+    assert far < 1e-6
+    assert turned < 1e-5
+    assert all(j.is_within(value) for j, value in zip(PAROL6.arm.joints, posture, strict=True))
+
+
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("name", BENCHES)
 def test_solutions_are_distinct(name: str, form: str):

@@ -42,15 +42,19 @@ class ClosedForm:
 
         Those are out of reach, or, where axes coincide, a solution that lacks one turn.
         """
+        branches, is_guess = self.branches(position, rotation)
+        return self.turns.within_limits(branches[~is_guess], near), [
+            *branches[is_guess & np.isfinite(branches).all(axis=1)]
+        ]
+
+    def branches(self, position: Array, rotation: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """EAIK's answers (m, n), whatever the limits, and which of them are least squares alone."""
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = rotation, position
         answer = self._robot.calculate_IK(pose)
         branches = np.empty_like(answer.Q)
         branches[:, self._order] = answer.Q
-        is_guess = np.array(answer.is_LS, dtype=bool)
-        return self.turns.within_limits(branches[~is_guess], near), [
-            *branches[is_guess & np.isfinite(branches).all(axis=1)]
-        ]
+        return branches, np.array(answer.is_LS, dtype=bool)
 
 
 def closed_form(arm: Arm, kinematics: Kinematics) -> ClosedForm | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import islice
+from itertools import chain, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ STARTS = 24  # beside the present posture
 FULL_POSE_JOINTS, MORE_STARTS = 6, 64  # that many where a full pose has to be searched for
 BATCH = 4  # starts that are tried together before their solutions are handed out
 FEW = 4  # starts where the closed form finds nothing, which it has never missed
+FINE_TURNS, MOST_AT_LIMITS = 120, 12  # the same, where none of those has a posture, and postures that are tried then
 TURNS = 16  # rotations about the axis of a tool that only has to point somewhere
 SAME = 1e-4  # [s] at full speed: solutions nearer than that are one
 SAME_REDUNDANT = 0.1  # [s] the same, where solutions lie in a continuum
@@ -59,7 +60,7 @@ class InverseKinematics:
         """Distinct joint values that meet the target: all of the closed form, the nearest first; where that gives none,
         what `near` leads to and its mirror images, then batches, each nearest first."""
         found: list[Array] = []
-        for positions in self._closed_form_solutions(target, near):
+        for positions in chain(self._closed_form_solutions(target, near), self._at_limits(target, near, found)):
             if self._is_new(positions, found, SAME):
                 found.append(positions)
                 yield positions
@@ -102,6 +103,21 @@ class InverseKinematics:
                 posture for guess in guesses for posture in self._from_guess(self._closed, target, guess, near)
             ]
         return postures
+
+    def _at_limits(self, target: Target, near: Array, found: list[Array]) -> Iterator[Array]:
+        """Where nothing was found, for the free turn leaves hardly any posture within the limits: what those of a fine
+        turn lead to that miss the limits least."""
+        if found or self._closed is None or target.pointing is None:
+            return
+        closed, present = self._closed, self._kinematics.tool(near).rotation
+        rotations = turns_about(target.pointing.direction, target.pointing.axis, present, FINE_TURNS)
+        answers = [closed.branches(target.position, rotation) for rotation in rotations]
+        exact = np.concatenate([branches[~is_guess] for branches, is_guess in answers])
+        postures, missed = closed.turns.nearly(exact[np.isfinite(exact).all(axis=1)])
+        for place in np.argsort(missed)[:MOST_AT_LIMITS].tolist():
+            attempt = self.descend(target, postures[place])
+            if attempt.is_solution:
+                yield attempt.positions
 
     def _rotations(self, target: Target, near: Array) -> list[Array]:
         """The tool's rotations that the target asks for, or some of them where it leaves one turn free."""

@@ -38,6 +38,15 @@ class Turns:
                 postures.extend(_turned(values, turns) if turns.any() else [values])
         return postures
 
+    def nearly(self, branches: Array) -> tuple[Array, Array]:
+        """The branches (m, n) with the full turns that bring them nearest to the limits, and by how much (m,) they
+        miss those."""
+        middle, half = 0.5 * (self._lower + self._upper), 0.5 * (self._upper - self._lower)
+        middle = np.where(np.isfinite(middle), middle, 0.0)
+        away = branches - middle
+        away = away - self._period * np.rint(away / self._period)
+        return middle + away, np.maximum(np.abs(away) - half, 0.0).max(axis=1)
+
 
 def _turned(values: Array, turns: Array) -> list[Array]:
     """`values` with up to `turns` full turns added to each."""
