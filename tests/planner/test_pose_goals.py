@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from schemas.planning import PlanCode, PoseGoal, Refusal
@@ -329,6 +329,8 @@ def test_what_is_not_a_number_cannot_get_in(field: str):
     position_tolerance=st.just(0.0) | st.floats(-1e300, 1e300),
     orientation_tolerance=st.just(0.0) | st.floats(-1e300, 1e300),
 ))  # fmt: skip
+@example(PoseGoal(position=(1e200, 0.0, 0.1)))
+@example(PoseGoal(position=(1.7e308, 1.7e308, -1.7e308)))
 @pytest.mark.parametrize("name", BENCHES)
 def test_whatever_pose_is_asked_for_there_are_postures_or_a_reason(name: str, goal: PoseGoal):
     bench = BENCHES[name]

@@ -48,6 +48,8 @@ class ParallelAxes:
     def postures(self, position: Array, near: Array) -> list[Array]:
         """Those within the limits, with every full turn, in no order; the shoulder stays where it may turn freely."""
         out, upper, fore = self._seen(position) - self._shoulder, self._upper, self._fore
+        if not math.hypot(out.real, out.imag) <= 2.0 * (abs(upper) + abs(fore)):  # whose square may be no number
+            return []
         cosine = (abs(out) ** 2 - abs(upper) ** 2 - abs(fore) ** 2) / (2.0 * abs(upper) * abs(fore))
         if abs(cosine) > 1.0 + STRETCHED:
             return []
