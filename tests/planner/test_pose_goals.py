@@ -331,6 +331,9 @@ def test_what_is_not_a_number_cannot_get_in(field: str):
 ))  # fmt: skip
 @example(PoseGoal(position=(1e200, 0.0, 0.1)))
 @example(PoseGoal(position=(1.7e308, 1.7e308, -1.7e308)))
+@example(PoseGoal(position=(0.2, 0.1, 0.1), position_tolerance=1e200))
+@example(PoseGoal(position=(0.2, 0.1, 0.1), orientation=(0.0, 0.0, 0.0, 1.0), orientation_tolerance=1e200))
+@example(PoseGoal(position=(9.2, 0.1, 0.1), position_tolerance=1e200))
 @pytest.mark.parametrize("name", BENCHES)
 def test_whatever_pose_is_asked_for_there_are_postures_or_a_reason(name: str, goal: PoseGoal):
     bench = BENCHES[name]

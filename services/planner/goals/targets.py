@@ -97,9 +97,9 @@ class Target:
         return self._is_within(error, position, max(ROTATION_TOLERANCE, self.rotation_tolerance))
 
     def _is_within(self, error: Array, position: float, rotation: float) -> bool:
-        if float(error[:3] @ error[:3]) > position**2:
+        if math.sqrt(float(error[:3] @ error[:3])) > position:
             return False
-        return len(error) == 3 or float(error[3:] @ error[3:]) <= (rotation * self.metres_per_radian) ** 2
+        return len(error) == 3 or math.sqrt(float(error[3:] @ error[3:])) <= rotation * self.metres_per_radian
 
 
 def turn_between(first: Array, second: Array) -> Array:
