@@ -16,7 +16,7 @@ from services.bench.plan_scenes import SCENES
 from services.planner.scene.world import World
 from services.planner.search.curve import smooth_runs
 from services.planner.search.smoothing import smooth, stopping
-from services.planner.timing import timing
+from services.planner.timing import profile
 from services.planner.timing.profile import joint_limits
 from services.planner.timing.time_optimal import time_optimal_way
 from services.planner.timing.timing import timed_way
@@ -99,7 +99,7 @@ def test_what_ruckig_is_asked_about_a_curve_has_no_waypoints(monkeypatch: pytest
             asked.append(demand)
             return super().calculate(demand, trajectory)
 
-    monkeypatch.setattr(timing, "Ruckig", Listening)
+    monkeypatch.setattr(profile, "Ruckig", Listening)
     timed_way(ARM.joint_names, smooth(corners_of(1, 4), Everywhere(), never), LIMITS)
     assert asked
     assert all(demand.intermediate_positions == [] for demand in asked)

@@ -97,14 +97,20 @@ def _time_way(length: float, direction: Array, limits: JointLimits) -> tuple[Tra
     demand.max_velocity = [MARGIN * float(np.min(limits.velocity[moving] / share[moving]))]
     demand.max_acceleration = [MARGIN * float(np.min(limits.acceleration[moving] / share[moving]))]
     demand.max_jerk = [MARGIN * float(np.min(limits.jerk[moving] / share[moving]))]
+    profile = solved(demand, f"a way of {length:.3g} s at full speed")
+    return profile, np.cumsum(profile.profiles[0][0].t).tolist()
+
+
+def solved(demand: InputParameter, what: str) -> Trajectory:
+    """ruckig's profile for `demand`; raises `NoProfile` that names `what` it was for."""
     profile = Trajectory(1)
     try:
         result = Ruckig(1).calculate(demand, profile)
     except RuckigError as error:
-        raise NoProfile(f"no jerk-limited profile for a way of {length:.3g} s at full speed") from error
+        raise NoProfile(f"no jerk-limited profile for {what}") from error
     if result not in (Result.Working, Result.Finished):
-        raise NoProfile(f"no jerk-limited profile for a way of {length:.3g} s at full speed: {result.name}")
-    return profile, np.cumsum(profile.profiles[0][0].t).tolist()
+        raise NoProfile(f"no jerk-limited profile for {what}: {result.name}")
+    return profile
 
 
 def _times(changes: Sequence[float], duration: float) -> list[float]:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
+from ruckig import InputParameter, Trajectory
 
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from services.planner.search.curve import Curve, smooth_runs
@@ -22,8 +22,8 @@ from services.planner.timing.profile import (
     MOST_POINTS,
     SPACING,
     JointLimits,
-    NoProfile,
     require_short,
+    solved,
     straight_line,
 )
 from services.planner.timing.sections import Section, boundary_speeds, sections_of
@@ -133,11 +133,4 @@ def _through(section: Section, before: float, after: float) -> Trajectory:
     demand.target_position = [section.length]
     demand.max_velocity, demand.max_acceleration = [section.speed], [section.acceleration]
     demand.max_jerk = [section.jerk]
-    profile = Trajectory(1)
-    try:
-        result = Ruckig(1).calculate(demand, profile)
-    except RuckigError as error:
-        raise NoProfile(f"no jerk-limited profile through a stretch of {section.length:.3g} s") from error
-    if result not in (Result.Working, Result.Finished):
-        raise NoProfile(f"no jerk-limited profile through a stretch of {section.length:.3g} s: {result.name}")
-    return profile
+    return solved(demand, f"a stretch of {section.length:.3g} s")
