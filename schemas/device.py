@@ -89,7 +89,7 @@ class DeviceEvent(Message, frozen=True, kw_only=True):
 
 
 class DeviceCommandKind(IntEnum):
-    """What a person may ask of the device besides motion; the numbers are those on the wire."""
+    """The device's commands, with the numbers they have on the wire."""
 
     HOLD = 1
     RESUME = 2
@@ -103,20 +103,74 @@ class DeviceCommandKind(IntEnum):
     SPEED = 10
 
 
-class DeviceCommandRequest(Message, frozen=True, kw_only=True):
-    """A command; REFERENCE and HOME are for the joints named, for all if none is."""
+class ResumeCommand(Message, frozen=True, kw_only=True, tag="resume"):
+    """Go on along the path that a hold has interrupted."""
 
-    command: DeviceCommandKind = DeviceCommandKind.HOLD
+
+class ResetCommand(Message, frozen=True, kw_only=True, tag="reset"):
+    """Leave a fault or an emergency stop."""
+
+
+class ReferenceCommand(Message, frozen=True, kw_only=True, tag="reference"):
+    """Declare where joints stand; all of them if none is named."""
+
     name: tuple[str, ...] = ()
-    position: Vector = ()  # [rad] or [m], for REFERENCE; empty: the reference pose of robot.toml
-    output: str = ""  # name, for OUTPUT
-    value: float = 0.0  # OUTPUT: 0 off, 1 on; SPEED: the time scale, 0 to 1
+    position: Vector = ()  # [rad] or [m] of each joint named; empty: the reference position of robot.toml
+
+
+class ArmCommand(Message, frozen=True, kw_only=True, tag="arm"):
+    """Energise the drivers."""
+
+
+class HomeCommand(Message, frozen=True, kw_only=True, tag="home"):
+    """Let joints find their switches; all that have one if none is named."""
+
+    name: tuple[str, ...] = ()
+
+
+class OutputCommand(Message, frozen=True, kw_only=True, tag="output"):
+    """Switch a digital output of robot.toml."""
+
+    output: str = ""
+    on: bool = False
+
+
+class SpeedCommand(Message, frozen=True, kw_only=True, tag="speed"):
+    """Play every path slower from now on, also the present one."""
+
+    scale: float = 1.0  # of the planned speed: 0 stands, 1 as planned
+
+
+DeviceCommand = (
+    ResumeCommand | ResetCommand | ReferenceCommand | ArmCommand | HomeCommand | OutputCommand | SpeedCommand
+)
+
+
+class DeviceCommandRequest(Message, frozen=True, kw_only=True):
+    """A command that starts, allows or changes something; what ends a motion is a `DeviceStopRequest`."""
+
+    command: DeviceCommand = ResumeCommand()
+
+
+class StopKind(StrEnum):
+    """How to end a motion or to make it impossible."""
+
+    STOP = "stop"  # decelerate along the path and forget the rest of it
+    HOLD = "hold"  # decelerate along the path and wait there for a resume
+    DISARM = "disarm"  # drivers off; refused while the arm moves, because it would drop
+
+
+class DeviceStopRequest(Message, frozen=True, kw_only=True):
+    """Served before everything else, and never refused for want of room, of a status or of a clock."""
+
+    kind: StopKind = StopKind.STOP
 
 
 class DeviceCommandResponse(Message, frozen=True, kw_only=True):
     """Whether the device did it, in its own words."""
 
-    accepted: bool = False
+    accepted: bool = False  # the device has confirmed it
+    sent: bool = False  # it has left the gateway; where it was not accepted, what the device did is not known
     reason: str = ""
     mode: DeviceMode = DeviceMode.BOOT
 

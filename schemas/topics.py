@@ -20,6 +20,7 @@ from schemas.device import (
     DeviceEvent,
     DeviceState,
     DeviceStatus,
+    DeviceStopRequest,
     PressRequest,
     PressResponse,
     SensorReadings,
@@ -87,6 +88,7 @@ class Request(Generic[Q_co, R_co]):
     response: type[R_co]
     server: str
     about: str
+    urgent: bool = False  # sent, read and handled before all that waits; equal ones that wait are handled once
 
 
 @dataclass(frozen=True)
@@ -163,8 +165,16 @@ FK = Request("fk", FkRequest, FkResponse, "planner", "link poses for joint value
 SCENE_EDIT = Request("scene/edit", SceneRequest, SceneResponse, "planner", "add, remove, move, attach, allow ...")
 DEVICE_COMMAND = Request(
     "device/command", DeviceCommandRequest, DeviceCommandResponse, GATEWAY,
-    "hold, resume, stop, reset, reference, arm, disarm, home, output, speed",
+    "resume, reset, reference, arm, home, output, speed",
 )  # fmt: skip
+DEVICE_STOP = Request(
+    "device/stop",
+    DeviceStopRequest,
+    DeviceCommandResponse,
+    GATEWAY,
+    "stop, hold or disarm, before anything else",
+    urgent=True,
+)
 DEVICE_CONFIGURE = Request(
     "device/configure", ConfigureRequest, ConfigureResponse, GATEWAY, "give the device its configuration anew"
 )
@@ -179,6 +189,7 @@ REQUESTS: tuple[Request[Message, Message], ...] = (
     FK,
     SCENE_EDIT,
     DEVICE_COMMAND,
+    DEVICE_STOP,
     DEVICE_CONFIGURE,
     DEVICE_PRESS,
 )

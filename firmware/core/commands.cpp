@@ -8,6 +8,12 @@ namespace {
 uint32_t id_of(const Frame& frame) { return load_u32(frame.bytes + 8); }
 uint8_t word_of(const Frame& frame) { return frame.bytes[20]; }
 
+// What ends a motion may be said by somebody who does not know yet which boot this is.
+bool is_stop(const Frame& frame) {
+    const Command command = static_cast<Command>(word_of(frame));
+    return command == Command::Hold || command == Command::Stop || command == Command::Disarm;
+}
+
 }  // namespace
 
 void Machine::receive_command(const Frame& frame, const Arrival& arrival) {
@@ -31,7 +37,8 @@ void Machine::receive_command(const Frame& frame, const Arrival& arrival) {
 
 Code Machine::judge_command(const Frame& frame, const Arrival& arrival) const {
     if (arrival.is_retained) return Code::Retained;
-    if (frame.boot_id() != identity_.boot_id) return Code::WrongBoot;
+    const bool is_for_any_boot = frame.boot_id() == 0 && is_stop(frame);
+    if (frame.boot_id() != identity_.boot_id && !is_for_any_boot) return Code::WrongBoot;
     return now_us_ > load_u64(frame.bytes + 12) ? Code::Expired : Code::Ok;
 }
 

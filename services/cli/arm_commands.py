@@ -31,12 +31,11 @@ def state(options: Options) -> ExitCode:
 
 
 def device_command(options: Options) -> ExitCode:
-    from schemas.device import DeviceCommandKind
     from services.cli.device import command
     from services.cli.session import connect
 
     with connect() as session:
-        return command(session, DeviceCommandKind[options.command.words[0].upper()])
+        return command(session, options.command.words[0])
 
 
 def reference_options(parser: Parser) -> None:

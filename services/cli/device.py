@@ -5,8 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse
-from schemas.topics import DEVICE_COMMAND
+from schemas.device import (
+    ArmCommand,
+    DeviceCommand,
+    DeviceCommandRequest,
+    DeviceCommandResponse,
+    DeviceStopRequest,
+    OutputCommand,
+    ReferenceCommand,
+    ResetCommand,
+    ResumeCommand,
+    SpeedCommand,
+    StopKind,
+)
+from schemas.topics import DEVICE_COMMAND, DEVICE_STOP
 from services.cli.device_names import require_name
 from services.cli.exits import CommandError, ExitCode, usage
 from services.cli.units import parse_joints, show
@@ -16,19 +28,27 @@ if TYPE_CHECKING:
     from services.cli.session import Session
 
 TIMEOUT = 3.0  # [s]
-AFTERWARDS = {
-    DeviceCommandKind.ARM: "the motors hold; `gemelo home` or `gemelo reference` if a joint is unreferenced",
-    DeviceCommandKind.DISARM: "the motors are without current, and every joint is unreferenced",
+BY_NAME: dict[str, DeviceCommand | StopKind] = {
+    "arm": ArmCommand(),
+    "reset": ResetCommand(),
+    "resume": ResumeCommand(),
+    "stop": StopKind.STOP,
+    "hold": StopKind.HOLD,
+    "disarm": StopKind.DISARM,
+}
+AFTERWARDS: dict[str, str] = {
+    "arm": "the motors hold; `gemelo home` or `gemelo reference` if a joint is unreferenced",
+    "disarm": "the motors are without current, and every joint is unreferenced",
 }
 
 
-def command(session: Session, kind: DeviceCommandKind) -> ExitCode:
-    """Sends a command and says what the device answered."""
-    code = _send(session, DeviceCommandRequest(command=kind))
-    if kind is DeviceCommandKind.ARM:
+def command(session: Session, name: str) -> ExitCode:
+    """Sends a command of `BY_NAME` and says what the device answered."""
+    code = _send(session, BY_NAME[name])
+    if name == "arm":
         wait_for_drivers(session)
-    if kind in AFTERWARDS:
-        print(f"  {AFTERWARDS[kind]}")
+    if name in AFTERWARDS:
+        print(f"  {AFTERWARDS[name]}")
     return code
 
 
@@ -41,13 +61,11 @@ def reference(session: Session, assignments: Sequence[str]) -> ExitCode:
     return code
 
 
-def reference_request(arm: Arm, assignments: Sequence[str]) -> DeviceCommandRequest:
-    """The request with every joint named."""
+def reference_request(arm: Arm, assignments: Sequence[str]) -> ReferenceCommand:
+    """The command with every joint named."""
     values = {joint.name: joint.drive.reference_position for joint in arm.joints}
     values.update(parse_joints(assignments, arm.joints))
-    return DeviceCommandRequest(
-        command=DeviceCommandKind.REFERENCE, name=tuple(values), position=tuple(values.values())
-    )
+    return ReferenceCommand(name=tuple(values), position=tuple(values.values()))
 
 
 def output(session: Session, name: str, is_on: bool) -> ExitCode:
@@ -55,14 +73,14 @@ def output(session: Session, name: str, is_on: bool) -> ExitCode:
     require_name("output", name, session.arm.outputs)
     return _send(
         session,
-        DeviceCommandRequest(command=DeviceCommandKind.OUTPUT, output=name, value=float(is_on)),
+        OutputCommand(output=name, on=is_on),
         f"output {name} {'on' if is_on else 'off'}",
     )
 
 
 def speed(session: Session, percent: float) -> ExitCode:
     """How fast the device plays every path from now on [%]."""
-    request = DeviceCommandRequest(command=DeviceCommandKind.SPEED, value=share_of(percent))
+    request = SpeedCommand(scale=share_of(percent))
     return _send(session, request, f"speed {percent:g} %")
 
 
@@ -73,13 +91,15 @@ def share_of(percent: float) -> float:
     return percent / 100.0
 
 
-def ask(session: Session, request: DeviceCommandRequest, what: str = "") -> DeviceCommandResponse:
+def ask(session: Session, wanted: DeviceCommand | StopKind, what: str = "") -> DeviceCommandResponse:
     """The device's answer; a no is raised with its reason."""
-    answer = session.node.call(DEVICE_COMMAND, request, timeout=TIMEOUT)
+    if isinstance(wanted, StopKind):
+        answer = session.node.call(DEVICE_STOP, DeviceStopRequest(kind=wanted), timeout=TIMEOUT)
+    else:
+        answer = session.node.call(DEVICE_COMMAND, DeviceCommandRequest(command=wanted), timeout=TIMEOUT)
     if not answer.accepted:
-        what = what or request.command.name.lower()
         mode = f" (device mode {answer.mode.name})" if f"mode {answer.mode.name}" not in answer.reason else ""
-        raise CommandError(f"{what} refused: {answer.reason}{mode}")
+        raise CommandError(f"{what or _name(wanted)} refused: {answer.reason}{mode}")
     return answer
 
 
@@ -88,7 +108,12 @@ def wait_for_drivers(session: Session) -> None:
     session.node.wait(max(joint.driver.enable_lead_ms for joint in session.arm.joints) * 1e-3)
 
 
-def _send(session: Session, request: DeviceCommandRequest, what: str = "") -> ExitCode:
-    what = what or request.command.name.lower()
-    print(f"{what} done: device mode {ask(session, request, what).mode.name}")
+def _send(session: Session, wanted: DeviceCommand | StopKind, what: str = "") -> ExitCode:
+    what = what or _name(wanted)
+    answer = ask(session, wanted, what)
+    print(f"{what} done: device mode {answer.mode.name}{f'; {answer.reason}' if answer.reason else ''}")
     return ExitCode.OK
+
+
+def _name(wanted: DeviceCommand | StopKind) -> str:
+    return wanted.value if isinstance(wanted, StopKind) else str(wanted.__struct_config__.tag)

@@ -50,12 +50,11 @@ def device_config(options: Options) -> ExitCode:
 
 
 def device_arm(options: Options) -> ExitCode:
-    from schemas.device import DeviceCommandKind
     from services.cli.device import command
     from services.cli.session import connect
 
     with connect() as session:
-        return command(session, DeviceCommandKind[options.command.words[1].upper()])
+        return command(session, options.command.words[1])
 
 
 def press_options(parser: Parser) -> None:

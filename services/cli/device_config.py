@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from schemas.device import (
+    ArmCommand,
     ConfigureRequest,
-    DeviceCommandKind,
-    DeviceCommandRequest,
     DeviceConfiguration,
     DeviceMode,
     DeviceState,
+    StopKind,
 )
 from schemas.topics import DEVICE_CONFIGURE
 from services.cli.confirm import confirm
@@ -48,7 +48,7 @@ def push(session: Session, yes: bool) -> ExitCode:
     _require_rest(state)
     if state.armed:
         confirm(QUESTION, yes)
-        ask(session, DeviceCommandRequest(command=DeviceCommandKind.DISARM))
+        ask(session, StopKind.DISARM)
         view.wait_for(lambda: view.state.message is not None and not view.state.message.armed)
     answer = session.node.call(DEVICE_CONFIGURE, ConfigureRequest(), timeout=TO_ANSWER)
     if not answer.accepted:
@@ -56,7 +56,7 @@ def push(session: Session, yes: bool) -> ExitCode:
         raise CommandError(f"the device refused the configuration: {answer.reason}{again}")
     print(f"the device works with configuration {answer.crc32:08x}")
     if state.armed:
-        ask(session, DeviceCommandRequest(command=DeviceCommandKind.ARM))
+        ask(session, ArmCommand())
         wait_for_drivers(session)
         print("armed again; no joint is referenced: `gemelo home` or `gemelo reference`")
     else:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceMode, DeviceState
+from schemas.device import DeviceMode, DeviceState, HomeCommand, StopKind
 from schemas.device_faults import fault_text
 from schemas.topics import DEVICE_EVENTS, DEVICE_STATE
 from services.cli.device import ask
@@ -36,7 +36,7 @@ def home(session: Session, wanted: Sequence[str], as_json: bool = False) -> Exit
     require_ready(session.arm, view.require_state())
     names = tuple(joint.name for joint in homing.joints)
     with two_stage_interrupt() as interrupt:
-        ask(session, DeviceCommandRequest(command=DeviceCommandKind.HOME, name=names))
+        ask(session, HomeCommand(name=names))
         session.node.subscribe(DEVICE_STATE, homing.on_state)
         report = _follow(session, view, homing, interrupt, as_json)
     if as_json:
@@ -94,7 +94,7 @@ def _follow(session: Session, view: DeviceView, homing: Homing, interrupt: Inter
 def _stop_once(session: Session, interrupt: Interrupt, quiet: bool) -> None:
     if interrupt.is_set and not interrupt.is_answered:
         interrupt.is_answered = True
-        ask(session, DeviceCommandRequest(command=DeviceCommandKind.STOP))
+        ask(session, StopKind.STOP)
         if not quiet:
             print("stopping: the joints slow down (Ctrl-C again leaves without waiting)", flush=True)
 

@@ -23,7 +23,9 @@ def goal_request(action: AnyAction) -> Request[GoalRequest, GoalResponse]:
 
 
 def cancel_request(action: AnyAction) -> Request[CancelRequest, CancelResponse]:
-    return Request(f"{action.key}/cancel", CancelRequest, CancelResponse, action.server, "end a goal before its end")
+    return Request(
+        f"{action.key}/cancel", CancelRequest, CancelResponse, action.server, "end a goal before its end", urgent=True
+    )
 
 
 def result_request(action: AnyAction) -> Request[ResultRequest, ResultResponse]:

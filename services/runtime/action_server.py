@@ -23,12 +23,15 @@ from schemas.topics import Action
 from services.runtime import action_keys as keys
 from services.runtime.errors import Refused
 from services.runtime.goal_book import Goal, GoalBook
-from services.runtime.requests import Pending
+from services.runtime.request_server import Pending, RequestServer
 from services.runtime.topics import Publisher
 
 G = TypeVar("G", bound=Message)
 F = TypeVar("F", bound=Message)
 R = TypeVar("R", bound=Message)
+
+OVERTAKEN = 2.0  # [s] that a goal may come after its own cancel, which overtakes what waits
+MOST_OVERTAKEN = 256  # such cancels that are remembered
 
 
 @dataclass(frozen=True)
@@ -62,15 +65,16 @@ class ActionServer(Generic[G, F, R]):
         action: Action[G, F, R],
         on_goal: OnGoal[G],
         on_cancel: OnCancel,
-        serve: Callable[[Any, Callable[[Any, Pending[Any]], None]], object],
+        serve: Callable[[Any, Callable[[Any, Pending[Any]], None]], RequestServer[Any, Any]],
         publisher: Callable[[Any], Publisher[Any]],
     ) -> None:
         self.action = action
         self._on_goal, self._on_cancel = on_goal, on_cancel
         self._goals = GoalBook()
+        self._cancelled_early: dict[str, float] = {}  # by goal that has not come yet: [s] monotonic
         self._feedback: Publisher[GoalFeedback] = publisher(keys.feedback_topic(action))
         self._status: Publisher[GoalStatuses] = publisher(keys.status_topic(action))
-        serve(keys.goal_request(action), self._answer_goal)
+        self._goal_requests = serve(keys.goal_request(action), self._answer_goal)
         serve(keys.cancel_request(action), self._answer_cancel)
         serve(keys.result_request(action), self._goals.answer_result)
         self.beat()
@@ -92,6 +96,10 @@ class ActionServer(Generic[G, F, R]):
             raise ValueError(f"goal {goal_id} has ended already, as {goal.status.name}")
         goal.end(status, msgspec.Raw(encode(result)))
         self._publish_status()
+
+    def refuse_waiting(self, reason: str) -> None:
+        """Refuses the goals that have arrived by now and were not looked at yet."""
+        self._goal_requests.refuse_waiting(reason)
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -115,6 +123,9 @@ class ActionServer(Generic[G, F, R]):
             wanted = decode(self.action.goal, bytes(request.goal))
         except BadMessage as error:
             raise Refused(f"{self.action.key}: {error}", "bad request") from error
+        if self._cancelled_early.pop(request.goal_id, None) is not None:
+            reason = "it was cancelled before it was looked at"
+            return GoalResponse(accepted=False, reason=reason, stamp=time.time_ns())
         goal = Goal(request.goal_id, request.client, GoalResponse(accepted=True, stamp=time.time_ns()))
         self._goals.add(goal)
         decision = refuse(0, "the server failed")
@@ -129,10 +140,10 @@ class ActionServer(Generic[G, F, R]):
 
     def _answer_cancel(self, request: CancelRequest, pending: Pending[CancelResponse]) -> None:
         if request.goal_id and request.goal_id not in self.active:
-            known = self._goals.get(request.goal_id)
-            reason = f"it has ended as {known.status.name}" if known else "no such goal is known here"
-            pending.reply(CancelResponse(reason=reason))
+            pending.reply(CancelResponse(reason=self._cancel_absent(request.goal_id)))
             return
+        if not request.goal_id:
+            self.refuse_waiting("all goals were cancelled after it was sent: send it again")
         wanted = (request.goal_id,) if request.goal_id else self.active
         canceling, reasons = [], [] if wanted else ["no goal is active"]
         for goal_id in wanted:
@@ -144,6 +155,17 @@ class ActionServer(Generic[G, F, R]):
             if not self._goals[goal_id].status.is_terminal:
                 self._set(self._goals[goal_id], GoalStatusCode.CANCELING)
         pending.reply(CancelResponse(canceling=tuple(canceling), reason="; ".join(reasons)))
+
+    def _cancel_absent(self, goal_id: str) -> str:
+        """Says why `goal_id` is not active; one that is not known may have been overtaken by its own cancel."""
+        known = self._goals.get(goal_id)
+        if known is not None:
+            return f"it has ended as {known.status.name}"
+        now = time.monotonic()
+        self._cancelled_early = {key: at for key, at in self._cancelled_early.items() if now - at < OVERTAKEN}
+        if len(self._cancelled_early) < MOST_OVERTAKEN:
+            self._cancelled_early[goal_id] = now
+        return "no such goal is known here; one of that name that comes within 2 s is refused"
 
     def _set(self, goal: Goal, status: GoalStatusCode) -> None:
         if not goal.status.is_terminal and goal.status is not status:

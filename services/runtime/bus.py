@@ -39,6 +39,11 @@ class Query(Protocol):
     @property
     def arrival(self) -> Arrival: ...
 
+    @property
+    def client(self) -> str:
+        """The session that asks, as it says itself; empty where it does not say."""
+        ...
+
     def reply(self, schema: str, payload: bytes) -> None: ...
 
     def fail(self, schema: str, payload: bytes) -> None: ...
@@ -95,9 +100,18 @@ class Bus(Protocol):
         ...
 
     def ask(
-        self, key: str, schema: str, payload: bytes, timeout: float, on_answer: Callable[[Answer | None], None]
+        self,
+        key: str,
+        schema: str,
+        payload: bytes,
+        timeout: float,
+        on_answer: Callable[[Answer | None], None],
+        urgent: bool = False,
     ) -> None:
-        """Sends one request; `on_answer` comes exactly once, with None where no answer came in `timeout` [s]."""
+        """Sends one request, before all that waits to be sent if it is `urgent`.
+
+        `on_answer` comes exactly once, with None where no answer came in `timeout` [s].
+        """
         ...
 
     def declare_alive(self, key: str) -> Declaration:

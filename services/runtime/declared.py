@@ -10,7 +10,7 @@ from typing import Any
 from schemas.system import NodeInfo, TopicStatistics
 from services.runtime.action_server import ActionServer
 from services.runtime.identity import Identity
-from services.runtime.requests import Server
+from services.runtime.request_server import RequestServer
 from services.runtime.topics import Publisher, Subscription
 
 
@@ -20,7 +20,7 @@ class Declared:
 
     publishers: dict[str, Publisher[Any]] = field(default_factory=dict)  # by key
     subscriptions: list[Subscription[Any]] = field(default_factory=list)
-    servers: list[Server[Any, Any]] = field(default_factory=list)
+    servers: list[RequestServer[Any, Any]] = field(default_factory=list)
     actions: list[ActionServer[Any, Any, Any]] = field(default_factory=list)
 
     def info(self, identity: Identity, robot: str) -> NodeInfo:
@@ -42,7 +42,7 @@ class Declared:
 
     def statistics(self) -> tuple[TopicStatistics, ...]:
         """What was received, dropped and bad, by key."""
-        hearers: list[Subscription[Any] | Server[Any, Any]] = [*self.subscriptions, *self.servers]
+        hearers: list[Subscription[Any] | RequestServer[Any, Any]] = [*self.subscriptions, *self.servers]
         return tuple(each.statistics for each in hearers)
 
     def report_losses(self) -> None:

@@ -16,7 +16,7 @@ from schemas.actions import (
     ResultRequest,
     ResultResponse,
 )
-from services.runtime.requests import Pending
+from services.runtime.request_server import Pending
 
 KEPT = 120.0  # [s] that a result can be asked for after the end
 MOST_KEPT = 256  # goals

@@ -141,7 +141,7 @@ class GoalHandle(Generic[F, R]):
         def put(answer: Answer | None) -> None:
             self._loop.inbox.put(lambda: on_answer(answer))
 
-        self._bus.ask(request.key, schema_of(request.request), encode(question), ASK_TIMEOUT, put)
+        self._bus.ask(request.key, schema_of(request.request), encode(question), ASK_TIMEOUT, put, request.urgent)
 
     def _ask_cancel(self) -> None:
         if not self._is_canceling and not self.is_over:

@@ -21,13 +21,19 @@ Task = Callable[[], None]
 
 
 class Inbox:
-    """A queue of things to do in the thread of logic."""
+    """A queue of things to do in the thread of logic, and a short one that goes before it."""
 
     def __init__(self) -> None:
         self._tasks: SimpleQueue[Task] = SimpleQueue()
+        self._urgent: deque[Task] = deque()
 
     def put(self, task: Task) -> None:
         self._tasks.put(task)
+
+    def put_first(self, task: Task) -> None:
+        """`task` is taken before all that `put` has brought."""
+        self._urgent.append(task)
+        self.wake()
 
     def wake(self) -> None:
         """Lets `take` return; safe in a signal handler."""
@@ -35,6 +41,8 @@ class Inbox:
 
     def take(self, timeout: float) -> Task | None:
         """The next task, or None after `timeout` [s]."""
+        if self._urgent:
+            return self._urgent.popleft()
         try:
             return self._tasks.get(timeout=timeout) if timeout > 0.0 else self._tasks.get_nowait()
         except Empty:

@@ -69,14 +69,20 @@ class MemoryBus:
             return self.network.served.wait_for(lambda: key in self.network.services and self.is_connected, timeout)
 
     def ask(
-        self, key: str, schema: str, payload: bytes, timeout: float, on_answer: Callable[[Answer | None], None]
+        self,
+        key: str,
+        schema: str,
+        payload: bytes,
+        timeout: float,
+        on_answer: Callable[[Answer | None], None],
+        urgent: bool = False,
     ) -> None:
         with self.network.lock:
             service = self.network.services.get(key) if self.is_connected else None
         if service is None:
             on_answer(None)
         else:
-            service.on_query(MemoryQuery(Arrival(key, schema, payload), timeout, on_answer))
+            service.on_query(MemoryQuery(Arrival(key, schema, payload), f"{id(self):x}", timeout, on_answer))
 
     def declare_alive(self, key: str) -> MemoryToken:
         with self.network.lock:

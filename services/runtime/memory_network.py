@@ -99,8 +99,10 @@ class MemoryToken:
 class MemoryQuery:
     """A request on its way; the first answer counts, and after the time-out none does."""
 
-    def __init__(self, arrival: Arrival, timeout: float, on_answer: Callable[[Answer | None], None]) -> None:
-        self.arrival = arrival
+    def __init__(
+        self, arrival: Arrival, client: str, timeout: float, on_answer: Callable[[Answer | None], None]
+    ) -> None:
+        self.arrival, self.client = arrival, client
         self._on_answer = on_answer
         self._lock = threading.Lock()
         self._is_open = True

@@ -28,7 +28,7 @@ from services.runtime.loop import Loop
 from services.runtime.parameter_registry import ParameterRegistry
 from services.runtime.parameters import ParameterSet
 from services.runtime.readiness import Readiness
-from services.runtime.requests import Pending, Server
+from services.runtime.request_server import Pending, RequestServer, UrgentServer
 from services.runtime.statistics import LoopStatistics
 from services.runtime.stopping import StopRequest, stop_on_signals
 from services.runtime.topics import Latest, Publisher, Subscription
@@ -126,9 +126,9 @@ class Node:
         """
         self._serve(request, lambda question, pending: pending.reply(handler(question)), worker)
 
-    def serve_later(self, request: Request[Q, R], handler: Callable[[Q, Pending[R]], None]) -> None:
+    def serve_later(self, request: Request[Q, R], handler: Callable[[Q, Pending[R]], None]) -> RequestServer[Q, R]:
         """As `serve`; the handler keeps the `Pending` and answers when it can, from any thread."""
-        self._serve(request, handler)
+        return self._serve(request, handler)
 
     def call(
         self, request: Request[Q, R], question: Q, timeout: float = 2.0, on_tick: Callable[[], None] | None = None
@@ -252,9 +252,13 @@ class Node:
 
     def _serve(
         self, request: Request[Q, R], handler: Callable[[Q, Pending[R]], None], worker: bool = False
-    ) -> Server[Q, R]:
-        put = self._worker.put if worker else self._loop.inbox.put
-        server = Server(self._bus, put, request, handler, self.log.warning)
+    ) -> RequestServer[Q, R]:
+        server: RequestServer[Q, R]
+        if request.urgent:
+            server = UrgentServer(self._bus, self._loop.inbox.put_first, request, handler, self.log.warning)
+        else:
+            put = self._worker.put if worker else self._loop.inbox.put
+            server = RequestServer(self._bus, put, request, handler, self.log.warning)
         self._declared.servers.append(server)
         return server
 

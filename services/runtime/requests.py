@@ -1,100 +1,22 @@
-"""Requests: a question with one answer, in the thread of logic or in the node's worker."""
+"""Requests as their client sees them: a question with one answer."""
 
 from __future__ import annotations
 
-import threading
-import traceback
-from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from typing import Generic, TypeVar
 
 from schemas.message import BadMessage, Message
-from schemas.system import Failure, TopicStatistics
+from schemas.system import Failure
 from schemas.topics import Request
-from services.runtime.bus import Answer, Arrival, Bus, Query
+from services.runtime.bus import Answer, Arrival, Bus
 from services.runtime.errors import NoAnswer, Refused
 from services.runtime.inbox import Task
-from services.runtime.topics import Complain
 from services.runtime.wire import from_arrival, schema_of, to_payload
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 
-MOST_WAITING = 64  # requests in the inbox of one server; more are refused
 PRESENCE_PATIENCE = 1.0  # [s] that a client waits for a server to appear
-
-
-class Pending(Generic[R]):
-    """A request that has not been answered yet."""
-
-    def __init__(self, query: Query) -> None:
-        self._query = query
-        self.is_answered = False
-
-    def reply(self, response: R) -> None:
-        """Only the first answer counts."""
-        payload = to_payload(response)
-        if not self.is_answered:
-            self.is_answered = True
-            self._query.reply(schema_of(type(response)), payload)
-
-    def refuse(self, kind: str, message: str) -> None:
-        """As `reply`, with why not."""
-        if not self.is_answered:
-            self.is_answered = True
-            self._query.fail(schema_of(Failure), to_payload(Failure(kind=kind, message=message)))
-
-
-class Server(Generic[Q, R]):
-    """Answers one request; `handler` may keep the `Pending` and answer later."""
-
-    def __init__(
-        self,
-        bus: Bus,
-        put: Callable[[Task], None],
-        request: Request[Q, R],
-        handler: Callable[[Q, Pending[R]], None],
-        complain: Complain,
-    ) -> None:
-        self.request = request
-        self._put, self._handler, self._complain = put, handler, complain
-        self._received, self._refused, self._bad = 0, 0, 0
-        self._places = threading.BoundedSemaphore(MOST_WAITING)
-        self._declaration = bus.serve(request.key, self._on_query)
-
-    @property
-    def statistics(self) -> TopicStatistics:
-        return TopicStatistics(key=self.request.key, received=self._received, dropped=self._refused, bad=self._bad)
-
-    def close(self) -> None:
-        self._declaration.close()
-
-    def _on_query(self, query: Query) -> None:
-        if not self._places.acquire(blocking=False):
-            self._refused += 1
-            Pending[R](query).refuse("busy", f"{self.request.key}: {MOST_WAITING} requests are waiting already")
-            return
-        self._put(lambda: self._handle(query))
-
-    def _handle(self, query: Query) -> None:
-        self._places.release()
-        pending: Pending[R] = Pending(query)
-        try:
-            question = from_arrival(self.request.request, query.arrival)
-        except BadMessage as error:
-            self._bad += 1
-            if self._bad == 1:
-                self._complain(f"{self.request.key}: refused a bad request: {error} (further ones are only counted)")
-            pending.refuse("bad request", str(error))
-            return
-        self._received += 1
-        try:
-            self._handler(question, pending)
-        except Refused as error:
-            pending.refuse(error.kind, str(error))
-        except Exception as error:
-            self._complain(f"{self.request.key}: {traceback.format_exc()}")
-            pending.refuse("internal error", f"{self.request.server} failed: {type(error).__name__}: {error}")
 
 
 class Asked(Generic[Q, R]):
@@ -108,7 +30,7 @@ class Asked(Generic[Q, R]):
         payload = to_payload(question)
         if not bus.wait_served(request.key, min(timeout, PRESENCE_PATIENCE)):
             raise NoAnswer(_nobody(bus, request))
-        bus.ask(request.key, schema_of(request.request), payload, timeout, self._on_answer)
+        bus.ask(request.key, schema_of(request.request), payload, timeout, self._on_answer, request.urgent)
 
     @property
     def is_over(self) -> bool:

@@ -50,6 +50,7 @@ class ZenohBus:
         except zenoh.ZError as error:
             raise BusNotOpen(str(error)) from error
         self._router = (host, port)
+        self._name = str(self._session.zid()).encode()
         self._astray_since: float | None = None  # [s] monotonic
         self._tokens: list[ZenohDeclaration] = []
         self._presence: dict[str, Presence] = {}
@@ -132,7 +133,13 @@ class ZenohBus:
         return presence.wait(timeout)
 
     def ask(
-        self, key: str, schema: str, payload: bytes, timeout: float, on_answer: Callable[[Answer | None], None]
+        self,
+        key: str,
+        schema: str,
+        payload: bytes,
+        timeout: float,
+        on_answer: Callable[[Answer | None], None],
+        urgent: bool = False,
     ) -> None:
         answers: list[Answer] = []
 
@@ -154,6 +161,9 @@ class ZenohBus:
             timeout=timeout,
             target=zenoh.QueryTarget.BEST_MATCHING,
             consolidation=zenoh.ConsolidationMode.NONE,
+            priority=zenoh.Priority.REAL_TIME if urgent else zenoh.Priority.DATA,
+            express=urgent,
+            attachment=self._name,
         )
 
     def declare_alive(self, key: str) -> ZenohDeclaration:

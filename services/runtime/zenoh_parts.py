@@ -9,6 +9,8 @@ import zenoh
 
 from services.runtime.bus import ENCODING, Arrival
 
+MOST_OF_A_NAME = 32  # [bytes] of what a client says of itself
+
 
 class ZenohPublication:
     """A declared publisher, plain or advanced."""
@@ -40,6 +42,7 @@ class ZenohQuery:
     def __init__(self, query: zenoh.Query, key: str) -> None:
         self._query = query
         self.arrival = Arrival(key, schema_in(query.encoding), bytes(query.payload or b""))
+        self.client = bytes(query.attachment or b"")[:MOST_OF_A_NAME].hex()
 
     def reply(self, schema: str, payload: bytes) -> None:
         with self._query as query:

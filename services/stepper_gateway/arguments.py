@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from schemas.device import DeviceCommandKind, DeviceCommandRequest
+from schemas.device import (
+    ArmCommand,
+    DeviceCommand,
+    DeviceCommandKind,
+    DeviceCommandRequest,
+    HomeCommand,
+    OutputCommand,
+    ReferenceCommand,
+    ResetCommand,
+    ResumeCommand,
+    SpeedCommand,
+    StopKind,
+)
 from services.arm.description import Arm, Joint
 from services.arm.errors import suggestion
 from services.stepper_gateway.commands import NO_ARGUMENTS, Arguments
@@ -10,33 +22,53 @@ from services.stepper_gateway.goal_limits import SLACK, beyond
 from services.stepper_gateway.goal_shape import require_known
 from services.stepper_gateway.refusals import invalid
 
+KINDS: dict[type[DeviceCommand], DeviceCommandKind] = {
+    ResumeCommand: DeviceCommandKind.RESUME,
+    ResetCommand: DeviceCommandKind.RESET,
+    ReferenceCommand: DeviceCommandKind.REFERENCE,
+    ArmCommand: DeviceCommandKind.ARM,
+    HomeCommand: DeviceCommandKind.HOME,
+    OutputCommand: DeviceCommandKind.OUTPUT,
+    SpeedCommand: DeviceCommandKind.SPEED,
+}
+STOPS = {
+    StopKind.STOP: DeviceCommandKind.STOP,
+    StopKind.HOLD: DeviceCommandKind.HOLD,
+    StopKind.DISARM: DeviceCommandKind.DISARM,
+}
+
+
+def kind_of(request: DeviceCommandRequest) -> DeviceCommandKind:
+    """The number that the command has on the wire."""
+    return KINDS[type(request.command)]
+
 
 def arguments_of(request: DeviceCommandRequest, arm: Arm) -> Arguments:
     """Raises `GoalRejected` for a name, position or value that the arm does not have."""
     match request.command:
-        case DeviceCommandKind.REFERENCE:
-            return _reference(request, arm)
-        case DeviceCommandKind.HOME:
-            return Arguments(argument=_homing_mask(request, arm))
-        case DeviceCommandKind.OUTPUT:
-            return _output(request, arm)
-        case DeviceCommandKind.SPEED:
-            return Arguments(argument=_permil(request.value))
+        case ReferenceCommand() as command:
+            return _reference(command, arm)
+        case HomeCommand() as command:
+            return Arguments(argument=_homing_mask(command.name, arm))
+        case OutputCommand() as command:
+            return _output(command, arm)
+        case SpeedCommand() as command:
+            return Arguments(argument=_permil(command.scale))
         case _:
             return NO_ARGUMENTS
 
 
-def _reference(request: DeviceCommandRequest, arm: Arm) -> Arguments:
-    """Where the joints named stand, by the request or else by robot.toml; all of them if none is named."""
-    if request.position and len(request.position) != len(request.name):
-        raise invalid(f"{len(request.name)} joints are named and {len(request.position)} positions given")
-    require_known(request.name, arm.joints)
+def _reference(command: ReferenceCommand, arm: Arm) -> Arguments:
+    """Where the joints named stand, by the command or else by robot.toml; all of them if none is named."""
+    if command.position and len(command.position) != len(command.name):
+        raise invalid(f"{len(command.name)} joints are named and {len(command.position)} positions given")
+    require_known(command.name, arm.joints)
     positions = {joint.name: joint.drive.reference_position for joint in arm.joints}
-    positions |= dict(zip(request.name, request.position, strict=False))
+    positions |= dict(zip(command.name, command.position, strict=False))
     for joint in arm.joints:
         _require_within(joint, positions[joint.name])
     steps = tuple(joint.steps.to_q8(positions[joint.name]) for joint in arm.joints)
-    return Arguments(positions=steps, argument=_mask(request.name, arm))
+    return Arguments(positions=steps, argument=_mask(command.name, arm))
 
 
 def _require_within(joint: Joint, position: float) -> None:
@@ -44,26 +76,24 @@ def _require_within(joint: Joint, position: float) -> None:
         raise invalid(beyond(joint, position))
 
 
-def _homing_mask(request: DeviceCommandRequest, arm: Arm) -> int:
-    require_known(request.name, arm.joints)
-    asked = [joint for joint in arm.joints if not request.name or joint.name in request.name]
+def _homing_mask(names: tuple[str, ...], arm: Arm) -> int:
+    require_known(names, arm.joints)
+    asked = [joint for joint in arm.joints if not names or joint.name in names]
     able = [joint.name for joint in asked if joint.drive.homing is not None]
     for joint in asked:
-        if joint.name not in able and (request.name or not able):
+        if joint.name not in able and (names or not able):
             raise invalid(
                 f'joint "{joint.name}" has no home switch: put it into place by hand and run `gemelo reference`, or '
                 "give it a [joint.homing] in robot.toml"
             )
-    return _mask(request.name, arm)
+    return _mask(names, arm)
 
 
-def _output(request: DeviceCommandRequest, arm: Arm) -> Arguments:
+def _output(command: OutputCommand, arm: Arm) -> Arguments:
     names = [output.name for output in arm.outputs]
-    if request.output not in names:
-        raise invalid(f'{arm.name} has no output "{request.output}"{suggestion(request.output, names)}')
-    if request.value not in (0.0, 1.0):
-        raise invalid(f'output "{request.output}" is 0 (off) or 1 (on), not {request.value:g}')
-    return Arguments(index=names.index(request.output), argument=int(request.value))
+    if command.output not in names:
+        raise invalid(f'{arm.name} has no output "{command.output}"{suggestion(command.output, names)}')
+    return Arguments(index=names.index(command.output), argument=int(command.on))
 
 
 def _permil(speed: float) -> int:

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceStatus, PressRequest
+from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceStatus, DeviceStopRequest, PressRequest
 from schemas.joints import JointTargets
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.scene import PlanningScene
 from schemas.system import LogLevel
 from schemas.topics import DEVICE_STATUS
 from services.arm.description import Arm
+from services.stepper_gateway.arguments import STOPS, kind_of
 from services.stepper_gateway.goals import GoalVerdict
 from services.stepper_gateway.links.frames import BadFrame, Heartbeat, encode
 from services.stepper_gateway.links.link import Kind, Received
@@ -102,7 +103,15 @@ class GatewayCore:
     def on_command(self, request: DeviceCommandRequest, ticket: int, moment: Moment) -> list[Output]:
         """A person's command; its answer comes as an `Answer` with this ticket."""
         if self._parts.desk.ask(request, ticket, self._parts.goals.is_active, moment):
-            self._give_way(request, moment)
+            self._give_way(kind_of(request), moment)
+        self._parts.desk.send_due(moment)
+        return self._finish(moment)
+
+    def on_stop(self, request: DeviceStopRequest, ticket: int, moment: Moment) -> list[Output]:
+        """A person's STOP, HOLD or DISARM; its answer comes as an `Answer` with this ticket."""
+        kind = STOPS[request.kind]
+        if self._parts.desk.stop(kind, ticket, self._parts.goals.is_active, moment):
+            self._give_way(kind, moment)
         self._parts.desk.send_due(moment)
         return self._finish(moment)
 
@@ -138,14 +147,14 @@ class GatewayCore:
         mover.pump(moment)
         return self._finish(moment)
 
-    def _give_way(self, request: DeviceCommandRequest, moment: Moment) -> None:
+    def _give_way(self, kind: DeviceCommandKind, moment: Moment) -> None:
         """A person's command comes before goals and targets."""
-        if request.command in PAUSES:
+        if kind in PAUSES:
             return
         self._parts.streaming.interrupt()
         if self._parts.goals.is_active:
-            self._parts.goals.stop(f"stopped by a device command ({request.command.name})", moment)
-        elif request.command == DeviceCommandKind.STOP:
+            self._parts.goals.stop(f"stopped by a device command ({kind.name})", moment)
+        elif kind == DeviceCommandKind.STOP:
             self.mover.stop(moment)
         else:
             self.mover.transmission.abandon()

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse, DeviceMode
-from services.stepper_gateway.arguments import arguments_of
-from services.stepper_gateway.commands import INTERNAL, PendingCommand
+from services.stepper_gateway.arguments import arguments_of, kind_of
+from services.stepper_gateway.commands import PendingCommand
 from services.stepper_gateway.links.frames import Code, CommandReply, code_name, encode
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.moment import Moment
@@ -45,38 +47,52 @@ class CommandDesk:
 
     def ask(self, request: DeviceCommandRequest, ticket: int, goal_is_active: bool, moment: Moment) -> bool:
         """Have it sent, or answer at once why not; true if it will be sent."""
-        mover = self._mover
+        mover, kind = self._mover, kind_of(request)
         try:
-            if reason := mover.absence(moment) or self._objection(request.command, goal_is_active):
+            if reason := mover.absence(moment) or self._objection(kind, goal_is_active):
                 raise invalid(reason)
             arguments = arguments_of(request, mover.arm)
         except GoalRejected as rejected:
             self._answer(ticket, False, rejected.reason)
             return False
-        mover.commands.ask(request.command, moment, mover.parameters.command_timeout, ticket, arguments)
+        mover.commands.ask(kind, moment, mover.parameters.command_timeout, ticket, arguments)
+        return True
+
+    def stop(self, kind: DeviceCommandKind, ticket: int, goal_is_active: bool, moment: Moment) -> bool:
+        """Have a stop sent, whatever is known of the device; true unless it is refused because the arm moves."""
+        mover = self._mover
+        if reason := self._objection(kind, goal_is_active):
+            self._answer(ticket, False, reason)
+            return False
+        stream = mover.stream.id if mover.stream is not None else 0
+        mover.commands.ask(kind, moment, mover.parameters.command_timeout, ticket, stream=stream)
         return True
 
     def on_reply(self, reply: CommandReply, moment: Moment) -> None:
-        """The device has answered a command."""
-        if reply.boot_id != self._mover.session.boot_id or reply.code == Code.EXPIRED:
+        """The device has answered a command; a stop that it refused for form's sake is sent again without the form."""
+        command = self._mover.commands.find(reply)
+        is_present = reply.boot_id == self._mover.session.boot_id
+        if command is None or not (is_present or command.is_stop):
             return
-        command = self._mover.commands.answered(reply)
-        if command is None:
-            return
+        if reply.code in (Code.EXPIRED, Code.WRONG_BOOT):
+            return self._insist(command, Code(reply.code), moment)
+        self._mover.commands.remove(command)
         accepted = reply.code in (Code.OK, Code.DUPLICATE)
-        if accepted:
+        if accepted and is_present:
             self._note(command, reply)
-        if command.ticket != INTERNAL:
-            self._answer(command.ticket, accepted, "" if accepted else self._complaint(command, reply), reply.mode)
-        elif not accepted:
-            self._mover.event("command_refused", self._complaint(command, reply), moment)
+        reason = self._mover.absence(moment) if accepted else self._complaint(command, reply)
+        for ticket in command.tickets:
+            self._answer(ticket, accepted, reason, reply.mode, sent=True)
+        if not command.tickets and not accepted:
+            self._mover.event("command_refused", reason, moment)
 
     def send_due(self, moment: Moment) -> None:
         """Send what is new or was not answered."""
         mover = self._mover
-        if mover.absence(moment):
+        if not mover.session.link_up:
             return
-        for frame in mover.commands.due(moment, mover.session.clock, mover.session.boot_id):
+        is_reachable = not mover.absence(moment)
+        for frame in mover.commands.due(moment, mover.session.clock, mover.session.boot_id, is_reachable):
             mover.out.send(Kind.CMD, encode(frame))
 
     def step(self, moment: Moment) -> None:
@@ -85,17 +101,35 @@ class CommandDesk:
             state = self._mover.session.latest
             if command.kind == DeviceCommandKind.HOLD and state is not None:
                 self._mover.hold_answered(state.mode == DeviceMode.HOLD, state.t_us)
-            if command.ticket != INTERNAL:
-                self._answer(command.ticket, False, f"the device has not answered {command.kind.name} in time")
-            elif command.kind == DeviceCommandKind.STOP:
+            for ticket in command.tickets:
+                self._answer(ticket, False, self._silence(command, moment), sent=command.times_sent > 0)
+            if command.is_own and command.kind == DeviceCommandKind.STOP:
                 self._mover.stop(moment)
         self.send_due(moment)
 
     def give_up(self, reason: str) -> None:
-        """The device these commands were for is gone."""
-        for command in self._mover.commands.drop_all():
-            if command.ticket != INTERNAL:
-                self._answer(command.ticket, False, reason)
+        """The device these commands were for is gone; a person's stop is sent on, to whatever is there."""
+        for command in self._mover.commands.drop_all_but_stops():
+            for ticket in command.tickets:
+                self._answer(ticket, False, reason, sent=command.times_sent > 0)
+
+    def _insist(self, command: PendingCommand, code: Code, moment: Moment) -> None:
+        if not command.is_stop:
+            return
+        if code == Code.EXPIRED:
+            command.needs_clock = False
+        else:
+            command.needs_boot = False
+        command.sent = -math.inf
+        self.send_due(moment)
+
+    def _silence(self, command: PendingCommand, moment: Moment) -> str:
+        """What is known of a command that was not answered in time."""
+        name, absence = command.kind.name, self._mover.absence(moment)
+        if not command.times_sent:
+            return f"{name} could not be sent: {absence}; the device holds by itself without heartbeats"
+        because = f": {absence}" if absence else ""
+        return f"the device has not answered {name} in time, which was sent {command.times_sent} times{because}"
 
     def _objection(self, kind: DeviceCommandKind, goal_is_active: bool) -> str:
         if goal_is_active and kind in AT_REST:
@@ -119,8 +153,8 @@ class CommandDesk:
         text = f"the device refuses {command.kind.name} in mode {mode}: {code_name(reply.code)}"
         return f"{text}, {remedy}" if remedy else text
 
-    def _answer(self, ticket: int, accepted: bool, reason: str, mode: int | None = None) -> None:
+    def _answer(self, ticket: int, accepted: bool, reason: str, mode: int | None = None, sent: bool = False) -> None:
         said = mode is not None and mode in DeviceMode._value2member_map_
         known = DeviceMode(mode or 0) if said else self._mover.session.mode
-        response = DeviceCommandResponse(accepted=accepted, reason=reason, mode=known)
+        response = DeviceCommandResponse(accepted=accepted, sent=sent, reason=reason, mode=known)
         self._mover.out.put(Answer(ticket, response))

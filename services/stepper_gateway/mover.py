@@ -162,10 +162,11 @@ class Mover:
 
     def stop(self, moment: Moment) -> None:
         """Decelerate along the path and forget the rest of it."""
+        stream = self.stream.id if self.stream is not None else 0
         self.transmission.abandon()
         self._holds = False
         self._stop_asked, self._stopped_us, self._awaits_stop = moment.monotonic, -1, True
-        self.commands.ask(DeviceCommandKind.STOP, moment, self.parameters.command_timeout)
+        self.commands.ask(DeviceCommandKind.STOP, moment, self.parameters.command_timeout, stream=stream)
 
     def has_stopped(self) -> bool:
         """Whether the device has answered the latest STOP and has said since that it stands."""

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import itertools
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any
 
 from schemas.device import (
     ConfigureRequest,
     ConfigureResponse,
     DeviceCommandRequest,
     DeviceCommandResponse,
+    DeviceStopRequest,
     PressRequest,
     PressResponse,
 )
@@ -26,14 +25,15 @@ from schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURE,
     DEVICE_PRESS,
+    DEVICE_STOP,
     FOLLOW_JOINT_TRAJECTORY,
     JOINT_TARGETS,
     SCENE,
 )
 from services.runtime.action_server import ActionServer, GoalDecision, accept, refuse
-from services.runtime.errors import Refused
 from services.runtime.node import Node
 from services.runtime.parameters import ParameterSet
+from services.runtime.request_server import Pending
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.moment import Moment
@@ -45,41 +45,31 @@ from services.stepper_gateway.outputs import (
     LogLine,
     Output,
     Publish,
-    Response,
     SendFrame,
 )
 from services.stepper_gateway.parameters import GatewayParameters
 
-AT_ONCE = 64  # payloads handled before the loop may look at its deadline
-PATIENCE = 12.0  # [s] a caller waits; the core answers sooner
+AT_ONCE = 16  # payloads handled before the loop looks at its deadline and for stops; chosen: about 1 ms
 
-R = TypeVar("R", DeviceCommandResponse, ConfigureResponse, PressResponse)
 Server = ActionServer[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
 
 
-@dataclass
-class Ticket:
-    """A caller in the node's worker thread who waits for the device's answer."""
-
-    response: Response | None = None
-    answered: threading.Event = field(default_factory=threading.Event)
-
-
 class Shell:
-    """Everything here runs in the thread of logic, but `wake` and the waiting of callers for their answers."""
+    """Everything here runs in the thread of logic, but `wake`."""
 
     def __init__(self, node: Node, core: GatewayCore, parameters: ParameterSet[GatewayParameters]) -> None:
         self._node, self._core, self._parameters = node, core, parameters
         self._link: Link | None = None
         self._is_woken = threading.Event()
-        self._tickets: dict[int, Ticket] = {}
-        self._numbers = itertools.count(1)
+        self._callers: dict[int, Pending[Any]] = {}  # by ticket: who waits for the device's answer
+        self._tickets = itertools.count(1)
         self._server: Server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self._on_goal, self._on_cancel)
         node.subscribe(JOINT_TARGETS, self._on_targets)
         node.subscribe(SCENE, core.on_scene)
-        node.serve(DEVICE_COMMAND, self._on_command, worker=True)
-        node.serve(DEVICE_CONFIGURE, self._on_configure, worker=True)
-        node.serve(DEVICE_PRESS, self._on_press, worker=True)
+        self._commands = node.serve_later(DEVICE_COMMAND, self._on_command)
+        node.serve_later(DEVICE_STOP, self._on_stop)
+        node.serve_later(DEVICE_CONFIGURE, self._on_configure)
+        node.serve_later(DEVICE_PRESS, self._on_press)
 
     def use(self, link: Link) -> None:
         self._link = link
@@ -126,25 +116,26 @@ class Shell:
     def _on_targets(self, targets: JointTargets) -> None:
         self._carry_out(self._core.on_targets(targets, self._moment()))
 
-    def _on_command(self, request: DeviceCommandRequest) -> DeviceCommandResponse:
-        return self._wait(DeviceCommandResponse, lambda number, now: self._core.on_command(request, number, now))
+    def _on_command(self, request: DeviceCommandRequest, pending: Pending[DeviceCommandResponse]) -> None:
+        self._carry_out(self._core.on_command(request, self._ticket(pending), self._moment()))
 
-    def _on_configure(self, _request: ConfigureRequest) -> ConfigureResponse:
-        return self._wait(ConfigureResponse, lambda number, now: self._core.on_configure(number, now))
+    def _on_stop(self, request: DeviceStopRequest, pending: Pending[DeviceCommandResponse]) -> None:
+        """What waits behind a stop was asked for before it, and must not move the arm after it."""
+        reason = f"{request.kind} was asked for after it: ask again"
+        self._server.refuse_waiting(reason)
+        self._commands.refuse_waiting(reason)
+        self._carry_out(self._core.on_stop(request, self._ticket(pending), self._moment()))
 
-    def _on_press(self, request: PressRequest) -> PressResponse:
-        return self._wait(PressResponse, lambda number, now: self._core.on_press(request, number, now))
+    def _on_configure(self, _request: ConfigureRequest, pending: Pending[ConfigureResponse]) -> None:
+        self._carry_out(self._core.on_configure(self._ticket(pending), self._moment()))
 
-    def _wait(self, kind: type[R], ask: Callable[[int, Moment], list[Output]]) -> R:
-        """In the worker thread: hands the request over and waits for the device's answer."""
-        number, ticket = next(self._numbers), Ticket()
-        self._tickets[number] = ticket
-        self._node.post(lambda: self._carry_out(ask(number, self._moment())))
-        ticket.answered.wait(PATIENCE)
-        self._tickets.pop(number, None)
-        if not isinstance(ticket.response, kind):
-            raise Refused("the gateway's control loop has not answered in time")
-        return ticket.response
+    def _on_press(self, request: PressRequest, pending: Pending[PressResponse]) -> None:
+        self._carry_out(self._core.on_press(request, self._ticket(pending), self._moment()))
+
+    def _ticket(self, pending: Pending[Any]) -> int:
+        ticket = next(self._tickets)
+        self._callers[ticket] = pending
+        return ticket
 
     def _carry_out(self, outputs: list[Output]) -> None:
         for output in outputs:
@@ -160,13 +151,7 @@ class Shell:
                     self._server.feedback(goal_id, feedback)
                 case GoalFinished(goal_id, status, result):
                     self._server.finish(goal_id, status, result)
-                case Answer(number, response):
-                    self._answer(number, response)
+                case Answer(ticket, response):
+                    self._callers.pop(ticket).reply(response)
                 case LogLine(level, text):
                     self._node.log.log(level, "%s", text)
-
-    def _answer(self, number: int, response: Response) -> None:
-        ticket = self._tickets.get(number)
-        if ticket is not None:
-            ticket.response = response
-            ticket.answered.set()

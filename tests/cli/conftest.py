@@ -9,7 +9,14 @@ import pytest
 
 from schemas.actions import GoalStatusCode
 from schemas.deployment import Deployment, PathsSection
-from schemas.device import DeviceCommandRequest, DeviceCommandResponse, DeviceMode, DeviceState, DeviceStatus
+from schemas.device import (
+    DeviceCommandRequest,
+    DeviceCommandResponse,
+    DeviceMode,
+    DeviceState,
+    DeviceStatus,
+    DeviceStopRequest,
+)
 from schemas.joints import JointState, StepErrors
 from schemas.motion import (
     FollowErrorCode,
@@ -22,6 +29,7 @@ from schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_STATE,
     DEVICE_STATUS,
+    DEVICE_STOP,
     FOLLOW_JOINT_TRAJECTORY,
     JOINT_STATES,
     PLAN,
@@ -45,13 +53,14 @@ class PretendGateway:
         self.ends_as = GoalStatusCode.SUCCEEDED
         self.reason = ""
         self.refusal = ""
-        self.commands: list[DeviceCommandRequest] = []
+        self.commands: list[DeviceCommandRequest | DeviceStopRequest] = []
         self.mode = DeviceMode.IDLE
         self.command_refusal = "the arm moves"  # in Run
         self._node, self._arm = node, arm
         self._goal: tuple[str, float] | None = None
         self._server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self._on_goal, self._on_cancel)
         node.serve(DEVICE_COMMAND, self._on_command)
+        node.serve(DEVICE_STOP, self._on_command)
         self._states, self._errors = node.publisher(JOINT_STATES), node.publisher(STEP_ERRORS)
         self._device = node.publisher(DEVICE_STATE)
         node.publisher(DEVICE_STATUS).put(DeviceStatus(online=True, device="rm1"))
@@ -88,7 +97,7 @@ class PretendGateway:
         )  # fmt: skip
         self._server.finish(goal_id, status, result)
 
-    def _on_command(self, request: DeviceCommandRequest) -> DeviceCommandResponse:
+    def _on_command(self, request: DeviceCommandRequest | DeviceStopRequest) -> DeviceCommandResponse:
         self.commands.append(request)
         if self.mode is DeviceMode.RUN:
             return DeviceCommandResponse(accepted=False, reason=self.command_refusal, mode=self.mode)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import msgspec
 
 from schemas.device import (
+    ArmCommand,
     ConfigureRequest,
     ConfigureResponse,
-    DeviceCommandKind,
+    DeviceCommand,
     DeviceCommandRequest,
     DeviceCommandResponse,
     DeviceConfiguration,
@@ -16,9 +17,14 @@ from schemas.device import (
     DeviceMode,
     DeviceState,
     DeviceStatus,
+    DeviceStopRequest,
+    HomeCommand,
+    OutputCommand,
     PressRequest,
     PressResponse,
     SensorReadings,
+    SpeedCommand,
+    StopKind,
 )
 from schemas.topics import (
     DEVICE_COMMAND,
@@ -28,6 +34,7 @@ from schemas.topics import (
     DEVICE_PRESS,
     DEVICE_STATE,
     DEVICE_STATUS,
+    DEVICE_STOP,
     SENSORS,
 )
 from services.arm.description import Arm
@@ -35,15 +42,13 @@ from services.runtime.node import Node
 
 TO_HOME = 0.15  # [s] for every joint
 
-Command = DeviceCommandKind
-
 
 class PretendDevice:
     """Does at once what it is asked; homes one joint after another, or comes to `homing_fault` at the second."""
 
     def __init__(self, node: Node, arm: Arm) -> None:
         self.arm, self._node = arm, node
-        self.asked: list[DeviceCommandRequest] = []
+        self.asked: list[DeviceCommand | StopKind] = []
         self.pressed: list[PressRequest] = []
         self.steps_off: dict[str, int] = {}
         self.homing_fault = DeviceFault.NONE
@@ -55,6 +60,7 @@ class PretendDevice:
         self._all: list[str] = []
         self._since = 0.0
         node.serve(DEVICE_COMMAND, self._on_command)
+        node.serve(DEVICE_STOP, self._on_stop)
         node.serve(DEVICE_CONFIGURE, self._on_configure)
         node.serve(DEVICE_PRESS, self._on_press)
         self._states, self._events = node.publisher(DEVICE_STATE), node.publisher(DEVICE_EVENTS)
@@ -105,22 +111,28 @@ class PretendDevice:
             self.set(mode=DeviceMode.IDLE if all(self.state.referenced) else DeviceMode.UNREFERENCED)
 
     def _on_command(self, request: DeviceCommandRequest) -> DeviceCommandResponse:
-        self.asked.append(request)
+        self.asked.append(request.command)
         match request.command:
-            case Command.HOME:
-                self._all = list(request.name)
-                self._homing, self._since = list(request.name), self._node.monotonic()
+            case HomeCommand() as home:
+                self._all = list(home.name)
+                self._homing, self._since = list(home.name), self._node.monotonic()
                 self.set(mode=DeviceMode.HOMING)
-            case Command.STOP if self._homing:
-                self._homing.clear()
-                self._events.put(DeviceEvent(event="homing_stopped", detail="command"))
-                self.set(mode=DeviceMode.UNREFERENCED)
-            case Command.ARM | Command.DISARM:
-                self.set(armed=request.command is Command.ARM, referenced=(False,) * 3)
-            case Command.OUTPUT:
-                self.set(outputs=(request.output,) if request.value else ())
-            case Command.SPEED:
-                self.set(speed=request.value)
+            case ArmCommand():
+                self.set(armed=True, referenced=(False,) * 3)
+            case OutputCommand() as output:
+                self.set(outputs=(output.output,) if output.on else ())
+            case SpeedCommand() as speed:
+                self.set(speed=speed.scale)
+        return DeviceCommandResponse(accepted=True, mode=self.state.mode)
+
+    def _on_stop(self, request: DeviceStopRequest) -> DeviceCommandResponse:
+        self.asked.append(request.kind)
+        if request.kind is StopKind.STOP and self._homing:
+            self._homing.clear()
+            self._events.put(DeviceEvent(event="homing_stopped", detail="command"))
+            self.set(mode=DeviceMode.UNREFERENCED)
+        if request.kind is StopKind.DISARM:
+            self.set(armed=False, referenced=(False,) * 3)
         return DeviceCommandResponse(accepted=True, mode=self.state.mode)
 
     def _on_configure(self, request: ConfigureRequest) -> ConfigureResponse:

@@ -12,13 +12,14 @@ import msgspec
 import pytest
 
 from schemas.device import (
-    DeviceCommandKind,
+    ArmCommand,
     DeviceConfiguration,
     DeviceFault,
     DeviceMode,
     DeviceStatus,
     PressKind,
     PressRequest,
+    StopKind,
 )
 from services.cli import device, device_config, device_monitor, device_status
 from services.cli.device_press import PRESSES, press, request_of
@@ -78,7 +79,7 @@ def test_ctrl_c_stops_the_homing(session, rm1_device, capsys):
     with pytest.raises(CommandError, match="it was stopped") as error:
         home(session, [])
     assert error.value.code is ExitCode.CANCELLED
-    assert rm1_device.asked[-1].command is DeviceCommandKind.STOP
+    assert rm1_device.asked[-1] is StopKind.STOP
     assert "stopping: the joints slow down" in capsys.readouterr().out
 
 
@@ -173,7 +174,7 @@ def test_silent_sensors_are_an_error(session, rm1_device, monkeypatch):
 
 def test_an_output_is_switched_by_its_name(session, rm1_device, capsys):
     assert device.output(session, "avanzar", True) is ExitCode.OK
-    assert rm1_device.asked[-1].value == 1.0
+    assert rm1_device.asked[-1].on
     assert "output avanzar on done" in capsys.readouterr().out
     with pytest.raises(CommandError, match='no output "avansar": did you mean "avanzar"'):
         device.output(session, "avansar", True)
@@ -181,15 +182,15 @@ def test_an_output_is_switched_by_its_name(session, rm1_device, capsys):
 
 def test_a_speed_is_a_share_of_the_planned_one(session, rm1_device):
     assert device.speed(session, 50.0) is ExitCode.OK
-    assert rm1_device.asked[-1].value == 0.5
+    assert rm1_device.asked[-1].scale == 0.5
     with pytest.raises(CommandError, match="not in 0 to 100"):
         device.speed(session, 101.0)
 
 
 def test_arming_and_disarming_say_what_follows(session, rm1_device, capsys):
-    assert device.command(session, DeviceCommandKind.DISARM) is ExitCode.OK
+    assert device.command(session, "disarm") is ExitCode.OK
     assert "every joint is unreferenced" in capsys.readouterr().out
-    assert device.command(session, DeviceCommandKind.ARM) is ExitCode.OK
+    assert device.command(session, "arm") is ExitCode.OK
     assert "`gemelo home`" in capsys.readouterr().out
 
 
@@ -228,7 +229,7 @@ def test_pushing_disarms_configures_and_arms_again(session, rm1_device, capsys):
     rm1_device.configuration = msgspec.structs.replace(rm1_device.configuration, accepted=False)
     rm1_device.tell()
     assert device_config.push(session, yes=True) is ExitCode.OK
-    assert [each.command for each in rm1_device.asked] == [DeviceCommandKind.DISARM, DeviceCommandKind.ARM]
+    assert rm1_device.asked == [StopKind.DISARM, ArmCommand()]
     assert "no joint is referenced: `gemelo home` or `gemelo reference`" in capsys.readouterr().out
 
 

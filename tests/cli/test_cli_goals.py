@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from schemas.device import DeviceCommandKind
+from schemas.device import ReferenceCommand
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.planning import JointGoal, NamedGoal, PoseGoal, Refusal
 from services.arm.description import load_arm
@@ -119,6 +119,6 @@ def test_how_a_move_that_did_not_arrive_ends(status, interrupted, code):
 
 def test_a_reference_names_every_joint():
     request = reference_request(ARM, ["q1=90deg"])
-    assert request.command is DeviceCommandKind.REFERENCE
+    assert isinstance(request, ReferenceCommand)
     assert request.name == ARM.joint_names
     assert request.position == (pytest.approx(math.pi / 2), 0.0, 0.0)

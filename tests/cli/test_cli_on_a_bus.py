@@ -9,7 +9,14 @@ import pytest
 import yaml
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceMode
+from schemas.device import (
+    DeviceCommandRequest,
+    DeviceMode,
+    DeviceStopRequest,
+    ResetCommand,
+    ResumeCommand,
+    StopKind,
+)
 from schemas.planning import JointGoal, NamedGoal, PlanRequest, PoseGoal
 from schemas.topics import JOINT_STATES, JOINT_TARGETS
 from services.cli import device, nodes, state, topics, traffic
@@ -156,10 +163,18 @@ def test_pub_stamps_what_has_no_stamp(session, network, deployment, capsys):
     assert "published 2 x JointTargets" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("kind", list(DeviceCommandKind)[:4])
-def test_a_device_command_is_done_or_refused_in_the_devices_words(session, stack, kind, capsys):
+@pytest.mark.parametrize(
+    ("kind", "request_"),
+    [
+        ("hold", DeviceStopRequest(kind=StopKind.HOLD)),
+        ("resume", DeviceCommandRequest(command=ResumeCommand())),
+        ("stop", DeviceStopRequest()),
+        ("reset", DeviceCommandRequest(command=ResetCommand())),
+    ],
+)
+def test_a_device_command_is_done_or_refused_in_the_devices_words(session, stack, kind, request_, capsys):
     assert device.command(session, kind) is ExitCode.OK
-    assert stack.commands[-1].command is kind
+    assert stack.commands[-1] == request_
     stack.mode = DeviceMode.RUN
     with pytest.raises(CommandError, match=r"refused: the arm moves \(device mode RUN\)"):
         device.command(session, kind)
@@ -168,7 +183,7 @@ def test_a_device_command_is_done_or_refused_in_the_devices_words(session, stack
 def test_a_refusal_that_names_the_mode_is_not_followed_by_it(session, stack):
     stack.mode, stack.command_refusal = DeviceMode.RUN, "the device refuses RESUME in mode RUN"
     with pytest.raises(CommandError, match=r"in mode RUN$"):
-        device.command(session, DeviceCommandKind.RESUME)
+        device.command(session, "resume")
 
 
 def test_a_reference_says_where_the_joints_are_now(session, stack, capsys):

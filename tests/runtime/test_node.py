@@ -21,7 +21,8 @@ from services.runtime.bus import Answer
 from services.runtime.errors import NoAnswer, NodeNameTaken, Refused
 from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.requests import Pending, call
+from services.runtime.request_server import Pending
+from services.runtime.requests import call
 from tests.runtime.support import Buses, hear, spinning, until
 
 

@@ -5,11 +5,19 @@ from __future__ import annotations
 import time
 from itertools import pairwise
 
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceMode
+from schemas.device import DeviceCommandRequest, DeviceMode, DeviceStopRequest, ReferenceCommand, StopKind
 from schemas.joints import JointState
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.planning import JointGoal, PlanCode, PlanRequest
-from schemas.topics import DEVICE_COMMAND, DEVICE_SHAFT, DEVICE_STATE, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, PLAN
+from schemas.topics import (
+    DEVICE_COMMAND,
+    DEVICE_SHAFT,
+    DEVICE_STATE,
+    DEVICE_STOP,
+    FOLLOW_JOINT_TRAJECTORY,
+    JOINT_STATES,
+    PLAN,
+)
 from services.arm.description import load_arm
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.errors import GoalRefused, NoAnswer, Refused
@@ -103,13 +111,14 @@ class Operator:
         self.wait_for(lambda: self.device.message is not None and not self.device.is_stale, 1.0)
         match self.device.message.mode:
             case DeviceMode.UNREFERENCED:
-                request = self._where_it_stands()
+                wanted = self._where_it_stands()
+                answer = self.node.call(DEVICE_COMMAND, DeviceCommandRequest(command=wanted), timeout=3.0)
+                return [wanted] if answer.accepted else []
             case DeviceMode.HOLD:
-                request = DeviceCommandRequest(command=DeviceCommandKind.STOP)
+                answer = self.node.call(DEVICE_STOP, DeviceStopRequest(), timeout=3.0)
+                return [StopKind.STOP] if answer.accepted else []
             case _:
                 return []
-        answer = self.node.call(DEVICE_COMMAND, request, timeout=3.0)
-        return [request.command] if answer.accepted else []
 
     def _where_it_stands(self):
         """A person looks at the arm before declaring: a virtual one says where its shafts are."""
@@ -117,7 +126,7 @@ class Operator:
         seen = self.shaft.message
         positions = dict(zip(seen.name, seen.position, strict=True))
         clamped = tuple(joint.clamp(positions[joint.name]) for joint in self.arm.joints)
-        return DeviceCommandRequest(command=DeviceCommandKind.REFERENCE, name=self.arm.joint_names, position=clamped)
+        return ReferenceCommand(name=self.arm.joint_names, position=clamped)
 
 
 def jumps(arm, states):

@@ -18,12 +18,15 @@ from firmware.bindings.device import Device
 from schemas.actions import GoalStatusCode
 from schemas.device import (
     ConfigureResponse,
+    DeviceCommand,
     DeviceCommandKind,
     DeviceCommandRequest,
     DeviceCommandResponse,
     DeviceState,
+    DeviceStopRequest,
     PressRequest,
     PressResponse,
+    StopKind,
 )
 from schemas.device_config import DeviceConfig
 from schemas.joints import JointTargets
@@ -38,6 +41,7 @@ from schemas.motion import (
 from schemas.topics import Topic
 from services.arm.description import Arm, load_arm
 from services.arm.device_config import device_config, reference_steps
+from services.stepper_gateway.arguments import KINDS
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.goals import GoalVerdict
 from services.stepper_gateway.knots import Knot
@@ -177,15 +181,18 @@ class Rig:
         self._do(self.core.on_targets(targets, self.moment))
 
     def command(self, kind: DeviceCommandKind, ticket: int = 1, **positions: float) -> None:
-        self.ask(DeviceCommandRequest(command=kind, name=tuple(positions), position=tuple(positions.values())), ticket)
+        self.ask(asked(kind, name=tuple(positions), position=tuple(positions.values())), ticket)
 
-    def ask(self, request: DeviceCommandRequest, ticket: int = 1) -> None:
-        """Ask for a command; its answer comes in `answers`."""
-        self._do(self.core.on_command(request, ticket, self.moment))
+    def ask(self, wanted: DeviceCommand | StopKind, ticket: int = 1) -> None:
+        """Ask for a command or a stop; its answer comes in `answers`."""
+        if isinstance(wanted, StopKind):
+            self._do(self.core.on_stop(DeviceStopRequest(kind=wanted), ticket, self.moment))
+        else:
+            self._do(self.core.on_command(DeviceCommandRequest(command=wanted), ticket, self.moment))
 
-    def answer(self, request: DeviceCommandRequest, ticket: int = 1) -> DeviceCommandResponse:
-        """The answer to a command, once the next states have come too."""
-        self.ask(request, ticket)
+    def answer(self, wanted: DeviceCommand | StopKind, ticket: int = 1) -> DeviceCommandResponse:
+        """The answer to a command or a stop, once the next states have come too."""
+        self.ask(wanted, ticket)
         assert self.run(3.0, lambda: ticket in self.answers)
         self.run(0.1)
         return self.answers.pop(ticket)
@@ -294,6 +301,14 @@ class Rig:
                     self.pressed[ticket] = response
                 case LogLine(_, text):
                     self.log.append(text)
+
+
+def asked(kind: DeviceCommandKind, **fields: Any) -> DeviceCommand | StopKind:
+    """What a person asks for under the command's number on the wire, with those of `fields` that it has."""
+    if kind in (DeviceCommandKind.STOP, DeviceCommandKind.HOLD, DeviceCommandKind.DISARM):
+        return StopKind[kind.name]
+    command = next(command for command, number in KINDS.items() if number == kind)
+    return command(**{field: value for field, value in fields.items() if field in command.__struct_fields__})
 
 
 def _fitting(steps: tuple[int, ...], config: DeviceConfig) -> tuple[int, ...]:

@@ -4,16 +4,27 @@ from __future__ import annotations
 
 from dataclasses import replace as with_
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse, DeviceFault, DeviceMode
+from schemas.device import (
+    DeviceCommand,
+    DeviceCommandKind,
+    DeviceCommandResponse,
+    DeviceFault,
+    DeviceMode,
+    HomeCommand,
+    OutputCommand,
+    SpeedCommand,
+)
+from schemas.message import BadMessage, decode
 from schemas.topics import JOINT_STATES
 from services.arm.description import load_arm
 from services.arm.device_config import device_config
 from services.stepper_gateway.links.link import Kind
-from tests.stepper_gateway.harness import ROOT, Rig, assert_within_limits, move, rm1
+from tests.stepper_gateway.harness import ROOT, Rig, asked, assert_within_limits, move, rm1
 
 ARM, DISARM, HOME = DeviceCommandKind.ARM, DeviceCommandKind.DISARM, DeviceCommandKind.HOME
 OUTPUT, SPEED, RESET, STOP = (
@@ -25,7 +36,7 @@ FAR = (0.6, -1.2, 0.08)
 
 
 def ask(rig: Rig, kind: DeviceCommandKind, *names: str, output: str = "", value: float = 0.0) -> DeviceCommandResponse:
-    return rig.answer(DeviceCommandRequest(command=kind, name=names, output=output, value=value))
+    return rig.answer(asked(kind, name=names, output=output, on=value > 0.0, scale=value))
 
 
 def done(rig: Rig, kind: DeviceCommandKind, *names: str, output: str = "", value: float = 0.0) -> None:
@@ -167,7 +178,9 @@ def test_an_output_goes_on_and_off_by_its_name() -> None:
     done(rig, OUTPUT, output="avanzar", value=0.0)
     assert rig.state.outputs == ()
     assert 'did you mean "avanzar"' in ask(rig, OUTPUT, output="avansar", value=1.0).reason
-    assert "0 (off) or 1 (on)" in ask(rig, OUTPUT, output="avanzar", value=0.5).reason
+    half_on = msgspec.msgpack.encode({"type": "output", "output": "avanzar", "on": 0.5})
+    with pytest.raises(BadMessage, match="`bool`, got `float`"):
+        decode(OutputCommand, half_on)
 
 
 def test_an_output_does_not_disturb_a_goal() -> None:
@@ -181,13 +194,13 @@ def test_an_output_does_not_disturb_a_goal() -> None:
 @pytest.mark.parametrize(
     ("request_", "words"),
     [
-        (DeviceCommandRequest(command=HOME, name=("braso_joint",)), ("braso_joint", "brazo_joint")),
-        (DeviceCommandRequest(command=SPEED, value=1.2), ("0 (stands) to 1", "1.2")),
-        (DeviceCommandRequest(command=SPEED, value=-0.1), ("0 (stands) to 1",)),
+        (HomeCommand(name=("braso_joint",)), ("braso_joint", "brazo_joint")),
+        (SpeedCommand(scale=1.2), ("0 (stands) to 1", "1.2")),
+        (SpeedCommand(scale=-0.1), ("0 (stands) to 1",)),
     ],
 )
 def test_a_command_that_names_or_asks_what_is_not_there_is_refused(
-    request_: DeviceCommandRequest, words: tuple[str, ...]
+    request_: DeviceCommand, words: tuple[str, ...]
 ) -> None:
     rig = Rig().ready()
     reason = rig.answer(request_).reason
@@ -242,7 +255,7 @@ def test_the_speed_may_change_again_and_again_on_the_way() -> None:
     assert rig.goal(move(ZERO, FAR)).accepted
     for index, speed in enumerate((0.2, 0.9, 0.1, 0.5, 1.0, 0.4)):
         rig.run(0.7)
-        rig.ask(DeviceCommandRequest(command=SPEED, value=speed), index)
+        rig.ask(SpeedCommand(scale=speed), index)
     status, result = rig.finish(seconds=120.0)
     assert status == GoalStatusCode.SUCCEEDED, result.error_string
     assert_within_limits(rig)

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from paho.mqtt import publish
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceStatus
+from schemas.device import ArmCommand, DeviceStatus, ReferenceCommand, StopKind
 from schemas.device_config import config_crc, config_text
 from schemas.motion import FollowErrorCode
 from services.arm.device_config import device_config
@@ -145,7 +145,7 @@ def test_a_retained_configuration_of_another_robot_is_replaced_and_nothing_moves
     stale = replace(wanted, joints=(replace(wanted.joints[0], max_velocity_q8=400_000), *wanted.joints[1:]))
     with closing(Gateway(processes.port)) as gateway:
         gateway.ready()
-        assert gateway.command(DeviceCommandRequest(command=DeviceCommandKind.DISARM)).accepted
+        assert gateway.command(StopKind.DISARM).accepted
         publish.single(
             "gemelo/v1/rm1/config", config_text(stale), qos=1, retain=True, hostname="127.0.0.1", port=processes.port
         )
@@ -155,9 +155,9 @@ def test_a_retained_configuration_of_another_robot_is_replaced_and_nothing_moves
         )
         assert gateway.run(5.0, lambda: gateway.published["device/configuration"][-1].accepted)
         assert said(gateway).config_crc32 == config_crc(config_text(wanted))
-        for kind in (DeviceCommandKind.ARM, DeviceCommandKind.REFERENCE):
+        for kind in (ArmCommand(), ReferenceCommand()):
             gateway.run(0.4)
-            assert gateway.command(DeviceCommandRequest(command=kind)).accepted
+            assert gateway.command(kind).accepted
         gateway.run(0.4)
         assert gateway.goal(NEAR).accepted
         assert gateway.finish()[0] == GoalStatusCode.SUCCEEDED

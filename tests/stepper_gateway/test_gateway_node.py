@@ -11,7 +11,15 @@ from pathlib import Path
 import pytest
 
 from schemas.actions import GoalStatusCode
-from schemas.device import ConfigureRequest, DeviceCommandKind, DeviceCommandRequest, PressKind, PressRequest
+from schemas.device import (
+    ConfigureRequest,
+    DeviceCommandRequest,
+    PressKind,
+    PressRequest,
+    ReferenceCommand,
+    ResetCommand,
+    ResumeCommand,
+)
 from schemas.joints import JointState, JointTargets
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from schemas.scene import PlanningScene
@@ -101,16 +109,16 @@ def test_a_client_moves_cancels_streams_and_commands(running: Running) -> None:
         running.client.wait(0.1)
     assert running.here.position[0] == pytest.approx(0.3, abs=0.01)
     running.client.wait(1.5)
-    answer = running.client.call(DEVICE_COMMAND, DeviceCommandRequest(command=DeviceCommandKind.RESUME), 3.0)
+    answer = running.client.call(DEVICE_COMMAND, DeviceCommandRequest(command=ResumeCommand()), 3.0)
     assert not answer.accepted
     assert "NOT_READY" in answer.reason
-    answer = running.client.call(DEVICE_COMMAND, DeviceCommandRequest(command=DeviceCommandKind.REFERENCE), 3.0)
+    answer = running.client.call(DEVICE_COMMAND, DeviceCommandRequest(command=ReferenceCommand()), 3.0)
     assert answer.accepted
     running.until(lambda: running.here.position == (0.0, 0.0, 0.0))
     assert running.client.call(DEVICE_CONFIGURE, ConfigureRequest(), 8.0).accepted
     pressed = running.client.call(DEVICE_PRESS, PressRequest(press=PressKind.ESTOP), 5.0)
     assert pressed.accepted, pressed.reason
-    answer = running.client.call(DEVICE_COMMAND, DeviceCommandRequest(command=DeviceCommandKind.RESET), 3.0)
+    answer = running.client.call(DEVICE_COMMAND, DeviceCommandRequest(command=ResetCommand()), 3.0)
     assert "release it" in answer.reason
 
 

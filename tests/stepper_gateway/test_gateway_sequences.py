@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceMode
+from schemas.device import DeviceCommandKind, DeviceMode, HomeCommand, ReferenceCommand
 from schemas.joints import JointTargets
 from schemas.message import Vector
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from schemas.topics import JOINT_STATES
-from tests.stepper_gateway.harness import Rig, Wire, assert_within_limits, move, rm1
+from tests.stepper_gateway.harness import Rig, Wire, asked, assert_within_limits, move, rm1
 
 JOINTS = rm1().joints
 LONGEST_GOAL = 12.0  # [s] of path and bridge
@@ -61,16 +61,14 @@ class Play:
         self.tickets += 1
         is_reference = kind == DeviceCommandKind.REFERENCE
         here = dict(zip(rm1().joint_names, self.here(), strict=True)) if is_reference else {}
-        request = DeviceCommandRequest(
-            command=kind, name=tuple(here), position=tuple(here.values()), output="avanzar", value=value
-        )
-        self.rig.ask(request, self.tickets)
+        fields = {"name": tuple(here), "position": tuple(here.values()), "output": "avanzar", "on": value > 0.0}
+        self.rig.ask(asked(kind, **fields, scale=value), self.tickets)
 
     def home(self, seconds: float) -> None:
         """One joint looks for its switch, for so long; its way is not the gateway's, and its count jumps."""
         self.finish_track()
         self.tickets += 1
-        self.rig.ask(DeviceCommandRequest(command=DeviceCommandKind.HOME, name=("efector_joint",)), self.tickets)
+        self.rig.ask(HomeCommand(name=("efector_joint",)), self.tickets)
         if self.rig.run(0.5, lambda: self.rig.device.mode == DeviceMode.HOMING):
             self.rig.run(seconds, lambda: self.rig.device.mode != DeviceMode.HOMING)
             if self.rig.device.mode == DeviceMode.HOMING:
@@ -100,7 +98,7 @@ class Play:
         """A homing that was stopped beyond the limits is brought back by hand, and declared."""
         if self.rig.device.mode == DeviceMode.UNREFERENCED:
             self.tickets += 1
-            self.rig.ask(DeviceCommandRequest(command=DeviceCommandKind.REFERENCE), self.tickets)
+            self.rig.ask(ReferenceCommand(), self.tickets)
             self.rig.run(0.5)
             self.quiet_since = len(self.rig.path)
             device = self.rig.device

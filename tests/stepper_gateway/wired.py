@@ -12,11 +12,14 @@ from typing import Any, TypeVar
 from schemas.actions import GoalStatusCode
 from schemas.device import (
     ConfigureResponse,
+    DeviceCommand,
     DeviceCommandRequest,
     DeviceCommandResponse,
     DeviceState,
+    DeviceStopRequest,
     PressRequest,
     PressResponse,
+    StopKind,
 )
 from schemas.motion import FollowJointTrajectoryGoal, FollowJointTrajectoryResult
 from services.stepper_gateway.core import GatewayCore
@@ -104,9 +107,12 @@ class Gateway:
         self.do(self.core.on_press(request, 1, self.moment))
         return self._answer(PressResponse)
 
-    def command(self, request: DeviceCommandRequest) -> DeviceCommandResponse:
+    def command(self, wanted: DeviceCommand | StopKind) -> DeviceCommandResponse:
         """The answer of the device."""
-        self.do(self.core.on_command(request, 1, self.moment))
+        if isinstance(wanted, StopKind):
+            self.do(self.core.on_stop(DeviceStopRequest(kind=wanted), 1, self.moment))
+        else:
+            self.do(self.core.on_command(DeviceCommandRequest(command=wanted), 1, self.moment))
         return self._answer(DeviceCommandResponse)
 
     def configure(self) -> ConfigureResponse:
