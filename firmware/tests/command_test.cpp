@@ -46,6 +46,20 @@ TEST(Command, OfAStaleLifeOrTimeDoesNothing) {
         << "the retained one was not counted as done";
 }
 
+TEST(Command, ThatStopsIsTakenByWhateverBootIsThere) {
+    Rig rig;
+    rig.send(quintic({0, 0}, {3000, 0}).whole());
+    rig.run_ms(300);
+    EXPECT_EQ(rig.send_command(build_command(Command::Resume, 1, {}, kNever, 0)), Code::WrongBoot);
+    EXPECT_EQ(rig.send_command(build_command(Command::Disarm, 2, {}, kNever, 0)), Code::NotReady);
+    EXPECT_EQ(rig.send_command(build_command(Command::Hold, 3, {}, kNever, 0)), Code::Ok);
+    EXPECT_EQ(rig.send_command(build_command(Command::Stop, 4, {}, kNever, 0)), Code::Ok);
+    EXPECT_EQ(rig.send_command(build_command(Command::Stop, 5, {}, kNever, 0), true), Code::Retained);
+    EXPECT_EQ(rig.mode(), Mode::Hold);
+    rig.run_until_idle();
+    EXPECT_EQ(rig.send_command(build_command(Command::Disarm, 6, {}, kNever, 0)), Code::Ok);
+}
+
 TEST(Reference, IsTakenAtRestOnly) {
     Rig rig;
     rig.send(quintic({0, 0}, {3000, 0}).whole());

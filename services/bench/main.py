@@ -45,7 +45,7 @@ ALONE = (
     "estop_reaction_ticks",
     "cli_start_ms",
 )  # before any stack disturbs them
-ON_A_STACK = ("stack_idle_cpu_percent", "stack_rss_mb", "state_to_frame_ms", "move_accept_to_first_step_ms")
+ON_A_STACK = ("stack_idle_cpu_percent", "stack_rss_mb", "state_to_frame_ms", "move_accept_to_first_step_ms", "stop_ms")
 BROKERS = {"chunk_ack_ms": "mosquitto", "chunk_ack_ms_amqtt": "amqtt"}
 CHIP = ("tick_instructions", "slot_instructions", "core_text_bytes", "core_ram_bytes")
 LAST = ("ready_s",)

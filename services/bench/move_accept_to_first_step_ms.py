@@ -72,14 +72,14 @@ def measure(stacks: Stacks) -> Figure:
     return of_samples(sharp, UNIT, GOAL, reference=reference, note=note)
 
 
-def sharp_start(arm: Arm, here: Vector, direction: float) -> JointTrajectory:
-    """The first joint speeds up and slows down evenly, a parabola each."""
+def sharp_start(arm: Arm, here: Vector, direction: float, ramp: float = RAMP) -> JointTrajectory:
+    """The first joint speeds up and slows down evenly, a parabola of `ramp` [s] each."""
     joint = arm.joints[0]
     acceleration = SHARE * joint.acceleration * direction
     points = []
-    for time, way, speed in ((0.0, 0.0, 0.0), (RAMP, 0.5, 1.0), (2 * RAMP, 1.0, 0.0)):
-        position = (here[0] + way * acceleration * RAMP**2, *here[1:])
-        velocity = (speed * acceleration * RAMP, *(0.0 for _ in here[1:]))
+    for time, way, speed in ((0.0, 0.0, 0.0), (ramp, 0.5, 1.0), (2 * ramp, 1.0, 0.0)):
+        position = (here[0] + way * acceleration * ramp**2, *here[1:])
+        velocity = (speed * acceleration * ramp, *(0.0 for _ in here[1:]))
         points.append(TrajectoryPoint(positions=position, velocities=velocity, time_from_start=time))
     return JointTrajectory(joint_names=arm.joint_names, points=tuple(points))
 

@@ -94,7 +94,7 @@ class Waiting:
         """Takes a place for `client`; or, if there is none, says why."""
         with self._lock:
             if self._of[client] >= MOST_OF_A_CLIENT:
-                return f"{self._key}: {MOST_OF_A_CLIENT} requests of this client are waiting already"
+                return f"{self._key}: {MOST_OF_A_CLIENT} requests are waiting already, all of this client"
             if self._of.total() >= MOST_WAITING:
                 return f"{self._key}: {MOST_WAITING} requests are waiting already"
             self._of[client] += 1

@@ -199,10 +199,13 @@ class Rig:
 
     def configure(self) -> ConfigureResponse:
         """The answer to a request for the configuration."""
-        self._do(self.core.on_configure(1, self.moment))
+        self.ask_configuration(1)
         assert self.run(6.0, lambda: 1 in self.configured)
         self.run(0.1)
         return self.configured.pop(1)
+
+    def ask_configuration(self, ticket: int) -> None:
+        self._do(self.core.on_configure(ticket, self.moment))
 
     def press(self, request: PressRequest, ticket: int = 1) -> None:
         self._do(self.core.on_press(request, ticket, self.moment))

@@ -1,0 +1,167 @@
+"""Urgent requests pass everything that waits, and one client's flood shuts out nobody, on either bus."""
+
+from __future__ import annotations
+
+import msgspec
+
+from schemas.actions import CancelRequest, CancelResponse, GoalRequest, GoalResponse
+from schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
+from schemas.message import Message, decode, encode
+from schemas.motion import FollowJointTrajectoryGoal
+from schemas.planning import PlanCode, PlanRequest, PlanResponse
+from schemas.system import Failure
+from schemas.topics import DEVICE_STOP, PLAN
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
+from services.runtime import action_keys as keys
+from services.runtime.action_server import accept
+from services.runtime.bus import Answer, Bus
+from services.runtime.request_server import MOST_OF_A_CLIENT, MOST_UNANSWERED, MOST_WAITING, Pending
+from tests.runtime.support import Buses, hear, spinning, until
+
+Answers = list[Answer | None]
+
+
+def ask(client: Bus, key: str, question: Message, answers: Answers, timeout: float = 5.0) -> None:
+    client.ask(key, type(question).__name__, encode(question), timeout, answers.append, True)
+
+
+def words(answer: Answer | None) -> str:
+    assert answer is not None
+    return decode(Failure, answer.payload).message
+
+
+def test_an_urgent_request_is_handled_before_all_that_waits(buses: Buses) -> None:
+    server, client = buses.node("gateway"), buses.open()
+    handled: list[str] = []
+    server.serve(PLAN, lambda request: handled.append("plan") or PlanResponse())
+    server.serve(DEVICE_STOP, lambda request: handled.append("stop") or DeviceCommandResponse(accepted=True))
+    assert client.wait_served(PLAN.key, 1.0)
+    assert client.wait_served(DEVICE_STOP.key, 1.0)
+    answers: Answers = []
+    for _ in range(MOST_OF_A_CLIENT):
+        ask(client, PLAN.key, PlanRequest(), answers)
+    refused: Answers = []
+    ask(client, PLAN.key, PlanRequest(), refused)  # its answer says that the others have arrived
+    assert until(lambda: len(refused) == 1)
+    stopped: Answers = []
+    ask(client, DEVICE_STOP.key, DeviceStopRequest(), stopped)
+    assert until(lambda: _received(server) == 1)
+    assert hear(server, lambda: len(handled) == MOST_OF_A_CLIENT + 1)
+    assert handled == ["stop"] + ["plan"] * MOST_OF_A_CLIENT
+
+
+def test_equal_stops_that_wait_are_handled_once_and_all_answered(buses: Buses) -> None:
+    server, client = buses.node("gateway"), buses.open()
+    handled: list[StopKind] = []
+    server.serve(DEVICE_STOP, lambda request: handled.append(request.kind) or DeviceCommandResponse(accepted=True))
+    assert client.wait_served(DEVICE_STOP.key, 1.0)
+    answers: Answers = []
+    for _ in range(200):
+        ask(client, DEVICE_STOP.key, DeviceStopRequest(), answers)
+    ask(client, DEVICE_STOP.key, DeviceStopRequest(kind=StopKind.HOLD), answers)
+    assert until(lambda: _received(server) == 201)
+    with spinning(server):
+        assert until(lambda: len(answers) == 201)
+    assert handled == [StopKind.STOP, StopKind.HOLD]
+    assert all(answer is not None and answer.ok for answer in answers)
+
+
+def _received(server) -> int:
+    return sum(each.received for each in server._declared.statistics() if each.key == DEVICE_STOP.key)
+
+
+def test_stops_are_carried_out_however_many_callers_wait(buses: Buses) -> None:
+    server, client = buses.node("gateway"), buses.open()
+    pendings: list[Pending[DeviceCommandResponse]] = []
+    server.serve_later(DEVICE_STOP, lambda request, pending: pendings.append(pending))
+    assert client.wait_served(DEVICE_STOP.key, 1.0)
+    answers: Answers = []
+    for _ in range(MOST_UNANSWERED + 1):
+        ask(client, DEVICE_STOP.key, DeviceStopRequest(), answers)
+    assert until(lambda: len(answers) == 1)
+    assert "taken; 1024 callers wait for its answer already" in words(answers[0])
+    assert hear(server, lambda: pendings)
+    taken = len(pendings)
+    ask(client, DEVICE_STOP.key, DeviceStopRequest(), answers)
+    assert hear(server, lambda: len(pendings) == taken + 1)
+
+
+def test_a_bad_stop_is_refused_where_it_arrives(buses: Buses) -> None:
+    server, client = buses.node("gateway"), buses.open()
+    server.serve(DEVICE_STOP, lambda request: DeviceCommandResponse(accepted=True))
+    assert client.wait_served(DEVICE_STOP.key, 1.0)
+    answers: Answers = []
+    client.ask(DEVICE_STOP.key, "DeviceStopRequest", b"\x81\xa4kind\xa3fly", 2.0, answers.append, True)
+    assert until(lambda: len(answers) == 1)
+    assert "fly" in words(answers[0])
+
+
+def test_the_flood_of_one_client_leaves_room_for_another(buses: Buses) -> None:
+    server, flooder, client = buses.node("planner"), buses.open(), buses.open()
+    server.serve(PLAN, lambda request: PlanResponse(code=PlanCode.SUCCESS))
+    assert flooder.wait_served(PLAN.key, 1.0)
+    assert client.wait_served(PLAN.key, 1.0)
+    flood: Answers = []
+    for _ in range(MOST_WAITING):
+        ask(flooder, PLAN.key, PlanRequest(), flood)
+    assert until(lambda: len(flood) == MOST_WAITING - MOST_OF_A_CLIENT)
+    assert "requests are waiting already, all of this client" in words(flood[0])
+    answers: Answers = []
+    ask(client, PLAN.key, PlanRequest(), answers)
+    with spinning(server):
+        assert until(lambda: len(answers) == 1)
+    assert answers[0] is not None
+    assert answers[0].ok
+
+
+def test_what_a_stop_has_overtaken_is_refused(buses: Buses) -> None:
+    server, client = buses.node("gateway"), buses.open()
+    started: list[str] = []
+    action = server.serve_action(FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: "")
+
+    def stop(request: DeviceStopRequest) -> DeviceCommandResponse:
+        action.refuse_waiting("stop was asked for after it: ask again")
+        return DeviceCommandResponse(accepted=True)
+
+    server.serve(DEVICE_STOP, stop)
+    goal_key = keys.goal_request(FOLLOW).key
+    assert client.wait_served(goal_key, 1.0)
+    assert client.wait_served(DEVICE_STOP.key, 1.0)
+    goals: Answers = []
+    for _ in range(MOST_OF_A_CLIENT + 1):  # the answer to the last one says that the others have arrived
+        ask(client, goal_key, _goal("early"), goals)
+    assert until(lambda: len(goals) == 1)
+    stops: Answers = []
+    ask(client, DEVICE_STOP.key, DeviceStopRequest(), stops)
+    assert until(lambda: _received(server) == 1)
+    with spinning(server):
+        assert until(lambda: len(goals) == MOST_OF_A_CLIENT + 1 and len(stops) == 1)
+        assert "was asked for after it" in words(goals[1])
+        assert not started
+        ask(client, goal_key, _goal("later"), goals)
+        assert until(lambda: started == ["later"])
+
+
+def test_a_goal_that_its_own_cancel_has_overtaken_does_not_start(buses: Buses) -> None:
+    server, client = buses.node("gateway"), buses.open()
+    started: list[str] = []
+    server.serve_action(FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: "")
+    goal_key, cancel_key = keys.goal_request(FOLLOW).key, keys.cancel_request(FOLLOW).key
+    assert client.wait_served(goal_key, 1.0)
+    assert client.wait_served(cancel_key, 1.0)
+    with spinning(server):
+        cancels: Answers = []
+        ask(client, cancel_key, CancelRequest(goal_id="g"), cancels)
+        assert until(lambda: len(cancels) == 1)
+        assert cancels[0] is not None
+        assert "within 2 s is refused" in decode(CancelResponse, cancels[0].payload).reason
+        goals: Answers = []
+        ask(client, goal_key, _goal("g"), goals)
+        assert until(lambda: len(goals) == 1)
+    assert goals[0] is not None
+    assert decode(GoalResponse, goals[0].payload).reason == "it was cancelled before it was looked at"
+    assert not started
+
+
+def _goal(goal_id: str) -> GoalRequest:
+    return GoalRequest(goal_id=goal_id, client="c", goal=msgspec.Raw(encode(FollowJointTrajectoryGoal())))

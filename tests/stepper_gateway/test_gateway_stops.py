@@ -1,0 +1,163 @@
+"""A stop gets through whatever is not known of the device, whatever is unanswered, and however often it is said."""
+
+from __future__ import annotations
+
+import pytest
+
+from schemas.actions import GoalStatusCode
+from schemas.device import DeviceMode, PressKind, PressRequest, StopKind
+from services.stepper_gateway.links.frames import Command, decode
+from services.stepper_gateway.links.link import Kind
+from tests.stepper_gateway.harness import Rig, assert_within_limits, move
+
+ZERO = (0.0, 0.0, 0.0)
+FAR = (1.2, -1.2, 0.08)
+
+
+def moving() -> Rig:
+    """A rig whose arm is in the middle of a goal."""
+    rig = Rig().ready()
+    assert rig.goal(move(ZERO, FAR)).accepted
+    rig.run(1.0)
+    assert rig.device.mode == DeviceMode.RUN
+    return rig
+
+
+def restarted(*lost: Kind) -> Rig:
+    """A rig whose gateway has restarted in the middle of a move, and hears nothing of these kinds."""
+    rig = moving()
+    rig.lost = set(lost)
+    rig.new_gateway()
+    rig.run(0.1)
+    assert rig.device.mode == DeviceMode.RUN
+    return rig
+
+
+def commands(rig: Rig) -> list[Command]:
+    frames = [decode(payload) for _, kind, payload in rig.sent if kind == Kind.CMD]
+    return [frame for frame in frames if isinstance(frame, Command)]
+
+
+def stands(rig: Rig) -> bool:
+    return rig.device.mode not in (DeviceMode.RUN, DeviceMode.HOLD)
+
+
+@pytest.mark.parametrize(
+    ("lost", "unknown"),
+    [
+        ((Kind.SYNC_R,), "the clock of device"),
+        ((Kind.STATUS,), "has not said yet who it is"),
+        ((Kind.STATUS, Kind.SYNC_R), "has not said yet who it is"),
+        ((Kind.STATE, Kind.STATUS), "has not been heard"),
+    ],
+)
+def test_a_stop_needs_neither_clock_nor_status_nor_boot_and_says_afterwards_what_is_not_known(
+    lost: tuple[Kind, ...], unknown: str
+) -> None:
+    rig = restarted(*lost)
+    before = rig.now
+    rig.ask(StopKind.STOP, 7)
+    assert rig.run(0.05, lambda: 7 in rig.answers)
+    assert rig.answers[7].accepted
+    assert unknown in rig.answers[7].reason
+    assert rig.run(2.0, lambda: stands(rig))
+    assert next(at for at, kind, _ in rig.sent if kind == Kind.CMD and at >= before) == before
+    assert_within_limits(rig)
+
+
+def test_a_hold_without_a_clock_stands_on_the_path() -> None:
+    rig = restarted(Kind.SYNC_R)
+    rig.ask(StopKind.HOLD, 7)
+    assert rig.run(0.05, lambda: 7 in rig.answers)
+    assert rig.answers[7].accepted
+    assert rig.device.mode == DeviceMode.HOLD
+
+
+def test_a_stop_that_comes_late_by_a_wrong_clock_is_sent_again_without_one() -> None:
+    rig = moving()
+    for _ in range(64):  # the machine has slept: its clock stands behind what the exchanges have said
+        rig.core.mover.session.clock.add(0, 1, 1, 100)
+    rig.ask(StopKind.STOP, 7)
+    assert rig.run(0.1, lambda: 7 in rig.answers)
+    assert rig.answers[7].accepted
+    assert rig.run(2.0, lambda: stands(rig))
+
+
+def test_a_stop_reaches_a_boot_that_the_gateway_has_not_met_yet() -> None:
+    rig = moving()
+    rig.lost = {Kind.STATE, Kind.STATUS}
+    rig.reboot(99)
+    rig.ask(StopKind.STOP, 7)
+    assert rig.run(0.1, lambda: 7 in rig.answers)
+    assert rig.answers[7].accepted
+
+
+def test_a_stop_leaves_at_once_with_a_configuration_and_twenty_presses_unanswered() -> None:
+    rig = moving()
+    rig.lost = {Kind.CONFIG, Kind.PRESS}
+    rig.ask_configuration(500)
+    for number in range(20):
+        rig.press(PressRequest(press=PressKind.ESTOP), 1000 + number)
+    before = rig.now
+    rig.ask(StopKind.STOP, 7)
+    assert [at for at, kind, _ in rig.sent if kind == Kind.CMD] == [before]
+    assert rig.run(0.1, lambda: 7 in rig.answers)
+    assert rig.finish()[0] == GoalStatusCode.ABORTED
+
+
+def test_repeated_stops_cost_one_frame_and_are_all_answered() -> None:
+    rig = moving()
+    for ticket in range(1, 201):
+        rig.ask(StopKind.STOP, ticket)
+    assert len(commands(rig)) == 1
+    assert rig.run(0.1, lambda: len(rig.answers) == 200)
+    assert all(answer.accepted for answer in rig.answers.values())
+    assert rig.finish()[0] == GoalStatusCode.ABORTED
+
+
+def test_a_stop_of_a_later_motion_is_not_taken_for_the_earlier_one() -> None:
+    rig = moving()
+    rig.ask(StopKind.STOP, 1)
+    assert rig.finish()[0] == GoalStatusCode.ABORTED
+    assert rig.goal(move(rig.position, ZERO), "h").accepted
+    rig.run(0.5)
+    rig.ask(StopKind.STOP, 2)
+    assert rig.finish("h")[0] == GoalStatusCode.ABORTED
+    assert len({frame.cmd_id for frame in commands(rig)}) == 2
+
+
+def test_a_stop_to_a_silent_device_says_that_it_was_sent_and_nothing_more() -> None:
+    rig = moving()
+    rig.device_is_on = False
+    rig.ask(StopKind.STOP, 7)
+    assert rig.run(3.0, lambda: 7 in rig.answers)
+    assert not rig.answers[7].accepted
+    assert rig.answers[7].sent
+    assert "has not answered STOP in time" in rig.answers[7].reason
+    assert "silent" in rig.answers[7].reason
+
+
+def test_a_stop_without_a_link_says_that_it_could_not_be_sent() -> None:
+    rig = moving()
+    rig.link(False)
+    rig.ask(StopKind.STOP, 7)
+    assert rig.run(3.0, lambda: 7 in rig.answers)
+    assert not rig.answers[7].sent
+    assert "the device holds by itself" in rig.answers[7].reason
+
+
+def test_a_stop_asked_for_without_a_link_leaves_with_the_link() -> None:
+    rig = moving()
+    rig.link(False)
+    rig.ask(StopKind.STOP, 7)
+    rig.run(0.3)
+    rig.link(True)
+    assert rig.run(0.1, lambda: 7 in rig.answers)
+    assert rig.answers[7].accepted
+
+
+def test_disarm_is_refused_while_a_goal_moves_the_arm() -> None:
+    rig = moving()
+    rig.ask(StopKind.DISARM, 7)
+    assert "cancel it or run `gemelo stop` before DISARM" in rig.answers[7].reason
+    assert not commands(rig)
