@@ -7,8 +7,8 @@ import time
 
 from services.bench.figure import Figure, Goal, NotMeasured, of_samples
 from services.bench.stacks import Stacks
-from services.cli.stack import Stack
 from services.runtime.deployment import project_root
+from services.stack.stack import Stack
 
 UNIT = "s"
 GOAL = Goal(median=8.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import psutil
 
-from services.cli.stack import Stack
+from services.stack.stack import Stack
 
 
 def families(stack: Stack) -> dict[str, list[psutil.Process]]:

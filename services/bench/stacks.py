@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from schemas.deployment import Deployment
 from services.arm.description import Arm, load_arm
 from services.bench.figure import NotMeasured
-from services.cli.stack import Stack
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.node import Node
+from services.stack.stack import Stack
 
 
 @dataclass(frozen=True)

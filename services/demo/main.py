@@ -15,11 +15,11 @@ from pathlib import Path
 import msgspec
 
 from services.arm.description import load_arm
-from services.cli.stack import Stack, StackError
 from services.demo.performance import Performance
 from services.demo.report import complaints, report_of, text_of
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.node import Node
+from services.stack.stack import Stack, StackError
 
 MOSQUITTO = (shutil.which("mosquitto"), shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin"))
 

@@ -17,8 +17,8 @@ import pytest
 
 from schemas.deployment import MqttSection
 from services.broker import mosquitto
-from services.cli.stack import free_ports
 from services.runtime.deployment import project_root
+from services.stack.stack import free_ports
 
 BROKERS = ["amqtt", "mosquitto"]
 

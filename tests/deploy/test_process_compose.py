@@ -8,8 +8,8 @@ import tomllib
 import yaml
 
 from schemas.topics import ACTIONS, REQUESTS, TOPICS
-from services.cli.stack import PROCESSES
 from services.runtime.deployment import project_root
+from services.stack.stack import PROCESSES
 
 ROOT = project_root()
 COMPOSE = yaml.safe_load((ROOT / "process-compose.yaml").read_text())

@@ -16,7 +16,7 @@ from schemas.frames import Transform
 from schemas.scene import BoxShape, PlanningScene, SceneObject, SceneRequest
 from schemas.topics import DEVICE_SHAFT, SCENE, SCENE_EDIT, STEP_ERRORS
 from services.arm.kinematics import Kinematics
-from services.cli.stack import Stack
+from services.stack.stack import Stack
 from tests.stack.person import Operator, jumps
 
 NEEDED = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from services.cli.stack import Stack
+from services.stack.stack import Stack
 from tests.stack.person import Operator
 
 

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 from services.cli.exits import ExitCode
-from services.cli.stack import Stack
+from services.stack.stack import Stack
 
 LONGEST = 120.0  # [s] of one command
 COMMAND = (sys.executable, "-m", "services.cli.main")

@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from services.cli.exits import ExitCode
-from services.cli.stack import Stack
+from services.stack.stack import Stack
 from tests.stack.gemelo import gemelo
 
 

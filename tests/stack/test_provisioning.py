@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from services.cli.exits import ExitCode
-from services.cli.stack import Stack
+from services.stack.stack import Stack
 from tests.stack.gemelo import gemelo
 
 PASSWORD = "correct horse battery"

@@ -11,7 +11,7 @@ from schemas.motion import FollowJointTrajectoryGoal
 from schemas.planning import NamedGoal, PlanCode, PlanRequest
 from schemas.topics import PLAN, STEP_ERRORS
 from services.arm.kinematics import Kinematics
-from services.cli.stack import Stack
+from services.stack.stack import Stack
 from tests.stack.gemelo import gemelo
 from tests.stack.person import Operator, jumps
 

@@ -13,7 +13,7 @@ import pytest
 
 from schemas.actions import GoalStatusCode
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
-from services.cli.stack import Stack
+from services.stack.stack import Stack
 from tests.stack.person import jumps
 
 

@@ -1,4 +1,4 @@
-"""What `make up` looks at before it starts anything, so that a mistake is said once: deployment, arm, ports."""
+"""The checks that `make up` runs before it starts a process: the deployment file, the arm's files and free ports."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from services.runtime.deployment import load_deployment, project_root
 from services.runtime.ports import PortTaken, require_free
 
 
-def troubles(deployment: Deployment) -> list[str]:
-    """Every reason why this deployment cannot start here, a sentence each."""
+def start_problems(deployment: Deployment) -> list[str]:
+    """Every reason why this deployment cannot start on this machine, one sentence each; empty if it can."""
     found = []
     try:
         load_arm(project_root() / deployment.robot)
@@ -31,13 +31,13 @@ def troubles(deployment: Deployment) -> list[str]:
 
 
 def main() -> int:
-    """`python -m services.cli.preflight`: 0 where nothing stands in the way."""
+    """`python -m services.stack.start_check`: prints every problem to stderr; 0 if there is none, else 1."""
     try:
-        found = troubles(load_deployment())
+        found = start_problems(load_deployment())
     except ConfigurationError as error:
         found = [str(error)]
-    for trouble in found:
-        print(f"gemelo: {trouble}", file=sys.stderr)
+    for problem in found:
+        print(f"gemelo: {problem}", file=sys.stderr)
     return 1 if found else 0
 
 

@@ -1,4 +1,4 @@
-"""What `make up` says before it starts anything."""
+"""The checks that `make up` runs before it starts a process."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import msgspec
 import pytest
 
 from schemas.deployment import Deployment, MqttSection, RouterSection, ViewerMode, ViewerSection
-from services.cli.preflight import main, troubles
-from services.cli.stack import free_ports
+from services.stack.stack import free_ports
+from services.stack.start_check import main, start_problems
 
 
 @pytest.fixture
@@ -21,12 +21,12 @@ def free() -> Deployment:
 
 
 def test_nothing_stands_in_the_way_of_free_ports_and_a_good_arm(free):
-    assert troubles(free) == []
+    assert start_problems(free) == []
 
 
 def test_every_taken_port_is_said_at_once(free):
     with socket.create_server(("127.0.0.1", free.router.port)), socket.create_server(("127.0.0.1", free.viewer.port)):
-        router, viewer = troubles(free)
+        router, viewer = start_problems(free)
     assert "GEMELO_ROUTER_PORT" in router
     assert "GEMELO_VIEWER_PORT" in viewer
 
@@ -34,12 +34,12 @@ def test_every_taken_port_is_said_at_once(free):
 def test_ports_of_a_viewer_that_is_not_wanted_do_not_matter(free):
     viewer = msgspec.structs.replace(free.viewer, mode=ViewerMode.NONE)
     with socket.create_server(("127.0.0.1", free.viewer.port)):
-        assert troubles(msgspec.structs.replace(free, viewer=viewer)) == []
+        assert start_problems(msgspec.structs.replace(free, viewer=viewer)) == []
 
 
 def test_an_arm_that_is_not_there_is_named(free):
-    (trouble,) = troubles(msgspec.structs.replace(free, robot="urdf/nobody"))
-    assert "urdf/nobody" in trouble
+    (problem,) = start_problems(msgspec.structs.replace(free, robot="urdf/nobody"))
+    assert "urdf/nobody" in problem
 
 
 def test_a_word_that_the_deployment_does_not_know_is_refused_with_those_it_does(monkeypatch, capsys):

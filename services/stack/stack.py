@@ -1,4 +1,4 @@
-"""The whole stack as a user starts it: process-compose on free ports, in folders of its own."""
+"""The whole stack for tests, demo and bench: process-compose on free ports, with run and output folders of its own."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
-from services.cli.compose import Compose, ComposeError
 from services.runtime.deployment import project_root
+from services.stack.compose import Compose, ComposeError
 
 PROCESSES = (
     "router",
@@ -33,7 +33,7 @@ STOP = 20.0  # [s] for all to end by themselves
 
 
 class StackError(Exception):
-    """The stack did not do what was asked; the text holds the end of the logs that matter."""
+    """The stack did not start or did not do what was asked; the text holds the end of the logs concerned."""
 
 
 class Stack:
@@ -98,7 +98,7 @@ class Stack:
         self.stop()
 
     def start(self) -> None:
-        """Starts every process and waits until all are ready; sets `ready_seconds`."""
+        """Starts every process and waits until all are ready; sets `ready_seconds` [s]; raises `StackError`."""
         self.run.mkdir(parents=True, exist_ok=True)
         self.out.mkdir(parents=True, exist_ok=True)
         started = time.monotonic()
@@ -122,7 +122,7 @@ class Stack:
         self.ready_seconds = time.monotonic() - started
 
     def stop(self) -> int | None:
-        """Ends all processes as Ctrl-C would; the exit code of process-compose."""
+        """Ends all processes as Ctrl-C would; returns the exit code of process-compose, None if it did not run."""
         server, self.server = self.server, None
         code = None
         if server is not None:
@@ -143,7 +143,7 @@ class Stack:
         return server.wait()
 
     def wait_ready(self, timeout: float, names: Sequence[str] | None = None) -> None:
-        """Waits until all processes, or `names`, say that their state is valid; raises `StackError`."""
+        """Waits until all processes, or `names`, are ready; raises `StackError` after `timeout` [s]."""
         wanted = tuple(names or self.processes)
         deadline = time.monotonic() + timeout
         missing = wanted
@@ -158,7 +158,7 @@ class Stack:
         raise StackError(f"not ready after {timeout:.0f} s: {', '.join(missing)}\n{tails}")
 
     def is_ready(self, name: str) -> bool:
-        """Whether `name` says that its state is valid: the file that deploy/probe looks at."""
+        """True if `name` touched the file that deploy/probe looks at within the last 3 s."""
         try:
             return time.time() - (self.run / f"{name}.ready").stat().st_mtime < 3.0
         except FileNotFoundError:
@@ -174,7 +174,10 @@ class Stack:
         return {state.name: state.pid for state in self.compose.processes() if state.is_running}
 
     def kill(self, name: str, number: signal.Signals = signal.SIGKILL) -> int:
-        """Sends `number` to the process itself, and also clears what it said of its readiness; the pid."""
+        """Sends signal `number` to the process and, for SIGKILL, removes its ready file; returns its process id.
+
+        Raises `StackError` if it does not run.
+        """
         pid = self.pid(name)
         if pid == 0:
             raise StackError(f"{name} does not run")
@@ -184,19 +187,19 @@ class Stack:
         return pid
 
     def logs(self, name: str) -> str:
-        """Everything that `name` has printed."""
+        """Everything that `name` has printed; empty if nothing."""
         try:
             return (self.out / "logs" / f"{name}.log").read_text(errors="replace")
         except FileNotFoundError:
             return ""
 
     def console(self) -> str:
-        """What process-compose itself has printed."""
+        """Everything that process-compose itself has printed."""
         return (self.folder / "console.log").read_text(errors="replace")
 
 
 def free_ports(count: int) -> tuple[int, ...]:
-    """`count` different ports of loopback that nobody listens on now."""
+    """`count` different TCP ports of 127.0.0.1 on which nobody listens now."""
     sockets = [socket.socket() for _ in range(count)]
     try:
         for each in sockets:

@@ -1,4 +1,4 @@
-"""Asking a running process-compose about its processes, over the socket file that it serves."""
+"""A client of process-compose over the Unix socket that it serves: the state of its processes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class ComposeError(Exception):
 
 
 class ProcessState(msgspec.Struct, frozen=True, kw_only=True):
-    """What process-compose knows of one process."""
+    """The state of one process as process-compose reports it."""
 
     name: str
     status: str = ""
@@ -35,17 +35,17 @@ class _ProcessStates(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Compose:
-    """A running process-compose, by its socket file."""
+    """A running process-compose, addressed by its socket file."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
     def process(self, name: str) -> ProcessState:
-        """The state of one process."""
+        """The state of the process `name`; raises `ComposeError` if process-compose does not answer."""
         return self._ask(f"/process/{quote(name)}", ProcessState)
 
     def processes(self) -> tuple[ProcessState, ...]:
-        """The states of all processes."""
+        """The states of all processes; raises `ComposeError` if process-compose does not answer."""
         return self._ask("/processes", _ProcessStates).data
 
     def _ask(self, path: str, kind: type[T]) -> T:
