@@ -20,6 +20,8 @@ listener {port} {host}
 allow_anonymous true
 set_tcp_nodelay true
 persistence false
+# No limit: a stop must not wait until a device has acknowledged what came before it.
+max_inflight_messages 0
 connection_messages false
 log_dest stderr
 log_type error

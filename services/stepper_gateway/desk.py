@@ -6,7 +6,7 @@ import math
 
 from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse, DeviceMode
 from services.stepper_gateway.arguments import arguments_of, kind_of
-from services.stepper_gateway.commands import PendingCommand
+from services.stepper_gateway.commands import STOPPING, PendingCommand
 from services.stepper_gateway.links.frames import Code, CommandReply, code_name, encode
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.moment import Moment
@@ -93,7 +93,7 @@ class CommandDesk:
             return
         is_reachable = not mover.absence(moment)
         for frame in mover.commands.due(moment, mover.session.clock, mover.session.boot_id, is_reachable):
-            mover.out.send(Kind.CMD, encode(frame))
+            mover.out.send(Kind.CMD, encode(frame), urgent=frame.cmd in STOPPING)
 
     def step(self, moment: Moment) -> None:
         """Give up what was not answered in time; a STOP of our own is asked for again."""

@@ -22,6 +22,7 @@ class SendFrame:
 
     kind: Kind
     payload: bytes
+    urgent: bool = False  # before all that waits for the wire
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +85,8 @@ class Outbox:
     def put(self, item: Output) -> None:
         self._items.append(item)
 
-    def send(self, kind: Kind, payload: bytes) -> None:
-        self._items.append(SendFrame(kind, payload))
+    def send(self, kind: Kind, payload: bytes, urgent: bool = False) -> None:
+        self._items.append(SendFrame(kind, payload, urgent))
 
     def publish(self, topic: Topic[Any], message: Message) -> None:
         self._items.append(Publish(topic, message))

@@ -140,9 +140,9 @@ class Shell:
     def _carry_out(self, outputs: list[Output]) -> None:
         for output in outputs:
             match output:
-                case SendFrame(kind, payload):
+                case SendFrame(kind, payload, urgent):
                     if self._link is not None:
-                        self._link.send(kind, payload)
+                        self._link.send(kind, payload, urgent)
                 case Publish(topic, message):
                     self._node.publisher(topic).put(message)
                 case GoalExecuting(goal_id):

@@ -17,7 +17,16 @@ from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
 from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
-from services.stepper_gateway.links.frames import Ack, CommandReply, Heartbeat, State, SyncReply, decode, encode
+from services.stepper_gateway.links.frames import (
+    Ack,
+    Command,
+    CommandReply,
+    Heartbeat,
+    State,
+    SyncReply,
+    decode,
+    encode,
+)
 from services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind, Link, Received
 from services.stepper_gateway.links.mqtt import MqttLink
 from services.stepper_gateway.links.serial import FRAMES, TYPES, SerialLink
@@ -142,7 +151,13 @@ class SerialPeer:
 
 
 def _frame_kind(frame: bytes) -> Kind:
-    return Kind(type(decode(frame)).__name__.lower().replace("heartbeat", "hb").replace("chunk", "traj"))
+    return Kind(
+        type(decode(frame))
+        .__name__.lower()
+        .replace("heartbeat", "hb")
+        .replace("chunk", "traj")
+        .replace("command", "cmd")
+    )
 
 
 @pytest.fixture(params=[MqttPeer, SerialPeer])
@@ -215,6 +230,19 @@ def test_a_wire_that_is_cut_says_so_sends_nothing_and_comes_back_empty(peer: Pee
     assert peer.heard() == [(Kind.HB, last)]
     peer.say(Kind.STATE, SAID[Kind.STATE])
     assert bench.until(lambda: bool(bench.received))
+
+
+def test_a_stop_needs_no_room_and_overtakes_what_waits_for_a_slow_line(board: SerialPeer) -> None:
+    with closing(Bench(board)) as bench:
+        assert bench.until(lambda: bench.link.connected)
+        waiting = 0
+        while bench.link.send(Kind.CONFIG, b'"' + b"x" * 1000 + b'"'):
+            waiting += 1
+        stop = encode(Command(boot_id=0, cmd_id=1, expires_us=0, cmd=3))
+        assert bench.link.send(Kind.CMD, stop, urgent=True)
+        assert bench.until(lambda: len(board.heard()) == waiting + 1)
+        place = [kind for kind, _ in board.heard()].index(Kind.CMD)
+        assert place < waiting - 5  # only what the kernel had taken already went before it
 
 
 def test_a_link_ends_when_it_is_closed(peer: Peer, bench: Bench) -> None:

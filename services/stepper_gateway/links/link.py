@@ -49,8 +49,8 @@ class Link(Protocol):
     def reason(self) -> str:
         """Why it is not connected, as a sentence with a remedy."""
 
-    def send(self, kind: Kind, payload: bytes) -> bool:
-        """False: not connected, and nothing was queued."""
+    def send(self, kind: Kind, payload: bytes, urgent: bool = False) -> bool:
+        """False: not connected, or no room, which an urgent payload needs none of, and nothing was queued."""
 
     def take(self, most: int) -> list[Received]:
         """What arrived since the last call, oldest first, at most so many."""

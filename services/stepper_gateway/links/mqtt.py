@@ -51,7 +51,8 @@ class MqttLink:
     def reason(self) -> str:
         return "" if self._client is not None else self._reason
 
-    def send(self, kind: Kind, payload: bytes) -> bool:
+    def send(self, kind: Kind, payload: bytes, urgent: bool = False) -> bool:
+        """All is sent at once, so nothing waits that an urgent payload could overtake."""
         client = self._client
         if client is None:
             return False
@@ -96,6 +97,7 @@ class MqttLink:
             reconnect_on_failure=False,
         )
         client.connect_timeout = CONNECT_TIMEOUT
+        client.max_inflight_messages_set(0)  # no limit: a stop must not wait until a broker has acknowledged others
         client.on_socket_open = _send_at_once
         client.on_connect = self._on_connect
         client.on_subscribe = self._on_subscribe

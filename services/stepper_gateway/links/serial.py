@@ -60,10 +60,12 @@ class SerialLink:
     def reason(self) -> str:
         return "" if self._line is not None else self._reason
 
-    def send(self, kind: Kind, payload: bytes) -> bool:
-        if self._line is None or sum(map(len, tuple(self._outgoing))) + len(payload) > BACKLOG:
+    def send(self, kind: Kind, payload: bytes, urgent: bool = False) -> bool:
+        has_room = urgent or sum(map(len, tuple(self._outgoing))) + len(payload) <= BACKLOG
+        if self._line is None or not has_room:
             return False
-        self._outgoing.append(packet(json_frame(FRAMES[kind], payload) if kind in FRAMES else payload))
+        put = self._outgoing.appendleft if urgent else self._outgoing.append
+        put(packet(json_frame(FRAMES[kind], payload) if kind in FRAMES else payload))
         self._has_outgoing.set()
         return True
 
