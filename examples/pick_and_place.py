@@ -27,7 +27,10 @@ def plan(request: PlanRequest) -> PlanResponse:
 
 def move(what: str, goal: Goal, motion: FreeMotion | LinearMotion) -> None:
     planned = plan(PlanRequest(goal=goal, motion=motion, allowed_time=5.0))
-    handle = follow.send(FollowJointTrajectoryGoal(trajectory=planned.trajectory, scene_version=planned.scene_version))
+    goal = FollowJointTrajectoryGoal(
+        trajectory=planned.trajectory, scene_version=planned.scene_version, scene_epoch=planned.scene_epoch
+    )
+    handle = follow.send(goal)
     try:
         outcome = handle.wait(planned.duration + 10.0)
     except KeyboardInterrupt:  # the arm would go on by itself

@@ -45,6 +45,7 @@ class FollowJointTrajectoryGoal(Message, frozen=True, kw_only=True):
     goal_tolerance: tuple[JointTolerance, ...] = ()
     goal_time_tolerance: float = 0.0  # [s] 0 is the default of the gateway, which is finite
     scene_version: int | None = None  # of the planning scene it is free of; absent: not planned in one
+    scene_epoch: int | None = None  # of the same scene; absent: not known, the version alone is compared
 
 
 class FollowJointTrajectoryFeedback(Message, frozen=True, kw_only=True):

@@ -178,6 +178,7 @@ class PlanResponse(Message, frozen=True, kw_only=True):
     times: PlanningTimes = PlanningTimes()
     planner_id: str = ""  # that found the way
     scene_version: int | None = None  # of the planning scene it is free of; absent: of a planner that knows none
+    scene_epoch: int | None = None  # of the same scene; a goal carries both
 
 
 class PlanCancel(Message, frozen=True, kw_only=True):

@@ -66,6 +66,7 @@ class PlanningScene(Message, frozen=True, kw_only=True):
 
     stamp: int = 0  # [ns] UNIX time of the last change
     version: int = 0  # +1 with every change
+    epoch: int = 0  # random, drawn where versions begin: no two scenes share both; 0: before the first change
     objects: tuple[SceneObject, ...] = ()
     allowed: tuple[AllowedPair, ...] = ()
 

@@ -1,6 +1,7 @@
 """The one table of the bus: every key, its message, rate, delivery, whether it is recorded, and who writes it.
 
-Keys are relative to the robot: on the network they stand under `<robot>/`.
+Keys are relative to the robot: on the network they stand under `<robot>/`. A LATCHED message of another node than its
+writer is dropped by every reader.
 """
 
 from __future__ import annotations

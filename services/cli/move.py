@@ -44,7 +44,9 @@ def follow(session: Session, plan: PlanResponse, quiet: bool = False) -> MoveRep
         def on_feedback(feedback: FollowJointTrajectoryFeedback) -> None:
             shown(feedback.elapsed, feedback.duration)
 
-        goal = FollowJointTrajectoryGoal(trajectory=plan.trajectory, scene_version=plan.scene_version)
+        goal = FollowJointTrajectoryGoal(
+            trajectory=plan.trajectory, scene_version=plan.scene_version, scene_epoch=plan.scene_epoch
+        )
         try:
             handle = client.send(goal, on_feedback=on_feedback)
         except GoalRefused as error:

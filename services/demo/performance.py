@@ -86,7 +86,9 @@ class Performance:
             if plan.refusal is not None:
                 return Move(name=stop.name, succeeded=False, reason=plan.refusal.message)
             handle = self._follow.send(
-                FollowJointTrajectoryGoal(trajectory=plan.trajectory, scene_version=plan.scene_version)
+                FollowJointTrajectoryGoal(
+                    trajectory=plan.trajectory, scene_version=plan.scene_version, scene_epoch=plan.scene_epoch
+                )
             )
             outcome = handle.wait(plan.duration + MOVE_MARGIN)
         except (GoalRefused, Refused, NoAnswer, ServerLost) as error:

@@ -92,8 +92,10 @@ class Planner:
             response = self._plan(request, present, age, deadline, watch)
         except NoPlan as no_plan:
             response = PlanResponse(code=no_plan.code, refusal=no_plan.refusal, fraction=no_plan.fraction)
-        version = self.surroundings.world.version
-        return msgspec.structs.replace(response, times=watch.times, scene_version=version)
+        scene = self.surroundings.world.scene
+        return msgspec.structs.replace(
+            response, times=watch.times, scene_version=scene.version, scene_epoch=scene.epoch
+        )
 
     def planned_path(self, trajectory: JointTrajectory, stamp: int) -> PlannedPath:
         """The way of the tool, for eyes; `stamp` [ns] UNIX."""

@@ -17,11 +17,12 @@ ENCODING = "application/msgpack"  # the schema's name follows after a semicolon
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """One message as it came: `schema` is empty where the sender named none."""
+    """One message as it came: `schema` and `writer` (a node's name) are empty where the sender named none."""
 
     key: str
     schema: str
     payload: bytes
+    writer: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +74,8 @@ class Bus(Protocol):
         """Call once a second; raises `BusError` where the router is there but this bus does not find back to it."""
         ...
 
-    def publish(self, key: str, schema: str, delivery: Delivery) -> Publication:
-        """EVERY and LATCHED are kept for readers that miss them while the router is away."""
+    def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> Publication:
+        """EVERY and LATCHED are kept for readers that miss them while the router is away; `writer` goes with each."""
         ...
 
     def subscribe(

@@ -32,8 +32,8 @@ class MemoryBus:
     def require_way_back(self) -> None:
         pass
 
-    def publish(self, key: str, schema: str, delivery: Delivery) -> MemoryPublication:
-        publication = MemoryPublication(self, key, schema, delivery)
+    def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> MemoryPublication:
+        publication = MemoryPublication(self, key, schema, delivery, writer)
         with self.network.lock:
             self.network.publications.add(publication)
         self._declared.append(publication)

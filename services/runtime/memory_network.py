@@ -43,11 +43,12 @@ class MemoryPublication:
     key: str
     schema: str
     delivery: Delivery
+    writer: str = ""
     last: Arrival | None = None
     unsent: deque[Arrival] = field(default_factory=lambda: deque(maxlen=KEPT))
 
     def put(self, payload: bytes) -> None:
-        arrival = Arrival(self.key, self.schema, payload)
+        arrival = Arrival(self.key, self.schema, payload, self.writer)
         network = self.bus.network
         with network.lock:
             if self.delivery is Delivery.LATCHED:

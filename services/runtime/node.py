@@ -97,7 +97,7 @@ class Node:
         """The publisher of a topic; the same one for every call."""
         publishers = self._declared.publishers
         if topic.key not in publishers:
-            publishers[topic.key] = Publisher(self._bus, topic)
+            publishers[topic.key] = Publisher(self._bus, topic, self.name)
         return publishers[topic.key]
 
     def subscribe(

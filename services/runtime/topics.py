@@ -8,7 +8,7 @@ from typing import Generic, Protocol, TypeVar
 
 from schemas.message import BadMessage, Message
 from schemas.system import TopicStatistics
-from schemas.topics import Delivery, Topic
+from schemas.topics import ANY, Delivery, Topic
 from services.runtime.bus import Arrival, Bus
 from services.runtime.inbox import Box, EveryBox, LatestBox
 from services.runtime.loop import Loop
@@ -29,9 +29,10 @@ class Complain(Protocol):
 class Publisher(Generic[M]):
     """The right to publish on one topic."""
 
-    def __init__(self, bus: Bus, topic: Topic[M]) -> None:
+    def __init__(self, bus: Bus, topic: Topic[M], writer: str) -> None:
+        """`writer` is the name of the node that publishes."""
         self.topic = topic
-        self._publication = bus.publish(topic.key, schema_of(topic.message), topic.delivery)
+        self._publication = bus.publish(topic.key, schema_of(topic.message), topic.delivery, writer)
 
     def put(self, message: M) -> None:
         """Raises `TypeError` for another message than the table's, `BadMessage` where it is too large."""
@@ -85,6 +86,7 @@ class Subscription(Generic[M]):
 
     def _handle(self, arrival: Arrival) -> None:
         try:
+            self._require_writer(arrival)
             message = from_arrival(self.topic.message, arrival)
         except BadMessage as error:
             self._bad += 1
@@ -93,6 +95,16 @@ class Subscription(Generic[M]):
             return
         self._received += 1
         self._handler(message)
+
+    def _require_writer(self, arrival: Arrival) -> None:
+        """Raises `BadMessage` for a latched message of a stranger, which would stay valid until the writer's next.
+
+        A node's name is its own while it lives (`identity.py`), so the writer that the table names is one process.
+        """
+        wanted = self.topic.writer
+        if self.topic.delivery is Delivery.LATCHED and wanted != ANY and arrival.writer != wanted:
+            who = f'node "{arrival.writer}"' if arrival.writer else "a stranger without a node's name"
+            raise BadMessage(f'it comes from {who}, and only "{wanted}" writes this key')
 
 
 class Latest(Generic[M]):

@@ -28,6 +28,7 @@ from services.runtime.zenoh_parts import (
     encoding_of,
     is_timeout,
     schema_in,
+    writer_in,
 )
 
 CACHE = 1024  # messages of an EVERY key that survive while the router is away
@@ -69,11 +70,12 @@ class ZenohBus:
         if time.monotonic() - self._astray_since > ASTRAY_PATIENCE:
             raise BusError(f"the router is there, but did not take this session back within {ASTRAY_PATIENCE:g} s")
 
-    def publish(self, key: str, schema: str, delivery: Delivery) -> ZenohPublication:
+    def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> ZenohPublication:
         encoding = encoding_of(schema)
         if delivery is Delivery.LATEST:
             drop = zenoh.CongestionControl.DROP
-            return ZenohPublication(self._session.declare_publisher(key, encoding=encoding, congestion_control=drop))
+            plain = self._session.declare_publisher(key, encoding=encoding, congestion_control=drop)
+            return ZenohPublication(plain, writer)
         latched = delivery is Delivery.LATCHED
         publisher = zx.declare_advanced_publisher(
             self._session,
@@ -85,7 +87,7 @@ class ZenohBus:
             sample_miss_detection=zx.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None),
             publisher_detection=latched,
         )
-        return ZenohPublication(publisher)
+        return ZenohPublication(publisher, writer)
 
     def subscribe(
         self,
@@ -96,7 +98,7 @@ class ZenohBus:
         own: bool = False,
     ) -> ZenohDeclaration:
         def on_sample(sample: zenoh.Sample) -> None:
-            on_arrival(Arrival(key, schema_in(sample.encoding), bytes(sample.payload)))
+            on_arrival(Arrival(key, schema_in(sample.encoding), bytes(sample.payload), writer_in(sample)))
 
         origin = zenoh.Locality.ANY if own else zenoh.Locality.REMOTE
         if delivery is Delivery.LATEST:

@@ -13,13 +13,14 @@ MOST_OF_A_NAME = 32  # [bytes] of what a client says of itself
 
 
 class ZenohPublication:
-    """A declared publisher, plain or advanced."""
+    """A declared publisher, plain or advanced; the writer's name is attached to every message."""
 
-    def __init__(self, publisher: Any) -> None:
+    def __init__(self, publisher: Any, writer: str) -> None:
         self._publisher = publisher
+        self._writer = writer.encode() or None
 
     def put(self, payload: bytes) -> None:
-        self._publisher.put(payload)
+        self._publisher.put(payload, attachment=self._writer)
 
     def close(self) -> None:
         self._publisher.undeclare()
@@ -80,6 +81,12 @@ def encoding_of(schema: str) -> zenoh.Encoding:
 def schema_in(encoding: zenoh.Encoding | None) -> str:
     kind, _, schema = str(encoding or "").partition(";")
     return schema if kind == ENCODING else ""
+
+
+def writer_in(sample: zenoh.Sample) -> str:
+    """The name that the writer attached; empty where there is none."""
+    attached = sample.attachment
+    return "" if attached is None else bytes(attached).decode(errors="replace")
 
 
 def is_timeout(error: zenoh.ReplyError) -> bool:

@@ -92,8 +92,16 @@ class GatewayCore:
         return reason, self._finish(moment)
 
     def on_scene(self, scene: PlanningScene) -> None:
-        """The planner's newest scene: goals planned in another are refused."""
-        self._parts.goals.scenes.heed(scene.version)
+        """The planner's newest scene: goals planned in another are refused. One that cannot be is said once."""
+        scenes = self._parts.goals.scenes
+        objection = scenes.take(scene)
+        if objection and scenes.dropped == 1:
+            self._parts.out.log(LogLevel.WARNING, f"scene: dropped: {objection} (further ones are only counted)")
+
+    @property
+    def scenes_dropped(self) -> int:
+        """How many scenes had a version that no planner gives."""
+        return self._parts.goals.scenes.dropped
 
     def on_targets(self, targets: JointTargets, moment: Moment) -> list[Output]:
         """A streamed target."""

@@ -16,7 +16,7 @@ from services.stepper_gateway.outputs import GoalExecuting, GoalFinished, GoalPr
 from services.stepper_gateway.path_log import PathPoint
 from services.stepper_gateway.paths import Path
 from services.stepper_gateway.refusals import GoalRejected, invalid
-from services.stepper_gateway.scene_versions import SceneVersions
+from services.stepper_gateway.scene_versions import PlannedIn, SceneVersions
 from services.stepper_gateway.validation import Validator
 
 HEARTBEAT_LOST = "the device holds because it lost the gateway's heartbeat"
@@ -57,7 +57,7 @@ class Goals:
         try:
             if self._current is not None and self._current.ending is not None:
                 raise invalid("the arm is still decelerating after the last goal; send this one again when it rests")
-            self.scenes.require_newest(goal.scene_version)
+            self.scenes.require_newest(PlannedIn.of(goal))
             checked = self._validator.check(goal, moment.unix, mover.parameters)
             presence = mover.presence(moment)
             path = self._validator.path(checked, presence, moment.unix, mover.parameters)
@@ -182,7 +182,7 @@ class Goals:
             presence = presence.joined(execution.accepted_from)
         self._waiting = None
         try:
-            self.scenes.require_newest(execution.goal.scene_version)
+            self.scenes.require_newest(execution.goal.planned_in)
             path = path or self._validator.path(execution.goal, presence, moment.unix, mover.parameters)
         except GoalRejected as rejected:
             ending = Ending(GoalStatusCode.ABORTED, rejected.code, rejected.reason)

@@ -1,30 +1,71 @@
-"""Which planning scene is the newest: a plan that was made in an older one may lead through what stands there now."""
+"""The newest planning scene: a plan that was made in an older one may lead through what stands there now."""
 
 from __future__ import annotations
 
-from schemas.motion import FollowErrorCode
+from typing import NamedTuple
+
+from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from schemas.scene import PlanningScene
 from services.stepper_gateway.refusals import GoalRejected
+
+MOST_UNHEARD = 10_000  # chosen: edits of one scene that may be missed in a row; more is no planner's version
+
+
+class PlannedIn(NamedTuple):
+    """The scene that a goal was planned in; None where the goal does not say it."""
+
+    version: int | None
+    epoch: int | None
+
+    @classmethod
+    def of(cls, goal: FollowJointTrajectoryGoal) -> PlannedIn:
+        return cls(goal.scene_version, goal.scene_epoch)
 
 
 class SceneVersions:
-    """Of the scenes heard of; where there was none yet, every goal will do."""
+    """Compares goals with the newest scene that the planner has told; before the first, every goal will do."""
 
     def __init__(self) -> None:
-        self._newest: int | None = None
-        self._highest = 0
+        self.dropped = 0  # scenes with a version that no planner gives
+        self._newest: PlanningScene | None = None
 
-    def heed(self, version: int) -> None:
-        """The planner tells its scene: after every change, and again after a restart."""
-        self._newest, self._highest = version, max(self._highest, version)
+    def take(self, scene: PlanningScene) -> str:
+        """The planner tells its scene: after every change, and again after a restart; why it is dropped, or empty.
 
-    def require_newest(self, planned: int | None) -> None:
-        """Raises `GoalRejected` for a plan made in another scene; None was made in none.
-
-        A version higher than any heard of is news that the client had sooner than the gateway.
+        Versions grow by one within an epoch, and go back only where a restart finds an older file.
         """
-        if planned is None or self._newest is None or planned == self._newest or planned > self._highest:
+        if objection := self._objection(scene):
+            self.dropped += 1
+            return objection
+        self._newest = scene
+        return ""
+
+    def require_newest(self, planned: PlannedIn) -> None:
+        """Raises `GoalRejected` for a plan made in another scene; one without a version was made in none.
+
+        A higher version of the same epoch is news that the client had sooner than the gateway.
+        """
+        newest = self._newest
+        if planned.version is None or newest is None:
             return
-        raise GoalRejected(
-            FollowErrorCode.SCENE_CHANGED,
-            f"planned in scene version {planned}, the scene is version {self._newest} now: plan again",
-        )
+        if planned.epoch not in (None, newest.epoch):
+            raise _changed(
+                f"planned in version {planned.version} of a scene that the planner holds no more; another one is at "
+                f"version {newest.version} now"
+            )
+        if planned.version < newest.version:
+            raise _changed(f"planned in scene version {planned.version}, the scene is version {newest.version} now")
+
+    def _objection(self, scene: PlanningScene) -> str:
+        if scene.version < 0:
+            return f"version {scene.version} is negative"
+        newest = self._newest
+        if newest is None or scene.epoch != newest.epoch:
+            return ""
+        if scene.version > newest.version + MOST_UNHEARD:
+            return f"version {scene.version} is more than {MOST_UNHEARD} changes after version {newest.version}"
+        return ""
+
+
+def _changed(what: str) -> GoalRejected:
+    return GoalRejected(FollowErrorCode.SCENE_CHANGED, f"{what}: plan again")

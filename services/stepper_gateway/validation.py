@@ -16,6 +16,7 @@ from services.stepper_gateway.limits import Limits
 from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.paths import Path, RoundedPath, SampledPath, profile
 from services.stepper_gateway.refusals import GoalRejected, invalid
+from services.stepper_gateway.scene_versions import PlannedIn
 
 SAME_VELOCITY = 1e-9  # [rad/s] or [m/s]
 MAX_DELAY = 60.0  # [s] that a trajectory's stamp may lie in the future
@@ -29,7 +30,7 @@ class CheckedGoal:
     path_tolerance: Bounds  # [steps]
     goal_tolerance: Bounds  # [steps]
     time_tolerance: float | None  # [s]
-    scene_version: int | None  # that it was planned in
+    planned_in: PlannedIn
 
     @property
     def target(self) -> Vector:
@@ -71,7 +72,7 @@ class Validator:
         trajectory = ordered_trajectory(goal.trajectory, self._joints)
         _require_time_ahead(trajectory, now)
         require_points_within(trajectory, self._joints)
-        return CheckedGoal(trajectory, path_bounds, end_bounds, late, goal.scene_version)
+        return CheckedGoal(trajectory, path_bounds, end_bounds, late, PlannedIn.of(goal))
 
     def path(self, goal: CheckedGoal, presence: Presence, now: int, parameters: GatewayParameters) -> Path:
         """The path from where the arm is, all of it within the limits; raises `GoalRejected`."""

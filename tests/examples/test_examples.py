@@ -47,6 +47,13 @@ def robot(router: RouterProcess) -> Iterator[Node]:
         yield node
 
 
+@pytest.fixture
+def state_publisher(router: RouterProcess) -> Iterator[Node]:
+    """A node that says the frames of rm1."""
+    with Node("state_publisher", router.deployment, robot="rm1") as node:
+        yield node
+
+
 def end(process: subprocess.Popen[str]) -> str:
     process.send_signal(signal.SIGTERM)
     output, errors = process.communicate(timeout=3.0)
@@ -73,13 +80,13 @@ def test_joint_monitor_prints_the_joints_and_notices_silence(start: Start, robot
     end(process)
 
 
-def test_tool_pose_warns_while_the_frame_does_not_exist_and_then_prints_it(start: Start, robot: Node) -> None:
+def test_tool_pose_warns_while_the_frame_does_not_exist_and_then_prints_it(start: Start, state_publisher: Node) -> None:
     process = start("tool_pose.py")
     assert process.stderr is not None
     assert "tool_pose WARNING" in process.stderr.readline()
     fixed = FrameTransform(parent="brazo_link", child="efector_link", transform=Transform(translation=(0.2, 0.0, 0.1)))
-    robot.publisher(STATIC_FRAMES).put(FrameTransforms(transforms=(fixed,)))
-    frames = robot.publisher(FRAMES)
+    state_publisher.publisher(STATIC_FRAMES).put(FrameTransforms(transforms=(fixed,)))
+    frames = state_publisher.publisher(FRAMES)
 
     def step(now: int) -> None:
         moving = FrameTransform(
@@ -87,7 +94,7 @@ def test_tool_pose_warns_while_the_frame_does_not_exist_and_then_prints_it(start
         )
         frames.put(FrameTransforms(transforms=(moving,)))
 
-    with spinning(robot, step):
+    with spinning(state_publisher, step):
         assert line(process) == "x +0.2000  y +0.0000  z +0.1500 m\n"
     end(process)
 

@@ -81,8 +81,11 @@ def recordings(tmp_path, kind):
 
 def test_what_is_said_on_the_bus_is_in_the_files(deployment, tmp_path, chunk, ack):
     network = MemoryNetwork()
-    with Node("gateway", deployment, bus=MemoryBus(network)) as gateway:
-        gateway.publisher(DESCRIPTION).put(RobotDescription(robot="rm1", urdf="<robot/>"))
+    with (
+        Node("state_publisher", deployment, bus=MemoryBus(network)) as state_publisher,
+        Node("gateway", deployment, bus=MemoryBus(network)) as gateway,
+    ):
+        state_publisher.publisher(DESCRIPTION).put(RobotDescription(robot="rm1", urdf="<robot/>"))
         with running(deployment, network):
             for seq in range(40):
                 gateway.publisher(COMMANDS).put(chunk(seq))

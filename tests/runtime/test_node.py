@@ -153,6 +153,29 @@ def test_bad_messages_are_dropped_counted_and_named_once(buses: Buses) -> None:
     assert "JointTargets" in said[0].text
 
 
+def test_a_latched_message_is_taken_from_its_writer_alone(buses: Buses) -> None:
+    """Of a stranger's that is valid but false nothing would be heard again until the writer's next."""
+    heard: list[str] = []
+    said: list[LogRecord] = []
+    writer, reader, observer = buses.node("state_publisher"), buses.node("reader"), buses.node("observer")
+    observer.subscribe(LOG, said.append)
+    subscription = reader.subscribe(DESCRIPTION, lambda message: heard.append(message.urdf))
+    buses.settle()
+    lie = RobotDescription(urdf="a lie")
+    buses.open().publish(DESCRIPTION.key, "RobotDescription", DESCRIPTION.delivery).put(encode(lie))
+    observer.publisher(DESCRIPTION).put(lie)
+    writer.publisher(DESCRIPTION).put(RobotDescription(urdf="the truth"))
+    assert hear(reader, lambda: heard and subscription.statistics.bad == 2)
+    assert hear(observer, lambda: said)
+    late = buses.node("late").latest(DESCRIPTION)
+    late_node = next(each for each in buses.opened if isinstance(each, Node) and each.name == "late")
+    assert hear(late_node, lambda: late.message)
+    assert late.message == RobotDescription(urdf="the truth")
+    assert heard == ["the truth"]
+    assert [record.text for record in said if record.node == "reader"] == [said[0].text]
+    assert 'only "state_publisher" writes this key' in said[0].text
+
+
 def test_a_publisher_takes_only_its_own_message_and_size(buses: Buses) -> None:
     node = buses.node("writer")
     with pytest.raises(TypeError, match="joint_states carries JointState, not JointTargets"):

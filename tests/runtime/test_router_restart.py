@@ -36,16 +36,16 @@ def open_node(router: RouterProcess, name: str) -> Node:
 
 
 def test_everything_works_again_after_the_router_was_killed(own_router: RouterProcess) -> None:
-    with open_node(own_router, "planner") as planner, open_node(own_router, "client") as client:
+    with open_node(own_router, "state_publisher") as writer, open_node(own_router, "client") as client:
         heard: list[int] = []
         states = client.latest(JOINT_STATES)
         client.subscribe(LOG, lambda record: heard.append(record.stamp))
         descriptions: list[str] = []
         client.subscribe(DESCRIPTION, lambda message: descriptions.append(message.urdf))
-        planner.serve(PLAN, lambda request: PlanResponse(code=PlanCode.SUCCESS))
-        log, description = planner.publisher(LOG), planner.publisher(DESCRIPTION)
+        writer.serve(PLAN, lambda request: PlanResponse(code=PlanCode.SUCCESS))
+        log, description = writer.publisher(LOG), writer.publisher(DESCRIPTION)
         log.put(LogRecord(stamp=1))
-        with spinning(planner), spinning(client):
+        with spinning(writer), spinning(client):
             assert client.call(PLAN, PlanRequest()).code is PlanCode.SUCCESS
             own_router.kill()
             assert until(lambda: not client.is_connected, 1.0)
@@ -58,10 +58,10 @@ def test_everything_works_again_after_the_router_was_killed(own_router: RouterPr
             back = time.monotonic()
             log.put(LogRecord(stamp=300))
             assert client.call(PLAN, PlanRequest(), timeout=RECOVERY).code is PlanCode.SUCCESS
-            assert until(lambda: client.alive() == {"planner", "client"}, RECOVERY)
+            assert until(lambda: client.alive() == {"state_publisher", "client"}, RECOVERY)
             assert until(lambda: heard == list(range(1, 301)), RECOVERY), heard[-5:]
             assert until(lambda: descriptions == ["while away"], RECOVERY)
-            planner.publisher(JOINT_STATES).put(JointState(stamp=9))
+            writer.publisher(JOINT_STATES).put(JointState(stamp=9))
             assert until(lambda: states.message == JointState(stamp=9), RECOVERY)
             assert time.monotonic() - back < RECOVERY
             with open_node(own_router, "late") as late:

@@ -82,7 +82,9 @@ class Operator:
     def send(self, plan):
         """The handle of a goal; joint states are kept from here on."""
         self.seen.clear()
-        goal = FollowJointTrajectoryGoal(trajectory=plan.trajectory, scene_version=plan.scene_version)
+        goal = FollowJointTrajectoryGoal(
+            trajectory=plan.trajectory, scene_version=plan.scene_version, scene_epoch=plan.scene_epoch
+        )
         return self.follow.send(goal)
 
     def move(self, speed=1.0):

@@ -21,6 +21,7 @@ from schemas.device import (
     ResumeCommand,
 )
 from schemas.joints import JointState, JointTargets
+from schemas.message import encode
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from schemas.scene import PlanningScene
 from schemas.topics import (
@@ -45,7 +46,7 @@ class Running:
     """The gateway's node in a thread, and a client's node."""
 
     def __init__(self, processes: Processes) -> None:
-        network = MemoryNetwork()
+        network = self._network = MemoryNetwork()
         self._stop = StopRequest()
         self.gateway = Node(
             "stepper_gateway", processes.deployment, robot="rm1", bus=MemoryBus(network), stop=self._stop
@@ -53,7 +54,12 @@ class Running:
         self._thread = threading.Thread(target=run, args=(self.gateway, processes.deployment))
         self._thread.start()
         self.client = Node("client", processes.deployment, robot="rm1", bus=MemoryBus(network), stop=StopRequest())
+        self.planner = Node("planner", processes.deployment, robot="rm1", bus=MemoryBus(network), stop=StopRequest())
         self.joints = self.client.latest(JOINT_STATES)
+
+    def network_bus(self) -> MemoryBus:
+        """For a participant that is no node."""
+        return MemoryBus(self._network)
 
     def until(self, is_true: Callable[[], bool], timeout: float = 10.0) -> None:
         end = time.monotonic() + timeout
@@ -71,6 +77,7 @@ class Running:
         self._thread.join(timeout=10.0)
         assert not self._thread.is_alive()
         self.client.close()
+        self.planner.close()
         self.gateway.close()
 
 
@@ -123,7 +130,7 @@ def test_a_client_moves_cancels_streams_and_commands(running: Running) -> None:
 
 
 def test_the_scene_of_the_bus_decides_which_plans_are_followed(running: Running) -> None:
-    running.client.publisher(SCENE).put(PlanningScene(version=4))
+    running.planner.publisher(SCENE).put(PlanningScene(version=4, epoch=9))
     running.client.wait(0.2)
     action = running.client.action(FOLLOW_JOINT_TRAJECTORY)
     trajectory = move((0.0, 0.0, 0.0), (0.1, -0.2, 0.01))
@@ -132,3 +139,20 @@ def test_the_scene_of_the_bus_decides_which_plans_are_followed(running: Running)
     assert refused.value.code == FollowErrorCode.SCENE_CHANGED
     outcome = action.send(FollowJointTrajectoryGoal(trajectory=trajectory, scene_version=4)).wait(20.0)
     assert outcome.status == GoalStatusCode.SUCCEEDED
+
+
+def test_a_stray_scene_blocks_no_planned_move(running: Running) -> None:
+    """Valid scenes of no node and of another node, before the planner's own and after it."""
+    anybody = running.network_bus().publish(SCENE.key, "PlanningScene", SCENE.delivery)
+    versions = (2**31, -(2**62), 5, 0)
+    strays = [PlanningScene(version=version, epoch=epoch) for version in versions for epoch in (0, 9)]
+    for stray in strays[:4]:
+        anybody.put(encode(stray))
+    running.planner.publisher(SCENE).put(PlanningScene(version=4, epoch=9))
+    for stray in strays:
+        anybody.put(encode(stray))
+        running.client.publisher(SCENE).put(stray)
+    action = running.client.action(FOLLOW_JOINT_TRAJECTORY)
+    trajectory = move((0.0, 0.0, 0.0), (0.1, -0.2, 0.01))
+    goal = FollowJointTrajectoryGoal(trajectory=trajectory, scene_version=4, scene_epoch=9)
+    assert action.send(goal).wait(20.0).status == GoalStatusCode.SUCCEEDED

@@ -14,19 +14,25 @@ from tests.stepper_gateway.harness import Rig, move
 HOME, THERE = (0.0, 0.0, 0.0), (0.1, -0.2, 0.01)
 
 
-def goal(version: int | None, delay: float = 0.0, rig: Rig | None = None) -> FollowJointTrajectoryGoal:
+def goal(
+    version: int | None, delay: float = 0.0, rig: Rig | None = None, epoch: int | None = None
+) -> FollowJointTrajectoryGoal:
     """To be begun `delay` [s] from now on."""
     trajectory = move(HOME, THERE)
     if rig is not None:
         trajectory = replace(trajectory, stamp=rig.moment.unix + round(delay * 1e9))
-    return FollowJointTrajectoryGoal(trajectory=trajectory, scene_version=version)
+    return FollowJointTrajectoryGoal(trajectory=trajectory, scene_version=version, scene_epoch=epoch)
 
 
 def heard(*versions: int) -> Rig:
-    """A gateway that has been told these scenes, in this order."""
+    """A gateway that has been told these versions of a scene, in this order."""
+    return told(*(PlanningScene(version=version) for version in versions))
+
+
+def told(*scenes: PlanningScene) -> Rig:
     rig = Rig().ready()
-    for version in versions:
-        rig.core.on_scene(PlanningScene(version=version))
+    for scene in scenes:
+        rig.core.on_scene(scene)
     return rig
 
 
@@ -63,9 +69,31 @@ def test_a_client_may_know_of_a_new_scene_sooner_than_the_gateway():
 
 def test_a_scene_that_went_back_makes_plans_of_the_later_one_bad():
     """A planner whose file was damaged begins again with nothing around the arm."""
-    rig = heard(4, 5, 0)
-    assert rig.goal(goal(5)).code is FollowErrorCode.SCENE_CHANGED
-    assert rig.goal(goal(0)).accepted
+    rig = told(PlanningScene(version=4, epoch=7), PlanningScene(version=5, epoch=7), PlanningScene(version=0))
+    assert rig.goal(goal(5, epoch=7)).code is FollowErrorCode.SCENE_CHANGED
+    assert rig.goal(goal(0, epoch=0)).accepted
+
+
+def test_a_scene_that_has_grown_to_the_same_version_again_is_another():
+    """After a lost file, and as many edits as before it."""
+    rig = told(PlanningScene(version=5, epoch=7), PlanningScene(version=0), PlanningScene(version=5, epoch=8))
+    verdict = rig.goal(goal(5, epoch=7))
+    assert verdict.code is FollowErrorCode.SCENE_CHANGED
+    assert "holds no more" in verdict.reason
+    assert verdict.reason.endswith("plan again")
+    assert rig.goal(goal(5, epoch=8)).accepted
+
+
+@pytest.mark.parametrize("version", [-1, -(2**62), 2**31, 4 + 10_001])
+def test_a_version_that_no_planner_gives_is_dropped_counted_and_said_once(version: int):
+    rig = heard(4)
+    for _ in range(3):
+        rig.core.on_scene(PlanningScene(version=version))
+    assert rig.core.scenes_dropped == 3
+    assert rig.goal(goal(3)).code is FollowErrorCode.SCENE_CHANGED
+    assert rig.goal(goal(4)).accepted
+    assert rig.finish()[0] is GoalStatusCode.SUCCEEDED
+    assert sum(str(version) in line for line in rig.log) == 1
 
 
 def test_a_goal_that_waits_for_its_time_is_aborted_where_the_scene_changes_meanwhile():

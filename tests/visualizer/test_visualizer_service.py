@@ -36,23 +36,24 @@ def test_it_is_ready_when_it_knows_the_arm_and_records_what_the_arm_does(deploym
     recording = tmp_path / "view.rrd"
     overrides = {"recording_path": str(recording)}
     with (
-        Node("gateway", deployment, bus=MemoryBus(network)) as gateway,
+        Node("state_publisher", deployment, bus=MemoryBus(network)) as state_publisher,
         Node("visualizer", deployment, bus=MemoryBus(network), overrides=overrides) as node,
     ):
         thread = threading.Thread(target=run, args=(node, deployment))
         thread.start()
         time.sleep(0.4)
         assert not node.is_ready
-        gateway.publisher(DESCRIPTION).put(RobotDescription(robot="rm1", urdf="<nonsense"))
-        gateway.publisher(DESCRIPTION).put(RobotDescription(robot="rm1", urdf=urdf_text, robot_toml="= no toml"))
+        descriptions = state_publisher.publisher(DESCRIPTION)
+        descriptions.put(RobotDescription(robot="rm1", urdf="<nonsense"))
+        descriptions.put(RobotDescription(robot="rm1", urdf=urdf_text, robot_toml="= no toml"))
         time.sleep(0.2)
         assert not node.is_ready
         description = RobotDescription(robot="rm1", urdf=urdf_text, robot_toml='tool_frame = "efector_link"')
-        gateway.publisher(DESCRIPTION).put(description)
+        descriptions.put(description)
         wait_for(lambda: node.is_ready)
         for index in range(20):
             state = JointState(stamp=time.time_ns(), name=NAMES, position=(0.01 * index, 0.0, 0.0))
-            gateway.publisher(JOINT_STATES).put(state)
+            state_publisher.publisher(JOINT_STATES).put(state)
             time.sleep(0.01)
         time.sleep(0.2)
         node.stop()

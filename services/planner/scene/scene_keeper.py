@@ -19,7 +19,7 @@ from services.planner.scene.clearance import CLEARANCE, ROUNDING
 from services.planner.scene.scene_check import usable_part
 from services.planner.scene.scene_file import FILE, DamagedScene, load_scene, put_aside, save_scene
 from services.planner.scene.scene_shapes import SceneError
-from services.planner.scene.scene_store import SceneStore
+from services.planner.scene.scene_store import SceneStore, drawn_epoch
 from services.planner.scene.world import World
 from services.planner.start import STALE_AFTER
 from services.runtime.deployment import project_root
@@ -133,5 +133,6 @@ class SceneKeeper:
         if reasons:
             aside = put_aside(self._file)
             self._node.log.error(f"left out of the scene, as {aside} still has it: {'; '.join(reasons)}")
+            usable = msgspec.structs.replace(usable, epoch=drawn_epoch())
             self._save(usable)
         return usable

@@ -1,6 +1,11 @@
-"""The planning scene as the planner holds it: always valid, its version one more with every change."""
+"""The planning scene as the planner holds it: always valid, its version one more with every change.
+
+Epoch 0 is the empty scene of before the first change, which draws an epoch: so no two scenes share epoch and version.
+"""
 
 from __future__ import annotations
+
+import secrets
 
 import msgspec
 
@@ -26,7 +31,13 @@ class SceneStore:
             changed = edited(self._arm, self.scene, request, links)
             if changed != self.scene:
                 require_scene(self._arm, changed, self._folders)
-                self.scene = msgspec.structs.replace(changed, stamp=stamp, version=self.scene.version + 1)
+                epoch, version = self.scene.epoch or drawn_epoch(), self.scene.version + 1
+                self.scene = msgspec.structs.replace(changed, stamp=stamp, version=version, epoch=epoch)
         except SceneError as error:
             return SceneResponse(reason=str(error), version=self.scene.version)
         return SceneResponse(accepted=True, version=self.scene.version)
+
+
+def drawn_epoch() -> int:
+    """Another epoch than any before: 62 random bits."""
+    return secrets.randbits(62) + 1

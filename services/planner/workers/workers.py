@@ -165,7 +165,10 @@ class Workers:
             message=f"the plan was stopped {assignment.words}: {allowed:g} s were allowed",
             remedy="allow more time, a larger scaling, or a goal nearer to where the arm is",
         )
-        return PlanResponse(code=PlanCode.TIMED_OUT, refusal=refusal, scene_version=self._scene().version)
+        scene = self._scene()
+        return PlanResponse(
+            code=PlanCode.TIMED_OUT, refusal=refusal, scene_version=scene.version, scene_epoch=scene.epoch
+        )
 
 
 def _failed(message: str, remedy: str) -> PlanResponse:
