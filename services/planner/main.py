@@ -41,7 +41,7 @@ def run(node: Node, deployment: Deployment) -> None:
 
     def step(now: int) -> None:
         plans.step(now)
-        reason = NOT_READY if states.age() >= STALE_AFTER else "" if workers.have_started else STARTING
+        reason = NOT_READY if states.age() >= STALE_AFTER else "" if workers.are_ready else STARTING
         node.set_ready(not reason, reason)
 
     with closing(workers):

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from queue import SimpleQueue
+from typing import Any
 
 import numpy as np
 import psutil
@@ -141,17 +142,63 @@ def test_a_process_that_does_not_come_back_is_killed_and_replaced(stack: Stack, 
     assert not process.is_running()
 
 
-def test_a_process_that_dies_is_said_and_replaced(stack: Stack):
+def until(is_true: Callable[[], object]) -> None:
+    end = time.monotonic() + PATIENCE
+    while not is_true():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+def test_a_plan_whose_process_was_killed_before_is_made_by_a_new_one(stack: Stack):
     stack.ask(EASY)
     assert stack.answer().code is PlanCode.SUCCESS
     planning_processes()[0].kill()
     stack.ask(EASY)
-    response = stack.answer()
+    assert stack.answer().code is PlanCode.SUCCESS
+
+
+def test_a_plan_whose_process_dies_meanwhile_is_made_again_in_the_time_that_is_left(stack: Stack):
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    (process,) = planning_processes()
+    process.suspend()
+    stack.ask(PlanRequest(goal=NamedGoal(name="ready"), start=HOME, allowed_time=30.0))
+    until(lambda: any(each.elapsed > 0.1 for each in stack.workers.progress(0)))
+    process.kill()
+    assert stack.answer().code is PlanCode.SUCCESS
+    assert not process.is_running()
+
+
+def test_a_plan_that_ends_two_processes_is_refused_and_the_next_made(stack: Stack, monkeypatch: pytest.MonkeyPatch):
+    stack.ask(EASY)
+    assert stack.answer().code is PlanCode.SUCCESS
+    plan = Process.plan
+
+    def killed(process: Process, *others: Any) -> PlanResponse:
+        for worker_process in planning_processes():
+            worker_process.kill()
+        return plan(process, *others)
+
+    with monkeypatch.context() as killing:
+        killing.setattr(Process, "plan", killed)
+        stack.ask(EASY)
+        response = stack.answer()
     assert response.code is PlanCode.FAILURE
     assert response.refusal is not None
+    assert response.refusal.message.startswith("2 worker processes of the planner have ended")
     assert response.refusal.remedy.startswith("plan again")
     stack.ask(EASY)
     assert stack.answer().code is PlanCode.SUCCESS
+
+
+def test_a_process_that_dies_idle_is_replaced_unasked_and_not_called_ready_meanwhile(stack: Stack):
+    until(lambda: stack.workers.are_ready)
+    (process,) = planning_processes()
+    process.kill()
+    process.wait(PATIENCE)
+    assert not stack.workers.are_ready
+    until(lambda: stack.workers.are_ready)
+    assert [each.pid for each in planning_processes()] != [process.pid]
 
 
 @pytest.mark.parametrize("allowed", [0.0, -1.0, -1e300])

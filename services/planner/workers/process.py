@@ -55,9 +55,16 @@ class Process:
         self._is_ready = self._has_toppra = self._is_over = False
         self._process = self._started()
 
+    @property
+    def is_ready(self) -> bool:
+        """True from the process's first word until it has ended; from any thread."""
+        return self._is_ready and self._process.poll() is None
+
     def be_ready(self, on_tick: Callable[[], None] = nothing) -> None:
         """Waits until it plans; raises as `plan`, and what `on_tick` raises: then it goes on starting."""
         with self._replaced_where_it_fails():
+            if self._process.poll() is not None:
+                raise EOFError("it has ended while it had nothing to do")
             if not self._is_ready:
                 self._hear(Ready, START, on_tick)
                 self._is_ready = True

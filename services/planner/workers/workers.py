@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import itertools
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
+
+from msgspec.structs import replace
 
 from schemas.joints import JointState
 from schemas.planning import PlanCancelResult, PlanCode, PlanProgress, PlanRequest, PlanResponse, Refusal
@@ -20,7 +23,9 @@ from services.planner.workers.process import Process, WorkerDied
 MOST = 2  # processes: as many as small computers have cores for it
 GRACE = 1.0  # [s] beyond the allowed time in which a worker ends its plan by itself
 PATIENCE = 5.0  # [s] for a thread to see that its process is gone
-AGAIN = 3  # plans of one request, where the scene changes meanwhile
+AGAIN = 3  # plans of one request, where the scene changes or the process dies meanwhile
+MOST_DEATHS = 1  # after which a plan is made again: one that ends two processes may end every one
+DIED_REMEDY = "plan again: new ones are started; the system's log may say what has ended them (out of memory?)"
 LOOK = 0.2  # [s] between two looks whether the scene has changed
 SHORT = 0.1  # [s] until which nothing is said of a plan
 LONGEST_ID = 100  # characters
@@ -42,8 +47,12 @@ class Workers:
         self._assignments: dict[str, Assignment] = {}
         self._numbers = itertools.count(1)
         self._lock = threading.Lock()
-        self.have_started = False  # so that a plan need not wait for it
         self._start_one()
+
+    @property
+    def are_ready(self) -> bool:
+        """True while a process lives that plans: then a plan need not wait for one to start."""
+        return any(process.is_ready for process in self._processes)
 
     def plan(self, request: PlanRequest, answer: Answer) -> None:
         """`answer` is called with the response, mostly in another thread; a second process starts for a second plan."""
@@ -111,7 +120,7 @@ class Workers:
         prepared: PlanningScene | None = None
         while True:
             scene = self._scene()
-            if scene is not prepared:
+            if scene is not prepared or not process.is_ready:
                 self._prepare(process, scene)
                 prepared = scene
             try:
@@ -129,27 +138,31 @@ class Workers:
         """Waits for it and its scene, before a plan would have to; what keeps it from that the next plan says."""
         with suppress(TimeoutError, WorkerDied):
             process.be_ready()
-            self.have_started = True
             process.show(scene)
 
     def _planned(self, process: Process, assignment: Assignment) -> PlanResponse | None:
         """A plan in the scene as it is at the plan's end; None for one that was cancelled."""
-        request = assignment.request
-        seconds = min(max(0.0, request.allowed_time), LONGEST) + GRACE
+        request, deaths = assignment.request, 0
         for _ in range(AGAIN):
+            began: float | None = None  # [s] monotonic
             try:
                 process.be_ready(assignment.require_wanted)
                 scene = self._scene()
                 process.show(scene, assignment.require_wanted)
                 present, age = self._present()
-                response = process.plan(assignment, Job(request=request, present=present, age=age), seconds)
+                job = Job(request=request, present=present, age=age)
+                began = time.monotonic()
+                response = process.plan(assignment, job, min(max(0.0, request.allowed_time), LONGEST) + GRACE)
             except Cancelled:
                 return None
             except TimeoutError:
                 return self._late(assignment)
             except WorkerDied as error:
-                remedy = "plan again: a new one is started"
-                return _failed(f"the planner's worker process has ended ({error})", remedy)
+                deaths += 1
+                request = _with_what_is_left(request, began)
+                if deaths > MOST_DEATHS or request.allowed_time <= 0.0:
+                    return _failed(f"{deaths} worker processes of the planner have ended ({error})", DIED_REMEDY)
+                continue
             if response.code is not PlanCode.SUCCESS or self._scene() is scene:
                 return response
         return _failed("the scene changes faster than a plan can be made in it", "plan again when it stays as it is")
@@ -169,6 +182,12 @@ class Workers:
         return PlanResponse(
             code=PlanCode.TIMED_OUT, refusal=refusal, scene_version=scene.version, scene_epoch=scene.epoch
         )
+
+
+def _with_what_is_left(request: PlanRequest, began: float | None) -> PlanRequest:
+    """The request with the time that is left of its own; the time that a process takes to start is not its own."""
+    spent = 0.0 if began is None else time.monotonic() - began
+    return replace(request, allowed_time=request.allowed_time - spent)
 
 
 def _failed(message: str, remedy: str) -> PlanResponse:
