@@ -29,12 +29,12 @@ class JointTrajectory(Message, frozen=True, kw_only=True):
 
 
 class JointTolerance(Message, frozen=True, kw_only=True):
-    """How far `name` may be off: 0 means the default, -1 means no bound."""
+    """How far `name` may be off: 0 means the default, -1 means no bound, another negative value is refused."""
 
     name: str = ""
     position: float = 0.0  # [rad] or [m]
-    velocity: float = 0.0  # [rad/s] or [m/s]
-    acceleration: float = 0.0  # [rad/s^2] or [m/s^2]
+    velocity: float = 0.0  # [rad/s] or [m/s]; the default is no bound
+    acceleration: float = 0.0  # [rad/s^2] or [m/s^2]; a bound is refused: no acceleration is measured
 
 
 class FollowJointTrajectoryGoal(Message, frozen=True, kw_only=True):

@@ -8,6 +8,7 @@ from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.mover import Mover
 
 TROUBLE = ("fault", "hold", "underrun", "estop", "homing_stopped", "text_lost", "press_refused")
+MOTION = {"started": "from", "finished": "at"}  # how the place of a motion's event is introduced
 BY_A_PERSON = "command"  # the detail of what somebody has asked for
 
 
@@ -17,4 +18,14 @@ def pass_on(event: EventReport, mover: Mover, moment: Moment) -> None:
     level = LogLevel.WARNING if is_trouble else LogLevel.INFO
     now = moment.monotonic
     happened = mover.session.clock.measured(event.t_us, now) if event.t_us else now
-    mover.event(event.event, event.detail, Moment(moment.unix_at(happened), happened), level)
+    said = _motion(event.event, mover) if event.event in MOTION else ""
+    mover.event(event.event, event.detail, Moment(moment.unix_at(happened), happened), level, said)
+
+
+def _motion(event: str, mover: Mover) -> str:
+    """That a motion begins or ends, and where the joints are; empty where that is not known."""
+    if mover.state is None:
+        return ""
+    places = zip(mover.joints, mover.reporter.positions(mover.state.steps), strict=True)
+    where = ", ".join(f"{joint.name} {position:+.4f} {joint.unit}" for joint, position in places)
+    return f"motion {event}: {MOTION[event]} {where}"

@@ -50,6 +50,7 @@ class Execution:
     max_error: list[float] = field(default_factory=list)  # [steps]
     feedback_due: float = 0.0  # [s] monotonic
     commanded: tuple[float, ...] = ()  # [steps] latest
+    departed: tuple[int, ...] = ()  # [steps] where the joints stood or passed when it began
 
     def __post_init__(self) -> None:
         self.max_error = [0.0] * len(self.joints)
@@ -70,7 +71,7 @@ class Execution:
         for index, joint in enumerate(self.joints):
             error = point.steps[index] - state.steps[index]
             self.max_error[index] = max(self.max_error[index], abs(error))
-            bound = self.goal.path_tolerance[index]
+            bound = self.goal.path_tolerance.position[index]
             if bound is not None and abs(error) > bound:
                 return Ending(
                     GoalStatusCode.ABORTED,
@@ -78,21 +79,55 @@ class Execution:
                     f'joint "{joint.name}" is {error:+.2f} steps off its path at {self.elapsed(state):.3f} s, more '
                     f"than {bound:g} steps",
                 )
+        return self._too_fast_or_slow(point, state)
+
+    def _too_fast_or_slow(self, point: PathPoint, state: State) -> Ending | None:
+        """An ending if a joint's velocity has left the path tolerance."""
+        scale = state.time_scale / 32768.0
+        rows = zip(self.joints, point.rate, state.velocity, self.goal.path_tolerance.velocity, strict=True)
+        for joint, wanted, done, bound in rows:
+            error = wanted * scale - done / 256.0
+            if bound is not None and abs(error) > bound:
+                per_unit, unit = joint.steps.per_unit, joint.unit
+                return Ending(
+                    GoalStatusCode.ABORTED,
+                    FollowErrorCode.PATH_TOLERANCE_VIOLATED,
+                    f'joint "{joint.name}" is {error / per_unit:+.5f} {unit}/s off its velocity at '
+                    f"{self.elapsed(state):.3f} s, more than {bound / per_unit:g} {unit}/s",
+                )
         return None
+
+    def account(self, ending: Ending, state: State | None, now: float) -> str:
+        """What moved where, how long, with what error, and why it ended otherwise; for the log."""
+        said = f"goal {self.goal_id} {ending.status.name.lower()} after {now - self.accepted.monotonic:.2f} s"
+        if ending.reason:
+            said += f": {ending.reason}"
+        if state is None or len(self.departed) != len(state.steps):
+            return f"{said}; nothing moved for it"
+        rows = list(zip(self.joints, self.departed, state.steps, strict=True))
+        moves = ", ".join(
+            f"{j.name} from {j.steps.to_position(old):+.4f} to {j.steps.to_position(new):+.4f} {j.unit}"
+            for j, old, new in rows
+        )
+        errors = [abs(error) for error in self.goal_errors(state)]
+        off = max(errors)
+        return f"{said}; {moves}; {off:.2f} steps from the goal at most ({self.joints[errors.index(off)].name})"
 
     def goal_errors(self, state: State) -> list[float]:
         """[steps] goal minus executed."""
         return [wanted - done for wanted, done in zip(self.target_steps, state.steps, strict=True)]
 
     def is_reached(self, state: State) -> bool:
-        """Whether the executed steps are within the goal tolerance."""
-        bounds = zip(self.goal_errors(state), self.goal.goal_tolerance, strict=True)
-        return all(bound is None or abs(error) <= bound for error, bound in bounds)
+        """True if the executed steps and the velocities are within the goal tolerance."""
+        tolerance = self.goal.goal_tolerance
+        places = zip(self.goal_errors(state), tolerance.position, strict=True)
+        speeds = zip((rate / 256.0 for rate in state.velocity), tolerance.velocity, strict=True)
+        return all(bound is None or abs(error) <= bound for error, bound in (*places, *speeds))
 
     def late(self, state: State, now: float) -> Ending:
         """The ending for a goal that was not reached in time."""
         errors = self.goal_errors(state)
-        bounds = [math.inf if bound is None else bound for bound in self.goal.goal_tolerance]
+        bounds = [math.inf if bound is None else bound for bound in self.goal.goal_tolerance.position]
         index = max(range(len(errors)), key=lambda i: abs(errors[i]) - bounds[i])
         joint, bound = self.joints[index], bounds[index]
         return Ending(

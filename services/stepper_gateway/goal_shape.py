@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from itertools import pairwise
+from typing import NamedTuple
 
 from schemas.message import Vector
 from schemas.motion import FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
@@ -45,10 +46,26 @@ def require_known(names: tuple[str, ...], joints: tuple[Joint, ...]) -> None:
             raise invalid_joints(f'joint "{name}" is named {count} times; name each joint once')
 
 
-def tolerances(goal: FollowJointTrajectoryGoal, joints: tuple[Joint, ...], factor: float) -> tuple[Bounds, Bounds]:
-    """Path and goal tolerance of every joint in steps, None for no bound; raises `GoalRejected`."""
-    path = _bounds("path_tolerance", goal.path_tolerance, joints)
-    end = _bounds("goal_tolerance", goal.goal_tolerance, joints)
+Bounds = tuple[float | None, ...]  # one for each joint of the arm; None: no bound
+
+
+class Tolerances(NamedTuple):
+    """How far every joint may be off: [steps] and [steps/s]."""
+
+    position: Bounds
+    velocity: Bounds
+
+
+def tolerances(
+    goal: FollowJointTrajectoryGoal, joints: tuple[Joint, ...], factor: float
+) -> tuple[Tolerances, Tolerances]:
+    """Path and goal tolerance; raises `GoalRejected`.
+
+    As ros2_control's joint_trajectory_controller: 0 is the default, -1 none, another negative value is refused. The
+    defaults are robot.toml's times `factor` for positions, and none for velocities.
+    """
+    path = _tolerances("path_tolerance", goal.path_tolerance, joints)
+    end = _tolerances("goal_tolerance", goal.goal_tolerance, joints)
     path_defaults = [joint.drive.path_tolerance_steps * factor for joint in joints]
     end_defaults = [joint.drive.goal_tolerance_steps * factor for joint in joints]
     return _filled(path, path_defaults), _filled(end, end_defaults)
@@ -64,30 +81,37 @@ def time_tolerance(goal: FollowJointTrajectoryGoal, default: float) -> float | N
     return asked or default
 
 
-Bounds = tuple[float | None, ...]
-
-
-def _bounds(field: str, given: tuple[JointTolerance, ...], joints: tuple[Joint, ...]) -> list[float | None]:
-    """In steps: 0 the default, None no bound."""
-    bounds: list[float | None] = [0.0] * len(joints)
+def _tolerances(field: str, given: tuple[JointTolerance, ...], joints: tuple[Joint, ...]) -> Tolerances:
+    """In steps: a position of 0 is the default."""
+    positions: list[float | None] = [0.0] * len(joints)
+    velocities: list[float | None] = [None] * len(joints)
     names = [joint.name for joint in joints]
     for tolerance in given:
         if tolerance.name not in names:
             hint = suggestion(tolerance.name, names)
             raise invalid_joints(f'{field} is for joint "{tolerance.name}", which is unknown{hint}')
-        if tolerance.position < 0.0 and tolerance.position != -1.0:
-            raise invalid(
-                f'{field} of joint "{tolerance.name}" is {tolerance.position:g}; give a distance, 0 for the default '
-                "or -1 for no bound"
-            )
         index = names.index(tolerance.name)
-        no_bound = tolerance.position == -1.0
-        bounds[index] = None if no_bound else tolerance.position * joints[index].steps.per_unit
-    return bounds
+        joint, where = joints[index], f'{field} of joint "{tolerance.name}"'
+        positions[index] = _bound(where, "position", tolerance.position, joint)
+        velocities[index] = _bound(where, "velocity", tolerance.velocity, joint) or None
+        if _bound(where, "acceleration", tolerance.acceleration, joint):
+            raise invalid(
+                f"{where}: an acceleration of {tolerance.acceleration:g} {joint.unit}/s^2 cannot be watched, because "
+                "the device measures steps and velocities only; give 0 or -1, and bound the velocity"
+            )
+    return Tolerances(tuple(positions), tuple(velocities))
 
 
-def _filled(bounds: list[float | None], defaults: list[float]) -> Bounds:
-    return tuple(default if bound == 0.0 else bound for bound, default in zip(bounds, defaults, strict=True))
+def _bound(where: str, quantity: str, value: float, joint: Joint) -> float | None:
+    """In steps; None for no bound."""
+    if value < 0.0 and value != -1.0:
+        raise invalid(f"{where}: {quantity} {value:g} is negative; give a bound, 0 for the default or -1 for no bound")
+    return None if value == -1.0 else value * joint.steps.per_unit
+
+
+def _filled(given: Tolerances, defaults: list[float]) -> Tolerances:
+    rows = zip(given.position, defaults, strict=True)
+    return given._replace(position=tuple(default if bound == 0.0 else bound for bound, default in rows))
 
 
 def _require_points(trajectory: JointTrajectory) -> None:

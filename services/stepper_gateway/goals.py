@@ -194,6 +194,7 @@ class Goals:
         mover = self._mover
         mover.lead = mover.parameters.trajectory_lead
         self._current = execution
+        execution.departed = () if mover.state is None else mover.state.steps
         stream = mover.stream
         ahead = 0.0
         if stream is not None and mover.transmission.is_open:
@@ -242,9 +243,4 @@ class Goals:
         result = execution.result(ending, self._mover.state, moment.monotonic)
         self._mover.out.put(GoalFinished(execution.goal_id, ending.status, result))
         level = LogLevel.INFO if ending.status == GoalStatusCode.SUCCEEDED else LogLevel.WARNING
-        self._mover.out.log(level, _epitaph(execution.goal_id, ending))
-
-
-def _epitaph(goal_id: str, ending: Ending) -> str:
-    end = f"goal {goal_id} {ending.status.name.lower()}"
-    return f"{end}: {ending.reason}" if ending.reason else end
+        self._mover.out.log(level, execution.account(ending, self._mover.state, moment.monotonic))

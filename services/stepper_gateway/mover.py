@@ -204,12 +204,14 @@ class Mover:
         self.stop(moment)
         return True
 
-    def event(self, event: str, detail: str, moment: Moment, level: LogLevel = LogLevel.WARNING) -> None:
-        """Say something once, on the bus and in the log."""
+    def event(
+        self, event: str, detail: str, moment: Moment, level: LogLevel = LogLevel.WARNING, said: str = ""
+    ) -> None:
+        """Say something once, on the bus and in the log; there as `said`, where that is given."""
         self.out.publish(
             DEVICE_EVENTS, DeviceEvent(stamp=moment.unix, device=self.arm.device.name, event=event, detail=detail)
         )
-        self.out.log(level, f"{event}: {detail}" if detail else event)
+        self.out.log(level, said or (f"{event}: {detail}" if detail else event))
 
     def _send(self, chunks: list[tuple[Chunk, SentChunk]], moment: Moment) -> None:
         for frame, sent in chunks:

@@ -10,7 +10,7 @@ from services.arm.description import Joint
 from services.arm.interpolation import TrajectorySampler
 from services.stepper_gateway.bridge import bridge
 from services.stepper_gateway.goal_limits import require_path_within, require_points_within, within
-from services.stepper_gateway.goal_shape import Bounds, ordered_trajectory, time_tolerance, tolerances
+from services.stepper_gateway.goal_shape import Tolerances, ordered_trajectory, time_tolerance, tolerances
 from services.stepper_gateway.knots import Knot, whole_steps
 from services.stepper_gateway.limits import Limits
 from services.stepper_gateway.parameters import GatewayParameters
@@ -27,8 +27,8 @@ class CheckedGoal:
     """A goal whose form is right, in the arm's joint order."""
 
     trajectory: JointTrajectory
-    path_tolerance: Bounds  # [steps]
-    goal_tolerance: Bounds  # [steps]
+    path_tolerance: Tolerances
+    goal_tolerance: Tolerances
     time_tolerance: float | None  # [s]
     planned_in: PlannedIn
 

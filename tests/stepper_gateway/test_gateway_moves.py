@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from schemas.actions import GoalStatusCode
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
 from schemas.topics import COMMAND_ACKS, COMMANDS, JOINT_STATES, STEP_ERRORS
+from services.stepper_gateway.execution import Execution
+from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.parameters import GatewayParameters
+from services.stepper_gateway.validation import Validator
 from tests.stepper_gateway.harness import Rig, Wire, assert_within_limits, move, rm1
 
 HOME = (0.0, 0.0, 0.0)
@@ -15,6 +21,15 @@ READY = (0.6, -1.2, 0.08)
 
 def expected_steps(position: tuple[float, ...]) -> tuple[int, ...]:
     return tuple((joint.steps.to_q8(p) + 128) >> 8 for joint, p in zip(rm1().joints, position, strict=True))
+
+
+def execution_near_its_end(bound: JointTolerance) -> tuple[Execution, State]:
+    """A goal whose joints are on their last step, the first still at 1 step/s."""
+    goal = FollowJointTrajectoryGoal(trajectory=move(HOME, READY), goal_tolerance=(bound,))
+    joints = rm1().joints
+    checked = Validator(joints, 25_000).check(goal, 0, GatewayParameters())
+    state = State(t_us=1, mode=2, steps=expected_steps(READY), velocity=(256, 0, 0))
+    return Execution("g", checked, joints, Moment(0, 0.0)), state
 
 
 def test_a_move_ends_on_the_exact_steps() -> None:
@@ -27,6 +42,23 @@ def test_a_move_ends_on_the_exact_steps() -> None:
     assert all(error <= 0.505 for error in result.max_following_error)
     assert rig.executing == ["g"]
     assert_within_limits(rig)
+
+
+def test_the_log_says_what_moved_where_how_long_and_with_what_error() -> None:
+    rig = Rig().ready()
+    rig.goal(move(HOME, READY))
+    result = rig.finish()[1]
+    (line,) = [line for line in rig.log if line.startswith("goal g ")]
+    assert line.startswith(f"goal g succeeded after {result.duration:.2f} s; brazo_joint from +0.0000 to +0.6000 rad, ")
+    assert "efector_joint from +0.0000 to +0.0799 m; " in line
+    assert f"{max(map(abs, result.final_error)):.2f} steps from the goal at most (" in line
+    assert any(line.startswith("motion started: from brazo_joint +0.0000 rad, ") for line in rig.log)
+    assert any(line.startswith("motion finished: at brazo_joint +0.6") for line in rig.log)
+    rig.goal(move(READY, HOME), "h")
+    rig.run(0.3)
+    rig.cancel("h")
+    rig.finish("h")
+    assert any(": the arm decelerated on its path; brazo_joint from +0.6" in line for line in rig.log)
 
 
 def test_every_state_is_within_half_a_step_of_the_command() -> None:
@@ -278,6 +310,39 @@ def test_a_goal_tolerance_below_what_steps_can_do_is_violated_by_name_and_number
     assert (status, result.error_code) == (GoalStatusCode.ABORTED, FollowErrorCode.GOAL_TOLERANCE_VIOLATED)
     assert "antebrazo_joint" in result.error_string
     assert "steps" in result.error_string
+
+
+@pytest.mark.parametrize("velocity", [0.0, -1.0, 0.05])
+def test_a_velocity_tolerance_that_the_arm_keeps_or_that_is_none_changes_nothing(velocity: float) -> None:
+    rig = Rig().ready()
+    bound = (JointTolerance(name="brazo_joint", velocity=velocity, acceleration=min(velocity, 0.0)),)
+    goal = FollowJointTrajectoryGoal(trajectory=move(HOME, READY), path_tolerance=bound, goal_tolerance=bound)
+    assert rig.goal(goal).accepted
+    assert rig.finish()[0] is GoalStatusCode.SUCCEEDED
+
+
+def test_a_velocity_off_its_path_tolerance_names_joint_error_and_time_and_decelerates() -> None:
+    rig = Rig().ready()
+    goal = FollowJointTrajectoryGoal(
+        trajectory=move(HOME, READY), path_tolerance=(JointTolerance(name="brazo_joint", velocity=1e-9),)
+    )
+    assert rig.goal(goal).accepted
+    status, result = rig.finish()
+    assert (status, result.error_code) == (GoalStatusCode.ABORTED, FollowErrorCode.PATH_TOLERANCE_VIOLATED)
+    assert 'joint "brazo_joint" is' in result.error_string
+    assert "rad/s off its velocity at" in result.error_string
+    assert "more than 1e-09 rad/s" in result.error_string
+    assert_within_limits(rig)
+
+
+def test_a_goal_whose_joint_still_moves_is_not_reached_within_a_velocity_tolerance() -> None:
+    """Its position has been within the tolerance long before its velocity is."""
+    bound = JointTolerance(name="brazo_joint", position=10.0, velocity=1e-6)
+    execution, state = execution_near_its_end(bound)
+    assert not execution.is_reached(state)
+    assert execution.is_reached(replace(state, velocity=(0,) * len(state.velocity)))
+    loose = JointTolerance(name="brazo_joint", position=10.0, velocity=100.0)
+    assert execution_near_its_end(loose)[0].is_reached(state)
 
 
 def test_a_path_tolerance_violation_names_joint_error_and_time_and_decelerates() -> None:

@@ -149,6 +149,10 @@ def test_accelerations_without_velocities_are_refused() -> None:
     [
         ({"path_tolerance": (JointTolerance(name="brazo_jiont"),)}, 'did you mean "brazo_joint"'),
         ({"goal_tolerance": (JointTolerance(name="brazo_joint", position=-2.0),)}, "-1 for no bound"),
+        ({"path_tolerance": (JointTolerance(name="brazo_joint", velocity=-7.0),)}, "velocity -7 is negative"),
+        ({"goal_tolerance": (JointTolerance(name="brazo_joint", velocity=-1e-9),)}, "-1 for no bound"),
+        ({"goal_tolerance": (JointTolerance(name="brazo_joint", acceleration=-7.0),)}, "acceleration -7 is negative"),
+        ({"path_tolerance": (JointTolerance(name="brazo_joint", acceleration=1e-9),)}, "measures steps and velocities"),
         ({"goal_time_tolerance": -3.0}, "goal_time_tolerance"),
     ],
 )
