@@ -215,6 +215,7 @@ class Node:
             error.is_logged = True  # type: ignore[attr-defined]
             raise
         finally:
+            gc.unfreeze()  # else a circle of what is frozen outlives the interpreter, and nanobind calls it a leak
             self._loop.forget(self._beat)
             if self._readiness is not None:
                 self._readiness.not_ready()

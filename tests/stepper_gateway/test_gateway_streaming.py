@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 
 import pytest
 from hypothesis import given, settings
@@ -150,3 +152,34 @@ def test_whatever_the_targets_the_tracker_keeps_every_limit(
                 assert abs(knot.acceleration[i]) <= LIMITS.acceleration[i] * (1 + 1e-9)
                 assert abs(knot.acceleration[i] - before.acceleration[i]) <= LIMITS.jerk[i] * 0.02 * (1 + 1e-6)
             before = knot
+
+
+ENDS = """
+from services.arm.description import load_arm
+from services.runtime.deployment import project_root
+from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.node import Node
+from services.runtime.stopping import StopRequest
+from services.stepper_gateway.core import GatewayCore
+from services.stepper_gateway.knots import Knot
+from services.stepper_gateway.limits import Limits
+from services.stepper_gateway.tracking import Tracker
+
+arm = load_arm(project_root() / "urdf/rm1")
+core = GatewayCore(arm, 1)
+core.own = core
+node = Node("stepper_gateway", robot="rm1", bus=MemoryBus(MemoryNetwork()), stop=StopRequest())
+
+def step(now):
+    core.tracker = Tracker(Limits.of(arm.joints), 0.02, Knot.at_rest((0.0, 0.0, 0.0)))
+    node.stop()
+
+node.spin(step)
+node.close()
+"""
+
+
+def test_a_gateway_that_has_streamed_ends_without_a_word_of_leaks() -> None:
+    """What ruckig has made lives in circles of the core, which must be collected before the interpreter ends."""
+    ended = subprocess.run([sys.executable, "-c", ENDS], capture_output=True, text=True, timeout=60.0, check=True)
+    assert ended.stderr == ""
