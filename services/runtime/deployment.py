@@ -47,6 +47,7 @@ def load_deployment(path: Path | None = None, environ: Mapping[str, str] | None 
     except msgspec.ValidationError as error:
         said = f" (with {', '.join(sources)} from the environment)" if sources else ""
         raise DeploymentError(f"{file}{said}: {error}{_choices(str(error))}") from error
+    _require_no_nul(raw, file, ())
     return _with_absolute_paths(deployment, root)
 
 
@@ -81,6 +82,14 @@ def _require_known(raw: dict[str, Any], known: dict[str, Any], file: Path, path:
             raise DeploymentError(f'{file}: unknown key "{name}": {hint}')
         if key != "parameters" and isinstance(value, dict) and isinstance(known[key], dict):
             _require_known(value, known[key], file, (*path, key))
+
+
+def _require_no_nul(value: object, file: Path, path: tuple[str, ...]) -> None:
+    """Most texts here become a path or a host, and neither has a NUL in it."""
+    if isinstance(value, str) and "\0" in value:
+        raise DeploymentError(f'{file}: key "{".".join(path)}" cannot be {value!r}: no path or host has a NUL in it')
+    for key, inner in value.items() if isinstance(value, dict) else ():
+        _require_no_nul(inner, file, (*path, key))
 
 
 def _choices(error: str) -> str:

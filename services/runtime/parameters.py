@@ -39,6 +39,8 @@ class ParameterSet(Generic[P]):
         declared = self._declared[name]
         if strict and isinstance(value, bool) != (declared.type == "bool"):
             raise Refused(f'{self._node}: parameter "{name}" is a {declared.type}: {value!r} is not')
+        if isinstance(value, str) and "\0" in value:
+            raise Refused(f'{self._node}: parameter "{name}" cannot be {value!r}: no path and no name has a NUL in it')
         values = {each: getattr(self.value, each) for each in self._declared} | {name: value}
         try:
             changed = msgspec.convert(values, self._kind, strict=strict)

@@ -16,7 +16,7 @@ def scene_mesh(shape: MeshShape, folders: Sequence[Path], warn: Callable[[str], 
     """The object's triangles in m; None, and a word to `warn`, where they cannot be had."""
     try:
         triangles = read_stl(_content(shape, folders))
-    except (BadMesh, OSError) as error:
+    except (BadMesh, OSError, ValueError) as error:
         warn(f'mesh "{shape.path}" of the scene cannot be drawn: {error}')
         return None
     corners = (triangles.vertices * np.array(shape.scale))[triangles.faces]

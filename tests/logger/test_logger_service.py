@@ -22,9 +22,11 @@ from mcap.stream_reader import StreamReader
 from schemas.device import DeviceEvent
 from schemas.frames import RobotDescription
 from schemas.joints import JointState
-from schemas.topics import COMMAND_ACKS, COMMANDS, DESCRIPTION, DEVICE_EVENTS, JOINT_STATES
+from schemas.system import LogRecord, Parameter, SetParameter
+from schemas.topics import COMMAND_ACKS, COMMANDS, DESCRIPTION, DEVICE_EVENTS, JOINT_STATES, LOG, Request
 from services.logger.main import run
 from services.runtime.deployment import load_deployment
+from services.runtime.errors import Refused
 from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
 
@@ -191,3 +193,17 @@ def test_sigterm_ends_it_with_a_finished_file(environment, tmp_path):
     with path.open("rb") as file:
         assert make_reader(file).get_summary().statistics.message_count > 0
     assert not (tmp_path / "run" / "logger.ready").exists()
+
+
+def test_a_folder_that_no_disk_can_have_is_refused_and_the_logger_goes_on(deployment, tmp_path):
+    network = MemoryNetwork()
+    with Node("client", deployment, bus=MemoryBus(network)) as client, running(deployment, network) as logger:
+        with pytest.raises(Refused, match="NUL"):
+            client.call(
+                Request("@node/logger/parameters/set", SetParameter, Parameter, "logger", ""),
+                SetParameter(name="log_dir", value="a\0b"),
+            )
+        client.publisher(LOG).put(LogRecord(text="after"))
+        assert logger.is_ready
+    (mcap,) = recordings(tmp_path, ".mcap")
+    assert "after" in [m.get("text") for topic, m in messages(mcap) if topic == "log"]

@@ -228,7 +228,8 @@ def test_a_mesh_is_read_when_it_is_added(tmp_path: Path) -> None:
     assert scene.add("cut", MeshShape(path="cut.stl")).startswith(
         'object "cut": "cut.stl" is no usable STL file: it has 2'
     )
-    assert scene.add("none", MeshShape(path="none.stl")).startswith('object "none": there is no mesh "none.stl"')
+    for path in ("none.stl", "n\0ne.stl", "n" * 5000):
+        assert scene.add("none", MeshShape(path=path)).startswith(f'object "none": there is no mesh "{path}"')
     assert scene.add("empty", MeshShape(data=b"")).startswith('object "empty": its data is no usable STL file')
 
 

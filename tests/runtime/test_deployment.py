@@ -54,6 +54,9 @@ def test_every_key_can_be_overridden_in_the_environment(file: Path) -> None:
         ("router = 5\n", {}, r"site.toml: .*object.*router"),
         ("[mqtt]\nbroker = 'emqx'\n", {}, r"site.toml: .*'emqx'.*mqtt\.broker"),
         ("[router\n", {}, r"site.toml: .*line 1"),
+        ('[paths]\nrun = "a\\u0000b"\n', {}, r'site.toml: key "paths.run" cannot be .* NUL'),
+        ('robot = "a\\u0000b"\n', {}, r'site.toml: key "robot" cannot be .* NUL'),
+        ('[parameters.logger]\nlog_dir = "\\u0000"\n', {}, r'key "parameters.logger.log_dir" cannot be .* NUL'),
         ("", {"GEMELO_ROUTER_PORT": "seven"}, r"with GEMELO_ROUTER_PORT from the environment.*int.*router\.port"),
     ],
 )

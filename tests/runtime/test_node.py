@@ -318,6 +318,17 @@ def test_parameters_are_listed_set_and_checked_at_run_time(buses: Buses) -> None
     assert parameters.value == GatewayParameters(lead=1.0, chunk=12)
 
 
+def test_a_parameter_takes_no_nul(buses: Buses) -> None:
+    class Folders(msgspec.Struct, frozen=True, kw_only=True):
+        log_dir: str = "here"
+
+    node = buses.node("logger")
+    folders = node.parameters(Folders)
+    with pytest.raises(Refused, match=r'logger: parameter "log_dir" cannot be .*NUL'):
+        node.set_parameter("log_dir", "a\0b")
+    assert folders.value.log_dir == "here"
+
+
 def test_parameters_from_the_deployment_and_the_command_line_are_checked(buses: Buses) -> None:
     replace = msgspec.structs.replace
     buses.deployment = replace(buses.deployment, parameters={"gateway": {"lead": 0.7}})

@@ -106,10 +106,18 @@ def _content(name: str, shape: MeshShape, folders: Folders) -> bytes:
             "robot's folder, or the file's content"
         )
     for folder in folders:
-        if (folder / relative).is_file():
+        if _is_file(folder / relative):
             return _read(name, folder / relative)
     looked = " and ".join(str(folder) for folder in folders) or "no folder"
     raise SceneError(f'object "{name}": there is no mesh "{shape.path}" in {looked}')
+
+
+def _is_file(path: Path) -> bool:
+    """False also for a path that no file system can have: too long a name, for example."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 def _read(name: str, path: Path) -> bytes:
