@@ -14,9 +14,9 @@ PATIENCE = 2.0  # [s] between asking and killing
 _PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
-def start(command: list[str]) -> subprocess.Popen[bytes]:
-    """Start it; on Linux the kernel ends it with this process, however that ends."""
-    return subprocess.Popen(command, env=environment(os.environ), preexec_fn=_die_with_parent)
+def start(command: list[str], stderr: int | None = None) -> subprocess.Popen[bytes]:
+    """Start it; on Linux the kernel ends it with this process, however that ends. `stderr` as for `Popen`."""
+    return subprocess.Popen(command, env=environment(os.environ), preexec_fn=_die_with_parent, stderr=stderr)
 
 
 def stop(child: subprocess.Popen[bytes]) -> None:

@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import IO
 from urllib.parse import quote
 
 from schemas.deployment import Deployment, ViewerMode, ViewerSection
@@ -25,6 +26,7 @@ from services.visualizer.child import start, stop
 from services.visualizer.connection import Watch
 
 PERIOD = 0.5  # [s] between two looks at the child
+CUT_OFF = "viewer: a sender ended or was cut off in the midst of a message; a visualizer comes back by itself"
 EARLY = 5.0  # [s] a native viewer that ends sooner had no display that it could use
 
 
@@ -37,10 +39,15 @@ def resolved(mode: ViewerMode, environ: Mapping[str, str], platform: str = sys.p
 
 
 def command(program: Path, viewer: ViewerSection, mode: ViewerMode, memory: str) -> list[str]:
-    """The command line of the program."""
+    """The command line of the program.
+
+    A page that is opened late is sent the newest data first and what comes live before the past, which it fills in
+    behind: a browser that draws slowly would else play hours before it shows the arm as it is.
+    """
     common = [str(program), "--bind", viewer.host, "--port", str(viewer.port)]
     if mode is ViewerMode.WEB:
-        return [*common, "--serve-web", "--web-viewer-port", str(viewer.web_port), "--server-memory-limit", memory]
+        return [*common, "--serve-web", "--web-viewer-port", str(viewer.web_port), "--newest-first",
+                "--server-memory-limit", memory]  # fmt: skip
     return [*common, "--memory-limit", memory, "--server-memory-limit", "64MB", "--hide-welcome-screen"]
 
 
@@ -86,7 +93,8 @@ def _idle(readiness: Readiness, stopping: threading.Event) -> int:
 def _keep(viewer: ViewerSection, mode: ViewerMode, memory: str, readiness: Readiness, stopping: threading.Event) -> int:
     """Run the viewer once. A native one that ends well was closed by its user; a web one never ends by itself."""
     watch = Watch(viewer.host, viewer.port)
-    child = start(command(rerun_binary(), viewer, mode, memory))
+    child = start(command(rerun_binary(), viewer, mode, memory), stderr=subprocess.PIPE)
+    threading.Thread(target=_relay, args=(child.stderr,), daemon=True, name="viewer's errors").start()
     started = time.monotonic()
     try:
         while not stopping.wait(PERIOD):
@@ -97,6 +105,13 @@ def _keep(viewer: ViewerSection, mode: ViewerMode, memory: str, readiness: Readi
     finally:
         watch.close()
         stop(child)
+
+
+def _relay(errors: IO[bytes] | None) -> None:
+    """Passes the program's errors on; a sender that was cut off is said in words, not in those of its protocol."""
+    for line in errors or ():
+        text = line.decode(errors="replace").rstrip()
+        print(CUT_OFF if "h2 protocol error" in text else text, file=sys.stderr, flush=True)
 
 
 def _beat(watch: Watch, readiness: Readiness, where: str) -> None:

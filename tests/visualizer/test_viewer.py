@@ -1,6 +1,7 @@
 """The viewer as a process: ready when it answers, on loopback only, and gone when it is told to go."""
 
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -9,11 +10,13 @@ import time
 
 import psutil
 import pytest
+import rerun as rr
 
 from schemas.deployment import ViewerMode, ViewerSection
+from services.visualizer.binary import environment, rerun_binary
 from services.visualizer.connection import Watch
 from services.visualizer.picture import free_port
-from services.visualizer.viewer import address, command, resolved
+from services.visualizer.viewer import CUT_OFF, address, command, resolved
 
 
 class Viewer:
@@ -96,6 +99,71 @@ def test_it_gets_ready_listens_on_loopback_only_and_stops_without_orphans(viewer
     assert gone(children)
     assert f"http://127.0.0.1:{viewer.section.web_port}/?url=" in output
     assert not (viewer.run / "viewer.ready").exists()
+
+
+def stream_to(viewer):
+    stream = rr.RecordingStream("gemelo", recording_id="late")
+    stream.connect_grpc(f"rerun+http://127.0.0.1:{viewer.section.port}/proxy")
+    return stream
+
+
+def test_a_viewer_that_is_opened_late_gets_the_newest_first(viewer, tmp_path):
+    """As a page does that is opened after hours: it shows the arm as it is, and then fills in the past."""
+    viewer.start()
+    viewer.wait_until_ready()
+    stream, saved = stream_to(viewer), tmp_path / "late.rrd"
+    for second in range(100):
+        columns = rr.Scalars.columns(scalars=[float(second)])
+        rr.send_columns(f"sent/{second}", [rr.TimeColumn("time", duration=[float(second)])], columns, recording=stream)
+        stream.flush(timeout_sec=5.0)
+    late = subprocess.Popen(
+        [rerun_binary(), f"rerun+http://127.0.0.1:{viewer.section.port}/proxy", "--save", saved],
+        env=environment(os.environ), stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        deadline = time.monotonic() + 15.0
+        order = []
+        while len(order) < 100:
+            assert time.monotonic() < deadline, order
+            time.sleep(0.2)
+            order = arrived(saved)
+    finally:
+        late.kill()
+        late.wait()
+        stream.disconnect()
+    assert order[0] == 99
+    assert order.index(98) < order.index(1)
+
+
+def arrived(saved):
+    """The seconds that are in the file, in their order."""
+    done = subprocess.run([rerun_binary(), "rrd", "print", saved], capture_output=True, text=True)
+    return [int(second) for second in re.findall(r"/sent/(\d+)\b", done.stdout)]
+
+
+SENDER = """
+import sys, rerun as rr
+stream = rr.RecordingStream("gemelo")
+stream.connect_grpc(sys.argv[1])
+for number in range(10_000_000):
+    stream.log("a", rr.Scalars(number))
+    if number == 20_000:
+        print("on", flush=True)
+"""
+
+
+def test_a_sender_that_is_killed_is_said_in_words_without_the_protocols_own(viewer):
+    viewer.start()
+    viewer.wait_until_ready()
+    url = f"rerun+http://127.0.0.1:{viewer.section.port}/proxy"
+    sender = subprocess.Popen([sys.executable, "-c", SENDER, url], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    try:
+        assert sender.stdout.readline() == b"on\n"
+    finally:
+        sender.kill()
+        sender.communicate()
+    said = viewer.process.stderr.readline()
+    assert said == f"{CUT_OFF}\n"
 
 
 def test_kill_9_of_the_parent_leaves_no_orphan(viewer):
