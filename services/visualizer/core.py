@@ -26,6 +26,8 @@ from services.visualizer.thinning import Thinned
 from services.visualizer.updates import Panel, Scalars, State, Strip, Times, Tint, Update
 
 PANEL_PERIOD = 500_000_000  # [ns]
+AHEAD = 60_000_000_000  # [ns] chosen: a stamp further in the future is false, and the view would follow it there
+FARTHEST = 1e9  # [rad], [m] or [steps]: no joint gets there; beyond it the view's arithmetic overflows
 BAND = 0.5  # [steps] rounding to whole steps alone gives as much
 
 
@@ -48,6 +50,7 @@ class Visualizer:
         self._tip: Array | None = None  # where the trail ends
         self._shown = ("", "")  # mode, panel
         self._panel_at = 0
+        self._latest = 0  # [ns] what is stamped later was never measured
         prismatic = frozenset(joint.name for joint in model.moving if joint.is_prismatic)
         self._facts = Facts(robot=robot, prismatic=prismatic)
 
@@ -99,8 +102,10 @@ class Visualizer:
 
     def step(self, now: int) -> list[Update]:
         """Everything new; `now` in ns UNIX."""
+        self._latest = now + AHEAD
         return [*self._measured(), *self._ghost(), *self._step_errors(), *self._shafts(), *self._planned(),
-                *self._preview.take(now), *self.scene.take(now), *self._device(now), *self.journal.take()]  # fmt: skip
+                *self._preview.take(now), *self.scene.take(now), *self._device(now),
+                *self.journal.take(self._latest)]  # fmt: skip
 
     def restart(self) -> None:
         """Say the lasting things again: the viewer is a new one."""
@@ -113,18 +118,18 @@ class Visualizer:
         row = list(before.newest or (0.0,) * len(self._names))
         for name, value in zip(names, values, strict=False):
             if name in self._names:
-                row[self._names.index(name)] = value
+                row[self._names.index(name)] = min(max(value, -FARTHEST), FARTHEST)
         return row
 
     def _measured(self) -> list[Update]:
-        times, rows = self._executed.take()
+        times, rows = self._executed.take(self._latest)
         if not len(times):
             return []
         plots = self._plots(times, rows, entities.executed)
         return [*arm_poses(self.model, entities.MEASURED, times, rows), *plots, *self._trail(times, rows)]
 
     def _ghost(self) -> list[Update]:
-        times, rows = self._commanded.take()
+        times, rows = self._commanded.take(self._latest)
         if not len(times):
             return []
         plots = self._plots(times, rows, entities.commanded)
@@ -144,7 +149,7 @@ class Visualizer:
         return [Strip(entities.TRAIL, int(times[-1]), line)] if moved else []
 
     def _step_errors(self) -> list[Update]:
-        times, rows = self._errors.take()
+        times, rows = self._errors.take(self._latest)
         if not len(times):
             return []
         edges = np.tile([BAND, -BAND], (len(times), 1))
@@ -154,7 +159,7 @@ class Visualizer:
         ]
 
     def _shafts(self) -> list[Update]:
-        times, rows = self._shaft.take()
+        times, rows = self._shaft.take(self._latest)
         if not len(times):
             return []
         return [Scalars(entities.shaft(name), times, rows[:, [column]]) for column, name in enumerate(self._names)]

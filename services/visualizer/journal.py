@@ -32,12 +32,12 @@ class Journal:
         text = f"{message.device}: {message.event}" + (f" ({message.detail})" if message.detail else "")
         self.add(message.stamp, text, EVENT_LEVELS.get(message.event, "INFO"))
 
-    def take(self) -> list[Update]:
-        """The lines since the last call."""
+    def take(self, latest: int = LAST_STAMP) -> list[Update]:
+        """The lines since the last call; one of after `latest` [ns] is of then."""
         lines, self._lines = self._lines, []
         if not lines:
             return []
-        stamps, said, levels = zip(*lines, strict=True)
+        stamps, said, levels = zip(*((min(stamp, latest), *line) for stamp, *line in lines), strict=True)
         texts = tuple(f"{time_of_day(stamp)} {text}" for stamp, text in zip(stamps, said, strict=True))
         return [LogLines(entities.LOG, np.array(stamps, dtype=np.int64), texts, levels)]
 

@@ -50,9 +50,9 @@ class Thinned:
         else:
             self._held = sample
 
-    def take(self) -> tuple[Times, Array]:
-        """Stamps (n,) and rows (n, width) kept since the last call."""
-        kept, self._kept = self._kept, []
+    def take(self, latest: int = LAST_STAMP) -> tuple[Times, Array]:
+        """Stamps (n,) and rows (n, width) kept since the last call; of those after `latest` [ns] nothing is left."""
+        kept, self._kept = [sample for sample in self._kept if sample[0] <= latest], []
         times = np.array([stamp for stamp, _ in kept], dtype=np.int64)
         return times, np.array([row for _, row in kept], dtype=np.float64).reshape(len(kept), self._width)
 

@@ -1,6 +1,7 @@
 """Messages become columns: in screen units, thinned while nothing moves, and none is lost when something does."""
 
 import math
+import warnings
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +20,7 @@ from schemas.joints import JointState, StepErrors
 from schemas.planning import PlannedPath
 from schemas.system import LogLevel, LogRecord
 from services.visualizer import entities
+from services.visualizer.core import AHEAD
 from services.visualizer.thinning import KEEP_ALIVE, Thinned
 from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip, Tint
 
@@ -240,3 +242,27 @@ def test_every_update_is_finite_and_ordered(core):
     for update in core.step(START):
         if isinstance(update, Scalars | Poses):
             assert np.all(np.diff(update.times) > 0)
+
+
+def test_values_that_no_joint_can_have_are_drawn_at_the_edge_without_an_overflow(core):
+    for index, value in enumerate((1e308, -1e308, 0.5)):
+        stamp = START + index * 20_000_000
+        core.on_joint_state(JointState(stamp=stamp, name=NAMES, position=(value,) * len(NAMES)))
+        core.on_step_errors(StepErrors(stamp=stamp, name=NAMES, error=(value,) * len(NAMES)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        updates = by_entity(core.step(START))
+    for entity in (entities.executed("brazo_joint"), entities.error("brazo_joint")):
+        assert np.all(np.isfinite(updates[entity].values))
+    assert updates[entities.error("brazo_joint")].values[-1][0] == 0.5
+
+
+def test_a_stamp_of_the_far_future_does_not_take_the_view_with_it(core):
+    """The view follows the latest time that it was ever told: one false stamp, and it would never come back."""
+    for stamp in (2**62, START + 20_000_000):
+        core.on_joint_state(JointState(stamp=stamp, name=NAMES, position=(0.5,) * len(NAMES)))
+        core.journal.on_log(LogRecord(stamp=stamp, node="anybody", text="here"))
+    updates = core.step(START + 30_000_000)
+    times = [int(time) for update in updates if hasattr(update, "times") for time in update.times]
+    assert START + 20_000_000 in times
+    assert max(times) <= START + AHEAD + 30_000_000
