@@ -51,7 +51,10 @@ class ClockSync:
             return
         exchange = Exchange((t0 + t3) / 2.0, ((t1 - t0) + (t2 - t3)) / 2.0, round_trip)
         if self._exchanges and not _agree(exchange, min(self._exchanges, key=lambda one: one.round_trip)):
+            # A quartz that drifts beyond its data sheet contradicts the old exchanges only: the young ones still tell.
+            agreeing = [one for one in self._exchanges if _agree(exchange, one)]
             self._exchanges.clear()
+            self._exchanges.extend(agreeing)
         self._exchanges.append(exchange)
         self._line = _line(self._exchanges)
 

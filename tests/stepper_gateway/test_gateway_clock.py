@@ -79,3 +79,14 @@ def test_an_impossible_exchange_is_passed_over() -> None:
     clock.add(1000, 50, 40, 2000)
     clock.add(2000, 50, 60, 1000)
     assert clock.exchanges == 0
+
+
+@pytest.mark.parametrize("drift", [500e-6, -500e-6, 2000e-6])
+def test_a_quartz_beyond_its_data_sheet_is_followed_without_a_gap(drift: float) -> None:
+    clock, rng = ClockSync(), random.Random(1)
+    for index in range(240):
+        ours = index * 5e5
+        exchange(clock, ours, rng.uniform(300, 2000), rng.uniform(300, 2000), drift)
+        assert clock.is_synchronised or index < 3, index
+        if index > 3:
+            assert abs(clock.device_time(ours * 1e-6) - true_time(ours, drift)) < 6000.0
