@@ -109,6 +109,8 @@ size_t gemelo_kept(VirtualDevice* device, uint8_t* text, size_t capacity) {
 
 void gemelo_advance(VirtualDevice* device, uint64_t until_us) { device->advance(until_us); }
 
+void gemelo_stand_still(VirtualDevice* device, uint64_t until_us) { device->stand_still(until_us); }
+
 void gemelo_halt(VirtualDevice* device) { device->machine().halt(); }
 
 void gemelo_report_status(VirtualDevice* device) { device->machine().report_status(); }

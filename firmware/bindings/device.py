@@ -113,6 +113,10 @@ class Device:
         """Let time pass; every tick before `until_us` is run."""
         self._library.gemelo_advance(self._handle, until_us)
 
+    def stand_still(self, until_us: int) -> None:
+        """Let time pass with no tick in it, to a slot's start; only the slot under way ends before."""
+        self._library.gemelo_stand_still(self._handle, until_us)
+
     def take(self) -> list[OutFrame]:
         """All that was said since the last call, oldest first."""
         frames: list[OutFrame] = []

@@ -96,6 +96,7 @@ def load_library(path: Path = LIBRARY) -> c.CDLL:
         "slip": (None, [device, c.c_uint8, c.c_int32]),
         "set_sensor": (None, [device, c.c_uint8, c.c_double]),
         "freeze": (None, [device, u64]),
+        "stand_still": (None, [device, u64]),
         "motor_create": (motor, [motor_config, c.c_double]),
         "motor_destroy": (None, [motor]),
         "motor_pulse": (None, [motor, c.c_int]),

@@ -22,13 +22,14 @@ void Machine::receive_command(const Frame& frame, const Arrival& arrival) {
         return;
     }
     Code code = judge_command(frame, arrival);
-    const Code* answered = code == Code::Ok || code == Code::Expired ? commands_.find(id_of(frame)) : nullptr;
+    const Code* answered =
+        code == Code::Ok || code == Code::Expired ? commands_.find(id_of(frame), word_of(frame)) : nullptr;
     if (answered != nullptr) {
         code = *answered;
     } else {
         if (code == Code::Ok) {
             code = carry_out(frame);
-            commands_.add(id_of(frame), code);
+            commands_.add(id_of(frame), word_of(frame), code);
         }
         if (code != Code::Ok) ++refused_;
     }
@@ -67,6 +68,9 @@ Code Machine::carry_out(const Frame& frame) {
             return switch_output(frame.bytes[21], argument);
         case Command::Speed:
             return change_speed(argument);
+        case Command::Status:
+            report_status();
+            return Code::Ok;
         default:
             return Code::UnknownCommand;
     }

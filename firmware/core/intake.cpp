@@ -3,6 +3,12 @@
 #include "machine.h"
 
 namespace gemelo {
+namespace {
+
+constexpr uint32_t kMostMissed = 1024;     // heartbeats in a row, a minute and a half of them
+constexpr uint64_t kSilenceUs = 60000000;  // after which any newer counter counts: that many may be lost by then
+
+}  // namespace
 
 void Machine::receive(const Arrival& arrival, uint64_t now_us) {
     const Frame frame = open_frame(arrival.bytes, arrival.size);
@@ -108,6 +114,8 @@ void Machine::open_stream(const Chunk& chunk) {
         point.play_us = 0;
         point.is_end = point.is_starved = false;
     }
+    for (uint8_t j = 0; j < rules_.joints; ++j) start_q8_[j] = knot.position[j];
+    is_opening_ = true;
     streams_.open(chunk.stream());
     stepper_.watch();
     awaits_first_pulse_ = true;
@@ -135,8 +143,10 @@ void Machine::receive_heartbeat(const Frame& frame, const Arrival& arrival) {
     if (frame.boot_id() != 0 && frame.boot_id() != identity_.boot_id) return;
     const uint32_t session = load_u32(frame.bytes + 8), counter = load_u32(frame.bytes + 12);
     const bool is_same = has_session_ && session == session_;
-    // A late or repeated beat is no sign of life.
-    if (is_same && static_cast<int32_t>(counter - counter_) <= 0) return;
+    // A late or repeated beat is no sign of life, and one from far ahead would make all that follow late.
+    const uint32_t newest = arrival.received_us > beat_us_ + kSilenceUs ? INT32_MAX : kMostMissed;
+    if (is_same && counter - counter_ - 1 >= newest) return;
+    beat_us_ = arrival.received_us;
     has_session_ = true;
     session_ = session;
     counter_ = counter;

@@ -1,10 +1,15 @@
 #include "machine.h"
 
+#include "phrase.h"
+
 namespace gemelo {
 namespace {
 
 // A device without a configuration says how it is, too.
 constexpr uint32_t kStateHzInBoot = 50;
+
+constexpr uint64_t kLongestGapUs = 4 * kSlotUs;  // between two slots' starts: more than an over-run may make of it
+constexpr uint64_t kStatusPeriodUs = 10000000;   // a broker may have lost what it was told
 
 }  // namespace
 
@@ -16,7 +21,7 @@ void Machine::begin(DeviceConfig& config, const Identity& identity, const Sink& 
     fault_joint_ = kNoJoint;
     referenced_ = was_referenced_ = 0;
     speed_permil_ = 1000;
-    is_armed_ = is_following_ = is_stopping_ = is_dry_ = awaits_first_pulse_ = false;
+    is_armed_ = is_following_ = is_stopping_ = is_dry_ = awaits_first_pulse_ = is_opening_ = false;
     is_still_ = true;
     heard_ = 0;
     slots_to_state_ = slots_to_sensors_ = 0;
@@ -51,7 +56,8 @@ void Machine::begin_outputs() {
 }
 
 void Machine::start(uint64_t now_us, const int32_t* steps, bool referenced) {
-    now_us_ = alive_us_ = now_us;
+    now_us_ = alive_us_ = slot_us_ = now_us;
+    status_due_us_ = now_us + kStatusPeriodUs;
     if (config_->joints != 0) {
         int64_t position_q20[kMaxJoints] = {};
         for (uint8_t j = 0; j < rules_.joints; ++j) position_q20[j] = static_cast<int64_t>(steps[j]) * kFineStep;
@@ -86,8 +92,10 @@ bool Machine::takes_config() const {
 
 void Machine::place(const int64_t* position_q20) {
     stepper_.place(position_q20);
-    for (Point& point : points_)
+    for (Point& point : points_) {
+        point.is_start = false;
         for (uint8_t j = 0; j < rules_.joints; ++j) point.position_q20[j] = position_q20[j];
+    }
 }
 
 // A joint that stands gets another count.
@@ -106,11 +114,26 @@ void Machine::slot(uint64_t slot_start_us) {
     if (!stepper_.wants_offer()) return;
     now_us_ = slot_start_us;
     watch_trips();
+    watch_ticks(slot_start_us);
     finish_slot();
     watch_heartbeat();
     plan_slot();
     guard_switches();
     report_due();
+}
+
+// No tick came for so long that the motors have come to a stand: what was missed is not caught up, and a motion goes on
+// from rest, if the heartbeat was not lost meanwhile.
+void Machine::watch_ticks(uint64_t slot_start_us) {
+    const bool is_late = slot_start_us > slot_us_ + kLongestGapUs;
+    const uint64_t gap_ms = (slot_start_us - slot_us_) / 1000;
+    slot_us_ = slot_start_us;
+    if (!is_late || !is_moving()) return;
+    path_.pause();
+    for (uint8_t j = 0; j < rules_.joints; ++j) ramp_[j].pause();
+    char detail[16];
+    Phrase(detail, sizeof detail).add(static_cast<uint32_t>(gap_ms)).add(" ms");
+    event("late", detail);
 }
 
 void Machine::finish_slot() {
@@ -181,6 +204,8 @@ void Machine::plan_slot() {
     for (uint8_t j = 0; j < rules_.joints; ++j) next.position_q20[j] = before.position_q20[j];
     path_.advance(mode_ == Mode::Hold ? 0 : speed_q30(), &next);
     next.stream = streams_.stream();
+    next.is_start = is_opening_;
+    is_opening_ = false;
     if (is_following_ || mode_ == Mode::Homing) advance_ramps(&next);
     const uint8_t limit = find_limit_ahead(before, next);
     if (limit != kNone) return fail(FaultCode::LimitSwitch, config_->input[limit].name, config_->input[limit].joint);
@@ -223,6 +248,10 @@ uint16_t Machine::buffered_ms() const {
 }
 
 void Machine::report_due() {
+    if (now_us_ >= status_due_us_) {
+        status_due_us_ = now_us_ + kStatusPeriodUs;
+        report_status();
+    }
     if (slots_to_state_ == 0) {
         slots_to_state_ = kSlotHz / (mode_ == Mode::Boot ? kStateHzInBoot : config_->state_hz);
         report_state(present());

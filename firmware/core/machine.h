@@ -120,6 +120,7 @@ class Machine {
     void watch_following();
     void advance_ramps(Point* point);
 
+    void watch_ticks(uint64_t slot_start_us);
     void finish_slot();
     void finish_stream_slot(const Point& point);
     void measure(const Point& point);
@@ -185,10 +186,15 @@ class Machine {
     bool is_stopping_ = false;
     bool is_dry_ = false;
     bool awaits_first_pulse_ = false;
+    bool is_opening_ = false;       // no slot of the stream has been made yet
+    int32_t start_q8_[kMaxJoints];  // where the stream begins
 
     uint64_t now_us_ = 0;
+    uint64_t slot_us_ = 0;  // the start of the last slot that was looked after
     uint64_t armed_us_ = 0;
     uint64_t alive_us_ = 0;  // of the last heartbeat, or of the start or resumption if that was later
+    uint64_t beat_us_ = 0;   // of the last heartbeat that counted
+    uint64_t status_due_us_ = 0;
     uint32_t session_ = 0;
     uint32_t counter_ = 0;
     bool has_session_ = false;

@@ -16,6 +16,7 @@ struct Point {
     uint64_t play_us;    // stream time
     uint32_t stream;     // that `play_us` belongs to
     uint32_t scale_q30;  // the time scale of this slot
+    bool is_start;       // the stream's first slot
     bool is_end;         // the stream ended here
     bool is_starved;     // the last knot that is known, and the stream goes on
 };
@@ -29,6 +30,8 @@ class Path {
     void append(const Knot& knot);
     // After the last append of a chunk; `ends` says that the stream's last knot is in.
     void accept(bool ends);
+    // The arm has come to a stand in the midst of it: goes on from rest.
+    void pause() { scale_.set(0); }
     // Forgets what has not been played; the path ends where it stands.
     void flush();
 

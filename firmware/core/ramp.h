@@ -15,6 +15,8 @@ class Ramp {
     void go(int64_t target_q20) { target_q24_ = target_q20 * 16; }
     // No faster than this [Q24.8 steps/s].
     void set_speed(int32_t speed_q8);
+    // The joint has come to a stand: goes on from rest.
+    void pause() { velocity_q24_ = 0; }
     // The same place by another count: there and its target.
     void shift(int64_t by_q20);
 

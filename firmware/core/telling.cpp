@@ -38,7 +38,9 @@ void Machine::report_state(const Point& point) {
     report.bad_frames = bad_frames_;
     for (uint8_t j = 0; j < rules_.joints; ++j) {
         report.steps[j] = stepper_.latched(j);
-        report.velocity_q8[j] = as_q8((point.position_q20[j] - before.position_q20[j]) * kSlotHz);
+        // A stream may begin up to a step from where the arm stands: that step is no velocity of its path.
+        const int64_t from_q20 = point.is_start ? as_q20(start_q8_[j]) : before.position_q20[j];
+        report.velocity_q8[j] = as_q8((point.position_q20[j] - from_q20) * kSlotHz);
     }
     reporter_.state(report);
 }

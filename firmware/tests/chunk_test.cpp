@@ -1,6 +1,7 @@
 // Chunks: in order, once, all or nothing, and refused with the reason.
 #include <gtest/gtest.h>
 
+#include "bytes.h"
 #include "motion.h"
 
 using namespace gemelo;
@@ -216,4 +217,21 @@ TEST(Clock, MayWrapAt32Bits) {
     EXPECT_EQ(rig.steps(0), 1500);
     EXPECT_EQ(rig.state().underruns, 0u);
     EXPECT_GT(rig.state().t_us, 1ull << 32);
+}
+
+TEST(State, TellsNoVelocityForTheStepBetweenTheArmAndAStreamsFirstKnot) {
+    DeviceConfig config = two_joints();
+    config.state_hz = 1000;
+    Rig rig(config);
+    ChunkSpec chunk = quintic({0, 0}, {300, 0}).whole();
+    for (Row& row : chunk.rows) row.position[1] += 121;  // 0.47 steps from where q2 stands
+    ASSERT_EQ(rig.send(chunk).code, Code::Ok);
+    rig.device.advance(rig.device.now_us() + 20000);
+    int states = 0;
+    for (const OutFrame& frame : rig.device.outputs()) {
+        if (frame.output != Output::State) continue;
+        ++states;
+        EXPECT_EQ(load_i32(frame.payload.data() + 60 + 4 * 3), 0) << "state " << states;
+    }
+    EXPECT_GE(states, 19);
 }

@@ -23,6 +23,48 @@ TEST(Command, ThatIsRepeatedIsAnsweredAgainAndNotDoneAgain) {
     EXPECT_EQ(rig.steps(0), 3000);
 }
 
+TEST(Command, UnderTheIdOfAnotherIsDoneAllTheSame) {
+    Rig rig;
+    rig.send(quintic({0, 0}, {3000, 0}).whole());
+    rig.run_ms(600);
+    EXPECT_EQ(rig.send_command(build_command(Command::Speed, 41, {}, kNever, kBoot, 0, 1000)), Code::Ok);
+    EXPECT_EQ(rig.send_command(build_command(Command::Stop, 41)), Code::Ok);
+    rig.run_ms(2000);
+    EXPECT_EQ(rig.mode(), Mode::Idle);
+    EXPECT_LT(rig.steps(0), 3000);
+}
+
+namespace {
+
+// Since it was asked last.
+int count_statuses(Rig& rig) {
+    int count = 0;
+    for (const OutFrame& frame : rig.device.outputs()) count += frame.output == Output::Status;
+    rig.device.outputs().clear();
+    return count;
+}
+
+}  // namespace
+
+TEST(Status, IsSaidOnRequestAndNowAndThen) {
+    Rig rig;
+    rig.device.receive(build_command(Command::Status, 1));
+    EXPECT_EQ(count_statuses(rig), 1);
+    rig.device.advance(rig.device.now_us() + 9900000);
+    EXPECT_EQ(count_statuses(rig), 0);
+    rig.device.advance(rig.device.now_us() + 30200000);
+    EXPECT_EQ(count_statuses(rig), 4);
+}
+
+TEST(Status, OfADeviceWithoutAConfigurationIsSaidToo) {
+    DeviceConfig none{};
+    Rig rig(none, false);
+    rig.device.receive(build_command(Command::Status, 1));
+    EXPECT_EQ(count_statuses(rig), 1);
+    rig.device.advance(rig.device.now_us() + 30100000);
+    EXPECT_EQ(count_statuses(rig), 3);
+}
+
 TEST(Command, ThatWasRefusedIsRefusedAgainThoughItCouldBeDoneNow) {
     Rig rig;
     const Bytes resume = build_command(Command::Resume, 9);

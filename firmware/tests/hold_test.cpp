@@ -193,6 +193,84 @@ TEST(Heartbeat, ThatIsRepeatedOrForAnotherBootIsNoSignOfLife) {
     }
 }
 
+TEST(Heartbeat, FromFarAheadDoesNotMakeThoseThatFollowLate) {
+    Rig rig;
+    Feeder feeder(kLong, 7);
+    Watch watch{kLong};
+    play(rig, &feeder, watch, 1000);
+    rig.device.receive(build_heartbeat(1, 1u << 24));
+    play(rig, &feeder, watch, 6000);
+    EXPECT_EQ(rig.count_events("hold"), 0);
+    EXPECT_EQ(rig.steps(0), 6000);
+}
+
+TEST(Heartbeat, CountsAgainAfterAnOutageOfAnyLength) {
+    for (uint32_t minutes : {1u, 2u, 600u}) {
+        Rig rig;
+        rig.device.receive(build_heartbeat(5, 9));
+        rig.device.stand_still(rig.device.now_us() + minutes * 60000000ull);
+        const uint32_t counter = 9 + minutes * 600;
+        ASSERT_EQ(rig.send(kLong.chunk(0, 100, 0)).code, Code::Ok);
+        for (uint32_t i = 0; i < 8; ++i) {
+            rig.device.receive(build_heartbeat(5, counter + i));
+            rig.run_ms(100, true);
+        }
+        EXPECT_EQ(rig.mode(), Mode::Run) << minutes << " minutes";
+    }
+}
+
+TEST(LateTicks, AreNotCaughtUpAndTheArmHoldsWhereTheHeartbeatWasLost) {
+    Rig rig;
+    Watch watch{kLong};
+    Feeder feeder(kLong, 7);
+    play(rig, &feeder, watch, 1200);
+    const int32_t before = rig.steps(0);
+    rig.device.stand_still(rig.device.now_us() + 2900000);
+    rig.run_ms(1, true);
+    rig.beat();
+    rig.beat();
+    rig.run_ms(1000);
+    EXPECT_EQ(rig.mode(), Mode::Hold);
+    EXPECT_EQ(rig.count_events("late"), 1);
+    EXPECT_NE(rig.event("late").find("29"), std::string::npos) << rig.event("late");
+    EXPECT_NE(rig.event("hold").find("heartbeat"), std::string::npos);
+    EXPECT_LE(std::abs(rig.steps(0) - before), 2 * 4 + 1) << "no more than two slots at 4000 steps/s";
+    rig.run_ms(3000);
+    EXPECT_LE(std::abs(rig.steps(0) - before), 2 * 4 + 1);
+    EXPECT_EQ(rig.state().velocity_q8[0], 0);
+    EXPECT_EQ(rig.command(Command::Stop), Code::Ok);
+    rig.run_ms(100);
+    EXPECT_EQ(rig.mode(), Mode::Idle);
+    EXPECT_LE(std::abs(rig.steps(0) - before), 2 * 4 + 1);
+    EXPECT_LE(rig.device.machine().max_slot_error_q8(), 128u);
+}
+
+TEST(LateTicks, OfLessThanAHeartbeatsPatienceGoOnAlongThePathFromRest) {
+    Rig rig;
+    Watch watch{kLong};
+    Feeder feeder(kLong, 7);
+    play(rig, &feeder, watch, 1200);
+    rig.device.stand_still(rig.device.now_us() + 200000);
+    rig.run_ms(1);
+    Watch after{kLong};
+    for (uint8_t j = 0; j < 2; ++j) after.p[j] = rig.path(j);
+    play(rig, &feeder, after, 8000);
+    EXPECT_EQ(rig.count_events("late"), 1);
+    EXPECT_EQ(rig.count_events("hold"), 0);
+    EXPECT_EQ(rig.mode(), Mode::Idle);
+    EXPECT_EQ(rig.steps(0), 6000);
+    EXPECT_EQ(rig.steps(1), -3500);
+    after.expect_good(rig);
+}
+
+TEST(LateTicks, AtRestAreHarmless) {
+    Rig rig;
+    rig.device.stand_still(rig.device.now_us() + 2900000);
+    rig.run_ms(10);
+    EXPECT_EQ(rig.mode(), Mode::Idle);
+    EXPECT_EQ(rig.count_events("late"), 0);
+}
+
 TEST(Stop, DeceleratesAlongThePathAndEndsTheStreamThere) {
     Rig rig;
     Watch watch{kLong};

@@ -107,6 +107,15 @@ void VirtualDevice::advance(uint64_t until_us) {
     if (until_us > now_us_) now_us_ = until_us;
 }
 
+void VirtualDevice::stand_still(uint64_t until_us) {
+    if (tick_in_slot_ != 0) advance(slot_start_us_ + kSlotUs);
+    if (until_us <= slot_start_us_) return;
+    const uint64_t slots = (until_us - slot_start_us_) / kSlotUs;
+    slot_start_us_ += slots * kSlotUs;
+    tick_ += slots * ticks_per_slot_;
+    if (slot_start_us_ > now_us_) now_us_ = slot_start_us_;
+}
+
 void VirtualDevice::run_until_tick(uint32_t due) {
     if (ticks_per_slot_ == 0) return run_slot_task();  // without a configuration there is no tick
     if (tick_in_slot_ == 0 && due > 0) {

@@ -48,6 +48,8 @@ class VirtualDevice {
 
     // Runs every tick whose time is before `until_us`; at a multiple of a slot since the start, a slot has just ended.
     void advance(uint64_t until_us);
+    // Everything stands still until then, pins and shafts too; the slot that is under way ends before.
+    void stand_still(uint64_t until_us);
     // The slot's task hangs for so long; only the interrupt runs, and what arrives waits.
     void freeze(uint64_t duration_us) { frozen_until_us_ = now_us_ + duration_us; }
     void advance_without_slots(uint32_t slots);

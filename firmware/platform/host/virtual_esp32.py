@@ -6,7 +6,6 @@ import logging
 import queue
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 from firmware.bindings.device import Device
@@ -27,6 +26,7 @@ log = logging.getLogger("virtual_esp32")
 PAUSE_MOVING = 0.002  # [s] longest wait between two looks at the clock
 PAUSE_AT_REST = 0.020  # [s] a state is due as often
 STALL = 0.1  # [s] a loop that was late by more was stopped by the operating system
+LAST_SLOTS = 2000  # [us] that run after a stall: one slot, and what is begun of the next
 LONGEST_STOP = 5.0  # [s] when the process is asked to end while the arm moves
 BEAT = 1.0  # [s] of the readiness file
 PARTING = 0.1  # [s] that an answer has to leave, before the wire is lost
@@ -73,10 +73,7 @@ class VirtualEsp32:
     def _turn(self) -> None:
         items = self._wait()
         now = time.monotonic()
-        if now - self._looked > STALL:
-            items = self._relive(items)
-        else:
-            self._advance(now)
+        self._advance(now)
         for item in items:
             self._handle(item)
         self._advance(time.monotonic())
@@ -101,25 +98,6 @@ class VirtualEsp32:
         while not self._inbox.empty():
             items.append(self._inbox.get())
         return items
-
-    def _relive(self, items: list[Item]) -> list[Item]:
-        """After a stall of the whole process, spread what waited in the socket over the time that was missed.
-
-        A board does not stop with our process: it would have had each frame when it came.
-        """
-        time.sleep(0.01)
-        while not self._inbox.empty():
-            items.append(self._inbox.get())
-        begin, end = self._looked, time.monotonic()
-        level = logging.WARNING if self._device.moving else logging.INFO
-        log.log(level, "the operating system kept us waiting for %.0f ms", (end - begin) * 1e3)
-        spread = []
-        for index, item in enumerate(items):
-            if isinstance(item, Arrived | SerialBytes):
-                due = begin + (end - begin) * (index + 1) / (len(items) + 1)
-                item = replace(item, monotonic=min(item.monotonic, due))
-            spread.append(item)
-        return spread
 
     def _handle(self, item: Item) -> None:
         match item:
@@ -226,7 +204,13 @@ class VirtualEsp32:
         log.info("device %s, boot %08x: %s", self._board.device_name, device.boot_id, where)
 
     def _advance(self, monotonic: float) -> None:
-        self._device.advance(self._clock.at(monotonic))
+        """Let the board run up to then; what a stall of this process has missed is not caught up."""
+        late, until_us = monotonic - self._looked, self._clock.at(monotonic)
+        if late > STALL:
+            level = logging.WARNING if self._device.moving else logging.INFO
+            log.log(level, "the operating system kept us waiting for %.0f ms: they are not caught up", late * 1e3)
+            self._device.stand_still(max(0, until_us - LAST_SLOTS))
+        self._device.advance(until_us)
         self._looked = max(self._looked, monotonic)
 
     def _beat(self, now: float) -> None:

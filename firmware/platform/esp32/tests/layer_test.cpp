@@ -161,6 +161,22 @@ TEST(Esp32Layer, EveryStepOfAStreamComesOutOfItsPin) {
     EXPECT_TRUE(has(running->said(Output::Event), "finished"));
 }
 
+TEST(Esp32Layer, WhatAFreezeHasMissedIsNotCaughtUpAndTheArmHolds) {
+    auto running = ready();
+    running->pass_ms(250);
+    running->move(0, 700);
+    running->pass_ms(150);
+    const uint32_t before = chip.ups[kStep];
+    chip.now_us += 2900000;
+    const rig::Bytes beat = rig::build_heartbeat(1, 100);  // came while it was frozen
+    board.from_mqtt.push(static_cast<uint8_t>(Inbound::Frame), 0, chip.now_us, beat.data(), beat.size());
+    running->pass_ms(500);
+    EXPECT_LE(chip.ups[kStep] - before, 6u);  // two slots at 2,600 steps/s
+    const std::string said = running->said(Output::Event);
+    EXPECT_TRUE(has(said, "\"late\"")) << said;
+    EXPECT_TRUE(has(said, "\"hold\"")) << said;
+}
+
 TEST(Esp32Layer, AQuestionThatComesWithinASlotIsAnsweredWithTimesInTheirOrder) {
     auto running = ready();
     chip.waking_us = 300;
