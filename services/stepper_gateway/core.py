@@ -16,7 +16,7 @@ from schemas.topics import DEVICE_STATUS
 from services.arm.description import Arm
 from services.stepper_gateway.arguments import STOPS, kind_of
 from services.stepper_gateway.goals import GoalVerdict
-from services.stepper_gateway.links.frames import BadFrame, Heartbeat, encode
+from services.stepper_gateway.links.frames import BadFrame, Command, Heartbeat, Sync, encode
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Output
@@ -25,6 +25,7 @@ from services.stepper_gateway.parts import Parts
 from services.stepper_gateway.reception import Reception
 from services.stepper_gateway.status import status_of
 
+REGULAR = {Heartbeat: Kind.HB, Sync: Kind.SYNC, Command: Kind.CMD}  # what the session sends by itself
 BAD_FRAME_REPORT = 1.0  # [s] between two
 PAUSES = (  # commands that leave goals and targets as they are
     DeviceCommandKind.HOLD,
@@ -140,14 +141,13 @@ class GatewayCore:
         period = moment.monotonic - self._stepped if self._stepped is not None else 0.0
         self._stepped = moment.monotonic
         for frame in mover.session.due(moment):
-            self._parts.out.send(Kind.HB if isinstance(frame, Heartbeat) else Kind.SYNC, encode(frame))
+            self._parts.out.send(REGULAR[type(frame)], encode(frame))
         absence = mover.absence(moment)
         if absence:
             self._parts.lose(absence, moment)
         self._parts.goals.step(moment, period)
         self._parts.streaming.step(moment)
-        if mover.stop_strangers(moment):
-            self._parts.goals.on_stranger(moment)
+        self._parts.stop_strangers(moment)
         self._parts.desk.step(moment)
         mover.configuration.step(absence, moment)
         self._parts.presses.step(moment)

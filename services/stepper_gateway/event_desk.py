@@ -7,7 +7,7 @@ from services.stepper_gateway.links.reports import EventReport
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.mover import Mover
 
-TROUBLE = ("fault", "hold", "underrun", "estop", "homing_stopped", "text_lost", "press_refused")
+TROUBLE = ("fault", "hold", "late", "underrun", "estop", "homing_stopped", "text_lost", "press_refused")
 MOTION = {"started": "from", "finished": "at"}  # how the place of a motion's event is introduced
 BY_A_PERSON = "command"  # the detail of what somebody has asked for
 

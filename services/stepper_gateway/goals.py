@@ -19,7 +19,12 @@ from services.stepper_gateway.refusals import GoalRejected, invalid
 from services.stepper_gateway.scene_versions import PlannedIn, SceneVersions
 from services.stepper_gateway.validation import Validator
 
-HEARTBEAT_LOST = "the device holds because it lost the gateway's heartbeat"
+HELD = {  # by the detail of the device's event
+    "heartbeat": "the device holds because it lost the gateway's heartbeat",
+    "command": "the device holds because somebody else has sent it HOLD or STOP: this gateway has not",
+    "shutdown": "the device holds because it is being shut down",
+}
+HELD_SILENTLY = "the device holds by itself and has not said why: see its own log"
 FAILED = GoalStatusCode.ABORTED, FollowErrorCode.DEVICE_FAILED
 
 
@@ -137,9 +142,12 @@ class Goals:
 
     def on_hold(self, moment: Moment) -> None:
         """The device holds by itself on a path of ours."""
+        stream, cause = self._mover.held
+        is_this = self._mover.stream is not None and stream == self._mover.stream.id
+        reason = HELD.get(cause, HELD_SILENTLY) if is_this else HELD_SILENTLY
         if self._current is None:
-            self.stop(HEARTBEAT_LOST, moment)
-        self._end(Ending(*FAILED, HEARTBEAT_LOST), moment)
+            self.stop(reason, moment)
+        self._end(Ending(*FAILED, reason), moment)
 
     def on_stranger(self, moment: Moment) -> None:
         """The device played another stream than the present goal's, and is being stopped."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
+from msgspec.structs import replace
+
 from schemas.device import DeviceCommandKind, DeviceEvent, DeviceMode
 from schemas.message import Vector
 from schemas.system import LogLevel
@@ -21,7 +23,7 @@ from services.stepper_gateway.outputs import Outbox
 from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.path_log import PathPoint
 from services.stepper_gateway.reporting import Reporter
-from services.stepper_gateway.session import DeviceSession
+from services.stepper_gateway.session import NO_EXPIRY, DeviceSession
 from services.stepper_gateway.slowness import Slowness
 from services.stepper_gateway.stream import SentChunk, Stream
 from services.stepper_gateway.transmission import Transmission
@@ -53,6 +55,7 @@ class Mover:
         self._stop_asked = -1.0e9  # [s] monotonic
         self._stopped_us = -1  # device time of its answer to the latest STOP
         self._awaits_stop = False
+        self.held = (0, "")  # the stream that the device has held last, and why, in its own words
 
     @property
     def state(self) -> State | None:
@@ -61,6 +64,11 @@ class Mover:
     @property
     def stream(self) -> Stream | None:
         return self.transmission.stream
+
+    @property
+    def is_followable(self) -> bool:
+        """Whether the device may have something of ours to play."""
+        return self.stream is not None and not (self.stream.is_abandoned or self.stream.is_finished)
 
     @property
     def is_held(self) -> bool:
@@ -176,6 +184,14 @@ class Mover:
     def lost(self) -> None:
         """The device cannot be reached: no answer to a STOP will come, nor will a person's RESUME."""
         self._holds = self._awaits_stop = False
+
+    def leave_stop(self, moment: Moment) -> None:
+        """A STOP on the wire, once: a device that is only frozen reads it behind the knots that wait there too."""
+        if not self.session.boot_id:
+            return
+        self.commands.ask(DeviceCommandKind.STOP, moment, self.parameters.command_timeout)
+        for frame in self.commands.due(moment, self.session.clock, self.session.boot_id):
+            self.out.send(Kind.CMD, encode(replace(frame, expires_us=NO_EXPIRY)))
 
     def begin_anew(self) -> None:
         """Another boot, or the same one with another configuration: neither the stream nor any STOP concerns it."""

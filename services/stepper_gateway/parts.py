@@ -35,9 +35,18 @@ class Parts:
 
     def lose(self, reason: str, moment: Moment) -> None:
         """The device cannot be reached: whatever it does now it does by itself."""
+        is_moving = self.mover.is_followable
         self.fail(reason, moment)
         self.desk.give_up(reason)
         self.mover.lost()
+        if is_moving:
+            self.mover.leave_stop(moment)
+
+    def stop_strangers(self, moment: Moment) -> None:
+        """A motion that nobody follows is stopped at once, also where a device comes back with it."""
+        if self.mover.stop_strangers(moment):
+            self.goals.on_stranger(moment)
+            self.desk.send_due(moment)
 
     def begin_anew(self, reason: str, moment: Moment) -> None:
         """Another boot, or another configuration: what the gateway knew of the arm's steps means nothing."""

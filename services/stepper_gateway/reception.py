@@ -19,6 +19,12 @@ from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.parts import Parts
 from services.stepper_gateway.path_log import PathPoint
 
+STOPPED = ("hold", "homing_stopped")
+BY_LOST_HEARTBEAT = "heartbeat"  # the detail of these
+RENEWED = (
+    "the device has stopped for lost heartbeats though this gateway sends them: they were lost on the way, or others "
+    "were sent under its session; it has begun a fresh session"
+)
 LOST = (DeviceMode.FAULT, DeviceMode.ESTOP, DeviceMode.UNREFERENCED, DeviceMode.HOMING, DeviceMode.BOOT)
 
 
@@ -36,6 +42,8 @@ class Reception:
             raise BadFrame("it is retained, and only a status may be")
         match received.kind:
             case Kind.STATUS:
+                if not payload:
+                    raise BadFrame("it is empty: somebody has cleared it at the broker, which changes nothing")
                 self._on_status(decode_report(StatusReport, payload), moment)
             case Kind.EVENT:
                 self._on_event(decode_report(EventReport, payload), moment)
@@ -60,6 +68,7 @@ class Reception:
             case Kind.SYNC_R, SyncReply():
                 self._mover.session.on_sync_reply(frame, received.arrival // 1000)
             case Kind.CMD_ACK, CommandReply():
+                self._mover.session.on_reply(frame)
                 self._parts.desk.on_reply(frame, moment)
             case _:
                 raise BadFrame(f"a {type(frame).__name__} frame does not belong there")
@@ -77,7 +86,16 @@ class Reception:
 
     def _on_event(self, event: EventReport, moment: Moment) -> None:
         pass_on(event, self._mover, moment)
+        if event.event in STOPPED:
+            self._on_stopped(event, moment)
         self._parts.presses.on_event(event)
+
+    def _on_stopped(self, event: EventReport, moment: Moment) -> None:
+        """The device slows down by itself; where it misses heartbeats that were sent, it gets a fresh session."""
+        mover = self._mover
+        mover.held = (event.stream, event.detail)
+        if event.detail == BY_LOST_HEARTBEAT and mover.session.renew_heartbeat(moment):
+            mover.event("heartbeat_renewed", RENEWED, moment)
 
     def _on_shaft(self, report: ShaftReport, arrival: float, moment: Moment) -> None:
         measured = self._mover.session.clock.measured(report.t_us, arrival)
@@ -106,6 +124,7 @@ class Reception:
             self._parts.fail(mover.hindrance(), moment)
         self._parts.goals.on_ack()
         self._parts.goals.on_state(state, point, moment)
+        self._parts.stop_strangers(moment)
 
     def _publish(self, state: State, point: PathPoint, moment: Moment) -> None:
         reporter = self._mover.reporter

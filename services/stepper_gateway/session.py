@@ -6,13 +6,28 @@ from collections import deque
 
 from schemas.device import DeviceMode
 from services.stepper_gateway.clock import ClockSync
-from services.stepper_gateway.links.frames import BadFrame, Heartbeat, State, StateFlag, Sync, SyncReply
+from services.stepper_gateway.links.frames import (
+    BadFrame,
+    Code,
+    Command,
+    CommandReply,
+    Heartbeat,
+    State,
+    StateFlag,
+    Sync,
+    SyncReply,
+)
 from services.stepper_gateway.links.reports import StatusReport
 from services.stepper_gateway.moment import Moment, next_beat
 
 HEARTBEAT = 0.1  # [s] a cut of 0.4 s does not stop the arm yet
 SYNC = 0.5  # [s]
 SYNC_AT_FIRST = 0.03  # [s] until the clock is known
+STEADY_BEATS = 0.7  # [s] of heartbeats without a pause, after which a device cannot miss them for want of any
+ASK_STATUS = 1.0  # [s] between two requests for a status that is missing
+STATUS = 11  # the command that asks for it
+NO_EXPIRY = 2**64 - 1  # [us]
+FARTHEST_AHEAD = 1.0  # [s] that a state's time may be ahead of the device's clock as it is known
 QUESTIONS = 32  # that may be under way
 OLD_BOOTS = 16  # remembered, so that a late frame of one does not look like a reboot
 
@@ -29,6 +44,10 @@ class DeviceSession:
         self._session_id = session_id
         self._counter = 0
         self._heartbeat_due = self._sync_due = 0.0
+        self._beat = self._beats_since = -1.0e9  # [s] monotonic, of the last one, and of the first without a pause
+        self._status_due = 0.0  # [s] monotonic
+        self._status_id = session_id ^ 0x80000000  # far from those of a person's commands
+        self._tells_status = True  # on request
         self._old_boots: list[int] = []
         self._reports: dict[int, StatusReport] = {}  # by boot id
         self._offline_boot = 0  # whose last will has come
@@ -82,6 +101,9 @@ class DeviceSession:
         if state.mode not in DeviceMode._value2member_map_:
             raise BadFrame(f"a state with the unknown mode {state.mode}")
         is_fresh = arrival - self.state_arrival <= timeout
+        ahead = state.t_us - self.clock.device_time(arrival) - FARTHEST_AHEAD * 1e6
+        if is_fresh and state.boot_id == self.boot_id and self.clock.is_synchronised and ahead > 0:
+            raise BadFrame(f"a state from {ahead * 1e-6 + FARTHEST_AHEAD:.1f} s ahead of the device's clock")
         if state.boot_id in self._old_boots and is_fresh:
             return False, False
         is_new_boot = self._meet(state.boot_id)
@@ -96,21 +118,45 @@ class DeviceSession:
             self._questions.remove(reply.t0)
             self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us)
 
-    def due(self, moment: Moment) -> list[Heartbeat | Sync]:
-        """Heartbeat and clock frames to send now; called by the control loop itself."""
-        frames: list[Heartbeat | Sync] = []
+    def on_reply(self, reply: CommandReply) -> None:
+        """A device with an older firmware cannot be asked for its status."""
+        if (reply.boot_id, reply.cmd, reply.code) == (self.boot_id, STATUS, Code.UNKNOWN_CMD):
+            self._tells_status = False
+
+    def renew_heartbeat(self, moment: Moment) -> bool:
+        """A fresh heartbeat session, where the device misses beats that have been sent; true if so."""
+        if self._beat - self._beats_since < STEADY_BEATS or moment.monotonic - self._beat > 2.0 * HEARTBEAT:
+            return False
+        self._session_id = self._session_id % 0xFFFFFFFF + 1
+        self._counter = 0
+        self._heartbeat_due, self._beats_since = 0.0, moment.monotonic
+        return True
+
+    def due(self, moment: Moment) -> list[Heartbeat | Sync | Command]:
+        """Heartbeat, clock and status frames to send now; called by the control loop itself."""
+        frames: list[Heartbeat | Sync | Command] = []
         if not self.link_up:
             return frames
         if moment.monotonic >= self._heartbeat_due:
             self._heartbeat_due = next_beat(self._heartbeat_due, moment.monotonic, HEARTBEAT)
             self._counter = (self._counter + 1) & 0xFFFFFFFF
+            if moment.monotonic - self._beat > 2.0 * HEARTBEAT:
+                self._beats_since = moment.monotonic
+            self._beat = moment.monotonic
             frames.append(Heartbeat(boot_id=self.boot_id, session=self._session_id, counter=self._counter))
         if moment.monotonic >= self._sync_due:
             period = SYNC if self.clock.is_synchronised else SYNC_AT_FIRST
             self._sync_due = next_beat(self._sync_due, moment.monotonic, period)
             self._questions.append(moment.micros)
             frames.append(Sync(boot_id=self.boot_id, t0=moment.micros))
+        if self._lacks_status(moment) and moment.monotonic >= self._status_due:
+            self._status_due = moment.monotonic + ASK_STATUS
+            self._status_id = (self._status_id + 1) & 0xFFFFFFFF
+            frames.append(Command(boot_id=self.boot_id, cmd_id=self._status_id, expires_us=NO_EXPIRY, cmd=STATUS))
         return frames
+
+    def _lacks_status(self, moment: Moment) -> bool:
+        return self._tells_status and self.status is None and self.boot_id != 0 and self.is_fresh(moment, ASK_STATUS)
 
     def is_fresh(self, moment: Moment, timeout: float) -> bool:
         """Whether a state has arrived within `timeout` seconds."""
@@ -149,4 +195,5 @@ class DeviceSession:
         self.latest = None
         self.clock.reset()
         self._sync_due = 0.0
+        self._status_due, self._tells_status = 0.0, True
         return is_reboot

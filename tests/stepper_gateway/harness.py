@@ -109,6 +109,7 @@ class Rig:
         self.config = config or device_config(self.arm)  # what the device works with when it starts
         self.device = Device(self.config, 77, 5_000_000, _fitting(steps, self.config), referenced)
         self.device_is_on = self.gateway_is_on = True
+        self.device_is_frozen = False  # what arrives waits
         self.published: dict[str, list[Any]] = defaultdict(list)
         self.finished: dict[str, tuple[GoalStatusCode, FollowJointTrajectoryResult]] = {}
         self.executing: list[str] = []
@@ -152,6 +153,15 @@ class Rig:
                 return True
             self._millisecond()
         return until is None or until()
+
+    def freeze(self, seconds: float) -> None:
+        """The device stands still as a whole, and wakes up to what has arrived meanwhile."""
+        self.device_is_frozen = True
+        self.run(seconds)
+        self.device_is_frozen = False
+        now_us = self.now_us - self._device_zero
+        self.device.stand_still(now_us - 2000)
+        self.device.advance(now_us)
 
     def ready(self) -> Rig:
         """Run until the gateway may accept goals and the drivers have been on for as long as they need."""
@@ -248,7 +258,7 @@ class Rig:
     def _millisecond(self) -> None:
         self.now_us += 1000
         self._deliver()
-        if self.device_is_on:
+        if self.device_is_on and not self.device_is_frozen:
             self.device.advance(self.now_us - self._device_zero)
             self.path.append(self.device.commanded_steps)
             for frame in self.device.take():
@@ -271,8 +281,8 @@ class Rig:
     def _deliver(self) -> None:
         if not self._flying:
             return
-        due = sorted(item for item in self._flying if item[0] <= self.now_us)
-        self._flying = [item for item in self._flying if item[0] > self.now_us]
+        due = sorted(item for item in self._flying if self._is_due(item))
+        self._flying = [item for item in self._flying if not self._is_due(item)]
         for _, _, to_device, kind, payload in due:
             if to_device and self.device_is_on and kind == Kind.CONFIG:
                 self.device.receive_config(payload)
@@ -280,6 +290,9 @@ class Rig:
                 self.device.receive(payload)
             elif not to_device and self.gateway_is_on:
                 self.receive(Kind(kind), payload)
+
+    def _is_due(self, item: tuple[int, int, bool, str, bytes]) -> bool:
+        return item[0] <= self.now_us and not (item[2] and self.device_is_frozen)
 
     def _do(self, outputs: list[Output]) -> None:
         for output in outputs:
