@@ -24,14 +24,19 @@ no_python() {
 find_uv() {
     local own=$state/tools/uv python=$1
     first_of uv && return 0
-    if [ ! -x "$own/bin/uv" ]; then
-        say "    uv is not on PATH: installing it from PyPI into .gemelo/tools/uv" >&2
-        rm -rf "$own"
-        install_uv "$python" "$own" >&2 ||
-            fail "uv could not be installed" "sudo apt-get install python3-venv     (Debian and Ubuntu leave it out of python3)" \
-                "or install uv yourself, so that it is on PATH"
-    fi
+    (
+        ! type -P flock >/dev/null || flock 8 # two steps at once may want it
+        [ -x "$own/bin/uv" ] || own_uv "$python" "$own" >&2
+    ) 8>"$state/uv.lock" || exit 1
     printf '%s\n' "$own/bin/uv"
+}
+
+own_uv() {
+    say "uv is not on PATH: installing it from PyPI into .gemelo/tools/uv"
+    rm -rf "$2"
+    install_uv "$1" "$2" ||
+        fail "uv could not be installed" "sudo apt-get install python3-venv     (Debian and Ubuntu leave it out of python3)" \
+            "or install uv yourself, so that it is on PATH"
 }
 
 # By venv where ensurepip is there, else by the system's pip into a plain folder, which PEP 668 allows.

@@ -1,21 +1,30 @@
-# The steps of deploy/bootstrap: said, timed, skipped when done, and failing with a remedy. Sourced.
+# The steps of deploy/bootstrap: skipped when done, side by side in lanes, failing with a remedy. Sourced.
 
-if [ -t 1 ]; then bold=$'\e[1m' dim=$'\e[2m' red=$'\e[31m' plain=$'\e[0m'; else bold='' dim='' red='' plain=''; fi
-done_steps=0
+if [ -t 1 ]; then bold=$'\e[1m' red=$'\e[31m' plain=$'\e[0m'; else bold='' red='' plain=''; fi
+logs=$state/logs       # what the commands of each step printed
+failures=$state/failed # the sentence and the remedies of each step that has failed
+current='' current_title=''
+lanes=() # process groups
 
-say() { printf '%s\n' "$*"; }
+# A pipe that is never at its end: the lanes write "WORD STEP REST" into it, the foreground reads (lanes.sh).
+exec {told}<> <(:)
 
-# fail WHAT REMEDY...: says what is wrong and every remedy, and ends.
+tell() { printf '%s %s %s\n' "$1" "$current" "$2" >&"$told"; }
+
+# say WORDS...: a line for the person.
+say() { if [ -n "$current" ]; then tell say "$*"; else printf '%s\n' "$*"; fi; }
+
+# fail WHAT REMEDY...: keeps what is wrong and every remedy, and ends this lane; outside of one says them and ends all.
 fail() {
-    printf '%sbootstrap: %s%s\n' "$red" "$1" "$plain" >&2
-    shift
-    printf '  remedy: %s\n' "$@" >&2
+    local text
+    text=$(printf '%sbootstrap: %s%s\n' "$red" "$1" "$plain" && shift && printf '  remedy: %s\n' "$@")
+    if [ -n "$current" ]; then printf '%s\n' "$text" >"$failures/$current"; else printf '%s\n' "$text" >&2; fi
     exit 1
 }
 
-# run COMMAND...: shows the command dimly, then runs it.
+# run COMMAND...: writes the command, then runs it.
 run() {
-    printf '%s    %s%s\n' "$dim" "${*//"$root/"/}" "$plain" >&2
+    printf '    %s\n' "${*//"$root/"/}" >&2
     "$@"
 }
 
@@ -40,14 +49,33 @@ step() {
     while [ "$1" != -- ]; do inputs+=("$1"); shift; done
     print=$(fingerprint "$words" ${inputs[@]+"${inputs[@]}"})
     if [ -e "$product" ] && [ -f "$stamp" ] && [ "$(<"$stamp")" = "$print" ]; then return 0; fi
-    started=$SECONDS
-    say "$bold==> $title$plain"
+    started=$SECONDS current=$name current_title=$title
+    : >"$logs/$name"
+    tell begin "$title"
     rm -f "$stamp"
-    "$2"
+    "$2" >"$logs/$name" 2>&1
     [ -e "$product" ] || fail "$title: $product is still missing" "deploy/bootstrap again; if it stays so, remove .venv and .gemelo first"
     printf '%s\n' "$print" >"$stamp"
-    done_steps=$((done_steps + 1))
-    say "    done in $((SECONDS - started)) s"
+    tell done "$((SECONDS - started))"
+    current=''
+}
+
+# lane FUNCTION: runs its steps beside the other lanes, in a process group of its own, so that Ctrl-C ends all of it.
+lane() {
+    set -m
+    (
+        set +m
+        trap end_of_lane EXIT
+        "$1"
+    ) </dev/null &
+    set +m
+    lanes+=($!)
+}
+
+# A step that this lane is still in has failed; where it has not said why, its output has.
+end_of_lane() {
+    [ -z "$current" ] || [ -s "$failures/$current" ] || (fail "$current_title: failed" "see its output above, then: make setup") || true
+    tell end ''
 }
 
 # Two bootstraps at once would build into each other's folders.
@@ -55,9 +83,4 @@ one_at_a_time() {
     type -P flock >/dev/null || return 0
     exec 9>"$state/bootstrap.lock"
     flock -n 9 || { say "waiting for another deploy/bootstrap in this folder"; flock 9; }
-}
-
-summary() {
-    [ "$done_steps" = 0 ] && return 0
-    say "${bold}ready.${plain} Start it with: make up     (or: source .venv/bin/activate && process-compose up)"
 }

@@ -13,7 +13,7 @@ import pytest
 from services.runtime.deployment import project_root
 
 COMMON = """bash sh cat chmod cut dirname env find flock grep head ln mkdir mktemp mv
-    rm sed sha256sum sort touch tr uname"""
+    rm sed sha256sum sleep sort touch tr uname"""
 UV = """#!/bin/sh
 echo "uv $*" >> "$HOME/uv.log"
 mkdir -p .venv/bin
@@ -62,16 +62,26 @@ class Machine:
         path.write_text(text)
         path.chmod(path.stat().st_mode | stat.S_IXUSR)
 
-    def bootstrap(self) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
+    def begin(self) -> subprocess.Popen[str]:
+        """A bootstrap in a process group of its own, as a terminal gives it."""
+        return subprocess.Popen(
             [self.bin / "bash", "deploy/bootstrap"],
             cwd=self.root,
             env={"PATH": str(self.bin), "HOME": str(self.home), "LC_ALL": "C"},
             stdin=subprocess.DEVNULL,
-            capture_output=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             text=True,
-            timeout=60,
+            start_new_session=True,
         )
+
+    def bootstrap(self) -> subprocess.CompletedProcess[str]:
+        process = self.begin()
+        try:
+            stdout, stderr = process.communicate(timeout=60)
+        finally:
+            process.kill()
+        return subprocess.CompletedProcess(process.args, process.returncode, stdout, stderr)
 
     def complete(self) -> None:
         """Everything that the bootstrap looks for, faked so that nothing is fetched or built."""
