@@ -19,6 +19,7 @@ from schemas.deployment import MqttSection
 from services.broker import mosquitto
 from services.runtime.deployment import project_root
 from services.stack.stack import free_ports
+from tests.optional import need
 
 BROKERS = ["amqtt", "mosquitto"]
 
@@ -27,6 +28,8 @@ class Process:
     """A gemelo-broker of its own port and folder."""
 
     def __init__(self, broker, folder, port=None):
+        if broker == "mosquitto":
+            need("mosquitto")
         self.port = port or free_ports(1)[0]
         self.ready = folder / "broker.ready"
         settings = {"GEMELO_MQTT_BROKER": broker, "GEMELO_MQTT_PORT": str(self.port), "GEMELO_PATHS_RUN": str(folder)}

@@ -17,6 +17,7 @@ from schemas.scene import BoxShape, PlanningScene, SceneObject, SceneRequest
 from schemas.topics import DEVICE_SHAFT, SCENE, SCENE_EDIT, STEP_ERRORS
 from services.arm.kinematics import Kinematics
 from services.stack.stack import Stack
+from tests.optional import need
 from tests.stack.person import Operator, jumps
 
 NEEDED = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner")
@@ -30,6 +31,7 @@ SHELF = SceneObject(
 
 @pytest.fixture(scope="module", params=["rm1", "parol6"])
 def operator(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Operator]:
+    need("mosquitto")
     environment, out = {"GEMELO_ROBOT": f"urdf/{request.param}"}, tmp_path_factory.mktemp("out")
     with Stack(broker="mosquitto", out=out, processes=NEEDED, environment=environment) as stack:
         person = Operator(stack)

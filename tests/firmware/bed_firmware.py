@@ -22,6 +22,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 from schemas.device import DeviceCommandKind, PressKind
 from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
+from tests.optional import need
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE = 10.0  # [s]
@@ -29,8 +30,9 @@ NOT_ARMED = 17
 
 
 def mosquitto_path() -> str:
-    found = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
-    assert found, "these tests need mosquitto: sudo apt-get install mosquitto"
+    need("mosquitto")
+    found = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
+    assert found
     return found
 
 

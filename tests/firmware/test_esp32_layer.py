@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import configparser
-import os
 import re
-import shutil
 import subprocess
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 from machine_code import Function, functions, reached
+
+from tests.optional import need
 
 ROOT = Path(__file__).parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -38,20 +38,10 @@ def objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def _require_compiler() -> None:
-    """A computer without the cross compiler goes on without its three tests; CI, which installs it, does not."""
-    if shutil.which("riscv64-unknown-elf-g++") is not None:
-        return
-    lack = "riscv64-unknown-elf-g++ missing: sudo apt-get install gcc-riscv64-unknown-elf"
-    if "CI" in os.environ:
-        pytest.fail(lack)
-    pytest.skip(lack)
-
-
 @pytest.fixture(scope="module")
 def interrupt_code(objects: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Function]:
     """The layer's interrupt and what of the core is mapped into IRAM, for the C3, as ESP-IDF would compile it."""
-    _require_compiler()
+    need("riscv")
     folder = tmp_path_factory.mktemp("core")
     mapped = []
     for name in _mapped(LAYER / "gemelo_core/linker.lf"):
@@ -109,6 +99,7 @@ def test_tasks_share_no_lock_and_allocate_nothing() -> None:
 
 
 def test_no_source_holds_credentials() -> None:
+    need("git")
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", "firmware"],
         cwd=ROOT, capture_output=True, text=True, check=True,

@@ -5,11 +5,13 @@ from __future__ import annotations
 import pytest
 
 from services.stack.stack import Stack
+from tests.optional import need
 from tests.stack.person import Operator
 
 
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory):
+    need("mosquitto")
     with Stack(broker="mosquitto", out=tmp_path_factory.mktemp("out")) as running:
         yield running
 

@@ -8,6 +8,7 @@ import pytest
 
 from services.cli.exits import ExitCode
 from services.stack.stack import Stack
+from tests.optional import need
 from tests.stack.gemelo import gemelo
 
 
@@ -20,6 +21,7 @@ def own_arm(tmp_path_factory, rm1_folder):
 
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory, own_arm):
+    need("mosquitto")
     environment = {"GEMELO_ROBOT": str(own_arm)}
     processes = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner")
     out = tmp_path_factory.mktemp("out")

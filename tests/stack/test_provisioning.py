@@ -6,6 +6,7 @@ import pytest
 
 from services.cli.exits import ExitCode
 from services.stack.stack import Stack
+from tests.optional import need
 from tests.stack.gemelo import gemelo
 
 PASSWORD = "correct horse battery"
@@ -13,6 +14,7 @@ PASSWORD = "correct horse battery"
 
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory):
+    need("mosquitto")
     environment = {"GEMELO_WIRE": "serial", "GEMELO_WIFI_PASSWORD": PASSWORD}
     out = tmp_path_factory.mktemp("out")
     with Stack(broker="mosquitto", out=out, processes=("broker", "virtual_esp32"), environment=environment) as running:

@@ -12,6 +12,7 @@ from schemas.planning import NamedGoal, PlanCode, PlanRequest
 from schemas.topics import PLAN, STEP_ERRORS
 from services.arm.kinematics import Kinematics
 from services.stack.stack import Stack
+from tests.optional import need
 from tests.stack.gemelo import gemelo
 from tests.stack.person import Operator, jumps
 
@@ -20,6 +21,7 @@ NEEDED = ("router", "broker", "virtual_esp32", "stepper_gateway", "planner")
 
 @pytest.fixture(scope="module")
 def parol6(tmp_path_factory):
+    need("mosquitto")
     environment = {"GEMELO_ROBOT": "urdf/parol6"}
     out = tmp_path_factory.mktemp("out")
     with Stack(broker="mosquitto", out=out, processes=NEEDED, environment=environment) as running:

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 from schemas.deployment import Broker, Deployment, MqttSection, PathsSection, Wire
+from tests.optional import need
 from tests.stepper_gateway.harness import ROOT
 
 BROKER = "services.broker.main"
@@ -54,6 +55,8 @@ class Processes:
 
     def start_broker(self) -> None:
         """Returns once it listens."""
+        if self.deployment.mqtt.broker is Broker.MOSQUITTO:
+            need("mosquitto")
         self.start(BROKER)
         end = time.monotonic() + 15.0
         while time.monotonic() < end:

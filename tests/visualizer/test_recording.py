@@ -9,6 +9,7 @@ from PIL import Image
 from services.visualizer import entities
 from services.visualizer.binary import rerun_binary
 from services.visualizer.picture import picture
+from tests.optional import need
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +41,7 @@ def test_the_layout_travels_with_the_recording(recording):
 
 
 def test_the_picture_shows_an_arm_and_its_plots(recording, tmp_path):
+    need("vulkan")
     with Image.open(picture(recording, tmp_path / "view.png", size=(960, 540))) as image:
         pixels = np.asarray(image.convert("RGB"))
     height, width, _ = pixels.shape

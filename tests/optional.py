@@ -1,0 +1,29 @@
+"""What a test can do without: it is skipped, and `make test` names it in its closing line; in CI it fails."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+OPTIONAL = Path(__file__).parents[1] / "deploy/optional"
+
+
+@cache
+def lack(name: str) -> str:
+    """What is missing and the remedy, or nothing where `name` of deploy/optional is here."""
+    done = subprocess.run([OPTIONAL, name], capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 1), done.stderr
+    return done.stdout.strip()
+
+
+def need(name: str) -> None:
+    """Skips the test, or all that a fixture is for, where `name` is missing; CI installs it, so there it fails."""
+    if not lack(name):
+        return
+    if "CI" in os.environ:
+        pytest.fail(lack(name))
+    pytest.skip(lack(name))
