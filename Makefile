@@ -25,12 +25,22 @@ test: setup ## all tests: Python, firmware, whole stack
 	@deploy/optional
 
 check: setup ## ruff, mypy, import-linter, clang-format
-	@$(bin)/ruff check --quiet .
-	@$(bin)/ruff format --check --quiet . || { echo "remedy: make format"; exit 1; }
-	@$(bin)/mypy --no-error-summary schemas services firmware
-	@$(bin)/lint-imports --no-logo >/dev/null || $(bin)/lint-imports --no-logo
-	@git ls-files '*.h' '*.hpp' '*.cpp' | xargs -r $(bin)/clang-format --dry-run -Werror
+	@$(MAKE) --jobs 2 --keep-going --output-sync=target $(checks)
 	@echo "check: all good"
+
+# Side by side, the longest first; each one's messages stay together.
+checks := check-types check-walls check-lint check-format check-cpp
+.PHONY: $(checks)
+check-types:
+	@$(bin)/mypy --no-error-summary schemas services firmware
+check-walls:
+	@$(bin)/lint-imports --no-logo >/dev/null || $(bin)/lint-imports --no-logo
+check-lint:
+	@$(bin)/ruff check --quiet .
+check-format:
+	@$(bin)/ruff format --check --quiet . || { echo "remedy: make format"; exit 1; }
+check-cpp:
+	@git ls-files '*.h' '*.hpp' '*.cpp' | xargs -r $(bin)/clang-format --dry-run -Werror
 
 format: setup ## let ruff and clang-format write
 	@$(bin)/ruff check --quiet --fix . ; $(bin)/ruff format --quiet .
