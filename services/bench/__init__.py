@@ -1,1 +1,1 @@
-"""Measures what `architecture.md` promises, each figure against a reference taken in the same run."""
+"""Measures what the project promises, each figure against a reference taken in the same run."""

@@ -1,4 +1,4 @@
-"""`make bench`: every figure of architecture.md, measured here and now, into out/bench.json and a table.
+"""`make bench`: every figure that the project promises, measured here and now, into out/bench.json and a table.
 
 A figure that cannot be measured says why; nothing is estimated. Exit code 1 if one is missing; a goal that is not met
 is said, and is not an error.
@@ -54,7 +54,7 @@ NAMES = (*ALONE, *CHIP, *ON_A_STACK, *BROKERS, *LAST)
 
 def main() -> None:
     """The command."""
-    parser = argparse.ArgumentParser(prog="make bench", description="Measure the figures of architecture.md.")
+    parser = argparse.ArgumentParser(prog="make bench", description="Measure the figures that the project promises.")
     parser.add_argument("--only", nargs="+", choices=NAMES, metavar="NAME", help=", ".join(NAMES))
     parser.add_argument("--out", type=Path, default=project_root() / "out/bench.json")
     options = parser.parse_args()

@@ -1,6 +1,6 @@
 // The motion core for Python: arrays in, arrays out, the interpreter's lock released while it works.
 //
-// Shapes and finiteness are checked here and in __init__.py; the headers trust what they are given.
+// Shapes and finiteness are checked here and in core.py; the headers trust what they are given.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/shared_ptr.h>
