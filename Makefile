@@ -20,8 +20,8 @@ down: ## stop a twin that runs elsewhere
 
 test: setup ## all tests: Python, firmware, whole stack
 	@deploy/test_firmware
-	@$(bin)/pytest -n auto --maxprocesses 4 --dist worksteal $(side_by_side)
-	@$(bin)/pytest $(filter-out $(side_by_side),$(patsubst %/,%,$(wildcard tests/*/)))
+	@$(bin)/pytest -rfE -n auto --maxprocesses 4 --dist worksteal $(side_by_side)
+	@$(bin)/pytest -rfE $(filter-out $(side_by_side),$(patsubst %/,%,$(wildcard tests/*/)))
 	@deploy/optional
 
 check: setup ## ruff, mypy, import-linter, clang-format
