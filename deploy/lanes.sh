@@ -58,6 +58,7 @@ line() { printf '%s%s' "$rewrite" "${1:+$1$'\n'}" && rewrite=''; }
 status() {
     local name last text="    $SECONDS s"
     local -a output
+    [ ${#running[@]} != 0 ] || return 0
     for name in ${running[@]+"${running[@]}"}; do
         mapfile -t output <"$logs/$name"
         last=${output[*]: -1}
