@@ -101,6 +101,7 @@ class DeviceCommandKind(IntEnum):
     HOME = 8
     OUTPUT = 9
     SPEED = 10
+    STATUS = 11  # the gateway asks for a status
 
 
 class ResumeCommand(Message, frozen=True, kw_only=True, tag="resume"):

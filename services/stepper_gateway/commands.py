@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from schemas.device import DeviceCommandKind
 from services.stepper_gateway.clock import ClockSync
-from services.stepper_gateway.links.frames import Command, CommandReply
+from services.stepper_gateway.links.frames import ANY_BOOT, NEVER_EXPIRES, Command, CommandReply
 from services.stepper_gateway.moment import Moment
 
 RETRY = 0.1  # [s]
@@ -33,8 +33,6 @@ class Arguments:
 
 NO_ARGUMENTS = Arguments()
 STOPPING = (DeviceCommandKind.STOP, DeviceCommandKind.HOLD, DeviceCommandKind.DISARM)
-ANY_BOOT = 0
-NEVER_EXPIRES = 0xFFFFFFFFFFFFFFFF  # [us]
 MOST_TICKETS = 256  # of one command: who asks for the same again is answered with the others
 
 
@@ -98,6 +96,7 @@ class Commands:
             if moment.monotonic - command.sent >= RETRY and (is_reachable or command.is_stop):
                 command.sent = moment.monotonic
                 command.times_sent += 1
+                command.needs_clock &= is_reachable  # one that is silent may read it whenever it wakes
                 frames.append(
                     Command(
                         boot_id=boot_id if command.needs_boot else ANY_BOOT,

@@ -42,27 +42,27 @@ class GatewayCore:
     def __init__(self, arm: Arm, session_id: int, parameters: GatewayParameters | None = None) -> None:
         self._parts = Parts(arm, session_id, parameters or GatewayParameters())
         self._reception = Reception(self._parts)
-        self.mover = self._parts.mover
+        self.device, self.controller = self._parts.device, self._parts.controller
         self.bad_frames = 0
         self._bad_reported = -1.0e9  # [s] monotonic
         self._told: DeviceStatus | None = None
         self._stepped: float | None = None  # [s] monotonic
 
     def set_parameters(self, parameters: GatewayParameters) -> None:
-        self.mover.parameters = parameters
+        self.device.parameters = parameters
 
     def not_ready(self, moment: Moment) -> str:
         """Why the gateway's state is not valid, empty if it is."""
-        mover = self.mover
-        return mover.absence(moment) or ("" if mover.state is not None else mover.hindrance())
+        device = self.device
+        return device.absence(moment) or ("" if device.state is not None else device.hindrance())
 
     def on_link(self, connected: bool, reason: str, moment: Moment) -> list[Output]:
         """The wire has come or gone."""
-        session = self.mover.session
+        session = self.device.session
         if connected != session.link_up:
             session.on_link(connected, reason)
             level = LogLevel.INFO if connected else LogLevel.WARNING
-            self.mover.event("connected" if connected else "disconnected", reason, moment, level)
+            self.device.event("connected" if connected else "disconnected", reason, moment, level)
         session.link_reason = reason
         return self._finish(moment)
 
@@ -74,7 +74,7 @@ class GatewayCore:
             self.bad_frames += 1
             if moment.monotonic - self._bad_reported >= BAD_FRAME_REPORT:
                 self._bad_reported = moment.monotonic
-                self.mover.event("bad_frame", f"{received.kind}: {error} ({self.bad_frames} so far)", moment)
+                self.device.event("bad_frame", f"{received.kind}: {error} ({self.bad_frames} so far)", moment)
         return self._finish(moment)
 
     def on_goal(
@@ -126,8 +126,7 @@ class GatewayCore:
 
     def on_configure(self, ticket: int, moment: Moment) -> list[Output]:
         """A person wants the device configured; the answer comes as an `Answer` with this ticket."""
-        mover = self.mover
-        mover.configuration.ask(ticket, mover.absence(moment), moment)
+        self.device.configuration.ask(ticket, self.device.absence(moment), moment)
         return self._finish(moment)
 
     def on_press(self, request: PressRequest, ticket: int, moment: Moment) -> list[Output]:
@@ -137,22 +136,22 @@ class GatewayCore:
 
     def step(self, moment: Moment) -> list[Output]:
         """One turn of the control loop, 50 times a second; sends the heartbeat."""
-        mover = self.mover
+        device = self.device
         period = moment.monotonic - self._stepped if self._stepped is not None else 0.0
         self._stepped = moment.monotonic
-        for frame in mover.session.due(moment):
+        for frame in device.session.due(moment):
             self._parts.out.send(REGULAR[type(frame)], encode(frame))
-        absence = mover.absence(moment)
+        absence = device.absence(moment)
         if absence:
             self._parts.lose(absence, moment)
         self._parts.goals.step(moment, period)
         self._parts.streaming.step(moment)
         self._parts.stop_strangers(moment)
         self._parts.desk.step(moment)
-        mover.configuration.step(absence, moment)
+        device.configuration.step(absence, moment)
         self._parts.presses.step(moment)
         self._parts.sensors.step(absence, moment)
-        mover.pump(moment)
+        self.controller.pump(moment)
         return self._finish(moment)
 
     def _give_way(self, kind: DeviceCommandKind, moment: Moment) -> None:
@@ -163,13 +162,13 @@ class GatewayCore:
         if self._parts.goals.is_active:
             self._parts.goals.stop(f"stopped by a device command ({kind.name})", moment)
         elif kind == DeviceCommandKind.STOP:
-            self.mover.stop(moment)
+            self.controller.stop(moment)
         else:
-            self.mover.transmission.abandon()
+            self.controller.transmission.abandon()
 
     def _finish(self, moment: Moment) -> list[Output]:
         """Tell of the device's status where it has changed, and hand the outputs out."""
-        status = status_of(self.mover, moment)
+        status = status_of(self.device, moment)
         if self._told is None or replace(status, stamp=0) != self._told:
             self._told = replace(status, stamp=0)
             self._parts.out.publish(DEVICE_STATUS, status)

@@ -7,10 +7,11 @@ import math
 from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse, DeviceMode
 from services.stepper_gateway.arguments import arguments_of, kind_of
 from services.stepper_gateway.commands import STOPPING, PendingCommand
+from services.stepper_gateway.gateway_device import GatewayDevice
 from services.stepper_gateway.links.frames import Code, CommandReply, code_name, encode
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.mover import Mover
+from services.stepper_gateway.mover import MotionController
 from services.stepper_gateway.outputs import Answer
 from services.stepper_gateway.refusals import GoalRejected, invalid
 
@@ -42,74 +43,74 @@ AT_REST = (DeviceCommandKind.REFERENCE, DeviceCommandKind.DISARM, DeviceCommandK
 class CommandDesk:
     """Takes commands, has them sent until the device answers, and hands the answers out."""
 
-    def __init__(self, mover: Mover) -> None:
-        self._mover = mover
+    def __init__(self, device: GatewayDevice, controller: MotionController) -> None:
+        self._device, self._controller = device, controller
 
     def ask(self, request: DeviceCommandRequest, ticket: int, goal_is_active: bool, moment: Moment) -> bool:
         """Have it sent, or answer at once why not; true if it will be sent."""
-        mover, kind = self._mover, kind_of(request)
+        kind = kind_of(request)
         try:
-            if reason := mover.absence(moment) or self._objection(kind, goal_is_active):
+            if reason := self._device.absence(moment) or self._objection(kind, goal_is_active):
                 raise invalid(reason)
-            arguments = arguments_of(request, mover.arm)
+            arguments = arguments_of(request, self._device.arm)
         except GoalRejected as rejected:
             self._answer(ticket, False, rejected.reason)
             return False
-        mover.commands.ask(kind, moment, mover.parameters.command_timeout, ticket, arguments)
+        self._device.commands.ask(kind, moment, self._device.parameters.command_timeout, ticket, arguments)
         return True
 
     def stop(self, kind: DeviceCommandKind, ticket: int, goal_is_active: bool, moment: Moment) -> bool:
         """Have a stop sent, whatever is known of the device; true unless it is refused because the arm moves."""
-        mover = self._mover
+        controller = self._controller
         if reason := self._objection(kind, goal_is_active):
             self._answer(ticket, False, reason)
             return False
-        stream = mover.stream.id if mover.stream is not None else 0
-        mover.commands.ask(kind, moment, mover.parameters.command_timeout, ticket, stream=stream)
+        stream = controller.stream.id if controller.stream is not None else 0
+        self._device.commands.ask(kind, moment, self._device.parameters.command_timeout, ticket, stream=stream)
         return True
 
     def on_reply(self, reply: CommandReply, moment: Moment) -> None:
         """The device has answered a command; a stop that it refused for form's sake is sent again without the form."""
-        command = self._mover.commands.find(reply)
-        is_present = reply.boot_id == self._mover.session.boot_id
+        command = self._device.commands.find(reply)
+        is_present = reply.boot_id == self._device.session.boot_id
         if command is None or not (is_present or command.is_stop):
             return
         if reply.code in (Code.EXPIRED, Code.WRONG_BOOT):
             return self._insist(command, Code(reply.code), moment)
-        self._mover.commands.remove(command)
+        self._device.commands.remove(command)
         accepted = reply.code in (Code.OK, Code.DUPLICATE)
         if accepted and is_present:
             self._note(command, reply)
-        reason = self._mover.absence(moment) if accepted else self._complaint(command, reply)
+        reason = self._device.absence(moment) if accepted else self._complaint(command, reply)
         for ticket in command.tickets:
             self._answer(ticket, accepted, reason, reply.mode, sent=True)
         if not command.tickets and not accepted:
-            self._mover.event("command_refused", reason, moment)
+            self._device.event("command_refused", reason, moment)
 
     def send_due(self, moment: Moment) -> None:
         """Send what is new or was not answered."""
-        mover = self._mover
-        if not mover.session.link_up:
+        if not self._device.session.link_up:
             return
-        is_reachable = not mover.absence(moment)
-        for frame in mover.commands.due(moment, mover.session.clock, mover.session.boot_id, is_reachable):
-            mover.out.send(Kind.CMD, encode(frame), urgent=frame.cmd in STOPPING)
+        device, session = self._device, self._device.session
+        is_reachable = not device.absence(moment)
+        for frame in device.commands.due(moment, session.clock, session.boot_id, is_reachable):
+            device.out.send(Kind.CMD, encode(frame), urgent=frame.cmd in STOPPING)
 
     def step(self, moment: Moment) -> None:
         """Give up what was not answered in time; a STOP of our own is asked for again."""
-        for command in self._mover.commands.expired(moment):
-            state = self._mover.session.latest
+        for command in self._device.commands.expired(moment):
+            state = self._device.session.latest
             if command.kind == DeviceCommandKind.HOLD and state is not None:
-                self._mover.hold_answered(state.mode == DeviceMode.HOLD, state.t_us)
+                self._controller.hold_answered(state.mode == DeviceMode.HOLD, state.t_us)
             for ticket in command.tickets:
                 self._answer(ticket, False, self._silence(command, moment), sent=command.times_sent > 0)
             if command.is_own and command.kind == DeviceCommandKind.STOP:
-                self._mover.stop(moment)
+                self._controller.stop(moment)
         self.send_due(moment)
 
     def give_up(self, reason: str) -> None:
         """The device these commands were for is gone; a person's stop is sent on, to whatever is there."""
-        for command in self._mover.commands.drop_all_but_stops():
+        for command in self._device.commands.drop_all_but_stops():
             for ticket in command.tickets:
                 self._answer(ticket, False, reason, sent=command.times_sent > 0)
 
@@ -125,7 +126,7 @@ class CommandDesk:
 
     def _silence(self, command: PendingCommand, moment: Moment) -> str:
         """What is known of a command that was not answered in time."""
-        name, absence = command.kind.name, self._mover.absence(moment)
+        name, absence = command.kind.name, self._device.absence(moment)
         if not command.times_sent:
             return f"{name} could not be sent: {absence}; the device holds by itself without heartbeats"
         because = f": {absence}" if absence else ""
@@ -134,16 +135,16 @@ class CommandDesk:
     def _objection(self, kind: DeviceCommandKind, goal_is_active: bool) -> str:
         if goal_is_active and kind in AT_REST:
             return f"a goal is being carried out: cancel it or run `gemelo stop` before {kind.name}"
-        return self._mover.configuration.objection() if kind in TRUSTING else ""
+        return self._device.configuration.objection() if kind in TRUSTING else ""
 
     def _note(self, command: PendingCommand, reply: CommandReply) -> None:
         match command.kind:
             case DeviceCommandKind.STOP:
-                self._mover.stop_answered(reply.t_us)
+                self._controller.stop_answered(reply.t_us)
             case DeviceCommandKind.HOLD:
-                self._mover.hold_answered(reply.mode == DeviceMode.HOLD, reply.t_us)
+                self._controller.hold_answered(reply.mode == DeviceMode.HOLD, reply.t_us)
             case kind if kind in AT_REST:
-                self._mover.transmission.forget()
+                self._controller.transmission.forget()
 
     def _complaint(self, command: PendingCommand, reply: CommandReply) -> str:
         remedy = REMEDIES.get(reply.code)
@@ -155,6 +156,6 @@ class CommandDesk:
 
     def _answer(self, ticket: int, accepted: bool, reason: str, mode: int | None = None, sent: bool = False) -> None:
         said = mode is not None and mode in DeviceMode._value2member_map_
-        known = DeviceMode(mode or 0) if said else self._mover.session.mode
+        known = DeviceMode(mode or 0) if said else self._device.session.mode
         response = DeviceCommandResponse(accepted=accepted, sent=sent, reason=reason, mode=known)
-        self._mover.out.put(Answer(ticket, response))
+        self._device.out.put(Answer(ticket, response))

@@ -8,10 +8,11 @@ from schemas.actions import GoalStatusCode
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from schemas.system import LogLevel
 from services.stepper_gateway.execution import Ending, Execution
+from services.stepper_gateway.gateway_device import GatewayDevice
 from services.stepper_gateway.links.frames import State
 from services.stepper_gateway.moment import Moment, next_beat
 from services.stepper_gateway.motion import PlannedMotion
-from services.stepper_gateway.mover import Mover
+from services.stepper_gateway.mover import MotionController
 from services.stepper_gateway.outputs import GoalExecuting, GoalFinished, GoalProgress
 from services.stepper_gateway.path_log import PathPoint
 from services.stepper_gateway.paths import Path
@@ -39,10 +40,10 @@ class GoalVerdict(NamedTuple):
 class Goals:
     """At most one goal moves the arm; a newer one takes over from it."""
 
-    def __init__(self, mover: Mover) -> None:
-        self._mover = mover
+    def __init__(self, device: GatewayDevice, controller: MotionController) -> None:
+        self._device, self._controller = device, controller
         self.scenes = SceneVersions()
-        self._validator = Validator(mover.joints, mover.arm.device.tick_hz)
+        self._validator = Validator(device.joints, device.arm.device.tick_hz)
         self._current: Execution | None = None
         self._waiting: Execution | None = None  # until its stamp, or until the stream before it has ended
 
@@ -52,24 +53,24 @@ class Goals:
 
     def use_tick(self, tick_hz: int) -> None:
         """The device's own figure for the tick that bounds step rates."""
-        self._validator = Validator(self._mover.joints, tick_hz)
+        self._validator = Validator(self._device.joints, tick_hz)
 
     def accept(self, goal_id: str, goal: FollowJointTrajectoryGoal, moment: Moment) -> GoalVerdict:
         """Accept and start a goal, or say why not."""
-        mover = self._mover
-        if reason := mover.refusal(moment):
+        controller = self._controller
+        if reason := self._device.refusal(moment):
             return GoalVerdict(False, FollowErrorCode.DEVICE_FAILED, reason)
         try:
             if self._current is not None and self._current.ending is not None:
                 raise invalid("the arm is still decelerating after the last goal; send this one again when it rests")
             self.scenes.require_newest(PlannedIn.of(goal))
-            checked = self._validator.check(goal, moment.unix, mover.parameters)
-            presence = mover.presence(moment)
-            path = self._validator.path(checked, presence, moment.unix, mover.parameters)
+            checked = self._validator.check(goal, moment.unix, self._device.parameters)
+            presence = controller.presence(moment)
+            path = self._validator.path(checked, presence, moment.unix, self._device.parameters)
         except GoalRejected as rejected:
             return GoalVerdict(False, rejected.code, rejected.reason)
         self._drop_waiting(moment)
-        self._waiting = Execution(goal_id, checked, mover.joints, moment)
+        self._waiting = Execution(goal_id, checked, self._device.joints, moment)
         if checked.trajectory.stamp <= moment.unix:
             self._waiting.accepted_from = presence
         self._start_waiting(moment, path)
@@ -83,7 +84,7 @@ class Goals:
         ending = Ending(GoalStatusCode.CANCELED, FollowErrorCode.CANCELED, "the arm decelerated on its path")
         if execution is self._waiting:
             self._waiting = None
-            if self._current is not None or self._mover.is_resting():
+            if self._current is not None or self._controller.is_resting():
                 self._finish(execution, ending, moment)
                 return ""
             self._current = execution  # what it waited behind has to stop
@@ -93,20 +94,20 @@ class Goals:
     def step(self, moment: Moment, period: float) -> None:
         """Start what has waited, and end what is late or refused."""
         self._start_waiting(moment)
-        execution, mover = self._current, self._mover
+        execution, controller = self._current, self._controller
         if execution is None:
             return self._stop_what_failed(moment)
         if execution.ending is not None:
-            if mover.has_stopped():
+            if controller.has_stopped():
                 self._finish_current(execution.ending, moment)
             return
         stream = execution.stream
         if stream is not None and stream.failure:
             return self._end(Ending(*FAILED, stream.failure), moment)
         if execution.deadline is not None:
-            execution.deadline += period * mover.excuse
-            if moment.monotonic > execution.deadline and mover.state is not None:
-                self._end(execution.late(mover.state, moment.monotonic), moment)
+            execution.deadline += period * controller.excuse
+            if moment.monotonic > execution.deadline and self._device.state is not None:
+                self._end(execution.late(self._device.state, moment.monotonic), moment)
 
     def on_ack(self) -> None:
         """EXECUTING means that the device has taken knots of the goal."""
@@ -115,20 +116,20 @@ class Goals:
             return
         if execution.stream.acked > execution.first_seq:
             execution.is_executing = True
-            self._mover.out.put(GoalExecuting(execution.goal_id))
+            self._device.out.put(GoalExecuting(execution.goal_id))
 
     def on_state(self, state: State, point: PathPoint, moment: Moment) -> None:
         """Check the goal's tolerances, report progress, and see whether it is done."""
-        execution, mover = self._current, self._mover
+        execution, controller = self._current, self._controller
         if execution is not None and execution.stream is not None and state.stream == execution.stream.id:
             self._follow(execution, state, point, moment)
-        if mover.is_resting():
+        if controller.is_resting():
             self._start_waiting(moment)
 
     def abort(self, reason: str, moment: Moment) -> None:
         """The device can no longer be relied upon: end now, with the last steps known."""
         self._drop_waiting(moment, Ending(*FAILED, reason))
-        self._mover.transmission.abandon()
+        self._controller.transmission.abandon()
         if self._current is not None:
             ending = self._current.ending
             self._finish_current(Ending(*FAILED, f"{ending.reason}; then {reason}" if ending else reason), moment)
@@ -137,13 +138,13 @@ class Goals:
         """Decelerate and abort, for a reason outside the goal."""
         self._drop_waiting(moment, Ending(*FAILED, reason))
         if self._current is None:
-            self._mover.stop(moment)
+            self._controller.stop(moment)
         self._end(Ending(*FAILED, reason), moment)
 
     def on_hold(self, moment: Moment) -> None:
         """The device holds by itself on a path of ours."""
-        stream, cause = self._mover.held
-        is_this = self._mover.stream is not None and stream == self._mover.stream.id
+        stream, cause = self._controller.held
+        is_this = self._controller.stream is not None and stream == self._controller.stream.id
         reason = HELD.get(cause, HELD_SILENTLY) if is_this else HELD_SILENTLY
         if self._current is None:
             self.stop(reason, moment)
@@ -169,29 +170,29 @@ class Goals:
     def _report(self, execution: Execution, state: State, point: PathPoint, moment: Moment) -> None:
         if moment.monotonic < execution.feedback_due or not execution.is_executing:
             return
-        period = 1.0 / self._mover.parameters.feedback_rate
+        period = 1.0 / self._device.parameters.feedback_rate
         execution.feedback_due = next_beat(execution.feedback_due, moment.monotonic, period)
-        positions = (self._mover.reporter.positions(point.steps), self._mover.reporter.positions(state.steps))
+        positions = (self._device.reporter.positions(point.steps), self._device.reporter.positions(state.steps))
         feedback = execution.feedback(point, state, positions, moment.unix)
-        self._mover.out.put(GoalProgress(execution.goal_id, feedback))
+        self._device.out.put(GoalProgress(execution.goal_id, feedback))
 
     def _start_waiting(self, moment: Moment, path: Path | None = None) -> None:
         """Begin the goal that waits if its time has come; `path` is known if it was accepted this very moment."""
-        execution, mover = self._waiting, self._mover
+        execution, controller = self._waiting, self._controller
         if execution is None or execution.goal.trajectory.stamp > moment.unix:
             return
         if self._current is not None and self._current.ending is not None:
             return
-        if not (mover.transmission.is_open or mover.is_resting()):
+        if not (controller.transmission.is_open or controller.is_resting()):
             self._preempt(moment)
             return
-        presence = mover.presence(moment)
+        presence = controller.presence(moment)
         if execution.accepted_from is not None:
             presence = presence.joined(execution.accepted_from)
         self._waiting = None
         try:
             self.scenes.require_newest(execution.goal.planned_in)
-            path = path or self._validator.path(execution.goal, presence, moment.unix, mover.parameters)
+            path = path or self._validator.path(execution.goal, presence, moment.unix, self._device.parameters)
         except GoalRejected as rejected:
             ending = Ending(GoalStatusCode.ABORTED, rejected.code, rejected.reason)
             return self._finish(execution, ending, moment)
@@ -199,29 +200,30 @@ class Goals:
         self._begin(execution, PlannedMotion(path), moment)
 
     def _begin(self, execution: Execution, motion: PlannedMotion, moment: Moment) -> None:
-        mover = self._mover
-        mover.lead = mover.parameters.trajectory_lead
+        controller = self._controller
+        controller.lead = self._device.parameters.trajectory_lead
         self._current = execution
-        execution.departed = () if mover.state is None else mover.state.steps
-        stream = mover.stream
+        execution.departed = () if self._device.state is None else self._device.state.steps
+        stream = controller.stream
         ahead = 0.0
-        if stream is not None and mover.transmission.is_open:
+        if stream is not None and controller.transmission.is_open:
             start_us, execution.first_seq = stream.end_us, stream.next_seq
-            ahead = (start_us - stream.played_us(moment.monotonic, mover.session.clock)) * 1e-6
-            mover.transmission.splice(motion)
-            mover.pump(moment)
+            ahead = (start_us - stream.played_us(moment.monotonic, self._device.session.clock)) * 1e-6
+            controller.transmission.splice(motion)
+            controller.pump(moment)
         else:
             start_us = 0
-            stream = mover.begin(motion, motion.start, moment)
+            stream = controller.begin(motion, motion.start, moment)
         late = execution.goal.time_tolerance
         end = moment.monotonic + ahead + motion.duration_us * 1e-6
         execution.begin(stream, start_us, motion.duration_us, None if late is None else end + late)
 
     def _stop_what_failed(self, moment: Moment) -> None:
         """The motion that a goal waits behind must come to an end."""
-        mover = self._mover
-        if self._waiting is not None and mover.transmission.owns_motion and mover.stream and mover.stream.failure:
-            mover.stop(moment)
+        controller = self._controller
+        has_failed = controller.transmission.owns_motion and controller.stream and controller.stream.failure
+        if self._waiting is not None and has_failed:
+            controller.stop(moment)
 
     def _preempt(self, moment: Moment) -> None:
         if self._current is not None:
@@ -240,7 +242,7 @@ class Goals:
         """Decelerate; the goal ends once the arm stands."""
         if self._current is not None and self._current.ending is None:
             self._current.ending = ending
-            self._mover.stop(moment)
+            self._controller.stop(moment)
 
     def _finish_current(self, ending: Ending, moment: Moment) -> None:
         execution, self._current = self._current, None
@@ -248,7 +250,7 @@ class Goals:
             self._finish(execution, ending, moment)
 
     def _finish(self, execution: Execution, ending: Ending, moment: Moment) -> None:
-        result = execution.result(ending, self._mover.state, moment.monotonic)
-        self._mover.out.put(GoalFinished(execution.goal_id, ending.status, result))
+        result = execution.result(ending, self._device.state, moment.monotonic)
+        self._device.out.put(GoalFinished(execution.goal_id, ending.status, result))
         level = LogLevel.INFO if ending.status == GoalStatusCode.SUCCEEDED else LogLevel.WARNING
-        self._mover.out.log(level, execution.account(ending, self._mover.state, moment.monotonic))
+        self._device.out.log(level, execution.account(ending, self._device.state, moment.monotonic))

@@ -4,26 +4,16 @@ from __future__ import annotations
 
 from collections import deque
 
-from msgspec.structs import replace
-
-from schemas.device import DeviceCommandKind, DeviceEvent, DeviceMode
+from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.message import Vector
-from schemas.system import LogLevel
-from schemas.topics import COMMAND_ACKS, COMMANDS, DEVICE_EVENTS
-from services.arm.description import Arm
-from services.stepper_gateway.commands import Commands
-from services.stepper_gateway.configuration import Configuration
-from services.stepper_gateway.hindrance import hindrance
+from schemas.topics import COMMAND_ACKS, COMMANDS
+from services.stepper_gateway.gateway_device import GatewayDevice
 from services.stepper_gateway.knots import Knot, whole_steps
 from services.stepper_gateway.links.frames import Ack, Chunk, State, encode
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion import Motion
-from services.stepper_gateway.outputs import Outbox
-from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.path_log import PathPoint
-from services.stepper_gateway.reporting import Reporter
-from services.stepper_gateway.session import NO_EXPIRY, DeviceSession
 from services.stepper_gateway.slowness import Slowness
 from services.stepper_gateway.stream import SentChunk, Stream
 from services.stepper_gateway.transmission import Transmission
@@ -34,21 +24,14 @@ STOP_AGAIN = 0.5  # [s] between STOPs for a device that does not obey
 MOVING = (DeviceMode.RUN, DeviceMode.HOLD)
 
 
-class Mover:
+class MotionController:
     """What goals and streamed targets have in common."""
 
-    def __init__(self, arm: Arm, session_id: int, parameters: GatewayParameters, out: Outbox) -> None:
-        self.arm = arm
-        self.joints = arm.joints
-        self.parameters = parameters
-        self.out = out
-        self.session = DeviceSession(arm.device.name, len(arm.joints), session_id)
-        self.configuration = Configuration(arm, self.session, out)
-        self.commands = Commands(session_id)
-        self.transmission = Transmission(arm.joints, session_id)
-        self.reporter = Reporter(arm)
+    def __init__(self, device: GatewayDevice, first_stream: int) -> None:
+        self._device = device
+        self.transmission = Transmission(device.joints, first_stream)
         self._slowness = Slowness()
-        self.lead = parameters.trajectory_lead  # [s]
+        self.lead = device.parameters.trajectory_lead  # [s]
         self._holds = False  # by a person's command, who will resume
         self._held_us = 0  # device time of its answer to HOLD
         self._history: deque[tuple[float, Vector]] = deque()
@@ -56,10 +39,6 @@ class Mover:
         self._stopped_us = -1  # device time of its answer to the latest STOP
         self._awaits_stop = False
         self.held = (0, "")  # the stream that the device has held last, and why, in its own words
-
-    @property
-    def state(self) -> State | None:
-        return self.session.state
 
     @property
     def stream(self) -> Stream | None:
@@ -73,7 +52,7 @@ class Mover:
     @property
     def is_held(self) -> bool:
         """Whether a person has asked for a hold, and has not ended it."""
-        return self._holds or self.commands.is_pending(DeviceCommandKind.HOLD)
+        return self._holds or self._device.commands.is_pending(DeviceCommandKind.HOLD)
 
     def is_followed(self, state: State) -> bool:
         """Whether the device plays the stream that we want it to play."""
@@ -81,7 +60,7 @@ class Mover:
 
     def is_resting(self) -> bool:
         """Whether the device stands idle with nothing under way to it."""
-        if self.session.mode != DeviceMode.IDLE or (self._awaits_stop and not self.has_stopped()):
+        if self._device.session.mode != DeviceMode.IDLE or (self._awaits_stop and not self.has_stopped()):
             return False
         stream = self.stream
         return stream is None or stream.is_abandoned or stream.is_finished
@@ -91,48 +70,37 @@ class Mover:
         """Share of the time that a goal may end later, because a person wants the arm slow."""
         return self._slowness.share
 
-    def absence(self, moment: Moment) -> str:
-        """Why the device cannot be reached, empty if it can."""
-        return self.session.absence(moment, self.parameters.state_timeout)
-
-    def hindrance(self) -> str:
-        """Why the device, though there, cannot start a motion; empty if it can."""
-        return self.configuration.objection() or hindrance(self.arm, self.state)
-
-    def refusal(self, moment: Moment) -> str:
-        """Why nothing may be started now, empty if it may."""
-        return self.absence(moment) or self.hindrance() or self.commands.hindrance()
-
     def begin(self, motion: Motion, position: Vector, moment: Moment) -> Stream:
         """A new stream from rest; its first chunk leaves at once."""
-        status = self.session.status
+        status = self._device.session.status
         capacity = status.queue_capacity if status is not None and status.queue_capacity else 128
-        self.reporter.motion_begins()
+        self._device.reporter.motion_begins()
         self._stopped_us, self._awaits_stop = -1, False
-        stream = self.transmission.begin(motion, Knot.at_rest(position), self.session.boot_id, capacity)
+        stream = self.transmission.begin(motion, Knot.at_rest(position), self._device.session.boot_id, capacity)
         self.pump(moment)
         return stream
 
     def pump(self, moment: Moment) -> None:
         """Send what is due of the present stream."""
-        if self.session.is_fresh(moment, self.parameters.state_timeout):
-            self._send(self.transmission.pump(moment, self.session.clock, self.lead), moment)
+        if self._device.session.is_fresh(moment, self._device.parameters.state_timeout):
+            self._send(self.transmission.pump(moment, self._device.session.clock, self.lead), moment)
 
     def on_ack(self, ack: Ack, arrival: float, moment: Moment) -> None:
         """Account for a chunk's answer, and fill a gap that it tells of."""
         stream, round_trip = self.stream, 0.0
         if stream is not None and ack.stream == stream.id and ack.boot_id == stream.boot_id:
             round_trip, lost = stream.on_ack(ack, arrival)
-            self._send(self.transmission.again(lost, moment, self.session.clock), moment)
-        steps = self.state.steps if self.state is not None else ()
-        self.out.publish(COMMAND_ACKS, self.reporter.ack(ack, round_trip, moment.unix_at(arrival), steps))
+            self._send(self.transmission.again(lost, moment, self._device.session.clock), moment)
+        device = self._device
+        steps = device.state.steps if device.state is not None else ()
+        device.out.publish(COMMAND_ACKS, device.reporter.ack(ack, round_trip, moment.unix_at(arrival), steps))
 
     def on_state(self, state: State, arrival: float) -> None:
         """Account for what the device says of the stream."""
         stream = self.stream
         if stream is not None and state.stream == stream.id:
             stream.on_state(state)
-        self._history.append((arrival, self.reporter.positions(state.steps)))
+        self._history.append((arrival, self._device.reporter.positions(state.steps)))
         while self._history[0][0] < arrival - HISTORY:
             self._history.popleft()
         if state.mode not in MOVING or (state.mode == DeviceMode.RUN and state.t_us > self._held_us):
@@ -148,13 +116,13 @@ class Mover:
 
     def rest_position(self) -> Vector:
         """[rad] or [m] where the arm rests: the path's own end if the device stands on it, else its step counts."""
-        state, stream = self.state, self.stream
+        state, stream = self._device.state, self.stream
         if state is None:
-            return self.arm.reference_position
+            return self._device.arm.reference_position
         if stream is None or not stream.is_finished or state.stream != stream.id:
-            return self.reporter.positions(state.steps)
+            return self._device.reporter.positions(state.steps)
         path_end = tuple(whole_steps(q8) for q8 in stream.log.last_steps.position)
-        return stream.log.last.position if path_end == state.steps else self.reporter.positions(state.steps)
+        return stream.log.last.position if path_end == state.steps else self._device.reporter.positions(state.steps)
 
     def presence(self, moment: Moment) -> Presence:
         """From where a new motion would start, and the range that the arm sweeps until then."""
@@ -163,7 +131,7 @@ class Mover:
             return Presence.at_rest(self.rest_position())
         last = stream.log.last
         start = last if self.transmission.is_open else Knot.at_rest(last.position)
-        ahead = stream.log.knots_between(stream.played_us(moment.monotonic, self.session.clock), stream.end_us)
+        ahead = stream.log.knots_between(stream.played_us(moment.monotonic, self._device.session.clock), stream.end_us)
         rows = [position for _, position in self._history] + [knot.position for knot in ahead]
         columns = list(zip(*rows, strict=True))
         return Presence(start, tuple(map(min, columns)), tuple(map(max, columns)), self.transmission.is_open)
@@ -174,11 +142,12 @@ class Mover:
         self.transmission.abandon()
         self._holds = False
         self._stop_asked, self._stopped_us, self._awaits_stop = moment.monotonic, -1, True
-        self.commands.ask(DeviceCommandKind.STOP, moment, self.parameters.command_timeout, stream=stream)
+        timeout = self._device.parameters.command_timeout
+        self._device.commands.ask(DeviceCommandKind.STOP, moment, timeout, stream=stream)
 
     def has_stopped(self) -> bool:
         """Whether the device has answered the latest STOP and has said since that it stands."""
-        state = self.session.latest
+        state = self._device.session.latest
         return state is not None and 0 <= self._stopped_us < state.t_us and state.mode not in MOVING
 
     def lost(self) -> None:
@@ -186,12 +155,8 @@ class Mover:
         self._holds = self._awaits_stop = False
 
     def leave_stop(self, moment: Moment) -> None:
-        """A STOP on the wire, once: a device that is only frozen reads it behind the knots that wait there too."""
-        if not self.session.boot_id:
-            return
-        self.commands.ask(DeviceCommandKind.STOP, moment, self.parameters.command_timeout)
-        for frame in self.commands.due(moment, self.session.clock, self.session.boot_id):
-            self.out.send(Kind.CMD, encode(replace(frame, expires_us=NO_EXPIRY)))
+        """Ask for a STOP once more: a device that is only frozen reads it behind the knots that wait there too."""
+        self._device.commands.ask(DeviceCommandKind.STOP, moment, self._device.parameters.command_timeout)
 
     def begin_anew(self) -> None:
         """Another boot, or the same one with another configuration: neither the stream nor any STOP concerns it."""
@@ -208,28 +173,19 @@ class Mover:
 
     def stop_strangers(self, moment: Moment) -> bool:
         """Stop a motion that is not ours, of a gateway before us or given up without a link; true if there is one."""
-        state = self.session.latest
+        state = self._device.session.latest
         if state is None or state.mode not in MOVING or self.is_held or self.is_followed(state):
             return False
         is_obeying = state.mode == DeviceMode.HOLD and self._stopped_us >= 0
-        if is_obeying or self.absence(moment):
+        if is_obeying or self._device.absence(moment):
             return False
         if moment.monotonic - self._stop_asked < STOP_AGAIN:
             return False
-        self.event("stopping", f"the device moves along stream {state.stream}, which nobody follows", moment)
+        self._device.event("stopping", f"the device moves along stream {state.stream}, which nobody follows", moment)
         self.stop(moment)
         return True
 
-    def event(
-        self, event: str, detail: str, moment: Moment, level: LogLevel = LogLevel.WARNING, said: str = ""
-    ) -> None:
-        """Say something once, on the bus and in the log; there as `said`, where that is given."""
-        self.out.publish(
-            DEVICE_EVENTS, DeviceEvent(stamp=moment.unix, device=self.arm.device.name, event=event, detail=detail)
-        )
-        self.out.log(level, said or (f"{event}: {detail}" if detail else event))
-
     def _send(self, chunks: list[tuple[Chunk, SentChunk]], moment: Moment) -> None:
         for frame, sent in chunks:
-            self.out.send(Kind.TRAJ, encode(frame))
-            self.out.publish(COMMANDS, self.reporter.chunk(frame, sent, moment))
+            self._device.out.send(Kind.TRAJ, encode(frame))
+            self._device.out.publish(COMMANDS, self._device.reporter.chunk(frame, sent, moment))

@@ -11,10 +11,10 @@ from msgspec.structs import replace
 from schemas.device import PressKind, PressRequest, PressResponse
 from services.arm.description import Arm
 from services.arm.errors import suggestion
+from services.stepper_gateway.gateway_device import GatewayDevice
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.links.reports import EventReport
 from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.mover import Mover
 from services.stepper_gateway.outputs import Answer
 from services.stepper_gateway.refusals import GoalRejected, invalid
 
@@ -32,26 +32,25 @@ class Press(NamedTuple):
 class PressDesk:
     """The device's event does not say which press it answers, so the next one is sent after it."""
 
-    def __init__(self, mover: Mover) -> None:
-        self._mover = mover
+    def __init__(self, device: GatewayDevice) -> None:
+        self._device = device
         self._waiting: deque[Press] = deque()
 
     def ask(self, request: PressRequest, ticket: int, moment: Moment) -> None:
         """Have it done, or answer at once why not."""
-        mover = self._mover
         try:
-            if reason := mover.absence(moment):
+            if reason := self._device.absence(moment):
                 raise invalid(reason)
-            status = mover.session.status
+            status = self._device.session.status
             if status is None or not status.virtual:
                 raise invalid(
-                    f'device "{mover.arm.device.name}" is a real one: press its buttons by hand; only a virtual '
+                    f'device "{self._device.arm.device.name}" is a real one: press its buttons by hand; only a virtual '
                     "device's are pressed by a request"
                 )
-            translated = replace(request, target=target_of(request, mover.arm))
+            translated = replace(request, target=target_of(request, self._device.arm))
         except GoalRejected as rejected:
             return self._answer(ticket, False, rejected.reason)
-        self._waiting.append(Press(translated, ticket, moment.monotonic + mover.parameters.command_timeout))
+        self._waiting.append(Press(translated, ticket, moment.monotonic + self._device.parameters.command_timeout))
         if len(self._waiting) == 1:
             self._send()
 
@@ -72,10 +71,10 @@ class PressDesk:
 
     def _send(self) -> None:
         if self._waiting:
-            self._mover.out.send(Kind.PRESS, msgspec.json.encode(self._waiting[0].request))
+            self._device.out.send(Kind.PRESS, msgspec.json.encode(self._waiting[0].request))
 
     def _answer(self, ticket: int, accepted: bool, reason: str) -> None:
-        self._mover.out.put(Answer(ticket, PressResponse(accepted=accepted, reason=reason)))
+        self._device.out.put(Answer(ticket, PressResponse(accepted=accepted, reason=reason)))
 
 
 def target_of(request: PressRequest, arm: Arm) -> str:

@@ -33,7 +33,7 @@ class Reception:
 
     def __init__(self, parts: Parts) -> None:
         self._parts = parts
-        self._mover = parts.mover
+        self._device, self._controller = parts.device, parts.controller
 
     def take(self, received: Received, moment: Moment) -> None:
         """One payload; raises `BadFrame` for one that no device says."""
@@ -48,7 +48,7 @@ class Reception:
             case Kind.EVENT:
                 self._on_event(decode_report(EventReport, payload), moment)
             case Kind.CONFIG_ACK:
-                self._mover.configuration.on_ack(decode_report(ConfigAckReport, payload))
+                self._device.configuration.on_ack(decode_report(ConfigAckReport, payload))
             case Kind.SENSORS:
                 self._parts.sensors.on_readings(decode_sensors(payload), arrival, moment)
             case Kind.SHAFT:
@@ -62,80 +62,80 @@ class Reception:
             case Kind.STATE, State():
                 self._on_state(frame, arrival, moment)
             case Kind.TRAJ_ACK, Ack():
-                if frame.boot_id == self._mover.session.boot_id:
-                    self._mover.on_ack(frame, arrival, moment)
+                if frame.boot_id == self._device.session.boot_id:
+                    self._controller.on_ack(frame, arrival, moment)
                     self._parts.goals.on_ack()
             case Kind.SYNC_R, SyncReply():
-                self._mover.session.on_sync_reply(frame, received.arrival // 1000)
+                self._device.session.on_sync_reply(frame, received.arrival // 1000)
             case Kind.CMD_ACK, CommandReply():
-                self._mover.session.on_reply(frame)
+                self._device.session.on_reply(frame)
                 self._parts.desk.on_reply(frame, moment)
             case _:
                 raise BadFrame(f"a {type(frame).__name__} frame does not belong there")
 
     def _on_status(self, status: StatusReport, moment: Moment) -> None:
-        mover = self._mover
-        before = mover.configuration.device_crc32
-        mover.session.on_status(status)
-        mover.configuration.on_status()
-        if before and mover.configuration.device_crc32 != before:
+        device = self._device
+        before = device.configuration.device_crc32
+        device.session.on_status(status)
+        device.configuration.on_status()
+        if before and device.configuration.device_crc32 != before:
             self._parts.begin_anew("the device has another configuration", moment)
-        known = mover.session.status
+        known = device.session.status
         if known is not None and known.tick_hz:
             self._parts.goals.use_tick(known.tick_hz)
 
     def _on_event(self, event: EventReport, moment: Moment) -> None:
-        pass_on(event, self._mover, moment)
+        pass_on(event, self._device, moment)
         if event.event in STOPPED:
             self._on_stopped(event, moment)
         self._parts.presses.on_event(event)
 
     def _on_stopped(self, event: EventReport, moment: Moment) -> None:
         """The device slows down by itself; where it misses heartbeats that were sent, it gets a fresh session."""
-        mover = self._mover
-        mover.held = (event.stream, event.detail)
-        if event.detail == BY_LOST_HEARTBEAT and mover.session.renew_heartbeat(moment):
-            mover.event("heartbeat_renewed", RENEWED, moment)
+        device = self._device
+        self._controller.held = (event.stream, event.detail)
+        if event.detail == BY_LOST_HEARTBEAT and device.session.renew_heartbeat(moment):
+            device.event("heartbeat_renewed", RENEWED, moment)
 
     def _on_shaft(self, report: ShaftReport, arrival: float, moment: Moment) -> None:
-        measured = self._mover.session.clock.measured(report.t_us, arrival)
-        self._mover.out.publish(DEVICE_SHAFT, self._mover.reporter.shaft(report, moment.unix_at(measured)))
+        measured = self._device.session.clock.measured(report.t_us, arrival)
+        self._device.out.publish(DEVICE_SHAFT, self._device.reporter.shaft(report, moment.unix_at(measured)))
 
     def _on_state(self, state: State, arrival: float, moment: Moment) -> None:
-        mover = self._mover
-        is_news, is_reboot = mover.session.on_state(state, arrival, mover.parameters.state_timeout)
+        device, controller = self._device, self._controller
+        is_news, is_reboot = device.session.on_state(state, arrival, device.parameters.state_timeout)
         if is_reboot:
             reason = "the device has restarted"
-            mover.event("rebooted", f"{reason}: its position and boot id are read anew", moment)
+            device.event("rebooted", f"{reason}: its position and boot id are read anew", moment)
             self._parts.begin_anew(reason, moment)
         if not is_news:
             return
-        if not mover.session.fits(state):
-            self._parts.fail(mover.hindrance(), moment)
+        if not device.session.fits(state):
+            self._parts.fail(device.hindrance(), moment)
             self._publish_device(state, moment)
             return
-        mover.on_state(state, arrival)
-        point = mover.commanded(state)
+        controller.on_state(state, arrival)
+        point = controller.commanded(state)
         self._publish(state, point, moment)
-        if state.mode == DeviceMode.HOLD and mover.is_followed(state) and not mover.is_held:
+        if state.mode == DeviceMode.HOLD and controller.is_followed(state) and not controller.is_held:
             self._parts.streaming.interrupt()
             self._parts.goals.on_hold(moment)
         if state.mode in LOST:
-            self._parts.fail(mover.hindrance(), moment)
+            self._parts.fail(device.hindrance(), moment)
         self._parts.goals.on_ack()
         self._parts.goals.on_state(state, point, moment)
         self._parts.stop_strangers(moment)
 
     def _publish(self, state: State, point: PathPoint, moment: Moment) -> None:
-        reporter = self._mover.reporter
+        reporter = self._device.reporter
         stamp = self._publish_device(state, moment)
-        self._mover.out.publish(JOINT_STATES, reporter.joint_state(state, stamp))
-        self._mover.out.publish(JOINT_COMMANDS, reporter.joint_command(point, state, stamp))
-        self._mover.out.publish(STEP_ERRORS, reporter.step_errors(point, state, stamp))
+        self._device.out.publish(JOINT_STATES, reporter.joint_state(state, stamp))
+        self._device.out.publish(JOINT_COMMANDS, reporter.joint_command(point, state, stamp))
+        self._device.out.publish(STEP_ERRORS, reporter.step_errors(point, state, stamp))
 
     def _publish_device(self, state: State, moment: Moment) -> int:
         """The state's stamp [ns]."""
-        session = self._mover.session
+        session = self._device.session
         stamp = moment.unix_at(session.clock.measured(state.t_us, session.state_arrival))
-        self._mover.out.publish(DEVICE_STATE, self._mover.reporter.device_state(state, stamp, session.clock))
+        self._device.out.publish(DEVICE_STATE, self._device.reporter.device_state(state, stamp, session.clock))
         return stamp

@@ -7,9 +7,9 @@ from typing import NamedTuple
 from schemas.device import SensorReadings
 from schemas.system import LogLevel
 from schemas.topics import SENSORS
+from services.stepper_gateway.gateway_device import GatewayDevice
 from services.stepper_gateway.links.reports import SensorReport
 from services.stepper_gateway.moment import Moment, next_beat
-from services.stepper_gateway.mover import Mover
 
 SILENCE = 2.0  # [s] without readings until nothing is republished
 PERIOD = 0.1  # [s] between two messages
@@ -26,9 +26,9 @@ class Readings(NamedTuple):
 class SensorWatch:
     """What one board measures, in the order of robot.toml."""
 
-    def __init__(self, mover: Mover) -> None:
-        self._mover = mover
-        self._units = {sensor.name: sensor.unit for sensor in mover.arm.sensors}
+    def __init__(self, device: GatewayDevice) -> None:
+        self._device = device
+        self._units = {sensor.name: sensor.unit for sensor in device.arm.sensors}
         self._readings: Readings | None = None
         self._present_since: float | None = None  # [s] monotonic, of the device
         self._due = 0.0  # [s] monotonic
@@ -37,11 +37,11 @@ class SensorWatch:
     def on_readings(self, report: SensorReport, arrival: float, moment: Moment) -> None:
         """Take what the board has measured."""
         known = {name: value for name, value in report.values.items() if name in self._units}
-        measured = self._mover.session.clock.measured(report.t_us, arrival)
+        measured = self._device.session.clock.measured(report.t_us, arrival)
         self._readings = Readings(known, moment.unix_at(measured), arrival)
         if self._is_silent:
             self._is_silent = False
-            self._mover.event("sensors_back", "the sensors report again", moment, LogLevel.INFO)
+            self._device.event("sensors_back", "the sensors report again", moment, LogLevel.INFO)
 
     def step(self, absence: str, moment: Moment) -> None:
         """Republish, or say once that there is nothing to republish."""
@@ -67,11 +67,11 @@ class SensorWatch:
             self._is_silent = True
             names = ", ".join(self._units)
             detail = f"no reading of {names} for {SILENCE:g} s: check the board's network and the sensors' wires"
-            self._mover.event("sensors_silent", detail, moment)
+            self._device.event("sensors_silent", detail, moment)
 
     def _publish(self, readings: Readings) -> None:
         names = tuple(name for name in self._units if name in readings.values)
-        self._mover.out.publish(
+        self._device.out.publish(
             SENSORS,
             SensorReadings(
                 stamp=readings.stamp,

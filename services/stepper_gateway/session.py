@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 
-from schemas.device import DeviceMode
+from schemas.device import DeviceCommandKind, DeviceMode
 from services.stepper_gateway.clock import ClockSync
 from services.stepper_gateway.links.frames import (
+    NEVER_EXPIRES,
     BadFrame,
     Code,
     Command,
@@ -25,8 +26,6 @@ SYNC = 0.5  # [s]
 SYNC_AT_FIRST = 0.03  # [s] until the clock is known
 STEADY_BEATS = 0.7  # [s] of heartbeats without a pause, after which a device cannot miss them for want of any
 ASK_STATUS = 1.0  # [s] between two requests for a status that is missing
-STATUS = 11  # the command that asks for it
-NO_EXPIRY = 2**64 - 1  # [us]
 FARTHEST_AHEAD = 1.0  # [s] that a state's time may be ahead of the device's clock as it is known
 QUESTIONS = 32  # that may be under way
 OLD_BOOTS = 16  # remembered, so that a late frame of one does not look like a reboot
@@ -120,7 +119,7 @@ class DeviceSession:
 
     def on_reply(self, reply: CommandReply) -> None:
         """A device with an older firmware cannot be asked for its status."""
-        if (reply.boot_id, reply.cmd, reply.code) == (self.boot_id, STATUS, Code.UNKNOWN_CMD):
+        if (reply.boot_id, reply.cmd, reply.code) == (self.boot_id, DeviceCommandKind.STATUS, Code.UNKNOWN_CMD):
             self._tells_status = False
 
     def renew_heartbeat(self, moment: Moment) -> bool:
@@ -152,7 +151,8 @@ class DeviceSession:
         if self._lacks_status(moment) and moment.monotonic >= self._status_due:
             self._status_due = moment.monotonic + ASK_STATUS
             self._status_id = (self._status_id + 1) & 0xFFFFFFFF
-            frames.append(Command(boot_id=self.boot_id, cmd_id=self._status_id, expires_us=NO_EXPIRY, cmd=STATUS))
+            kind = DeviceCommandKind.STATUS
+            frames.append(Command(boot_id=self.boot_id, cmd_id=self._status_id, expires_us=NEVER_EXPIRES, cmd=kind))
         return frames
 
     def _lacks_status(self, moment: Moment) -> bool:

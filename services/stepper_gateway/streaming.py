@@ -6,8 +6,9 @@ Whoever streams must go on sending (0.5 s by default), also to keep a far target
 from __future__ import annotations
 
 from schemas.joints import JointTargets
+from services.stepper_gateway.gateway_device import GatewayDevice
 from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.mover import Mover
+from services.stepper_gateway.mover import MotionController
 from services.stepper_gateway.refusals import GoalRejected, invalid
 from services.stepper_gateway.targets import TargetStream
 
@@ -15,36 +16,36 @@ COMPLAINT = 1.0  # [s] between two of them
 
 
 class Streaming:
-    """Feeds targets to the mover."""
+    """Feeds targets to the controller."""
 
-    def __init__(self, mover: Mover) -> None:
-        self._mover = mover
-        self._targets = TargetStream(mover.joints)
+    def __init__(self, device: GatewayDevice, controller: MotionController) -> None:
+        self._device, self._controller = device, controller
+        self._targets = TargetStream(device.joints)
         self._complained = -1.0e9  # [s] monotonic
         self._unsaid = 0
 
     def on_targets(self, targets: JointTargets, goal_is_active: bool, moment: Moment) -> None:
         """Take the newest target, or refuse it and keep the one before."""
-        silence = self._mover.parameters.stream_silence
+        silence = self._device.parameters.stream_silence
         self._targets.heard(moment.monotonic, silence)
         try:
             if goal_is_active:
                 raise invalid("a goal is being carried out; cancel it first")
-            if reason := self._mover.refusal(moment):
+            if reason := self._device.refusal(moment):
                 raise invalid(reason)
             self._targets.require_uninterrupted(silence)
             columns = self._targets.checked(targets)
         except GoalRejected as rejected:
             return self._complain(rejected.reason, moment)
-        self._targets.take(columns, self._mover.presence(moment).start.position)
+        self._targets.take(columns, self._controller.presence(moment).start.position)
         self._begin(moment)
 
     def step(self, moment: Moment) -> None:
         """Brake on silence, begin when the arm rests, notice the end."""
-        stream = self._mover.stream
-        if self._targets.is_active and (stream is None or not self._mover.transmission.is_open):
+        stream = self._controller.stream
+        if self._targets.is_active and (stream is None or not self._controller.transmission.is_open):
             self._end(stream is not None and bool(stream.failure), moment)
-        if self._targets.is_silent(moment.monotonic, self._mover.parameters.stream_silence):
+        if self._targets.is_silent(moment.monotonic, self._device.parameters.stream_silence):
             self._fall_silent(moment)
         self._begin(moment)
 
@@ -63,23 +64,23 @@ class Streaming:
     def _fall_silent(self, moment: Moment) -> None:
         """Decelerate now, not behind what has been sent; a stream that rests ends with its last knot."""
         if self._targets.is_active and not self._targets.is_resting:
-            self._mover.stop(moment)
+            self._controller.stop(moment)
             self._targets.end()
         self._targets.fall_silent()
 
     def _begin(self, moment: Moment) -> None:
-        mover = self._mover
-        if self._targets.target is None or self._targets.is_active or not mover.is_resting():
+        controller = self._controller
+        if self._targets.target is None or self._targets.is_active or not controller.is_resting():
             return
-        start = mover.presence(moment).start
-        mover.lead = mover.parameters.streaming_lead
-        mover.begin(self._targets.motion(start), start.position, moment)
+        start = controller.presence(moment).start
+        controller.lead = self._device.parameters.streaming_lead
+        controller.begin(self._targets.motion(start), start.position, moment)
 
     def _end(self, failed: bool, moment: Moment) -> None:
-        stream = self._mover.stream
+        stream = self._controller.stream
         if failed and stream is not None:
             self._complain(stream.failure, moment)
-            self._mover.stop(moment)
+            self._controller.stop(moment)
         self._targets.end(interrupted=failed)
 
     def _complain(self, reason: str, moment: Moment) -> None:
@@ -89,4 +90,4 @@ class Streaming:
             return
         more = f" (and {self._unsaid} more)" if self._unsaid else ""
         self._complained, self._unsaid = moment.monotonic, 0
-        self._mover.event("target_refused", reason + more, moment)
+        self._device.event("target_refused", reason + more, moment)

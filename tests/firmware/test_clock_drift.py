@@ -29,7 +29,7 @@ class DriftingRig(Rig):
 
     def clock_error(self) -> float:
         """[s] by which the gateway is wrong about the device's clock."""
-        believed = self.core.mover.session.clock.device_time(self.moment.monotonic)
+        believed = self.core.device.session.clock.device_time(self.moment.monotonic)
         return (believed - self.clock.at(self.now)) * 1e-6
 
 

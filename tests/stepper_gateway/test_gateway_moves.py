@@ -154,8 +154,8 @@ def test_defect_6_success_is_never_said_before_the_device_has_executed_the_steps
         executed = rig.device.steps
         rig.run(0.001)
     assert executed == expected_steps(READY)
-    assert rig.core.mover.stream is not None
-    assert rig.core.mover.stream.acked == rig.core.mover.stream.next_seq
+    assert rig.core.controller.stream is not None
+    assert rig.core.controller.stream.acked == rig.core.controller.stream.next_seq
 
 
 def test_defect_6_without_a_device_a_goal_is_refused_not_simulated() -> None:
@@ -192,7 +192,7 @@ def test_a_cancel_at_once_and_one_at_the_end_both_end_the_goal() -> None:
     assert rig.cancel("early") == ""
     assert rig.finish("early", 5.0)[0] == GoalStatusCode.CANCELED
     rig.goal(move(rig.position, READY), "late")
-    stream = rig.core.mover.stream
+    stream = rig.core.controller.stream
     assert stream is not None
     rig.run(20.0, lambda: stream.is_complete)
     rig.run(0.2)
@@ -237,7 +237,7 @@ def test_many_goals_after_another_keep_the_limits() -> None:
 def test_a_goal_that_arrives_while_the_last_knots_are_played_starts_after_them() -> None:
     rig = Rig().ready()
     rig.goal(move(HOME, (0.2, -0.2, 0.02)), "first")
-    stream = rig.core.mover.stream
+    stream = rig.core.controller.stream
     assert stream is not None
     assert rig.run(10.0, lambda: stream.is_complete)
     here = rig.messages(JOINT_STATES)[-1].position

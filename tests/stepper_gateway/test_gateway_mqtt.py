@@ -42,7 +42,7 @@ def test_a_move_over_a_real_broker_and_what_strangers_publish_moves_nothing(proc
             )
         gateway.run(0.5)
         assert gateway.core.bad_frames >= 10
-        assert gateway.published["joint_states"][-1].position == gateway.core.mover.reporter.positions(steps)
+        assert gateway.published["joint_states"][-1].position == gateway.core.device.reporter.positions(steps)
         assert gateway.goal(HOME, "back").accepted
         assert gateway.finish("back")[0] == GoalStatusCode.SUCCEEDED
         trips = sorted(ack.round_trip for ack in gateway.published["command_acks"])
@@ -72,12 +72,12 @@ def test_a_killed_broker_aborts_the_goal_and_nothing_stale_is_sent_after_it_retu
 def test_a_restarted_device_is_met_again(processes: Processes) -> None:
     with closing(Gateway(processes.port)) as gateway:
         gateway.ready()
-        boot = gateway.core.mover.session.boot_id
+        boot = gateway.core.device.session.boot_id
         processes.kill(DEVICE)
         assert gateway.run(3.0, lambda: bool(gateway.core.not_ready(gateway.moment)))
         processes.start(DEVICE)
         gateway.ready()
-        assert gateway.core.mover.session.boot_id != boot
+        assert gateway.core.device.session.boot_id != boot
         assert gateway.goal(NEAR).accepted
         assert gateway.finish()[0] == GoalStatusCode.SUCCEEDED
 

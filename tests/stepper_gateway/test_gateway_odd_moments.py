@@ -35,7 +35,7 @@ def rig_with_a_goal_that_waits() -> Rig:
     """The first goal's last knots are under way, so the second one has to wait for their end."""
     rig = Rig().ready()
     rig.goal(move(HOME, (0.2, -0.2, 0.02)), "first")
-    stream = rig.core.mover.stream
+    stream = rig.core.controller.stream
     assert stream is not None
     assert rig.run(10.0, lambda: stream.is_complete)
     assert rig.goal(move(here(rig), (0.5, 0.1, 0.05)), "second").accepted

@@ -22,7 +22,7 @@ def virtual(rig: Rig) -> Rig:
     """What this device says of itself from now on."""
     rig.ready()
     status = {"online": True, "device": "rm1", "boot_id": 77, "joints": 3, "tick_hz": 50_000, "queue_capacity": 128}
-    crc = rig.core.mover.configuration.crc32
+    crc = rig.core.device.configuration.crc32
     rig.receive(Kind.STATUS, json.dumps(status | {"config_crc32": crc, "virtual": True}).encode())
     return rig
 
@@ -37,7 +37,7 @@ def presses(rig: Rig) -> list[str]:
 
 def test_a_real_device_is_not_pressed_by_a_request() -> None:
     rig = Rig().ready()
-    status = {"online": True, "boot_id": 77, "joints": 3, "config_crc32": rig.core.mover.configuration.crc32}
+    status = {"online": True, "boot_id": 77, "joints": 3, "config_crc32": rig.core.device.configuration.crc32}
     rig.receive(Kind.STATUS, json.dumps(status).encode())
     rig.press(ESTOP)
     assert not rig.pressed[1].accepted

@@ -204,7 +204,8 @@ def restart(play: Play) -> None:
 
 
 PAUSES = (DeviceCommandKind.HOLD, DeviceCommandKind.RESUME)
-PLAIN = [kind for kind in DeviceCommandKind if kind not in (DeviceCommandKind.HOME, DeviceCommandKind.SPEED)]
+NOT_PLAIN = (DeviceCommandKind.HOME, DeviceCommandKind.SPEED, DeviceCommandKind.STATUS)
+PLAIN = [kind for kind in DeviceCommandKind if kind not in NOT_PLAIN]
 waits = st.one_of(st.floats(0.0, 0.06), st.floats(0.0, 3.0))
 reaches = st.sampled_from([0.0, 1e-4, 0.003, 0.02, 0.1, 0.4, 1.0])
 EXPLORED = st.one_of(

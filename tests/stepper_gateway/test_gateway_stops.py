@@ -76,7 +76,7 @@ def test_a_hold_without_a_clock_stands_on_the_path() -> None:
 def test_a_stop_that_comes_late_by_a_wrong_clock_is_sent_again_without_one() -> None:
     rig = moving()
     for _ in range(64):  # the machine has slept: its clock stands behind what the exchanges have said
-        rig.core.mover.session.clock.add(0, 1, 1, 100)
+        rig.core.device.session.clock.add(0, 1, 1, 100)
     rig.ask(StopKind.STOP, 7)
     assert rig.run(0.1, lambda: 7 in rig.answers)
     assert rig.answers[7].accepted

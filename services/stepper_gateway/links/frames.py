@@ -14,6 +14,8 @@ import msgspec
 
 from services.runtime.serial_frames import MAGIC, VERSION, sealed
 
+ANY_BOOT = 0  # as the boot id of a command that stops
+NEVER_EXPIRES = 2**64 - 1  # [us]
 NO_JOINT = 255
 
 Row = tuple[int, ...]
