@@ -9,7 +9,7 @@ import random
 from collections.abc import Callable, Iterator
 
 from services.bench.figure import Figure, Goal, of_samples, quantile
-from services.stepper_gateway.clock import ClockSync
+from services.stepper_gateway.device.clock import ClockSync
 
 UNIT = "us"
 DRIFT = 100e-6  # of the device's clock

@@ -14,16 +14,16 @@ from schemas.scene import PlanningScene
 from schemas.system import LogLevel
 from schemas.topics import DEVICE_STATUS
 from services.arm.description import Arm
-from services.stepper_gateway.arguments import STOPS, kind_of
-from services.stepper_gateway.goals import GoalVerdict
+from services.stepper_gateway.components import Components
+from services.stepper_gateway.device.command_arguments import STOPS, kind_of
+from services.stepper_gateway.device.frame_handler import FrameHandler
+from services.stepper_gateway.device.gateway_device import status_of
+from services.stepper_gateway.goals.goal_executor import GoalVerdict
 from services.stepper_gateway.links.frames import BadFrame, Command, Heartbeat, Sync, encode
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Output
 from services.stepper_gateway.parameters import GatewayParameters
-from services.stepper_gateway.parts import Parts
-from services.stepper_gateway.reception import Reception
-from services.stepper_gateway.status import status_of
 
 REGULAR = {Heartbeat: Kind.HB, Sync: Kind.SYNC, Command: Kind.CMD}  # what the session sends by itself
 BAD_FRAME_REPORT = 1.0  # [s] between two
@@ -40,9 +40,9 @@ class GatewayCore:
     """One arm, one device."""
 
     def __init__(self, arm: Arm, session_id: int, parameters: GatewayParameters | None = None) -> None:
-        self._parts = Parts(arm, session_id, parameters or GatewayParameters())
-        self._reception = Reception(self._parts)
-        self.device, self.controller = self._parts.device, self._parts.controller
+        self._components = Components(arm, session_id, parameters or GatewayParameters())
+        self._frame_handler = FrameHandler(self._components)
+        self.device, self.controller = self._components.device, self._components.controller
         self.bad_frames = 0
         self._bad_reported = -1.0e9  # [s] monotonic
         self._told: DeviceStatus | None = None
@@ -54,7 +54,7 @@ class GatewayCore:
     def not_ready(self, moment: Moment) -> str:
         """Why the gateway's state is not valid, empty if it is."""
         device = self.device
-        return device.absence(moment) or ("" if device.state is not None else device.hindrance())
+        return device.unreachable_reason(moment) or ("" if device.state is not None else device.not_ready_reason())
 
     def on_link(self, connected: bool, reason: str, moment: Moment) -> list[Output]:
         """The wire has come or gone."""
@@ -69,7 +69,7 @@ class GatewayCore:
     def on_received(self, received: Received, moment: Moment) -> list[Output]:
         """One payload from the device; one that is no frame is counted, and reported now and then."""
         try:
-            self._reception.take(received, moment)
+            self._frame_handler.take(received, moment)
         except BadFrame as error:
             self.bad_frames += 1
             if moment.monotonic - self._bad_reported >= BAD_FRAME_REPORT:
@@ -81,57 +81,57 @@ class GatewayCore:
         self, goal_id: str, goal: FollowJointTrajectoryGoal, moment: Moment
     ) -> tuple[GoalVerdict, list[Output]]:
         """A goal, to be accepted or refused at once."""
-        verdict = self._parts.goals.accept(goal_id, goal, moment)
+        verdict = self._components.goals.accept(goal_id, goal, moment)
         if verdict.accepted:
-            self._parts.streaming.yield_to_goal()
+            self._components.streaming.end_for_goal()
         return verdict, self._finish(moment)
 
     def on_cancel(self, goal_id: str, moment: Moment) -> tuple[str, list[Output]]:
         """Empty if the goal is being cancelled, else why not."""
-        reason = self._parts.goals.cancel(goal_id, moment)
-        self._parts.desk.send_due(moment)
+        reason = self._components.goals.cancel(goal_id, moment)
+        self._components.command_handler.send_due(moment)
         return reason, self._finish(moment)
 
     def on_scene(self, scene: PlanningScene) -> None:
         """The planner's newest scene: goals planned in another are refused. One that cannot be is said once."""
-        scenes = self._parts.goals.scenes
+        scenes = self._components.goals.scenes
         objection = scenes.take(scene)
         if objection and scenes.dropped == 1:
-            self._parts.out.log(LogLevel.WARNING, f"scene: dropped: {objection} (further ones are only counted)")
+            self._components.out.log(LogLevel.WARNING, f"scene: dropped: {objection} (further ones are only counted)")
 
     @property
     def scenes_dropped(self) -> int:
         """How many scenes had a version that no planner gives."""
-        return self._parts.goals.scenes.dropped
+        return self._components.goals.scenes.dropped
 
     def on_targets(self, targets: JointTargets, moment: Moment) -> list[Output]:
         """A streamed target."""
-        self._parts.streaming.on_targets(targets, self._parts.goals.is_active, moment)
+        self._components.streaming.on_targets(targets, self._components.goals.is_active, moment)
         return self._finish(moment)
 
     def on_command(self, request: DeviceCommandRequest, ticket: int, moment: Moment) -> list[Output]:
         """A person's command; its answer comes as an `Answer` with this ticket."""
-        if self._parts.desk.ask(request, ticket, self._parts.goals.is_active, moment):
-            self._give_way(kind_of(request), moment)
-        self._parts.desk.send_due(moment)
+        if self._components.command_handler.ask(request, ticket, self._components.goals.is_active, moment):
+            self._make_way_for(kind_of(request), moment)
+        self._components.command_handler.send_due(moment)
         return self._finish(moment)
 
     def on_stop(self, request: DeviceStopRequest, ticket: int, moment: Moment) -> list[Output]:
         """A person's STOP, HOLD or DISARM; its answer comes as an `Answer` with this ticket."""
         kind = STOPS[request.kind]
-        if self._parts.desk.stop(kind, ticket, self._parts.goals.is_active, moment):
-            self._give_way(kind, moment)
-        self._parts.desk.send_due(moment)
+        if self._components.command_handler.stop(kind, ticket, self._components.goals.is_active, moment):
+            self._make_way_for(kind, moment)
+        self._components.command_handler.send_due(moment)
         return self._finish(moment)
 
     def on_configure(self, ticket: int, moment: Moment) -> list[Output]:
         """A person wants the device configured; the answer comes as an `Answer` with this ticket."""
-        self.device.configuration.ask(ticket, self.device.absence(moment), moment)
+        self.device.configuration.ask(ticket, self.device.unreachable_reason(moment), moment)
         return self._finish(moment)
 
     def on_press(self, request: PressRequest, ticket: int, moment: Moment) -> list[Output]:
         """A press of a virtual device; its answer comes as an `Answer` with this ticket."""
-        self._parts.presses.ask(request, ticket, moment)
+        self._components.presses.ask(request, ticket, moment)
         return self._finish(moment)
 
     def step(self, moment: Moment) -> list[Output]:
@@ -140,27 +140,27 @@ class GatewayCore:
         period = moment.monotonic - self._stepped if self._stepped is not None else 0.0
         self._stepped = moment.monotonic
         for frame in device.session.due(moment):
-            self._parts.out.send(REGULAR[type(frame)], encode(frame))
-        absence = device.absence(moment)
-        if absence:
-            self._parts.lose(absence, moment)
-        self._parts.goals.step(moment, period)
-        self._parts.streaming.step(moment)
-        self._parts.stop_strangers(moment)
-        self._parts.desk.step(moment)
-        device.configuration.step(absence, moment)
-        self._parts.presses.step(moment)
-        self._parts.sensors.step(absence, moment)
+            self._components.out.send(REGULAR[type(frame)], encode(frame))
+        unreachable_reason = device.unreachable_reason(moment)
+        if unreachable_reason:
+            self._components.on_unreachable(unreachable_reason, moment)
+        self._components.goals.step(moment, period)
+        self._components.streaming.step(moment)
+        self._components.stop_foreign_motion(moment)
+        self._components.command_handler.step(moment)
+        device.configuration.step(unreachable_reason, moment)
+        self._components.presses.step(moment)
+        self._components.sensors.step(unreachable_reason, moment)
         self.controller.pump(moment)
         return self._finish(moment)
 
-    def _give_way(self, kind: DeviceCommandKind, moment: Moment) -> None:
+    def _make_way_for(self, kind: DeviceCommandKind, moment: Moment) -> None:
         """A person's command comes before goals and targets."""
         if kind in PAUSES:
             return
-        self._parts.streaming.interrupt()
-        if self._parts.goals.is_active:
-            self._parts.goals.stop(f"stopped by a device command ({kind.name})", moment)
+        self._components.streaming.interrupt()
+        if self._components.goals.is_active:
+            self._components.goals.stop(f"stopped by a device command ({kind.name})", moment)
         elif kind == DeviceCommandKind.STOP:
             self.controller.stop(moment)
         else:
@@ -171,5 +171,5 @@ class GatewayCore:
         status = status_of(self.device, moment)
         if self._told is None or replace(status, stamp=0) != self._told:
             self._told = replace(status, stamp=0)
-            self._parts.out.publish(DEVICE_STATUS, status)
-        return self._parts.out.take()
+            self._components.out.publish(DEVICE_STATUS, status)
+        return self._components.out.take()

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import secrets
+from collections.abc import Callable
 from contextlib import closing
+from pathlib import Path
 
-from schemas.deployment import Deployment
+from schemas.deployment import Deployment, DeviceKind, Wire
 from services.arm.description import load_arm
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.links.wires import open_link
+from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.shell import Shell
 
 RATE = 50.0  # [Hz]
+VIRTUAL_LINE = "virtual_esp32.tty"
 
 
 def run(node: Node, deployment: Deployment) -> None:
@@ -27,6 +30,26 @@ def run(node: Node, deployment: Deployment) -> None:
     with closing(open_link(deployment, arm.device.name, shell.wake)) as link:
         shell.use(link)
         node.spin(shell.step, rate=RATE)
+
+
+def open_link(deployment: Deployment, device: str, wake: Callable[[], None]) -> Link:
+    """The other wire's library is not even imported."""
+    match deployment.wire:
+        case Wire.MQTT:
+            from services.stepper_gateway.links.mqtt import MqttLink
+
+            return MqttLink(deployment.mqtt.host, deployment.mqtt.port, device, wake)
+        case Wire.SERIAL:
+            from services.stepper_gateway.links.serial import SerialLink
+
+            return SerialLink(serial_device(deployment), deployment.serial.baud, wake)
+
+
+def serial_device(deployment: Deployment) -> str:
+    """The port that the board is at; a virtual one has a line of its own among the run's files."""
+    if deployment.device is DeviceKind.VIRTUAL:
+        return str(Path(deployment.paths.run) / VIRTUAL_LINE)
+    return deployment.serial.device
 
 
 def main() -> None:

@@ -16,9 +16,9 @@ from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics
 from services.planner.jog.jog import PERIOD, Jog
 from services.planner.scene.world import World
-from services.stepper_gateway.knots import Knot
-from services.stepper_gateway.limits import Limits
-from services.stepper_gateway.tracking import Tracker
+from services.stepper_gateway.motion.knots import Knot
+from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.target_tracker import Tracker
 
 Array = NDArray[np.float64]
 

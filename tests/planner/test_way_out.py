@@ -17,9 +17,9 @@ from services.planner.core import Planner
 from services.planner.jog.jog import PERIOD
 from services.planner.scene.clearance import CLEARANCE
 from services.planner.scene.world import World
-from services.stepper_gateway.knots import Knot
-from services.stepper_gateway.limits import Limits
-from services.stepper_gateway.tracking import Tracker
+from services.stepper_gateway.motion.knots import Knot
+from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.target_tracker import Tracker
 from tests.planner.jogging import Array, Jogged, arm_of, kinematics_of
 
 ARMS, KINDS = ("rm1", "parol6"), ("itself", "a post", "what it carries")

@@ -41,13 +41,14 @@ from schemas.motion import (
 from schemas.topics import Topic
 from services.arm.description import Arm, load_arm
 from services.arm.device_config import device_config, reference_steps
-from services.stepper_gateway.arguments import KINDS
 from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.goals import GoalVerdict
-from services.stepper_gateway.knots import Knot
-from services.stepper_gateway.limits import Limits
+from services.stepper_gateway.device.command_arguments import KINDS
+from services.stepper_gateway.goals.goal_executor import GoalVerdict
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.motion.knots import Knot
+from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.paths import profile
 from services.stepper_gateway.outputs import (
     Answer,
     GoalExecuting,
@@ -59,7 +60,6 @@ from services.stepper_gateway.outputs import (
     SendFrame,
 )
 from services.stepper_gateway.parameters import GatewayParameters
-from services.stepper_gateway.paths import profile
 
 ROOT = Path(__file__).resolve().parents[2]
 UNIX = 1_700_000_000_000_000_000  # [ns] at the start of virtual time

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from services.stepper_gateway.links.frames import NO_JOINT, Ack, Code
-from services.stepper_gateway.stream import refusal
+from services.stepper_gateway.motion.stream import refusal
 from tests.stepper_gateway.harness import rm1
 
 

@@ -8,11 +8,11 @@ from msgspec.structs import replace
 from schemas.actions import GoalStatusCode
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
 from schemas.topics import COMMAND_ACKS, COMMANDS, JOINT_STATES, STEP_ERRORS
-from services.stepper_gateway.execution import Execution
+from services.stepper_gateway.goals.active_goal import ActiveGoal
+from services.stepper_gateway.goals.goal_validator import GoalValidator
 from services.stepper_gateway.links.frames import State
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.parameters import GatewayParameters
-from services.stepper_gateway.validation import Validator
 from tests.stepper_gateway.harness import Rig, Wire, assert_within_limits, move, rm1
 
 HOME = (0.0, 0.0, 0.0)
@@ -23,13 +23,13 @@ def expected_steps(position: tuple[float, ...]) -> tuple[int, ...]:
     return tuple((joint.steps.to_q8(p) + 128) >> 8 for joint, p in zip(rm1().joints, position, strict=True))
 
 
-def execution_near_its_end(bound: JointTolerance) -> tuple[Execution, State]:
+def execution_near_its_end(bound: JointTolerance) -> tuple[ActiveGoal, State]:
     """A goal whose joints are on their last step, the first still at 1 step/s."""
     goal = FollowJointTrajectoryGoal(trajectory=move(HOME, READY), goal_tolerance=(bound,))
     joints = rm1().joints
-    checked = Validator(joints, 25_000).check(goal, 0, GatewayParameters())
+    checked = GoalValidator(joints, 25_000).check(goal, 0, GatewayParameters())
     state = State(t_us=1, mode=2, steps=expected_steps(READY), velocity=(256, 0, 0))
-    return Execution("g", checked, joints, Moment(0, 0.0)), state
+    return ActiveGoal("g", checked, joints, Moment(0, 0.0)), state
 
 
 def test_a_move_ends_on_the_exact_steps() -> None:

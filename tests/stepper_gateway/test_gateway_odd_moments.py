@@ -6,7 +6,7 @@ from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
 from schemas.topics import JOINT_STATES
-from services.stepper_gateway.clock import ENOUGH, ClockSync
+from services.stepper_gateway.device.clock import ENOUGH, ClockSync
 from tests.stepper_gateway.harness import Rig, assert_within_limits, move, rm1
 
 HOME = (0.0, 0.0, 0.0)

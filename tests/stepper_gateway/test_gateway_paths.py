@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from schemas.message import Vector
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from services.arm.interpolation import TrajectorySampler
-from services.stepper_gateway.bridge import BridgedPath, bridge
-from services.stepper_gateway.clock import ClockSync
-from services.stepper_gateway.goal_limits import within
-from services.stepper_gateway.knots import Knot, StepEncoder, StepKnot, whole_steps
-from services.stepper_gateway.limits import Limits
-from services.stepper_gateway.motion import PlannedMotion
-from services.stepper_gateway.path_log import PathLog
-from services.stepper_gateway.paths import Path, RoundedPath, SampledPath, profile
+from services.stepper_gateway.device.clock import ClockSync
+from services.stepper_gateway.goals.limit_checks import within
+from services.stepper_gateway.motion.commanded_path import CommandedPath
+from services.stepper_gateway.motion.knot_sources import PathKnots
+from services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot, whole_steps
+from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.path_joining import JoinedPath, bridge
+from services.stepper_gateway.motion.paths import Path, RoundedPath, SampledPath, profile
 from tests.stepper_gateway.harness import ROOT, move, rm1
 
 JOINTS = rm1().joints
@@ -75,7 +75,7 @@ def test_a_bridge_is_continuous_and_keeps_the_limits(
     assert joined.at(0.0).position == pytest.approx(start.position, abs=1e-9)
     assert joined.at(0.0).velocity == pytest.approx(start.velocity, abs=1e-9)
     assert joined.at(joined.duration).position == pytest.approx(third, abs=1e-6)
-    if isinstance(joined, BridgedPath):
+    if isinstance(joined, JoinedPath):
         left, right = joined.at(joined.meets - 1e-9), joined.at(joined.meets)
         assert left.position == pytest.approx(right.position, abs=1e-6)
         assert left.velocity == pytest.approx(right.velocity, abs=1e-5)
@@ -94,7 +94,7 @@ def test_a_planned_motion_has_equal_steps_of_at_most_20_ms_and_ends_exactly(dura
         TrajectoryPoint(positions=(p,) * 3, velocities=HOME, time_from_start=t)
         for p, t in ((0.0, 0.0), (0.1, duration))
     )
-    motion = PlannedMotion(SampledPath(TrajectorySampler(JointTrajectory(points=points))))
+    motion = PathKnots(SampledPath(TrajectorySampler(JointTrajectory(points=points))))
     knots: list[Knot] = []
     while not motion.is_finished:
         knots += motion.take(7)
@@ -111,7 +111,7 @@ def test_ruckig_is_never_given_intermediate_positions() -> None:
 
 
 def test_the_path_log_is_the_hermite_that_the_device_plays() -> None:
-    log = PathLog()
+    log = CommandedPath()
     knot = Knot.at_rest(HOME)
     log.append(0, StepKnot((0, 0, 0), (0, 0, 0)), knot)
     log.append(20_000, StepKnot((256, 0, 0), (25600, 0, 0)), knot)

@@ -8,9 +8,9 @@ from contextlib import closing
 import pytest
 
 from schemas.device import DeviceMode, PressKind, PressRequest
+from services.stepper_gateway.device.press_handler import target_of
+from services.stepper_gateway.goals.rejections import GoalRejected
 from services.stepper_gateway.links.link import Kind
-from services.stepper_gateway.presses import target_of
-from services.stepper_gateway.refusals import GoalRejected
 from tests.stepper_gateway.harness import Rig, rm1
 from tests.stepper_gateway.processes import Processes
 from tests.stepper_gateway.wired import Gateway

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from schemas.actions import GoalStatusCode
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from schemas.scene import PlanningScene
-from services.stepper_gateway.goals import GoalVerdict
+from services.stepper_gateway.goals.goal_executor import GoalVerdict
 from tests.stepper_gateway.harness import Rig, move
 
 HOME, THERE = (0.0, 0.0, 0.0), (0.1, -0.2, 0.01)

@@ -11,7 +11,7 @@ import pytest
 from schemas.actions import GoalStatusCode
 from schemas.deployment import Deployment, DeviceKind, SerialSection, Wire
 from schemas.device import DeviceMode, PressKind, PressRequest
-from services.stepper_gateway.links.wires import open_link, serial_device
+from services.stepper_gateway.main import open_link, serial_device
 from tests.stepper_gateway.processes import DEVICE, Processes
 from tests.stepper_gateway.wired import Gateway
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceMode
 from schemas.topics import DEVICE_EVENTS, JOINT_STATES
-from services.stepper_gateway.knots import Knot
-from services.stepper_gateway.limits import Limits
-from services.stepper_gateway.tracking import Tracker
+from services.stepper_gateway.motion.knots import Knot
+from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.target_tracker import TargetTracker
 from tests.stepper_gateway.harness import UNIX, Rig, assert_within_limits, move, rm1
 
 
@@ -137,7 +137,7 @@ def test_whatever_the_targets_the_tracker_keeps_every_limit(
     program: list[tuple[tuple[float, ...], int, bool]],
 ) -> None:
     lower = (-2.95, -2.95, 0.0)
-    tracker = Tracker(LIMITS, 0.02, Knot.at_rest((0.0, 0.0, 0.1)))
+    tracker = TargetTracker(LIMITS, 0.02, Knot.at_rest((0.0, 0.0, 0.1)))
     before = tracker.knot
     for share, count, brakes in program:
         target = tuple(lo + (s + 1) / 2 * (hi - lo) for s, lo, hi in zip(share, lower, UPPER, strict=True))
@@ -161,9 +161,9 @@ from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
 from services.runtime.stopping import StopRequest
 from services.stepper_gateway.core import GatewayCore
-from services.stepper_gateway.knots import Knot
-from services.stepper_gateway.limits import Limits
-from services.stepper_gateway.tracking import Tracker
+from services.stepper_gateway.motion.knots import Knot
+from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.target_tracker import TargetTracker
 
 arm = load_arm(project_root() / "urdf/rm1")
 core = GatewayCore(arm, 1)
@@ -171,7 +171,7 @@ core.own = core
 node = Node("stepper_gateway", robot="rm1", bus=MemoryBus(MemoryNetwork()), stop=StopRequest())
 
 def step(now):
-    core.tracker = Tracker(Limits.of(arm.joints), 0.02, Knot.at_rest((0.0, 0.0, 0.0)))
+    core.tracker = TargetTracker(Limits.of(arm.joints), 0.02, Knot.at_rest((0.0, 0.0, 0.0)))
     node.stop()
 
 node.spin(step)

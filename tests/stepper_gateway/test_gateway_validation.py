@@ -11,10 +11,10 @@ from msgspec.structs import replace
 
 from schemas.message import Vector
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
-from services.stepper_gateway.knots import Knot
+from services.stepper_gateway.goals.goal_validator import GoalValidator, MotionStart
+from services.stepper_gateway.goals.rejections import GoalRejected
+from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.parameters import GatewayParameters
-from services.stepper_gateway.refusals import GoalRejected
-from services.stepper_gateway.validation import Presence, Validator
 from tests.stepper_gateway.harness import UNIX, Rig, assert_within_limits, move, rm1
 
 HOME = (0.0, 0.0, 0.0)
@@ -32,13 +32,13 @@ def trajectory(*points: TrajectoryPoint, names: tuple[str, ...] = NAMES, stamp: 
     return JointTrajectory(joint_names=names, points=points, stamp=stamp)
 
 
-def refusal(goal: FollowJointTrajectoryGoal | JointTrajectory, presence: Presence | None = None) -> GoalRejected:
+def refusal(goal: FollowJointTrajectoryGoal | JointTrajectory, presence: MotionStart | None = None) -> GoalRejected:
     if isinstance(goal, JointTrajectory):
         goal = FollowJointTrajectoryGoal(trajectory=goal)
-    validator, parameters = Validator(rm1().joints, 50_000), GatewayParameters()
+    validator, parameters = GoalValidator(rm1().joints, 50_000), GatewayParameters()
     try:
         checked = validator.check(goal, UNIX, parameters)
-        validator.path(checked, presence or Presence.at_rest(HOME), UNIX, parameters)
+        validator.path(checked, presence or MotionStart.at_rest(HOME), UNIX, parameters)
     except GoalRejected as rejected:
         return rejected
     pytest.fail("it was accepted")
@@ -134,7 +134,7 @@ def test_a_bad_goal_is_refused_with_what_is_wrong(
 
 def test_too_fast_is_refused_with_the_velocity_limit() -> None:
     far, near = (-2.9, 0.0, 0.0), (2.9, 0.0, 0.0)
-    rejected = refusal(trajectory(point(far, 0.0, Z), point(near, 5.0, Z)), Presence.at_rest(far))
+    rejected = refusal(trajectory(point(far, 0.0, Z), point(near, 5.0, Z)), MotionStart.at_rest(far))
     for part in ("brazo_joint", "rad/s", "velocity limit 1.57", "times as long"):
         assert part in rejected.reason
 
@@ -162,10 +162,10 @@ def test_a_bad_tolerance_is_refused(fields: dict[str, Any], said: str) -> None:
 
 
 def test_more_steps_a_second_than_the_tick_allows_are_refused() -> None:
-    validator, parameters = Validator(rm1().joints, 4_000), GatewayParameters()
+    validator, parameters = GoalValidator(rm1().joints, 4_000), GatewayParameters()
     checked = validator.check(FollowJointTrajectoryGoal(trajectory=move(HOME, (2.5, 0.0, 0.0))), UNIX, parameters)
     with pytest.raises(GoalRejected, match=r"brazo_joint.*steps/s.*2000 steps/s"):
-        validator.path(checked, Presence.at_rest(HOME), UNIX, parameters)
+        validator.path(checked, MotionStart.at_rest(HOME), UNIX, parameters)
 
 
 def test_the_order_of_the_names_is_kept() -> None:
@@ -185,8 +185,8 @@ def test_the_order_of_the_names_is_kept() -> None:
 
 def test_a_start_within_the_range_swept_while_moving_is_accepted() -> None:
     start = Knot((0.5, 0.0, 0.1), (0.3, 0.0, 0.0), (0.0, 0.0, 0.0))
-    presence = Presence(start, (0.2, 0.0, 0.1), (0.5, 0.0, 0.1))
-    validator, parameters = Validator(rm1().joints, 50_000), GatewayParameters()
+    presence = MotionStart(start, (0.2, 0.0, 0.1), (0.5, 0.0, 0.1))
+    validator, parameters = GoalValidator(rm1().joints, 50_000), GatewayParameters()
     goal = FollowJointTrajectoryGoal(trajectory=move((0.3, 0.0, 0.1), (1.0, 0.5, 0.1)))
     path = validator.path(validator.check(goal, UNIX, parameters), presence, UNIX, parameters)
     assert path.at(0.0).position == pytest.approx(start.position)
@@ -218,9 +218,9 @@ goals = st.builds(
 @settings(max_examples=150)
 @given(goals)
 def test_any_goal_is_refused_or_its_path_keeps_the_limits(goal: FollowJointTrajectoryGoal) -> None:
-    validator, parameters = Validator(rm1().joints, 50_000), GatewayParameters()
+    validator, parameters = GoalValidator(rm1().joints, 50_000), GatewayParameters()
     try:
-        path = validator.path(validator.check(goal, UNIX, parameters), Presence.at_rest(HOME), UNIX, parameters)
+        path = validator.path(validator.check(goal, UNIX, parameters), MotionStart.at_rest(HOME), UNIX, parameters)
     except GoalRejected:
         return
     for i in range(101):

@@ -1,0 +1,58 @@
+"""The gateway's parts, and what happens to all of them at once."""
+
+from __future__ import annotations
+
+from services.arm.description import Arm
+from services.stepper_gateway.device.command_handler import CommandHandler
+from services.stepper_gateway.device.gateway_device import GatewayDevice
+from services.stepper_gateway.device.press_handler import PressHandler
+from services.stepper_gateway.device.sensors import SensorRelay
+from services.stepper_gateway.goals.goal_executor import GoalExecutor
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.motion.motion_controller import MotionController
+from services.stepper_gateway.motion.target_follower import TargetFollower
+from services.stepper_gateway.outputs import Outbox
+from services.stepper_gateway.parameters import GatewayParameters
+
+
+class Components:
+    """Everything that moves the arm, or speaks for it, with one device."""
+
+    def __init__(self, arm: Arm, session_id: int, parameters: GatewayParameters) -> None:
+        self.out = Outbox()
+        self.device = GatewayDevice(arm, session_id, parameters, self.out)
+        self.controller = MotionController(self.device, session_id)
+        self.goals = GoalExecutor(self.device, self.controller)
+        self.streaming = TargetFollower(self.device, self.controller)
+        self.command_handler = CommandHandler(self.device, self.controller)
+        self.sensors = SensorRelay(self.device)
+        self.presses = PressHandler(self.device)
+
+    def abort_all(self, reason: str, moment: Moment) -> None:
+        """Nothing of what was under way is continued."""
+        if self.goals.is_active:
+            self.goals.abort(reason, moment)
+        self.streaming.interrupt()
+        self.controller.transmission.abandon()
+
+    def on_unreachable(self, reason: str, moment: Moment) -> None:
+        """The device cannot be reached: whatever it does now it does by itself."""
+        is_moving = self.controller.is_followable
+        self.abort_all(reason, moment)
+        self.command_handler.drop_all(reason)
+        self.controller.lost()
+        if is_moving:
+            self.controller.leave_stop(moment)
+            self.command_handler.send_due(moment)
+
+    def stop_foreign_motion(self, moment: Moment) -> None:
+        """A motion that nobody follows is stopped at once, also where a device comes back with it."""
+        if self.controller.stop_foreign_motion(moment):
+            self.goals.on_foreign_motion(moment)
+            self.command_handler.send_due(moment)
+
+    def start_over(self, reason: str, moment: Moment) -> None:
+        """Another boot, or another configuration: what the gateway knew of the arm's steps means nothing."""
+        self.abort_all(reason, moment)
+        self.command_handler.drop_all(reason)
+        self.controller.start_over()

@@ -1,0 +1,1 @@
+"""The device: its session, configuration, commands and reports."""

@@ -1,0 +1,161 @@
+"""The command_handler for device commands: a person's, each with an answer, and the gateway's own STOPs."""
+
+from __future__ import annotations
+
+import math
+
+from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse, DeviceMode
+from services.stepper_gateway.device.command_arguments import arguments_of, kind_of
+from services.stepper_gateway.device.gateway_device import GatewayDevice
+from services.stepper_gateway.device.pending_commands import STOPPING, PendingCommand
+from services.stepper_gateway.goals.rejections import GoalRejected, invalid
+from services.stepper_gateway.links.frames import Code, CommandReply, code_name, encode
+from services.stepper_gateway.links.link import Kind
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.motion.motion_controller import MotionController
+from services.stepper_gateway.outputs import Answer
+
+REMEDIES: dict[int, str] = {
+    Code.NOT_READY: "it does not do that in this mode",
+    Code.POSITION_LIMIT: "the position is beyond its soft limits",
+    Code.NOT_ARMED: "its drivers are off, or only just on: run `gemelo device arm`, and wait a second",
+    Code.ESTOP_PRESSED: "its emergency stop is pressed: release it first",
+    Code.NO_HOMING: "a joint has no home switch: give it a [joint.homing] in robot.toml, or run `gemelo reference`",
+    Code.BAD_ARGUMENT: "it has no such output, joint or value: see `gemelo device config`",
+}
+NOT_NOW = {
+    DeviceCommandKind.RESUME: "only a hold can be resumed; start a new goal",
+    DeviceCommandKind.REFERENCE: "the arm must stand: run `gemelo stop`, or clear its fault with `gemelo reset`",
+    DeviceCommandKind.HOME: "the arm must stand: run `gemelo stop`, or clear its fault with `gemelo reset`",
+    DeviceCommandKind.DISARM: "the arm must stand: run `gemelo stop` first",
+    DeviceCommandKind.ARM: "clear its fault or emergency stop with `gemelo reset` first",
+}
+TRUSTING = (  # commands that would move or mean something else with another configuration
+    DeviceCommandKind.RESUME,
+    DeviceCommandKind.REFERENCE,
+    DeviceCommandKind.ARM,
+    DeviceCommandKind.HOME,
+    DeviceCommandKind.OUTPUT,
+)
+AT_REST = (DeviceCommandKind.REFERENCE, DeviceCommandKind.DISARM, DeviceCommandKind.HOME)  # steps count anew after them
+
+
+class CommandHandler:
+    """Takes commands, has them sent until the device answers, and hands the answers out."""
+
+    def __init__(self, device: GatewayDevice, controller: MotionController) -> None:
+        self._device, self._controller = device, controller
+
+    def ask(self, request: DeviceCommandRequest, ticket: int, goal_is_active: bool, moment: Moment) -> bool:
+        """Have it sent, or answer at once why not; true if it will be sent."""
+        kind = kind_of(request)
+        try:
+            if reason := self._device.unreachable_reason(moment) or self._objection(kind, goal_is_active):
+                raise invalid(reason)
+            arguments = arguments_of(request, self._device.arm)
+        except GoalRejected as rejected:
+            self._answer(ticket, False, rejected.reason)
+            return False
+        self._device.commands.ask(kind, moment, self._device.parameters.command_timeout, ticket, arguments)
+        return True
+
+    def stop(self, kind: DeviceCommandKind, ticket: int, goal_is_active: bool, moment: Moment) -> bool:
+        """Have a stop sent, whatever is known of the device; true unless it is refused because the arm moves."""
+        controller = self._controller
+        if reason := self._objection(kind, goal_is_active):
+            self._answer(ticket, False, reason)
+            return False
+        stream = controller.stream.id if controller.stream is not None else 0
+        self._device.commands.ask(kind, moment, self._device.parameters.command_timeout, ticket, stream=stream)
+        return True
+
+    def on_reply(self, reply: CommandReply, moment: Moment) -> None:
+        """The device has answered a command; a stop that it refused for form's sake is sent again without the form."""
+        command = self._device.commands.find(reply)
+        is_present = reply.boot_id == self._device.session.boot_id
+        if command is None or not (is_present or command.is_stop):
+            return
+        if reply.code in (Code.EXPIRED, Code.WRONG_BOOT):
+            return self._insist(command, Code(reply.code), moment)
+        self._device.commands.remove(command)
+        accepted = reply.code in (Code.OK, Code.DUPLICATE)
+        if accepted and is_present:
+            self._note(command, reply)
+        reason = self._device.unreachable_reason(moment) if accepted else self._complaint(command, reply)
+        for ticket in command.tickets:
+            self._answer(ticket, accepted, reason, reply.mode, sent=True)
+        if not command.tickets and not accepted:
+            self._device.event("command_refused", reason, moment)
+
+    def send_due(self, moment: Moment) -> None:
+        """Send what is new or was not answered."""
+        if not self._device.session.link_up:
+            return
+        device, session = self._device, self._device.session
+        is_reachable = not device.unreachable_reason(moment)
+        for frame in device.commands.due(moment, session.clock, session.boot_id, is_reachable):
+            device.out.send(Kind.CMD, encode(frame), urgent=frame.cmd in STOPPING)
+
+    def step(self, moment: Moment) -> None:
+        """Give up what was not answered in time; a STOP of our own is asked for again."""
+        for command in self._device.commands.expired(moment):
+            state = self._device.session.latest
+            if command.kind == DeviceCommandKind.HOLD and state is not None:
+                self._controller.hold_answered(state.mode == DeviceMode.HOLD, state.t_us)
+            for ticket in command.tickets:
+                self._answer(ticket, False, self._silence(command, moment), sent=command.times_sent > 0)
+            if command.is_own and command.kind == DeviceCommandKind.STOP:
+                self._controller.stop(moment)
+        self.send_due(moment)
+
+    def drop_all(self, reason: str) -> None:
+        """The device these commands were for is gone; a person's stop is sent on, to whatever is there."""
+        for command in self._device.commands.drop_all_but_stops():
+            for ticket in command.tickets:
+                self._answer(ticket, False, reason, sent=command.times_sent > 0)
+
+    def _insist(self, command: PendingCommand, code: Code, moment: Moment) -> None:
+        if not command.is_stop:
+            return
+        if code == Code.EXPIRED:
+            command.needs_clock = False
+        else:
+            command.needs_boot = False
+        command.sent = -math.inf
+        self.send_due(moment)
+
+    def _silence(self, command: PendingCommand, moment: Moment) -> str:
+        """What is known of a command that was not answered in time."""
+        name, unreachable_reason = command.kind.name, self._device.unreachable_reason(moment)
+        if not command.times_sent:
+            return f"{name} could not be sent: {unreachable_reason}; the device holds by itself without heartbeats"
+        because = f": {unreachable_reason}" if unreachable_reason else ""
+        return f"the device has not answered {name} in time, which was sent {command.times_sent} times{because}"
+
+    def _objection(self, kind: DeviceCommandKind, goal_is_active: bool) -> str:
+        if goal_is_active and kind in AT_REST:
+            return f"a goal is being carried out: cancel it or run `gemelo stop` before {kind.name}"
+        return self._device.configuration.mismatch_reason() if kind in TRUSTING else ""
+
+    def _note(self, command: PendingCommand, reply: CommandReply) -> None:
+        match command.kind:
+            case DeviceCommandKind.STOP:
+                self._controller.stop_answered(reply.t_us)
+            case DeviceCommandKind.HOLD:
+                self._controller.hold_answered(reply.mode == DeviceMode.HOLD, reply.t_us)
+            case kind if kind in AT_REST:
+                self._controller.transmission.forget()
+
+    def _complaint(self, command: PendingCommand, reply: CommandReply) -> str:
+        remedy = REMEDIES.get(reply.code)
+        if reply.code == Code.NOT_READY:
+            remedy = NOT_NOW.get(command.kind, remedy)
+        mode = DeviceMode(reply.mode).name if reply.mode in DeviceMode._value2member_map_ else str(reply.mode)
+        text = f"the device refuses {command.kind.name} in mode {mode}: {code_name(reply.code)}"
+        return f"{text}, {remedy}" if remedy else text
+
+    def _answer(self, ticket: int, accepted: bool, reason: str, mode: int | None = None, sent: bool = False) -> None:
+        said = mode is not None and mode in DeviceMode._value2member_map_
+        known = DeviceMode(mode or 0) if said else self._device.session.mode
+        response = DeviceCommandResponse(accepted=accepted, sent=sent, reason=reason, mode=known)
+        self._device.out.put(Answer(ticket, response))

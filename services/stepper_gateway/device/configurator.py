@@ -1,0 +1,146 @@
+"""The device's configuration: what robot.toml asks for, whether the device works with it, and giving it."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from schemas.device import ConfigureResponse, DeviceConfiguration, DeviceMode
+from schemas.device_config import config_crc, config_text
+from schemas.system import LogLevel
+from schemas.topics import DEVICE_CONFIGURATION
+from services.arm.description import Arm
+from services.arm.device_config import device_config
+from services.stepper_gateway.device.session import DeviceSession
+from services.stepper_gateway.links.link import Kind
+from services.stepper_gateway.links.reports import ConfigAckReport
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.outputs import Answer, Outbox
+
+AGAIN = 1.0  # [s] until a configuration that was not answered is sent once more
+PATIENCE = 5.0  # [s] for an answer: a board writes it to its flash first
+DISARMED = (DeviceMode.UNREFERENCED, DeviceMode.FAULT, DeviceMode.ESTOP)
+
+
+class Configuration:
+    """Whatever happens, nothing moves while the device works with another configuration than robot.toml's.
+
+    Only the present boot's own status counts. The text is sent retained, so that a broker keeps the newest; a retained
+    one of somebody else that a device meets shows in an answer to a text that is not ours, and is then replaced.
+    """
+
+    def __init__(self, arm: Arm, session: DeviceSession, out: Outbox) -> None:
+        self._name = arm.device.name
+        self._session, self._out = session, out
+        self._text = config_text(device_config(arm))
+        self.crc32 = config_crc(self._text)
+        self._sent = -1.0e9  # [s] monotonic
+        self._refusal = ""  # the device's, of this text
+        self._refused_by = 0  # boot
+        self._is_displaced = False  # the device has met another text
+        self._tickets: dict[int, float] = {}  # people who wait, and until when [s] monotonic
+        self._told: DeviceConfiguration | None = None
+
+    @property
+    def device_crc32(self) -> int:
+        """Of what the present boot works with; 0: none, or not known."""
+        status = self._session.status
+        return status.config_crc32 if status is not None else 0
+
+    @property
+    def is_in_force(self) -> bool:
+        return self.device_crc32 == self.crc32
+
+    def mismatch_reason(self) -> str:
+        """Why the device may not move by what it was told, with the remedy; empty if it may."""
+        if self.is_in_force:
+            return ""
+        name, asked = self._name, f"{self.crc32:08x}"
+        if refusal := self._refusal_of_this_boot():
+            return f'device "{name}" refuses the configuration of robot.toml: {refusal}; correct it and start again'
+        if self._may_take():
+            return f'device "{name}" is being given its configuration ({asked}): wait a second'
+        return (
+            f'device "{name}" works with configuration {self.device_crc32:08x}, robot.toml asks for {asked}, and an '
+            "armed device takes none: run `gemelo device config --push`, which disarms, configures and arms it"
+        )
+
+    def ask(self, ticket: int, unreachable_reason: str, moment: Moment) -> None:
+        """A person wants the device to have it."""
+        if unreachable_reason:
+            return self._answer(ticket, False, unreachable_reason)
+        if not self.is_in_force and not self._may_take():
+            return self._answer(ticket, False, self.mismatch_reason())
+        self._refusal = ""
+        self._tickets[ticket] = moment.monotonic + PATIENCE
+        self._send(moment)
+
+    def on_ack(self, ack: ConfigAckReport) -> None:
+        """The device has answered a configuration, perhaps not one of ours."""
+        if ack.crc32 != self.crc32:
+            self._is_displaced = True
+            what = f"the device was given another configuration ({ack.crc32:08x})"
+            whose = "a retained one of the broker, or another gateway's; ours is sent again"
+            return self._out.log(LogLevel.WARNING, f"{what}: {whose}")
+        about = f"{ack.part}: {ack.reason}" if ack.part else ack.reason
+        self._refusal = "" if ack.accepted or self._is_about_mode() else about
+        self._refused_by = self._session.boot_id
+        for ticket in list(self._tickets):
+            if not ack.accepted or self.is_in_force:
+                self._answer(ticket, ack.accepted, "" if ack.accepted else about)
+
+    def on_status(self) -> None:
+        """The device may have said that it works with it."""
+        for ticket in list(self._tickets):
+            if self.is_in_force:
+                self._answer(ticket, True, "")
+
+    def step(self, unreachable_reason: str, moment: Moment) -> None:
+        """Give it where it is missing and may be given; tell of it where something has changed."""
+        for ticket, deadline in list(self._tickets.items()):
+            if moment.monotonic >= deadline:
+                reason = unreachable_reason or "the device has not answered the configuration in time"
+                self._answer(ticket, False, reason)
+        if self._is_wanted(unreachable_reason) and moment.monotonic - self._sent >= AGAIN:
+            self._send(moment)
+        self._tell(unreachable_reason, moment)
+
+    def _is_wanted(self, unreachable_reason: str) -> bool:
+        if not self._session.link_up:
+            return False
+        if self._is_displaced or self._tickets:
+            return True
+        is_missing = not self.is_in_force and self._may_take() and not self._refusal_of_this_boot()
+        return is_missing and not unreachable_reason
+
+    def _may_take(self) -> bool:
+        if self._session.mode == DeviceMode.BOOT:
+            return True
+        return not self._session.is_armed and self._session.mode in DISARMED
+
+    def _is_about_mode(self) -> bool:
+        """A refusal of an armed device says nothing about the text."""
+        return not self._may_take()
+
+    def _refusal_of_this_boot(self) -> str:
+        return self._refusal if self._refused_by == self._session.boot_id else ""
+
+    def _send(self, moment: Moment) -> None:
+        self._sent, self._is_displaced = moment.monotonic, False
+        self._out.send(Kind.CONFIG, self._text)
+
+    def _answer(self, ticket: int, accepted: bool, reason: str) -> None:
+        self._tickets.pop(ticket, None)
+        self._out.put(Answer(ticket, ConfigureResponse(accepted=accepted, reason=reason, crc32=self.device_crc32)))
+
+    def _tell(self, unreachable_reason: str, moment: Moment) -> None:
+        message = DeviceConfiguration(
+            stamp=moment.unix,
+            text=self._text.decode(),
+            crc32=self.crc32,
+            device_crc32=self.device_crc32,
+            accepted=self.is_in_force and not unreachable_reason,
+            reason=unreachable_reason or self.mismatch_reason(),
+        )
+        if self._told is None or replace(message, stamp=0) != self._told:
+            self._told = replace(message, stamp=0)
+            self._out.publish(DEVICE_CONFIGURATION, message)

@@ -1,0 +1,164 @@
+"""What the device says, taken in: frames and JSON change what the gateway knows, does and tells."""
+
+from __future__ import annotations
+
+from schemas.device import DeviceMode
+from schemas.system import LogLevel
+from schemas.topics import DEVICE_SHAFT, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS
+from services.stepper_gateway.components import Components
+from services.stepper_gateway.device.gateway_device import GatewayDevice
+from services.stepper_gateway.links.frames import Ack, BadFrame, CommandReply, State, SyncReply, decode
+from services.stepper_gateway.links.link import Kind, Received
+from services.stepper_gateway.links.reports import (
+    ConfigAckReport,
+    EventReport,
+    ShaftReport,
+    StatusReport,
+    decode_report,
+    decode_sensors,
+)
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.motion.commanded_path import PathPoint
+
+STOPPED = ("hold", "homing_stopped")
+BY_LOST_HEARTBEAT = "heartbeat"  # the detail of these
+RENEWED = (
+    "the device has stopped for lost heartbeats though this gateway sends them: they were lost on the way, or others "
+    "were sent under its session; it has begun a fresh session"
+)
+LOST = (DeviceMode.FAULT, DeviceMode.ESTOP, DeviceMode.UNREFERENCED, DeviceMode.HOMING, DeviceMode.BOOT)
+TROUBLE = ("fault", "hold", "late", "underrun", "estop", "homing_stopped", "text_lost", "press_refused")
+MOTION = {"started": "from", "finished": "at"}  # how the place of a motion's event is introduced
+BY_A_PERSON = "command"  # the detail of what somebody has asked for
+
+
+class FrameHandler:
+    """The device's side of the core."""
+
+    def __init__(self, parts: Components) -> None:
+        self._components = parts
+        self._device, self._controller = parts.device, parts.controller
+
+    def take(self, received: Received, moment: Moment) -> None:
+        """One payload; raises `BadFrame` for one that no device says."""
+        payload, arrival = received.payload, received.arrival * 1e-9
+        if received.retained and received.kind != Kind.STATUS:
+            raise BadFrame("it is retained, and only a status may be")
+        match received.kind:
+            case Kind.STATUS:
+                if not payload:
+                    raise BadFrame("it is empty: somebody has cleared it at the broker, which changes nothing")
+                self._on_status(decode_report(StatusReport, payload), moment)
+            case Kind.EVENT:
+                self._on_event(decode_report(EventReport, payload), moment)
+            case Kind.CONFIG_ACK:
+                self._device.configuration.on_ack(decode_report(ConfigAckReport, payload))
+            case Kind.SENSORS:
+                self._components.sensors.on_readings(decode_sensors(payload), arrival, moment)
+            case Kind.SHAFT:
+                self._on_shaft(decode_report(ShaftReport, payload), arrival, moment)
+            case _:
+                self._on_frame(received, arrival, moment)
+
+    def _on_frame(self, received: Received, arrival: float, moment: Moment) -> None:
+        frame = decode(received.payload)
+        match received.kind, frame:
+            case Kind.STATE, State():
+                self._on_state(frame, arrival, moment)
+            case Kind.TRAJ_ACK, Ack():
+                if frame.boot_id == self._device.session.boot_id:
+                    self._controller.on_ack(frame, arrival, moment)
+                    self._components.goals.on_ack()
+            case Kind.SYNC_R, SyncReply():
+                self._device.session.on_sync_reply(frame, received.arrival // 1000)
+            case Kind.CMD_ACK, CommandReply():
+                self._device.session.on_reply(frame)
+                self._components.command_handler.on_reply(frame, moment)
+            case _:
+                raise BadFrame(f"a {type(frame).__name__} frame does not belong there")
+
+    def _on_status(self, status: StatusReport, moment: Moment) -> None:
+        device = self._device
+        before = device.configuration.device_crc32
+        device.session.on_status(status)
+        device.configuration.on_status()
+        if before and device.configuration.device_crc32 != before:
+            self._components.start_over("the device has another configuration", moment)
+        known = device.session.status
+        if known is not None and known.tick_hz:
+            self._components.goals.use_tick(known.tick_hz)
+
+    def _on_event(self, event: EventReport, moment: Moment) -> None:
+        publish_event(event, self._device, moment)
+        if event.event in STOPPED:
+            self._on_stopped(event, moment)
+        self._components.presses.on_event(event)
+
+    def _on_stopped(self, event: EventReport, moment: Moment) -> None:
+        """The device slows down by itself; where it misses heartbeats that were sent, it gets a fresh session."""
+        device = self._device
+        self._controller.held = (event.stream, event.detail)
+        if event.detail == BY_LOST_HEARTBEAT and device.session.renew_heartbeat(moment):
+            device.event("heartbeat_renewed", RENEWED, moment)
+
+    def _on_shaft(self, report: ShaftReport, arrival: float, moment: Moment) -> None:
+        measured = self._device.session.clock.measured(report.t_us, arrival)
+        self._device.out.publish(DEVICE_SHAFT, self._device.reporter.shaft(report, moment.unix_at(measured)))
+
+    def _on_state(self, state: State, arrival: float, moment: Moment) -> None:
+        device, controller = self._device, self._controller
+        is_news, is_reboot = device.session.on_state(state, arrival, device.parameters.state_timeout)
+        if is_reboot:
+            reason = "the device has restarted"
+            device.event("rebooted", f"{reason}: its position and boot id are read anew", moment)
+            self._components.start_over(reason, moment)
+        if not is_news:
+            return
+        if not device.session.fits(state):
+            self._components.abort_all(device.not_ready_reason(), moment)
+            self._publish_device(state, moment)
+            return
+        controller.on_state(state, arrival)
+        point = controller.commanded(state)
+        self._publish(state, point, moment)
+        if state.mode == DeviceMode.HOLD and controller.is_followed(state) and not controller.is_held:
+            self._components.streaming.interrupt()
+            self._components.goals.on_hold(moment)
+        if state.mode in LOST:
+            self._components.abort_all(device.not_ready_reason(), moment)
+        self._components.goals.on_ack()
+        self._components.goals.on_state(state, point, moment)
+        self._components.stop_foreign_motion(moment)
+
+    def _publish(self, state: State, point: PathPoint, moment: Moment) -> None:
+        reporter = self._device.reporter
+        stamp = self._publish_device(state, moment)
+        self._device.out.publish(JOINT_STATES, reporter.joint_state(state, stamp))
+        self._device.out.publish(JOINT_COMMANDS, reporter.joint_command(point, state, stamp))
+        self._device.out.publish(STEP_ERRORS, reporter.step_errors(point, state, stamp))
+
+    def _publish_device(self, state: State, moment: Moment) -> int:
+        """The state's stamp [ns]."""
+        session = self._device.session
+        stamp = moment.unix_at(session.clock.measured(state.t_us, session.state_arrival))
+        self._device.out.publish(DEVICE_STATE, self._device.reporter.device_state(state, stamp, session.clock))
+        return stamp
+
+
+def publish_event(event: EventReport, device: GatewayDevice, moment: Moment) -> None:
+    """Say it on the bus and in the log."""
+    is_trouble = event.event in TROUBLE and event.detail != BY_A_PERSON
+    level = LogLevel.WARNING if is_trouble else LogLevel.INFO
+    now = moment.monotonic
+    happened = device.session.clock.measured(event.t_us, now) if event.t_us else now
+    said = _motion(event.event, device) if event.event in MOTION else ""
+    device.event(event.event, event.detail, Moment(moment.unix_at(happened), happened), level, said)
+
+
+def _motion(event: str, device: GatewayDevice) -> str:
+    """That a motion begins or ends, and where the joints are; empty where that is not known."""
+    if device.state is None:
+        return ""
+    places = zip(device.joints, device.reporter.positions(device.state.steps), strict=True)
+    where = ", ".join(f"{joint.name} {position:+.4f} {joint.unit}" for joint, position in places)
+    return f"motion {event}: {MOTION[event]} {where}"

@@ -1,0 +1,80 @@
+"""The device as all parts of the gateway use it: its session, configuration and commands, and why it cannot be used."""
+
+from __future__ import annotations
+
+from schemas.device import DeviceEvent, DeviceStatus
+from schemas.system import LogLevel
+from schemas.topics import DEVICE_EVENTS
+from services.arm.description import Arm
+from services.stepper_gateway.device.configurator import Configuration
+from services.stepper_gateway.device.pending_commands import PendingCommands
+from services.stepper_gateway.device.readiness import not_ready_reason
+from services.stepper_gateway.device.reporting import Reporter
+from services.stepper_gateway.device.session import DeviceSession
+from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.links.reports import StatusReport
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.outputs import Outbox
+from services.stepper_gateway.parameters import GatewayParameters
+
+
+class GatewayDevice:
+    """One device; nothing here moves it."""
+
+    def __init__(self, arm: Arm, session_id: int, parameters: GatewayParameters, out: Outbox) -> None:
+        """`session_id` is the gateway's own, and the first number of its commands."""
+        self.arm = arm
+        self.joints = arm.joints
+        self.parameters = parameters
+        self.out = out
+        self.session = DeviceSession(arm.device.name, len(arm.joints), session_id)
+        self.configuration = Configuration(arm, self.session, out)
+        self.commands = PendingCommands(session_id)
+        self.reporter = Reporter(arm)
+
+    @property
+    def state(self) -> State | None:
+        """The latest state of the arm's joints; None before the first."""
+        return self.session.state
+
+    def unreachable_reason(self, moment: Moment) -> str:
+        """Why the device cannot be reached, empty if it can."""
+        return self.session.unreachable_reason(moment, self.parameters.state_timeout)
+
+    def not_ready_reason(self) -> str:
+        """Why the device, though it can be reached, cannot start a motion; empty if it can."""
+        return self.configuration.mismatch_reason() or not_ready_reason(self.arm, self.state)
+
+    def refusal(self, moment: Moment) -> str:
+        """Why no motion may be started now, empty if one may."""
+        return self.unreachable_reason(moment) or self.not_ready_reason() or self.commands.not_ready_reason()
+
+    def event(
+        self, event: str, detail: str, moment: Moment, level: LogLevel = LogLevel.WARNING, log_text: str = ""
+    ) -> None:
+        """Tell of something once, on the bus and in the log; there as `log_text`, where that is given."""
+        self.out.publish(
+            DEVICE_EVENTS, DeviceEvent(stamp=moment.unix, device=self.arm.device.name, event=event, detail=detail)
+        )
+        self.out.log(level, log_text or (f"{event}: {detail}" if detail else event))
+
+
+def status_of(device: GatewayDevice, moment: Moment) -> DeviceStatus:
+    """Only the boot that says its states is described; a silent device is offline, whatever a broker has retained."""
+    unreachable_reason, session = device.unreachable_reason(moment), device.session
+    report = session.status or StatusReport(online=False)
+    return DeviceStatus(
+        stamp=moment.unix,
+        online=not unreachable_reason,
+        reason=unreachable_reason or device.not_ready_reason(),
+        device=device.arm.device.name,
+        firmware=report.firmware,
+        boot_id=session.boot_id,
+        reset_cause=report.reset_cause,
+        joints=report.joints,
+        tick_hz=report.tick_hz,
+        queue_capacity=report.queue_capacity,
+        config_crc32=device.configuration.device_crc32,
+        wanted_crc32=device.configuration.crc32,
+        virtual=report.virtual,
+    )

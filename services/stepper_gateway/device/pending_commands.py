@@ -1,0 +1,146 @@
+"""Commands to the device: sent again until it answers, and never carried out twice or too late."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from schemas.device import DeviceCommandKind
+from services.stepper_gateway.device.clock import ClockSync
+from services.stepper_gateway.links.frames import ANY_BOOT, NEVER_EXPIRES, Command, CommandReply
+from services.stepper_gateway.moment import Moment
+
+RETRY = 0.1  # [s]
+TIME_TO_LIVE = 500_000  # [us]
+INTERNAL = 0  # ticket of the gateway's own commands
+EXCLUSIVE = (  # what a person has asked for would hit whatever is started before the answer
+    DeviceCommandKind.STOP,
+    DeviceCommandKind.RESET,
+    DeviceCommandKind.REFERENCE,
+    DeviceCommandKind.ARM,
+    DeviceCommandKind.DISARM,
+    DeviceCommandKind.HOME,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """What a command says besides its kind, as the frame has it."""
+
+    positions: tuple[int, ...] = ()  # [1/256 step] of REFERENCE
+    index: int = 0
+    argument: int = 0
+
+
+NO_ARGUMENTS = Arguments()
+STOPPING = (DeviceCommandKind.STOP, DeviceCommandKind.HOLD, DeviceCommandKind.DISARM)
+MOST_TICKETS = 256  # of one command: who asks for the same again is answered with the others
+
+
+@dataclass
+class PendingCommand:
+    """A command that the device has not answered yet."""
+
+    cmd_id: int
+    kind: DeviceCommandKind
+    arguments: Arguments
+    tickets: list[int]  # of all who have asked for it; none for the gateway's own
+    deadline: float  # [s] monotonic
+    is_own: bool = False  # the gateway itself wants it, whoever else does
+    stream: int = 0  # that was played or sent when it was asked for
+    sent: float = -1.0e9  # [s] monotonic, the last time
+    times_sent: int = 0
+    needs_clock: bool = True  # false once a device has called a stop late: then it is sent without an expiry
+    needs_boot: bool = True  # false once a device was another boot: then a stop is sent to whatever boot is there
+
+    @property
+    def is_stop(self) -> bool:
+        """True if it ends a motion: then it is sent without a status, a clock or even a known boot."""
+        return self.kind in STOPPING
+
+
+class PendingCommands:
+    """All commands under way to one boot of the device."""
+
+    def __init__(self, first_id: int) -> None:
+        self._next_id = first_id
+        self._pending: list[PendingCommand] = []
+
+    def ask(
+        self, kind: DeviceCommandKind, moment: Moment, timeout: float, ticket: int = INTERNAL,
+        arguments: Arguments = NO_ARGUMENTS, stream: int = 0,
+    ) -> None:  # fmt: skip
+        """Have `kind` sent with the next frames; a stop of the same stream that is under way serves this caller too."""
+        tickets = [] if ticket == INTERNAL else [ticket]
+        under_way = self._stop_under_way(kind, stream)
+        if under_way is not None and len(under_way.tickets) < MOST_TICKETS:
+            under_way.tickets += tickets
+            under_way.is_own |= not tickets
+            return
+        self._next_id = self._next_id % 0xFFFFFFFF + 1
+        deadline = moment.monotonic + timeout
+        command = PendingCommand(self._next_id, kind, arguments, tickets, deadline, not tickets, stream)
+        self._pending.insert(self._place_of(command), command)
+
+    def is_pending(self, kind: DeviceCommandKind) -> bool:
+        return any(command.kind == kind for command in self._pending)
+
+    def not_ready_reason(self) -> str:
+        """Why nothing may be started now, empty if it may."""
+        asked = [c.kind.name for c in self._pending if c.tickets and c.kind in EXCLUSIVE]
+        return f"the device has not answered {asked[0]} yet: wait a moment" if asked else ""
+
+    def due(self, moment: Moment, clock: ClockSync, boot_id: int, is_reachable: bool) -> list[Command]:
+        """The frames to send now; to a device that is not reachable, or not known, only those that stop it."""
+        frames = []
+        for command in self._pending:
+            if moment.monotonic - command.sent >= RETRY and (is_reachable or command.is_stop):
+                command.sent = moment.monotonic
+                command.times_sent += 1
+                command.needs_clock &= is_reachable  # one that is silent may read it whenever it wakes
+                frames.append(
+                    Command(
+                        boot_id=boot_id if command.needs_boot else ANY_BOOT,
+                        cmd_id=command.cmd_id,
+                        expires_us=self._expiry(command, moment, clock),
+                        cmd=command.kind,
+                        index=command.arguments.index,
+                        argument=command.arguments.argument,
+                        positions=command.arguments.positions,
+                    )
+                )
+        return frames
+
+    def find(self, reply: CommandReply) -> PendingCommand | None:
+        """The command under way that this reply belongs to."""
+        of_reply = (c for c in self._pending if c.cmd_id == reply.cmd_id and c.kind == reply.cmd)
+        return next(of_reply, None)
+
+    def remove(self, command: PendingCommand) -> None:
+        self._pending.remove(command)
+
+    def expired(self, moment: Moment) -> list[PendingCommand]:
+        """Commands that the device has not answered in time; they are given up."""
+        late = [command for command in self._pending if moment.monotonic >= command.deadline]
+        self._pending = [command for command in self._pending if command not in late]
+        return late
+
+    def drop_all_but_stops(self) -> list[PendingCommand]:
+        """Gives up what is under way but the stops that somebody has asked for."""
+        dropped = [command for command in self._pending if not (command.is_stop and command.tickets)]
+        self._pending = [command for command in self._pending if command not in dropped]
+        return dropped
+
+    def _stop_under_way(self, kind: DeviceCommandKind, stream: int) -> PendingCommand | None:
+        alike = (c for c in self._pending if c.is_stop and c.kind == kind and c.stream == stream)
+        return next(alike, None)
+
+    def _place_of(self, command: PendingCommand) -> int:
+        """Stops go before everything that is under way."""
+        return sum(each.is_stop for each in self._pending) if command.is_stop else len(self._pending)
+
+    @staticmethod
+    def _expiry(command: PendingCommand, moment: Moment, clock: ClockSync) -> int:
+        """[us] of the device's clock after which the device refuses the command."""
+        if command.is_stop and not (clock.is_synchronised and command.needs_clock):
+            return NEVER_EXPIRES
+        return clock.device_time(moment.monotonic) + TIME_TO_LIVE

@@ -1,0 +1,98 @@
+"""Presses: what a person does to a virtual device's world, one at a time, each answered by the device itself."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple
+
+import msgspec
+from msgspec.structs import replace
+
+from schemas.device import PressKind, PressRequest, PressResponse
+from services.arm.description import Arm
+from services.arm.errors import suggestion
+from services.stepper_gateway.device.gateway_device import GatewayDevice
+from services.stepper_gateway.goals.rejections import GoalRejected, invalid
+from services.stepper_gateway.links.link import Kind
+from services.stepper_gateway.links.reports import EventReport
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.outputs import Answer
+
+DONE, REFUSED = "pressed", "press_refused"
+
+
+class Press(NamedTuple):
+    """One that waits for its answer."""
+
+    request: PressRequest
+    ticket: int
+    deadline: float  # [s] monotonic
+
+
+class PressHandler:
+    """The device's event does not say which press it answers, so the next one is sent after it."""
+
+    def __init__(self, device: GatewayDevice) -> None:
+        self._device = device
+        self._waiting: deque[Press] = deque()
+
+    def ask(self, request: PressRequest, ticket: int, moment: Moment) -> None:
+        """Have it done, or answer at once why not."""
+        try:
+            if reason := self._device.unreachable_reason(moment):
+                raise invalid(reason)
+            status = self._device.session.status
+            if status is None or not status.virtual:
+                raise invalid(
+                    f'device "{self._device.arm.device.name}" is a real one: press its buttons by hand; only a virtual '
+                    "device's are pressed by a request"
+                )
+            translated = replace(request, target=target_of(request, self._device.arm))
+        except GoalRejected as rejected:
+            return self._answer(ticket, False, rejected.reason)
+        self._waiting.append(Press(translated, ticket, moment.monotonic + self._device.parameters.command_timeout))
+        if len(self._waiting) == 1:
+            self._send()
+
+    def on_event(self, event: EventReport) -> None:
+        """The device has done the oldest one, or refused it."""
+        if event.event in (DONE, REFUSED) and self._waiting:
+            press = self._waiting.popleft()
+            done = event.event == DONE
+            self._answer(press.ticket, done, "" if done else event.detail)
+            self._send()
+
+    def step(self, moment: Moment) -> None:
+        """Give up what was not answered in time."""
+        while self._waiting and moment.monotonic >= self._waiting[0].deadline:
+            press = self._waiting.popleft()
+            self._answer(press.ticket, False, f"the device has not answered {press.request.press} in time")
+            self._send()
+
+    def _send(self) -> None:
+        if self._waiting:
+            self._device.out.send(Kind.PRESS, msgspec.json.encode(self._waiting[0].request))
+
+    def _answer(self, ticket: int, accepted: bool, reason: str) -> None:
+        self._device.out.put(Answer(ticket, PressResponse(accepted=accepted, reason=reason)))
+
+
+def target_of(request: PressRequest, arm: Arm) -> str:
+    """The target as the device knows it, which calls joints by their wire names; raises `GoalRejected`."""
+    match request.press:
+        case PressKind.BLOCK | PressKind.SLIP:
+            wire_names = {joint.name: joint.wire_name for joint in arm.joints}
+            wire_names |= {joint.wire_name: joint.wire_name for joint in arm.joints}
+            return wire_names[_known(request.target, tuple(wire_names), "joint")]
+        case PressKind.SWITCH:
+            return _known(request.target, tuple(switch.name for switch in arm.inputs), "input")
+        case PressKind.SENSOR:
+            return _known(request.target, tuple(sensor.name for sensor in arm.sensors), "sensor")
+        case _:
+            return request.target
+
+
+def _known(target: str, names: tuple[str, ...], kind: str) -> str:
+    if target not in names:
+        raise invalid(f'there is no {kind} "{target}"{suggestion(target, names)}')
+    return target

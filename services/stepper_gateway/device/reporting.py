@@ -1,0 +1,146 @@
+"""Device states as messages of the bus: what the joints did, what was asked, and the difference."""
+
+from __future__ import annotations
+
+from schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState, ShaftPositions
+from schemas.joints import JointState, StepErrors
+from schemas.message import Vector
+from services.arm.description import Arm, Joint
+from services.stepper_gateway.device.clock import ClockSync
+from services.stepper_gateway.device.readiness import input_names, joint_name
+from services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, State, StateFlag, code_name
+from services.stepper_gateway.links.reports import ShaftReport
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.motion.commanded_path import PathPoint
+from services.stepper_gateway.motion.stream import SentChunk
+
+HALF_STEP = 0.5 + 1.0 / 256.0  # [steps] by which whole steps may lie beside the path, which has 1/256 itself
+
+
+class Reporter:
+    """Converts for one arm; steps stay behind this edge."""
+
+    def __init__(self, arm: Arm) -> None:
+        joints = arm.joints
+        self._arm = arm
+        self._joints = joints
+        self._names = tuple(joint.name for joint in joints)
+        self._max_error = [0.0] * len(joints)
+
+    def motion_begins(self) -> None:
+        """From here on `max_error` counts anew."""
+        self._max_error = [0.0] * len(self._joints)
+
+    def positions(self, steps: tuple[int, ...] | tuple[float, ...]) -> Vector:
+        """[rad] or [m] of motor steps; a joint on its limit is there, not half a step beyond it."""
+        return tuple(_position(joint, count) for joint, count in zip(self._joints, steps, strict=True))
+
+    def _rates(self, rates: tuple[float, ...], scale: float = 1.0) -> Vector:
+        return tuple(rate * scale / joint.steps.per_unit for joint, rate in zip(self._joints, rates, strict=True))
+
+    def joint_state(self, state: State, stamp: int) -> JointState:
+        """The measured joints."""
+        rates = tuple(rate / 256.0 for rate in state.velocity)
+        return JointState(
+            stamp=stamp, name=self._names, position=self.positions(state.steps), velocity=self._rates(rates)
+        )
+
+    def joint_command(self, point: PathPoint, state: State, stamp: int) -> JointState:
+        """What the path asks for at the same instant."""
+        return JointState(
+            stamp=stamp,
+            name=self._names,
+            position=self.positions(point.steps),
+            velocity=self._rates(point.rate, state.time_scale / 32768.0),
+        )
+
+    def step_errors(self, point: PathPoint, state: State, stamp: int) -> StepErrors:
+        """Commanded minus executed."""
+        error = tuple(wanted - done for wanted, done in zip(point.steps, state.steps, strict=True))
+        self._max_error = [max(a, abs(b)) for a, b in zip(self._max_error, error, strict=True)]
+        return StepErrors(
+            stamp=stamp,
+            name=self._names,
+            commanded=point.steps,
+            executed=state.steps,
+            error=error,
+            max_error=tuple(self._max_error),
+        )
+
+    def device_state(self, state: State, stamp: int, clock: ClockSync) -> DeviceState:
+        """Everything else that the device said."""
+        return DeviceState(
+            stamp=stamp,
+            device_time=state.t_us,
+            boot_id=state.boot_id,
+            mode=DeviceMode(state.mode),
+            fault=state.fault,
+            fault_joint=joint_name(self._arm, state.fault_joint),
+            armed=bool(state.flags & StateFlag.ARMED),
+            referenced=tuple(bool(state.referenced >> index & 1) for index in range(len(state.steps))),
+            inputs=input_names(self._arm, state),
+            outputs=tuple(one.name for index, one in enumerate(self._arm.outputs) if state.outputs >> index & 1),
+            speed=state.speed / 1000.0,
+            name=self._names if len(state.steps) == len(self._names) else (),
+            steps=state.steps,
+            velocity=tuple(rate / 256.0 for rate in state.velocity),
+            time_scale=state.time_scale / 32768.0,
+            buffered=state.buffered_ms * 1e-3,
+            stream=state.stream,
+            next_seq=state.next_seq,
+            play_time=state.play_us * 1e-6,
+            underruns=state.underruns,
+            refused=state.refused,
+            bad_frames=state.bad_frames,
+            round_trip=clock.round_trip,
+        )
+
+    def shaft(self, report: ShaftReport, stamp: int) -> ShaftPositions:
+        """A virtual device's true shafts; raises `BadFrame` for one of another arm."""
+        if len(report.steps) != len(self._joints) or len(report.shaft) != len(self._joints):
+            raise BadFrame(f"shafts of {len(report.shaft)} joints, this arm has {len(self._joints)}")
+        return ShaftPositions(
+            stamp=stamp,
+            name=self._names,
+            steps=report.steps,
+            shaft=report.shaft,
+            position=self.positions(report.shaft),
+        )
+
+    def chunk(self, frame: Chunk, sent: SentChunk, moment: Moment) -> CommandChunk:
+        """A chunk as it was sent."""
+        return CommandChunk(
+            stamp=moment.unix,
+            stream=frame.stream,
+            seq=frame.seq,
+            name=self._names,
+            dt=frame.dt_us * 1e-6,
+            time=sent.time_us * 1e-6,
+            position=tuple(knot.position for knot in sent.knots),
+            velocity=tuple(knot.velocity for knot in sent.knots),
+            acceleration=tuple(knot.acceleration for knot in sent.knots),
+            steps=frame.positions,
+            step_rate=frame.velocities,
+        )
+
+    def ack(self, ack: Ack, round_trip: float, stamp: int, steps: tuple[int, ...]) -> CommandAck:
+        """The device's answer to a chunk."""
+        return CommandAck(
+            stamp=stamp,
+            stream=ack.stream,
+            seq=ack.seq,
+            code=ack.code,
+            reason="" if ack.code == Code.OK else code_name(ack.code),
+            next_seq=ack.next_seq,
+            credits=ack.credits,
+            buffered=ack.buffered_ms * 1e-3,
+            round_trip=round_trip,
+            steps=steps,
+        )
+
+
+def _position(joint: Joint, count: float) -> float:
+    """The device stands on the whole step nearest to a limit: a plan from there must not begin outside."""
+    position = joint.steps.to_position(count)
+    nearest = min(max(position, joint.lower), joint.upper)
+    return nearest if abs(position - nearest) * joint.steps.per_unit <= HALF_STEP else position

@@ -1,0 +1,199 @@
+"""The device as known through its link: who it is, which boot, how it is, what time it has, whether it is there."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from schemas.device import DeviceCommandKind, DeviceMode
+from services.stepper_gateway.device.clock import ClockSync
+from services.stepper_gateway.links.frames import (
+    NEVER_EXPIRES,
+    BadFrame,
+    Code,
+    Command,
+    CommandReply,
+    Heartbeat,
+    State,
+    StateFlag,
+    Sync,
+    SyncReply,
+)
+from services.stepper_gateway.links.reports import StatusReport
+from services.stepper_gateway.moment import Moment, next_beat
+
+HEARTBEAT = 0.1  # [s] a cut of 0.4 s does not stop the arm yet
+SYNC = 0.5  # [s]
+SYNC_AT_FIRST = 0.03  # [s] until the clock is known
+STEADY_BEATS = 0.7  # [s] of heartbeats without a pause, after which a device cannot miss them for want of any
+ASK_STATUS = 1.0  # [s] between two requests for a status that is missing
+FARTHEST_AHEAD = 1.0  # [s] that a state's time may be ahead of the device's clock as it is known
+QUESTIONS = 32  # that may be under way
+OLD_BOOTS = 16  # remembered, so that a late frame of one does not look like a reboot
+
+
+class DeviceSession:
+    """What is known of one device; refuses what belongs to another boot or comes out of order.
+
+    Only states tell which boot lives: a status or a last will may be old.
+    """
+
+    def __init__(self, device: str, joints: int, session_id: int) -> None:
+        self._device = device
+        self._joints = joints
+        self._session_id = session_id
+        self._counter = 0
+        self._heartbeat_due = self._sync_due = 0.0
+        self._beat = self._beats_since = -1.0e9  # [s] monotonic, of the last one, and of the first without a pause
+        self._status_due = 0.0  # [s] monotonic
+        self._status_id = session_id ^ 0x80000000  # far from those of a person's commands
+        self._tells_status = True  # on request
+        self._old_boots: list[int] = []
+        self._reports: dict[int, StatusReport] = {}  # by boot id
+        self._offline_boot = 0  # whose last will has come
+        self._questions: deque[int] = deque(maxlen=QUESTIONS)  # [us] SYNCs that may be answered
+        self.link_up = False
+        self.link_reason = "no connection yet"
+        self.latest: State | None = None  # of any number of joints
+        self.state_arrival = -1.0e9  # [s] monotonic
+        self.boot_id = 0
+        self.clock = ClockSync()
+
+    @property
+    def status(self) -> StatusReport | None:
+        """What the present boot has said about itself."""
+        return self._reports.get(self.boot_id)
+
+    @property
+    def state(self) -> State | None:
+        """The latest state, if it is one of this arm."""
+        return self.latest if self.latest is not None and self.fits(self.latest) else None
+
+    @property
+    def is_armed(self) -> bool:
+        """Whether the drivers are energised."""
+        return self.latest is not None and bool(self.latest.flags & StateFlag.ARMED)
+
+    def fits(self, state: State) -> bool:
+        """Whether the state has this arm's joints; a device with another configuration has others."""
+        return len(state.steps) == self._joints
+
+    def on_link(self, connected: bool, reason: str) -> None:
+        self.link_up, self.link_reason = connected, reason
+        if connected:
+            self._heartbeat_due = self._sync_due = 0.0
+        else:
+            self.state_arrival = -1.0e9
+
+    def on_status(self, status: StatusReport) -> None:
+        """Take what a boot says about itself, or its last will."""
+        if not status.online:
+            self._offline_boot = status.boot_id
+            return
+        if status.boot_id == self._offline_boot:
+            self._offline_boot = 0
+        self._reports[status.boot_id] = status
+        if len(self._reports) > OLD_BOOTS:
+            del self._reports[next(boot for boot in self._reports if boot != self.boot_id)]
+
+    def on_state(self, state: State, arrival: float, timeout: float) -> tuple[bool, bool]:
+        """(is it news, does it tell of a new boot); raises `BadFrame` for one that no device says."""
+        if state.mode not in DeviceMode._value2member_map_:
+            raise BadFrame(f"a state with the unknown mode {state.mode}")
+        is_fresh = arrival - self.state_arrival <= timeout
+        ahead = state.t_us - self.clock.device_time(arrival) - FARTHEST_AHEAD * 1e6
+        if is_fresh and state.boot_id == self.boot_id and self.clock.is_synchronised and ahead > 0:
+            raise BadFrame(f"a state from {ahead * 1e-6 + FARTHEST_AHEAD:.1f} s ahead of the device's clock")
+        if state.boot_id in self._old_boots and is_fresh:
+            return False, False
+        is_new_boot = self._meet(state.boot_id)
+        if self.latest is not None and state.t_us <= self.latest.t_us and is_fresh:
+            return False, is_new_boot
+        self.latest, self.state_arrival = state, arrival
+        return True, is_new_boot
+
+    def on_sync_reply(self, reply: SyncReply, arrival_us: int) -> None:
+        """Take an answer to a question of ours."""
+        if reply.boot_id == self.boot_id and reply.t0 in self._questions:
+            self._questions.remove(reply.t0)
+            self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us)
+
+    def on_reply(self, reply: CommandReply) -> None:
+        """A device with an older firmware cannot be asked for its status."""
+        if (reply.boot_id, reply.cmd, reply.code) == (self.boot_id, DeviceCommandKind.STATUS, Code.UNKNOWN_CMD):
+            self._tells_status = False
+
+    def renew_heartbeat(self, moment: Moment) -> bool:
+        """A fresh heartbeat session, where the device misses beats that have been sent; true if so."""
+        if self._beat - self._beats_since < STEADY_BEATS or moment.monotonic - self._beat > 2.0 * HEARTBEAT:
+            return False
+        self._session_id = self._session_id % 0xFFFFFFFF + 1
+        self._counter = 0
+        self._heartbeat_due, self._beats_since = 0.0, moment.monotonic
+        return True
+
+    def due(self, moment: Moment) -> list[Heartbeat | Sync | Command]:
+        """Heartbeat, clock and status frames to send now; called by the control loop itself."""
+        frames: list[Heartbeat | Sync | Command] = []
+        if not self.link_up:
+            return frames
+        if moment.monotonic >= self._heartbeat_due:
+            self._heartbeat_due = next_beat(self._heartbeat_due, moment.monotonic, HEARTBEAT)
+            self._counter = (self._counter + 1) & 0xFFFFFFFF
+            if moment.monotonic - self._beat > 2.0 * HEARTBEAT:
+                self._beats_since = moment.monotonic
+            self._beat = moment.monotonic
+            frames.append(Heartbeat(boot_id=self.boot_id, session=self._session_id, counter=self._counter))
+        if moment.monotonic >= self._sync_due:
+            period = SYNC if self.clock.is_synchronised else SYNC_AT_FIRST
+            self._sync_due = next_beat(self._sync_due, moment.monotonic, period)
+            self._questions.append(moment.micros)
+            frames.append(Sync(boot_id=self.boot_id, t0=moment.micros))
+        if self._lacks_status(moment) and moment.monotonic >= self._status_due:
+            self._status_due = moment.monotonic + ASK_STATUS
+            self._status_id = (self._status_id + 1) & 0xFFFFFFFF
+            kind = DeviceCommandKind.STATUS
+            frames.append(Command(boot_id=self.boot_id, cmd_id=self._status_id, expires_us=NEVER_EXPIRES, cmd=kind))
+        return frames
+
+    def _lacks_status(self, moment: Moment) -> bool:
+        return self._tells_status and self.status is None and self.boot_id != 0 and self.is_fresh(moment, ASK_STATUS)
+
+    def is_fresh(self, moment: Moment, timeout: float) -> bool:
+        """Whether a state has arrived within `timeout` seconds."""
+        return self.link_up and moment.monotonic - self.state_arrival <= timeout
+
+    @property
+    def mode(self) -> DeviceMode:
+        return DeviceMode(self.latest.mode) if self.latest is not None else DeviceMode.BOOT
+
+    def unreachable_reason(self, moment: Moment, timeout: float) -> str:
+        """Why the device cannot be reached, empty if it can."""
+        name = self._device
+        if not self.link_up:
+            return f'no link to device "{name}": {self.link_reason}'
+        if not self.is_fresh(moment, timeout):
+            if self._offline_boot and self.boot_id in (0, self._offline_boot):
+                return f'device "{name}" is offline: switch it on, or check its network'
+            if self.latest is None and not self._reports:
+                return f'device "{name}" has not been heard: is it switched on and does it use the same broker?'
+            return f'device "{name}" is silent for more than {timeout:g} s: check its power and network'
+        if self.status is None:
+            return f'device "{name}" has not said yet who it is: wait a second, or restart it'
+        if not self.clock.is_synchronised:
+            return f'the clock of device "{name}" is not known yet: try again in a second'
+        return ""
+
+    def _meet(self, boot_id: int) -> bool:
+        """Adopt a boot id; true if it replaces another one."""
+        if boot_id == self.boot_id:
+            return False
+        is_reboot = self.boot_id != 0
+        if is_reboot:
+            self._old_boots = [*self._old_boots[1 - OLD_BOOTS :], self.boot_id]
+        self._old_boots = [boot for boot in self._old_boots if boot != boot_id]
+        self.boot_id = boot_id
+        self.latest = None
+        self.clock.reset()
+        self._sync_due = 0.0
+        self._status_due, self._tells_status = 0.0, True
+        return is_reboot

@@ -1,0 +1,1 @@
+"""Goals of follow_joint_trajectory."""

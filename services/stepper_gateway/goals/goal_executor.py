@@ -1,0 +1,256 @@
+"""Goals of follow_joint_trajectory: accepted or refused, carried out, and ended with a reason."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from schemas.actions import GoalStatusCode
+from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from schemas.system import LogLevel
+from services.stepper_gateway.device.gateway_device import GatewayDevice
+from services.stepper_gateway.goals.active_goal import ActiveGoal, GoalEnding
+from services.stepper_gateway.goals.goal_validator import GoalValidator
+from services.stepper_gateway.goals.rejections import GoalRejected, invalid
+from services.stepper_gateway.goals.scene_versions import PlannedIn, SceneVersions
+from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.moment import Moment, next_beat
+from services.stepper_gateway.motion.commanded_path import PathPoint
+from services.stepper_gateway.motion.knot_sources import PathKnots
+from services.stepper_gateway.motion.motion_controller import MotionController
+from services.stepper_gateway.motion.paths import Path
+from services.stepper_gateway.outputs import GoalExecuting, GoalFinished, GoalProgress
+
+HELD = {  # by the detail of the device's event
+    "heartbeat": "the device holds because it lost the gateway's heartbeat",
+    "command": "the device holds because somebody else has sent it HOLD or STOP: this gateway has not",
+    "shutdown": "the device holds because it is being shut down",
+}
+HELD_SILENTLY = "the device holds by itself and has not said why: see its own log"
+FAILED = GoalStatusCode.ABORTED, FollowErrorCode.DEVICE_FAILED
+
+
+class GoalVerdict(NamedTuple):
+    """The answer to a goal request."""
+
+    accepted: bool
+    code: FollowErrorCode = FollowErrorCode.SUCCESSFUL
+    reason: str = ""
+
+
+class GoalExecutor:
+    """At most one goal moves the arm; a newer one takes over from it."""
+
+    def __init__(self, device: GatewayDevice, controller: MotionController) -> None:
+        self._device, self._controller = device, controller
+        self.scenes = SceneVersions()
+        self._validator = GoalValidator(device.joints, device.arm.device.tick_hz)
+        self._current: ActiveGoal | None = None
+        self._waiting: ActiveGoal | None = None  # until its stamp, or until the stream before it has ended
+
+    @property
+    def is_active(self) -> bool:
+        return self._current is not None or self._waiting is not None
+
+    def use_tick(self, tick_hz: int) -> None:
+        """The device's own figure for the tick that bounds step rates."""
+        self._validator = GoalValidator(self._device.joints, tick_hz)
+
+    def accept(self, goal_id: str, goal: FollowJointTrajectoryGoal, moment: Moment) -> GoalVerdict:
+        """Accept and start a goal, or say why not."""
+        controller = self._controller
+        if reason := self._device.refusal(moment):
+            return GoalVerdict(False, FollowErrorCode.DEVICE_FAILED, reason)
+        try:
+            if self._current is not None and self._current.ending is not None:
+                raise invalid("the arm is still decelerating after the last goal; send this one again when it rests")
+            self.scenes.require_newest(PlannedIn.of(goal))
+            checked = self._validator.check(goal, moment.unix, self._device.parameters)
+            motion_start = controller.motion_start(moment)
+            path = self._validator.path(checked, motion_start, moment.unix, self._device.parameters)
+        except GoalRejected as rejected:
+            return GoalVerdict(False, rejected.code, rejected.reason)
+        self._drop_waiting(moment)
+        self._waiting = ActiveGoal(goal_id, checked, self._device.joints, moment)
+        if checked.trajectory.stamp <= moment.unix:
+            self._waiting.accepted_from = motion_start
+        self._start_waiting(moment, path)
+        return GoalVerdict(True)
+
+    def cancel(self, goal_id: str, moment: Moment) -> str:
+        """Decelerate; empty, or why there is nothing to cancel."""
+        execution = next((e for e in (self._current, self._waiting) if e is not None and e.goal_id == goal_id), None)
+        if execution is None:
+            return f"goal {goal_id} is not being carried out"
+        ending = GoalEnding(GoalStatusCode.CANCELED, FollowErrorCode.CANCELED, "the arm decelerated on its path")
+        if execution is self._waiting:
+            self._waiting = None
+            if self._current is not None or self._controller.is_resting():
+                self._finish(execution, ending, moment)
+                return ""
+            self._current = execution  # what it waited behind has to stop
+        self._end(ending, moment)
+        return ""
+
+    def step(self, moment: Moment, period: float) -> None:
+        """Start what has waited, and end what is late or refused."""
+        self._start_waiting(moment)
+        execution, controller = self._current, self._controller
+        if execution is None:
+            return self._stop_what_failed(moment)
+        if execution.ending is not None:
+            if controller.has_stopped():
+                self._finish_current(execution.ending, moment)
+            return
+        stream = execution.stream
+        if stream is not None and stream.failure:
+            return self._end(GoalEnding(*FAILED, stream.failure), moment)
+        if execution.deadline is not None:
+            execution.deadline += period * controller.slowdown_share
+            if moment.monotonic > execution.deadline and self._device.state is not None:
+                self._end(execution.late(self._device.state, moment.monotonic), moment)
+
+    def on_ack(self) -> None:
+        """EXECUTING means that the device has taken knots of the goal."""
+        execution = self._current
+        if execution is None or execution.is_executing or execution.stream is None or execution.ending is not None:
+            return
+        if execution.stream.acked > execution.first_seq:
+            execution.is_executing = True
+            self._device.out.put(GoalExecuting(execution.goal_id))
+
+    def on_state(self, state: State, point: PathPoint, moment: Moment) -> None:
+        """Check the goal's tolerances, report progress, and see whether it is done."""
+        execution, controller = self._current, self._controller
+        if execution is not None and execution.stream is not None and state.stream == execution.stream.id:
+            self._follow(execution, state, point, moment)
+        if controller.is_resting():
+            self._start_waiting(moment)
+
+    def abort(self, reason: str, moment: Moment) -> None:
+        """The device can no longer be relied upon: end now, with the last steps known."""
+        self._drop_waiting(moment, GoalEnding(*FAILED, reason))
+        self._controller.transmission.abandon()
+        if self._current is not None:
+            ending = self._current.ending
+            self._finish_current(GoalEnding(*FAILED, f"{ending.reason}; then {reason}" if ending else reason), moment)
+
+    def stop(self, reason: str, moment: Moment) -> None:
+        """Decelerate and abort, for a reason outside the goal."""
+        self._drop_waiting(moment, GoalEnding(*FAILED, reason))
+        if self._current is None:
+            self._controller.stop(moment)
+        self._end(GoalEnding(*FAILED, reason), moment)
+
+    def on_hold(self, moment: Moment) -> None:
+        """The device holds by itself on a path of ours."""
+        stream, cause = self._controller.held
+        is_this = self._controller.stream is not None and stream == self._controller.stream.id
+        reason = HELD.get(cause, HELD_SILENTLY) if is_this else HELD_SILENTLY
+        if self._current is None:
+            self.stop(reason, moment)
+        self._end(GoalEnding(*FAILED, reason), moment)
+
+    def on_foreign_motion(self, moment: Moment) -> None:
+        """The device played another stream than the present goal's, and is being stopped."""
+        self._end(GoalEnding(*FAILED, "the device moved along another stream"), moment)
+
+    def _follow(self, execution: ActiveGoal, state: State, point: PathPoint, moment: Moment) -> None:
+        strayed = execution.follow(point, state)
+        stream = execution.stream
+        is_finished = stream is not None and stream.is_finished and execution.ending is None
+        if is_finished and strayed is None and execution.is_reached(state):
+            done = GoalEnding(GoalStatusCode.SUCCEEDED, FollowErrorCode.SUCCESSFUL, "")
+            return self._finish_current(done, moment)
+        if is_finished and execution.deadline is None:  # no time would bring more steps
+            return self._finish_current(strayed or execution.late(state, moment.monotonic), moment)
+        if strayed is not None and execution.ending is None:
+            return self._end(strayed, moment)
+        self._report(execution, state, point, moment)
+
+    def _report(self, execution: ActiveGoal, state: State, point: PathPoint, moment: Moment) -> None:
+        if moment.monotonic < execution.feedback_due or not execution.is_executing:
+            return
+        period = 1.0 / self._device.parameters.feedback_rate
+        execution.feedback_due = next_beat(execution.feedback_due, moment.monotonic, period)
+        positions = (self._device.reporter.positions(point.steps), self._device.reporter.positions(state.steps))
+        feedback = execution.feedback(point, state, positions, moment.unix)
+        self._device.out.put(GoalProgress(execution.goal_id, feedback))
+
+    def _start_waiting(self, moment: Moment, path: Path | None = None) -> None:
+        """Begin the goal that waits if its time has come; `path` is known if it was accepted this very moment."""
+        execution, controller = self._waiting, self._controller
+        if execution is None or execution.goal.trajectory.stamp > moment.unix:
+            return
+        if self._current is not None and self._current.ending is not None:
+            return
+        if not (controller.transmission.is_open or controller.is_resting()):
+            self._preempt(moment)
+            return
+        motion_start = controller.motion_start(moment)
+        if execution.accepted_from is not None:
+            motion_start = motion_start.joined(execution.accepted_from)
+        self._waiting = None
+        try:
+            self.scenes.require_newest(execution.goal.planned_in)
+            path = path or self._validator.path(execution.goal, motion_start, moment.unix, self._device.parameters)
+        except GoalRejected as rejected:
+            ending = GoalEnding(GoalStatusCode.ABORTED, rejected.code, rejected.reason)
+            return self._finish(execution, ending, moment)
+        self._preempt(moment)
+        self._begin(execution, PathKnots(path), moment)
+
+    def _begin(self, execution: ActiveGoal, motion: PathKnots, moment: Moment) -> None:
+        controller = self._controller
+        controller.lead = self._device.parameters.trajectory_lead
+        self._current = execution
+        execution.departed = () if self._device.state is None else self._device.state.steps
+        stream = controller.stream
+        ahead = 0.0
+        if stream is not None and controller.transmission.is_open:
+            start_us, execution.first_seq = stream.end_us, stream.next_seq
+            ahead = (start_us - stream.played_us(moment.monotonic, self._device.session.clock)) * 1e-6
+            controller.transmission.splice(motion)
+            controller.pump(moment)
+        else:
+            start_us = 0
+            stream = controller.begin(motion, motion.start, moment)
+        late = execution.goal.time_tolerance
+        end = moment.monotonic + ahead + motion.duration_us * 1e-6
+        execution.begin(stream, start_us, motion.duration_us, None if late is None else end + late)
+
+    def _stop_what_failed(self, moment: Moment) -> None:
+        """The motion that a goal waits behind must come to an end."""
+        controller = self._controller
+        has_failed = controller.transmission.owns_motion and controller.stream and controller.stream.failure
+        if self._waiting is not None and has_failed:
+            controller.stop(moment)
+
+    def _preempt(self, moment: Moment) -> None:
+        if self._current is not None:
+            reason = "a newer goal took over"
+            self._finish_current(GoalEnding(GoalStatusCode.PREEMPTED, FollowErrorCode.PREEMPTED, reason), moment)
+
+    def _drop_waiting(self, moment: Moment, ending: GoalEnding | None = None) -> None:
+        execution, self._waiting = self._waiting, None
+        if execution is not None:
+            reason = "a newer goal took over before this one began"
+            self._finish(
+                execution, ending or GoalEnding(GoalStatusCode.PREEMPTED, FollowErrorCode.PREEMPTED, reason), moment
+            )
+
+    def _end(self, ending: GoalEnding, moment: Moment) -> None:
+        """Decelerate; the goal ends once the arm stands."""
+        if self._current is not None and self._current.ending is None:
+            self._current.ending = ending
+            self._controller.stop(moment)
+
+    def _finish_current(self, ending: GoalEnding, moment: Moment) -> None:
+        execution, self._current = self._current, None
+        if execution is not None:
+            self._finish(execution, ending, moment)
+
+    def _finish(self, execution: ActiveGoal, ending: GoalEnding, moment: Moment) -> None:
+        result = execution.result(ending, self._device.state, moment.monotonic)
+        self._device.out.put(GoalFinished(execution.goal_id, ending.status, result))
+        level = LogLevel.INFO if ending.status == GoalStatusCode.SUCCEEDED else LogLevel.WARNING
+        self._device.out.log(level, execution.account(ending, self._device.state, moment.monotonic))

@@ -1,0 +1,161 @@
+"""A goal held against the arm: accepted with a path to follow, or refused with joint, value, limit and remedy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from schemas.message import Vector
+from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from services.arm.description import Joint
+from services.arm.interpolation import TrajectorySampler
+from services.stepper_gateway.goals.limit_checks import require_path_within, require_points_within, within
+from services.stepper_gateway.goals.rejections import GoalRejected, invalid
+from services.stepper_gateway.goals.scene_versions import PlannedIn
+from services.stepper_gateway.goals.trajectory_checks import Tolerances, ordered_trajectory, time_tolerance, tolerances
+from services.stepper_gateway.motion.knots import Knot, whole_steps
+from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.path_joining import join
+from services.stepper_gateway.motion.paths import Path, RoundedPath, SampledPath, profile
+from services.stepper_gateway.parameters import GatewayParameters
+
+SAME_VELOCITY = 1e-9  # [rad/s] or [m/s]
+MAX_DELAY = 60.0  # [s] that a trajectory's stamp may lie in the future
+
+
+@dataclass(frozen=True)
+class ValidatedGoal:
+    """A goal whose form is right, in the arm's joint order."""
+
+    trajectory: JointTrajectory
+    path_tolerance: Tolerances
+    goal_tolerance: Tolerances
+    time_tolerance: float | None  # [s]
+    planned_in: PlannedIn
+
+    @property
+    def target(self) -> Vector:
+        """[rad] or [m] where the arm is to end."""
+        return self.trajectory.points[-1].positions
+
+
+@dataclass(frozen=True)
+class MotionStart:
+    """Where the arm is for the sake of a new path: its next knot to be decided, and the range it sweeps meanwhile."""
+
+    start: Knot
+    lowest: Vector
+    highest: Vector
+    is_sent: bool = False  # the next knot follows one that was sent, perhaps between two whole steps
+
+    @classmethod
+    def at_rest(cls, position: Vector) -> MotionStart:
+        return cls(Knot.at_rest(position), position, position)
+
+    def joined(self, other: MotionStart) -> MotionStart:
+        """From here, having swept the other's range too."""
+        lowest = tuple(map(min, self.lowest, other.lowest))
+        return MotionStart(self.start, lowest, tuple(map(max, self.highest, other.highest)), self.is_sent)
+
+
+class GoalValidator:
+    """Validation for one arm."""
+
+    def __init__(self, joints: tuple[Joint, ...], tick_hz: int) -> None:
+        self._joints = joints
+        self._limits = Limits.of(joints)
+        self._tick_hz = tick_hz
+
+    def check(self, goal: FollowJointTrajectoryGoal, now: int, parameters: GatewayParameters) -> ValidatedGoal:
+        """What does not depend on where the arm is; `now` in ns UNIX; raises `GoalRejected`."""
+        path_bounds, end_bounds = tolerances(goal, self._joints, parameters.tolerance_factor)
+        late = time_tolerance(goal, parameters.goal_time_tolerance)
+        trajectory = ordered_trajectory(goal.trajectory, self._joints)
+        _require_time_ahead(trajectory, now)
+        require_points_within(trajectory, self._joints)
+        return ValidatedGoal(trajectory, path_bounds, end_bounds, late, PlannedIn.of(goal))
+
+    def path(self, goal: ValidatedGoal, motion_start: MotionStart, now: int, parameters: GatewayParameters) -> Path:
+        """The path from where the arm is, all of it within the limits; raises `GoalRejected`."""
+        trajectory = goal.trajectory
+        offset = max(0.0, (now - trajectory.stamp) * 1e-9) if trajectory.stamp else 0.0
+        start = motion_start.start
+        if len(trajectory.points) == 1 and not trajectory.points[0].velocities:
+            return self._single_point(trajectory.points[0], start, offset)
+        path = _path(trajectory, start, offset, parameters.corner_time)
+        require_path_within(path, self._joints, parameters, self._tick_hz)
+        first = path.at(0.0)
+        if self._is_same(motion_start, first):
+            return path
+        self._require_near(first, motion_start, parameters)
+        joined = join(start, path, self._limits, lambda knot: within(knot, self._joints))
+        if joined is None:
+            raise invalid("no way from the arm's present motion onto the trajectory stays within the joint limits")
+        return joined
+
+    def _single_point(self, point: TrajectoryPoint, start: Knot, offset: float) -> Path:
+        """Straight there in exactly the time given, jerk-limited: a goal without a planner."""
+        target = Knot.at_rest(point.positions)
+        fastest = profile(start, target, self._limits)
+        if fastest is None:
+            raise invalid("no way from the arm's present motion to the point stays within the limits")
+        wanted = point.time_from_start - offset
+        if fastest.duration > wanted + 1e-6 and wanted > 0.0:
+            raise invalid(
+                f"the point cannot be reached within {wanted:.3f} s: the limits need {fastest.duration:.3f} s; "
+                "give a later time_from_start"
+            )
+        # Ruckig cannot stretch every motion to every duration; being early by a little is within the goal.
+        path = profile(start, target, self._limits, max(wanted, 0.0)) or fastest
+        if not all(within(path.at(path.duration * i / 200), self._joints) for i in range(201)):
+            raise invalid("the way from the arm's present motion to the point leaves the joint limits")
+        return path
+
+    def _is_same(self, motion_start: MotionStart, first: Knot) -> bool:
+        """Whether the path begins where the arm is: on the same whole steps, or to the wire's resolution."""
+        start = motion_start.start
+        rows = list(zip(self._joints, start.position, first.position, strict=True))
+        if start.is_at_rest and first.is_at_rest and not motion_start.is_sent:
+            return all(whole_steps(j.steps.to_q8(a)) == whole_steps(j.steps.to_q8(b)) for j, a, b in rows)
+        if any(abs(a - b) > SAME_VELOCITY for a, b in zip(start.velocity, first.velocity, strict=True)):
+            return False
+        return all(abs(a - b) * joint.steps.per_unit <= 1.0 / 256.0 for joint, a, b in rows)
+
+    def _require_near(self, first: Knot, motion_start: MotionStart, parameters: GatewayParameters) -> None:
+        rows = zip(self._joints, first.position, motion_start.lowest, motion_start.highest, strict=True)
+        for joint, position, lowest, highest in rows:
+            linear = joint.unit == "m"
+            tolerance = parameters.start_tolerance_linear if linear else parameters.start_tolerance
+            if not lowest - tolerance <= position <= highest + tolerance:
+                where = f"{lowest:.4f}" if lowest == highest else f"{lowest:.4f} to {highest:.4f}"
+                distance = max(lowest - position, position - highest)
+                raise invalid(
+                    f'joint "{joint.name}": the trajectory starts at {position:.4f} {joint.unit}, the arm is at '
+                    f"{where} {joint.unit}: {distance:.4f} {joint.unit} apart, more than the {tolerance:g} "
+                    f"{joint.unit} allowed; plan from the present state"
+                )
+
+
+def _path(trajectory: JointTrajectory, start: Knot, offset: float, corner: float) -> Path:
+    if not trajectory.points[0].velocities:
+        return RoundedPath(trajectory, start.position, corner, offset)
+    beginning = TrajectoryPoint(
+        positions=start.position,
+        velocities=start.velocity,
+        accelerations=start.acceleration if trajectory.points[0].accelerations else (),
+    )
+    return SampledPath(TrajectorySampler(trajectory, beginning), offset)
+
+
+def _require_time_ahead(trajectory: JointTrajectory, now: int) -> None:
+    if trajectory.stamp == 0:
+        return
+    end = trajectory.stamp * 1e-9 + trajectory.points[-1].time_from_start
+    if end < now * 1e-9:
+        raise GoalRejected(
+            FollowErrorCode.OLD_HEADER_TIMESTAMP,
+            f"the trajectory ended {now * 1e-9 - end:.3f} s ago by its stamp; use stamp 0 to start now, and check the "
+            "clocks of both machines",
+        )
+    delay = trajectory.stamp * 1e-9 - now * 1e-9
+    if delay > MAX_DELAY:
+        raise invalid(f"the trajectory's stamp lies {delay:.1f} s ahead, more than {MAX_DELAY:.0f} s; send it later")

@@ -1,0 +1,98 @@
+"""The second half of validation: may this arm do it? Points and everything between them against every limit."""
+
+from __future__ import annotations
+
+from schemas.motion import JointTrajectory
+from services.arm.description import Joint
+from services.stepper_gateway.goals.rejections import invalid
+from services.stepper_gateway.motion.knot_sources import KNOT_TIME
+from services.stepper_gateway.motion.knots import Knot
+from services.stepper_gateway.motion.paths import Path
+from services.stepper_gateway.parameters import GatewayParameters
+
+SLACK = 1e-9  # [rad] or [m]: rounding of a limit that was computed
+
+
+def require_points_within(trajectory: JointTrajectory, joints: tuple[Joint, ...]) -> None:
+    """Every point within the joint limits; raises `GoalRejected`."""
+    for index, point in enumerate(trajectory.points):
+        for joint, position in zip(joints, point.positions, strict=True):
+            if not joint.lower - SLACK <= position <= joint.upper + SLACK:
+                raise invalid(f"{beyond(joint, position)} at point {index} ({point.time_from_start:.3f} s)")
+
+
+def require_path_within(path: Path, joints: tuple[Joint, ...], parameters: GatewayParameters, tick_hz: int) -> None:
+    """The path between the points too, at twice the knots' rate; raises `GoalRejected`."""
+    bounds = [_Bound(joint, parameters, tick_hz) for joint in joints]
+    count = max(1, int(path.duration / (KNOT_TIME / 2)) + 1)
+    for index in range(count + 1):
+        t = path.duration * index / count
+        knot = path.at(t)
+        for column, bound in enumerate(bounds):
+            if not bound.holds(knot.position[column], knot.velocity[column], knot.acceleration[column]):
+                raise invalid(bound.complaint(knot, column, t))
+
+
+def within(knot: Knot, joints: tuple[Joint, ...]) -> bool:
+    """Whether every joint is within its limits."""
+    return all(j.lower - SLACK <= p <= j.upper + SLACK for j, p in zip(joints, knot.position, strict=True))
+
+
+def beyond(joint: Joint, position: float) -> str:
+    """The sentence for a position outside the limits."""
+    side, limit = ("lower", joint.lower) if position < joint.lower else ("upper", joint.upper)
+    return (
+        f'joint "{joint.name}": {position:.4f} {joint.unit} is beyond the {side} limit {limit:.4f} {joint.unit}; '
+        f"stay within {joint.lower:.4f} to {joint.upper:.4f} {joint.unit}"
+    )
+
+
+class _Bound:
+    """All limits of one joint."""
+
+    def __init__(self, joint: Joint, parameters: GatewayParameters, tick_hz: int) -> None:
+        self.joint = joint
+        self.lower, self.upper = joint.lower - SLACK, joint.upper + SLACK
+        self.velocity = joint.velocity * (1.0 + parameters.velocity_margin)
+        self.acceleration = joint.acceleration * (1.0 + parameters.acceleration_margin)
+        self.step_rate = step_rate_limit(joint, tick_hz)
+        self._rate_velocity = self.step_rate / joint.steps.per_unit
+
+    def holds(self, position: float, velocity: float, acceleration: float) -> bool:
+        return (
+            self.lower <= position <= self.upper
+            and abs(velocity) <= min(self.velocity, self._rate_velocity)
+            and abs(acceleration) <= self.acceleration
+        )
+
+    def complaint(self, knot: Knot, column: int, t: float) -> str:
+        joint, unit = self.joint, self.joint.unit
+        position, velocity, acceleration = (values[column] for values in knot)
+        if not self.lower <= position <= self.upper:
+            return f"{beyond(joint, position)} (between points, at {t:.3f} s)"
+        if abs(velocity) > self._rate_velocity:
+            rate = abs(velocity) * joint.steps.per_unit
+            return (
+                f'joint "{joint.name}": {rate:.0f} steps/s at {t:.3f} s is more than the {self.step_rate:.0f} steps/s '
+                f"that its driver and the device can do; {_slower(rate, self.step_rate)}"
+            )
+        if abs(velocity) > self.velocity:
+            return (
+                f'joint "{joint.name}": {abs(velocity):.4f} {unit}/s at {t:.3f} s is beyond the velocity limit '
+                f"{joint.velocity:.4f} {unit}/s; {_slower(velocity, joint.velocity)}"
+            )
+        factor = (abs(acceleration) / joint.acceleration) ** 0.5
+        return (
+            f'joint "{joint.name}": {abs(acceleration):.4f} {unit}/s^2 at {t:.3f} s is beyond the acceleration limit '
+            f"{joint.acceleration:.4f} {unit}/s^2; make the trajectory {factor:.2f} times as long, give velocities "
+            "with the points, or let the planner time it"
+        )
+
+
+def step_rate_limit(joint: Joint, tick_hz: int) -> float:
+    """[steps/s] that the driver's pulses and the device's tick allow: a pulse is one tick high and one low."""
+    return min(tick_hz / 2.0, 1e6 / (joint.driver.step_high_us + joint.driver.step_low_us))
+
+
+def _slower(value: float, limit: float) -> str:
+    return f"make the trajectory {abs(value) / limit:.2f} times as long"

@@ -1,0 +1,1 @@
+"""Knots, streams and what moves the device."""

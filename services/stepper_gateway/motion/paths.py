@@ -1,0 +1,122 @@
+"""Paths: where the arm is to be at every time from 0 to a duration."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from typing import Protocol
+
+from ruckig import InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
+
+from schemas.message import Vector
+from schemas.motion import JointTrajectory
+from services.arm.interpolation import TrajectorySampler
+from services.stepper_gateway.motion.knots import Knot
+from services.stepper_gateway.motion.limits import Limits
+
+
+class Path(Protocol):
+    """A motion as a function of time."""
+
+    @property
+    def duration(self) -> float:
+        """[s]"""
+
+    def at(self, t: float) -> Knot:
+        """The knot at `t` [s], held at the ends."""
+
+
+class SampledPath:
+    """A trajectory with velocities (cubic) or accelerations (quintic), entered `offset` seconds after its start."""
+
+    def __init__(self, sampler: TrajectorySampler, offset: float = 0.0) -> None:
+        self._sampler = sampler
+        self._offset = offset
+        self.duration = max(0.0, sampler.duration - offset)
+
+    def at(self, t: float) -> Knot:
+        return Knot(*self._sampler.at(t + self._offset))
+
+
+class RoundedPath:
+    """Straight lines between positions, each corner a parabola over `corner` seconds.
+
+    It is the moving average of the straight lines over the last `corner` seconds: from rest to rest, with an
+    acceleration of the change of velocity divided by `corner`, and over so much later.
+    """
+
+    def __init__(self, trajectory: JointTrajectory, start: Vector, corner: float, offset: float = 0.0) -> None:
+        times = [point.time_from_start for point in trajectory.points]
+        rows = [point.positions for point in trajectory.points]
+        if times[0] > 0.0:
+            times.insert(0, 0.0)
+            rows.insert(0, start)
+        self._times, self._rows, self._corner, self._offset = times, rows, corner, offset
+        self._integrals = [tuple(0.0 for _ in rows[0])]
+        for i in range(1, len(times)):
+            step = 0.5 * (times[i] - times[i - 1])
+            self._integrals.append(
+                tuple(s + step * (a + b) for s, a, b in zip(self._integrals[-1], rows[i - 1], rows[i], strict=True))
+            )
+        self.duration = max(0.0, times[-1] + corner - offset)
+
+    def at(self, t: float) -> Knot:
+        late, early = t + self._offset, t + self._offset - self._corner
+        p1, v1, s1 = self._line(late)
+        p0, v0, s0 = self._line(early)
+        corner = self._corner
+        return Knot(
+            tuple((b - a) / corner for a, b in zip(s0, s1, strict=True)),
+            tuple((b - a) / corner for a, b in zip(p0, p1, strict=True)),
+            tuple((b - a) / corner for a, b in zip(v0, v1, strict=True)),
+        )
+
+    def _line(self, t: float) -> tuple[Vector, Vector, Vector]:
+        """Position, velocity and the position's integral of the straight lines, held at both ends."""
+        times, rows = self._times, self._rows
+        zeros = tuple(0.0 for _ in rows[0])
+        if t < times[0]:
+            return rows[0], zeros, tuple((t - times[0]) * p for p in rows[0])
+        i = bisect_right(times, t) - 1
+        dt = t - times[i]
+        if i == len(times) - 1:
+            return rows[i], zeros, tuple(s + dt * p for s, p in zip(self._integrals[i], rows[i], strict=True))
+        span = times[i + 1] - times[i]
+        velocity = tuple((b - a) / span for a, b in zip(rows[i], rows[i + 1], strict=True))
+        position = tuple(a + v * dt for a, v in zip(rows[i], velocity, strict=True))
+        area = tuple(s + 0.5 * dt * (a + p) for s, a, p in zip(self._integrals[i], rows[i], position, strict=True))
+        return position, velocity, area
+
+
+class ProfilePath:
+    """A jerk-limited profile of ruckig from one knot to another."""
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self._trajectory = trajectory
+        self.duration: float = trajectory.duration
+
+    def at(self, t: float) -> Knot:
+        position, velocity, acceleration = self._trajectory.at_time(min(max(t, 0.0), self.duration))
+        return Knot(tuple(position), tuple(velocity), tuple(acceleration))
+
+
+def profile(start: Knot, target: Knot, limits: Limits, duration: float | None = None) -> ProfilePath | None:
+    """From `start` to `target` as fast as the limits allow, or in exactly `duration`; None if that cannot be."""
+    problem = InputParameter(len(start.position))
+    problem.current_position, problem.target_position = start.position, target.position
+    problem.current_velocity, problem.target_velocity = start.velocity, target.velocity
+    problem.current_acceleration, problem.target_acceleration = start.acceleration, target.acceleration
+    limits = limits.raised_to(start, target)
+    problem.max_velocity, problem.max_acceleration, problem.max_jerk = limits
+    problem.synchronization = Synchronization.Phase
+    if duration is not None:
+        problem.minimum_duration = duration
+    trajectory = Trajectory(len(start.position))
+    try:
+        result = Ruckig(len(start.position)).calculate(problem, trajectory)
+    except RuckigError:  # no profile satisfies this, or rounding hides the one that does
+        return None
+    if result not in (Result.Working, Result.Finished):
+        return None
+    if duration is not None and trajectory.duration > duration + 1e-6:
+        return None
+    return ProfilePath(trajectory)

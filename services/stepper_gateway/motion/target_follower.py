@@ -1,0 +1,93 @@
+"""Streamed joint targets: tracked while nothing else moves the arm, stopped when they fall silent.
+
+Whoever streams must go on sending (0.5 s by default), also to keep a far target: the arm does not go on to a stale one.
+"""
+
+from __future__ import annotations
+
+from schemas.joints import JointTargets
+from services.stepper_gateway.device.gateway_device import GatewayDevice
+from services.stepper_gateway.goals.rejections import GoalRejected, invalid
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.motion.motion_controller import MotionController
+from services.stepper_gateway.motion.target_stream import TargetStream
+
+COMPLAINT = 1.0  # [s] between two of them
+
+
+class TargetFollower:
+    """Feeds targets to the controller."""
+
+    def __init__(self, device: GatewayDevice, controller: MotionController) -> None:
+        self._device, self._controller = device, controller
+        self._targets = TargetStream(device.joints)
+        self._complained = -1.0e9  # [s] monotonic
+        self._unsaid = 0
+
+    def on_targets(self, targets: JointTargets, goal_is_active: bool, moment: Moment) -> None:
+        """Take the newest target, or refuse it and keep the one before."""
+        silence = self._device.parameters.stream_silence
+        self._targets.note_message(moment.monotonic, silence)
+        try:
+            if goal_is_active:
+                raise invalid("a goal is being carried out; cancel it first")
+            if reason := self._device.refusal(moment):
+                raise invalid(reason)
+            self._targets.require_uninterrupted(silence)
+            columns = self._targets.checked(targets)
+        except GoalRejected as rejected:
+            return self._complain(rejected.reason, moment)
+        self._targets.take(columns, self._controller.motion_start(moment).start.position)
+        self._begin(moment)
+
+    def step(self, moment: Moment) -> None:
+        """Brake on silence, begin when the arm rests, notice the end."""
+        stream = self._controller.stream
+        if self._targets.is_active and (stream is None or not self._controller.transmission.is_open):
+            self._end(stream is not None and bool(stream.failure), moment)
+        if self._targets.is_silent(moment.monotonic, self._device.parameters.stream_silence):
+            self._fall_silent(moment)
+        self._begin(moment)
+
+    def end_for_goal(self) -> None:
+        """A goal takes over from where the targets have led."""
+        self._targets.end()
+
+    def interrupt(self) -> None:
+        """The arm is stopped for another reason; targets count again after a silence."""
+        self._targets.end(interrupted=True)
+
+    @property
+    def is_active(self) -> bool:
+        return self._targets.is_active
+
+    def _fall_silent(self, moment: Moment) -> None:
+        """Decelerate now, not behind what has been sent; a stream that rests ends with its last knot."""
+        if self._targets.is_active and not self._targets.is_resting:
+            self._controller.stop(moment)
+            self._targets.end()
+        self._targets.fall_silent()
+
+    def _begin(self, moment: Moment) -> None:
+        controller = self._controller
+        if self._targets.target is None or self._targets.is_active or not controller.is_resting():
+            return
+        start = controller.motion_start(moment).start
+        controller.lead = self._device.parameters.streaming_lead
+        controller.begin(self._targets.motion(start), start.position, moment)
+
+    def _end(self, failed: bool, moment: Moment) -> None:
+        stream = self._controller.stream
+        if failed and stream is not None:
+            self._complain(stream.failure, moment)
+            self._controller.stop(moment)
+        self._targets.end(interrupted=failed)
+
+    def _complain(self, reason: str, moment: Moment) -> None:
+        """Once a second at most: targets come fast."""
+        if moment.monotonic - self._complained < COMPLAINT:
+            self._unsaid += 1
+            return
+        more = f" (and {self._unsaid} more)" if self._unsaid else ""
+        self._complained, self._unsaid = moment.monotonic, 0
+        self._device.event("target_refused", reason + more, moment)

@@ -1,0 +1,96 @@
+"""Streamed targets: which are taken, and when the stream has fallen silent."""
+
+from __future__ import annotations
+
+from schemas.joints import JointTargets
+from schemas.message import Vector
+from services.arm.description import Joint
+from services.stepper_gateway.goals.limit_checks import SLACK, beyond
+from services.stepper_gateway.goals.rejections import invalid, invalid_joints
+from services.stepper_gateway.goals.trajectory_checks import require_known
+from services.stepper_gateway.motion.knot_sources import KNOT_TIME, TargetKnots
+from services.stepper_gateway.motion.knots import Knot
+from services.stepper_gateway.motion.limits import Limits
+from services.stepper_gateway.motion.target_tracker import TargetTracker
+
+NEVER = -1.0e9  # [s]
+
+
+class TargetStream:
+    """The newest target and what tracks it."""
+
+    def __init__(self, joints: tuple[Joint, ...]) -> None:
+        self._joints = joints
+        self._tracker: TargetTracker | None = None
+        self._latest = NEVER  # [s] monotonic, of the last message, taken or not
+        self._is_interrupted = False
+        self.target: Vector | None = None  # [rad] or [m] that waits for a stream to begin
+
+    @property
+    def is_active(self) -> bool:
+        return self._tracker is not None
+
+    @property
+    def is_resting(self) -> bool:
+        """Whether the newest knot stands."""
+        return self._tracker is None or self._tracker.knot.is_at_rest
+
+    def checked(self, targets: JointTargets) -> dict[int, float]:
+        """Column and position of every joint named; raises `GoalRejected`."""
+        require_known(targets.name, self._joints)
+        if not targets.name:
+            raise invalid_joints("a target names no joint")
+        if len(targets.position) != len(targets.name):
+            raise invalid(f"a target names {len(targets.name)} joints and gives {len(targets.position)} positions")
+        names = [joint.name for joint in self._joints]
+        columns = {names.index(name): position for name, position in zip(targets.name, targets.position, strict=True)}
+        for column, position in columns.items():
+            joint = self._joints[column]
+            if not joint.lower - SLACK <= position <= joint.upper + SLACK:
+                raise invalid(beyond(joint, position))
+        return columns
+
+    def note_message(self, now: float, silence: float) -> None:
+        """A message has come; after an interruption only silence makes the next one count again."""
+        if now - self._latest > silence:
+            self._is_interrupted = False
+        self._latest = now
+
+    def require_uninterrupted(self, silence: float) -> None:
+        if self._is_interrupted:
+            raise invalid(
+                f"streaming was interrupted, and nothing resumes by itself: send no target for {silence:g} s, then "
+                "start again"
+            )
+
+    def take(self, columns: dict[int, float], present: Vector) -> None:
+        """The newest target; joints that it does not name keep theirs, or stay where they are."""
+        base = self._tracker.target if self._tracker is not None and not self._tracker.is_braking else self.target
+        target = tuple(columns.get(index, value) for index, value in enumerate(base or present))
+        if self._tracker is not None:
+            self._tracker.follow(target)
+        else:
+            self.target = target
+
+    def motion(self, start: Knot) -> TargetKnots:
+        """Begin to track the target that waits, from rest at `start`."""
+        self._tracker = TargetTracker(Limits.of(self._joints), KNOT_TIME, start)
+        if self.target is not None:
+            self._tracker.follow(self.target)
+        self.target = None
+        return TargetKnots(self._tracker)
+
+    def is_silent(self, now: float, silence: float) -> bool:
+        return now - self._latest > silence
+
+    def fall_silent(self) -> None:
+        """Let the stream end at rest; a target that waits is too old."""
+        self.target = None
+        if self._tracker is not None:
+            self._tracker.brake()
+
+    def end(self, interrupted: bool = False) -> None:
+        """No more tracking: it is over, a goal takes over, or it was interrupted."""
+        self._is_interrupted = self._is_interrupted or (interrupted and (self.is_active or self.target is not None))
+        self.fall_silent()
+        self._tracker = None

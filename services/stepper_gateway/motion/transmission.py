@@ -1,0 +1,98 @@
+"""Keeps the device's queue filled: never too far ahead to react, never too short to keep its speed."""
+
+from __future__ import annotations
+
+from services.arm.description import Joint
+from services.stepper_gateway.device.clock import ClockSync
+from services.stepper_gateway.links.frames import Chunk
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.motion.knot_sources import Motion
+from services.stepper_gateway.motion.knots import Knot, StepEncoder, stop_time
+from services.stepper_gateway.motion.stream import SentChunk, Stream
+
+LARGEST_CHUNK = 20  # [knots]
+SMALLEST_CHUNK = 2  # [knots] 25 chunks a second at 20 ms
+
+
+class Transmission:
+    """The motion that is being sent and the stream it travels on."""
+
+    def __init__(self, joints: tuple[Joint, ...], first_stream: int) -> None:
+        self._joints = joints
+        self._encoder = StepEncoder(joints)
+        self._next_id = first_stream
+        self.stream: Stream | None = None  # the present or the last one
+        self._motion: Motion | None = None
+        self._start: Knot | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether knots can still be added to the stream."""
+        stream = self.stream
+        return stream is not None and not (stream.is_complete or stream.is_abandoned)
+
+    @property
+    def owns_motion(self) -> bool:
+        """Whether what the device plays is what we want it to play."""
+        return self.stream is not None and not self.stream.is_abandoned
+
+    def begin(self, motion: Motion, start: Knot, boot_id: int, capacity: int) -> Stream:
+        """A new stream from rest at `start`."""
+        self.stream = Stream(self._next_id, boot_id, self._joints, self._encoder, capacity)
+        self._next_id = self._next_id % 0xFFFFFFFF + 1
+        self._motion, self._start = motion, start
+        return self.stream
+
+    def splice(self, motion: Motion) -> None:
+        """Go on with another motion, which continues from the last knot sent."""
+        self._motion = motion
+
+    def abandon(self) -> None:
+        """Send nothing more of this stream, not even again."""
+        self._motion = self._start = None
+        if self.stream is not None:
+            self.stream.is_abandoned = True
+            self.stream.unacked.clear()
+
+    def forget(self) -> None:
+        """The stream's path means nothing any more: the steps are counted anew."""
+        self.abandon()
+        self.stream = None
+
+    def pump(self, moment: Moment, clock: ClockSync, lead: float) -> list[tuple[Chunk, SentChunk]]:
+        """Chunks to send now: late ones again, then new ones until the lead is filled."""
+        stream = self.stream
+        if stream is None or stream.is_abandoned:
+            return []
+        chunks = list(stream.overdue(moment.monotonic))
+        while (chunk := self._next_chunk(stream, moment, clock, lead)) is not None:
+            chunks.append(chunk)
+        return [(stream.frame(chunk, moment, clock), chunk) for chunk in chunks]
+
+    def again(self, chunks: list[SentChunk], moment: Moment, clock: ClockSync) -> list[tuple[Chunk, SentChunk]]:
+        """The same chunks once more."""
+        stream = self.stream
+        return [(stream.frame(chunk, moment, clock), chunk) for chunk in chunks] if stream is not None else []
+
+    def _next_chunk(self, stream: Stream, moment: Moment, clock: ClockSync, lead: float) -> SentChunk | None:
+        motion = self._motion
+        if motion is None:
+            return None
+        played = stream.played_us(moment.monotonic, clock)
+        dt = motion.dt_us * 1e-6
+        missing = int((lead + self._braking(stream, played) - (stream.end_us - played) * 1e-6) / dt + 1e-3)
+        count = min(missing, LARGEST_CHUNK, stream.credits(played))
+        if count < SMALLEST_CHUNK:
+            return None
+        knots = motion.take(count - 1 if self._start is not None else count)
+        if self._start is not None:
+            knots.insert(0, self._start)
+            self._start = None
+        if motion.is_finished:
+            self._motion = None
+        return stream.add(knots, motion.dt_us, motion.is_finished)
+
+    def _braking(self, stream: Stream, played_us: int) -> float:
+        """[s] half the longest stopping time on the way: with less, the device would slow down by itself."""
+        knots = stream.log.knots_between(played_us, stream.end_us)
+        return 0.5 * max((stop_time(knot, self._joints) for knot in knots), default=0.0)
