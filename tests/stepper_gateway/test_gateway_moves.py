@@ -28,7 +28,7 @@ def execution_near_its_end(bound: JointTolerance) -> tuple[ActiveGoal, State]:
     goal = FollowJointTrajectoryGoal(trajectory=move(HOME, READY), goal_tolerance=(bound,))
     joints = rm1().joints
     checked = GoalValidator(joints, 25_000).check(goal, 0, GatewayParameters())
-    state = State(t_us=1, mode=2, steps=expected_steps(READY), velocity=(256, 0, 0))
+    state = State(t_us=1, mode=2, steps=expected_steps(READY), velocity=(1.0, 0.0, 0.0))
     return ActiveGoal("g", checked, joints, Moment(0, 0.0)), state
 
 

@@ -18,7 +18,7 @@ from services.stepper_gateway.motion.commanded_path import CommandedPath
 from services.stepper_gateway.motion.knot_sources import PathKnots
 from services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot, whole_steps
 from services.stepper_gateway.motion.limits import Limits
-from services.stepper_gateway.motion.path_joining import JoinedPath, bridge
+from services.stepper_gateway.motion.path_joining import JoinedPath, join_path
 from services.stepper_gateway.motion.paths import Path, RoundedPath, SampledPath, profile
 from tests.stepper_gateway.harness import ROOT, move, rm1
 
@@ -70,7 +70,7 @@ def test_a_bridge_is_continuous_and_keeps_the_limits(
     assert before is not None
     start = before.at(before.duration * share)
     path = SampledPath(TrajectorySampler(move(start.position, third)))
-    joined = bridge(start, path, LIMITS, lambda knot: within(knot, JOINTS))
+    joined = join_path(start, path, LIMITS, lambda knot: within(knot, JOINTS))
     assert joined is not None
     assert joined.at(0.0).position == pytest.approx(start.position, abs=1e-9)
     assert joined.at(0.0).velocity == pytest.approx(start.velocity, abs=1e-9)

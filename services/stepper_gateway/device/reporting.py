@@ -40,7 +40,7 @@ class Reporter:
 
     def joint_state(self, state: State, stamp: int) -> JointState:
         """The measured joints."""
-        rates = tuple(rate / 256.0 for rate in state.velocity)
+        rates = state.velocity
         return JointState(
             stamp=stamp, name=self._names, position=self.positions(state.steps), velocity=self._rates(rates)
         )
@@ -51,7 +51,7 @@ class Reporter:
             stamp=stamp,
             name=self._names,
             position=self.positions(point.steps),
-            velocity=self._rates(point.rate, state.time_scale / 32768.0),
+            velocity=self._rates(point.rate, state.time_scale),
         )
 
     def step_errors(self, point: PathPoint, state: State, stamp: int) -> StepErrors:
@@ -80,11 +80,11 @@ class Reporter:
             referenced=tuple(bool(state.referenced >> index & 1) for index in range(len(state.steps))),
             inputs=input_names(self._arm, state),
             outputs=tuple(one.name for index, one in enumerate(self._arm.outputs) if state.outputs >> index & 1),
-            speed=state.speed / 1000.0,
+            speed=state.speed,
             name=self._names if len(state.steps) == len(self._names) else (),
             steps=state.steps,
-            velocity=tuple(rate / 256.0 for rate in state.velocity),
-            time_scale=state.time_scale / 32768.0,
+            velocity=state.velocity,
+            time_scale=state.time_scale,
             buffered=state.buffered_ms * 1e-3,
             stream=state.stream,
             next_seq=state.next_seq,

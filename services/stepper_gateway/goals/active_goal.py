@@ -83,10 +83,10 @@ class ActiveGoal:
 
     def _too_fast_or_slow(self, point: PathPoint, state: State) -> GoalEnding | None:
         """An ending if a joint's velocity has left the path tolerance."""
-        scale = state.time_scale / 32768.0
+        scale = state.time_scale
         rows = zip(self.joints, point.rate, state.velocity, self.goal.path_tolerance.velocity, strict=True)
         for joint, wanted, done, bound in rows:
-            error = wanted * scale - done / 256.0
+            error = wanted * scale - done
             if bound is not None and abs(error) > bound:
                 per_unit, unit = joint.steps.per_unit, joint.unit
                 return GoalEnding(
@@ -121,7 +121,7 @@ class ActiveGoal:
         """True if the executed steps and the velocities are within the goal tolerance."""
         tolerance = self.goal.goal_tolerance
         places = zip(self.goal_errors(state), tolerance.position, strict=True)
-        speeds = zip((rate / 256.0 for rate in state.velocity), tolerance.velocity, strict=True)
+        speeds = zip(state.velocity, tolerance.velocity, strict=True)
         return all(bound is None or abs(error) <= bound for error, bound in (*places, *speeds))
 
     def late(self, state: State, now: float) -> GoalEnding:
@@ -149,9 +149,9 @@ class ActiveGoal:
         """`positions`: commanded and executed [rad] or [m]."""
         elapsed = self.elapsed(state)
         times = [p.time_from_start for p in self.goal.trajectory.points]
-        scale = state.time_scale / 32768.0
+        scale = state.time_scale
         wanted = tuple(r * scale / j.steps.per_unit for j, r in zip(self.joints, point.rate, strict=True))
-        done = tuple(r / 256.0 / j.steps.per_unit for j, r in zip(self.joints, state.velocity, strict=True))
+        done = tuple(r / j.steps.per_unit for j, r in zip(self.joints, state.velocity, strict=True))
         desired = TrajectoryPoint(positions=positions[0], velocities=wanted, time_from_start=elapsed)
         actual = TrajectoryPoint(positions=positions[1], velocities=done, time_from_start=elapsed)
         error = TrajectoryPoint(

@@ -14,7 +14,7 @@ from services.stepper_gateway.goals.scene_versions import PlannedIn
 from services.stepper_gateway.goals.trajectory_checks import Tolerances, ordered_trajectory, time_tolerance, tolerances
 from services.stepper_gateway.motion.knots import Knot, whole_steps
 from services.stepper_gateway.motion.limits import Limits
-from services.stepper_gateway.motion.path_joining import join
+from services.stepper_gateway.motion.path_joining import join_path
 from services.stepper_gateway.motion.paths import Path, RoundedPath, SampledPath, profile
 from services.stepper_gateway.parameters import GatewayParameters
 
@@ -87,7 +87,7 @@ class GoalValidator:
         if self._is_same(motion_start, first):
             return path
         self._require_near(first, motion_start, parameters)
-        joined = join(start, path, self._limits, lambda knot: within(knot, self._joints))
+        joined = join_path(start, path, self._limits, lambda knot: within(knot, self._joints))
         if joined is None:
             raise invalid("no way from the arm's present motion onto the trajectory stays within the joint limits")
         return joined

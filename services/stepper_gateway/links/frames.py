@@ -12,8 +12,11 @@ from enum import IntEnum, IntFlag
 
 import msgspec
 
+from schemas.message import Vector
 from services.runtime.serial_frames import MAGIC, VERSION, sealed
 
+UNITY = 32768.0  # of a time scale, Q1.15
+Q8 = 256.0  # of a velocity, Q24.8
 ANY_BOOT = 0  # as the boot id of a command that stops
 NEVER_EXPIRES = 2**64 - 1  # [us]
 NO_JOINT = 255
@@ -177,7 +180,7 @@ class State(Frame, frozen=True, kw_only=True, gc=False):
     mode: int
     fault: int = 0
     inputs: int = 0
-    time_scale: int = 0  # Q1.15
+    time_scale: float = 0.0  # 0 stands, 1 plays as planned
     buffered_ms: int = 0
     stream: int = 0
     next_seq: int = 0
@@ -189,9 +192,9 @@ class State(Frame, frozen=True, kw_only=True, gc=False):
     fault_joint: int = NO_JOINT
     outputs: int = 0  # bit i: output i is on
     referenced: int = 0xFFFF  # bit j: the place of joint j is known
-    speed: int = 1000  # [1/1000] the time scale that was asked for
+    speed: float = 1.0  # the time scale that was asked for
     steps: Row = ()
-    velocity: Row = ()
+    velocity: Vector = ()  # [steps/s]
 
 
 AnyFrame = Chunk | Ack | Command | CommandReply | Heartbeat | Sync | SyncReply | State
@@ -229,11 +232,11 @@ def encode(frame: AnyFrame) -> bytes:
         case State():
             kind, joints = FrameType.STATE, len(frame.steps)
             body = _STATE.pack(
-                frame.t_us, frame.mode, frame.fault, frame.inputs, frame.time_scale, frame.buffered_ms,
+                frame.t_us, frame.mode, frame.fault, frame.inputs, round(frame.time_scale * UNITY), frame.buffered_ms,
                 frame.stream, frame.next_seq, frame.play_us, frame.underruns, frame.refused, frame.bad_frames,
-                frame.flags, frame.fault_joint, frame.outputs, frame.referenced, frame.speed,
+                frame.flags, frame.fault_joint, frame.outputs, frame.referenced, round(frame.speed * 1000.0),
             )  # fmt: skip
-            body += _rows((*frame.steps, *frame.velocity))
+            body += _rows((*frame.steps, *(round(rate * Q8) for rate in frame.velocity)))
     return sealed(kind, body, frame.boot_id, joints)
 
 
@@ -315,10 +318,10 @@ def _read_state(boot_id: int, joints: int, body: bytes) -> State:
     t_us, mode, fault, inputs, scale, buffered, stream, next_seq, play_us, *counts = _STATE.unpack_from(body)
     steps, velocity = _read_rows(body, _STATE.size, joints, 2)
     return State(
-        boot_id=boot_id, t_us=t_us, mode=mode, fault=fault, inputs=inputs, time_scale=scale, buffered_ms=buffered,
-        stream=stream, next_seq=next_seq, play_us=play_us, underruns=counts[0], refused=counts[1],
+        boot_id=boot_id, t_us=t_us, mode=mode, fault=fault, inputs=inputs, time_scale=scale / UNITY,
+        buffered_ms=buffered, stream=stream, next_seq=next_seq, play_us=play_us, underruns=counts[0], refused=counts[1],
         bad_frames=counts[2], flags=counts[3], fault_joint=counts[4], outputs=counts[5], referenced=counts[6],
-        speed=counts[7], steps=steps, velocity=velocity,
+        speed=counts[7] / 1000.0, steps=steps, velocity=tuple(rate / Q8 for rate in velocity),
     )  # fmt: skip
 
 

@@ -31,14 +31,14 @@ class Slowdown:
 
     def on_state(self, state: State, is_held: bool) -> None:
         """Take the time scale of a state; `is_held`: by a person's command."""
-        slowness = 1.0 - state.time_scale / 32768.0
+        slowness = 1.0 - state.time_scale
         if is_held:
             self.share = slowness
         elif state.mode != DeviceMode.RUN:
             self.share = 0.0
         else:
             # After a hold or a low speed it takes a while to be fast again, and is never slower than before.
-            self.share = min(slowness, max(1.0 - state.speed / 1000.0, self.share))
+            self.share = min(slowness, max(1.0 - state.speed, self.share))
 
 
 class MotionController:

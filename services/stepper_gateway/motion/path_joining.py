@@ -28,7 +28,7 @@ class JoinedPath:
         return self._bridge.at(t) if t < self.meets else self._path.at(t)
 
 
-def join(start: Knot, path: Path, limits: Limits, within: Within) -> Path | None:
+def join_path(start: Knot, path: Path, limits: Limits, within: Within) -> Path | None:
     """`path`, joined from `start` as early as the limits allow; else straight to its end; None if that leaves `within`.
 
     The join ends at the smallest time of the grid at which the state-to-state minimum is no longer than that

@@ -147,7 +147,7 @@ class Stream:
         if self._play is None:
             return 0
         since = max(0, clock.device_time(now) - self._play.t_us)
-        return min(self.end_us, self._play.play_us + since * self._play.time_scale // 32768)
+        return min(self.end_us, self._play.play_us + int(since * self._play.time_scale))
 
     def commanded(self, play_us: int) -> PathPoint:
         """What the path asks for at `play_us`."""
