@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from services.bench.arms import parol6
 from services.bench.figure import Figure, NotMeasured, of_samples, quantile
 from services.bench.postures import SCENE, CoalChecker, random_postures
-from services.planner.search.native_scene import native_scene
+from services.planner.collision.native_scene import native_scene
 
 Array = NDArray[np.float64]
 
@@ -23,15 +23,15 @@ FEW = 30  # of them for coal
 def measure() -> Figure:
     """parol6 with the best build of the check; the others are the references."""
     try:
-        from services.planner.native import MotionCore
-        from services.planner.native.library import motion
+        from services.planner.native.binding import motion
+        from services.planner.native.native_planner import NativePlanner
     except ImportError as error:
         raise NotMeasured(str(error)) from error
     arm = parol6()
     ways = lines(random_postures(arm, 2 * WAYS))
     samples: dict[str, list[float]] = {}
     for name in motion.kernel_names():
-        core = MotionCore(arm, kernel=name)
+        core = NativePlanner(arm, kernel=name)
         core.set_scene(native_scene(arm, SCENE)[0])
         samples[name] = rates(core.free, ways)
     best = motion.kernel_names()[0]

@@ -6,7 +6,7 @@ from services.arm.kinematics import Kinematics
 from services.bench.arms import parol6, rm1
 from services.bench.figure import Figure, Goal, NotMeasured, of_samples, quantile
 from services.bench.poses import problems, solving_ms
-from services.planner.goals.ik import InverseKinematics
+from services.planner.kinematics.ik import InverseKinematics
 
 UNIT = "ms"
 GOAL = Goal(median=0.2, p99=1.0)

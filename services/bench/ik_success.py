@@ -7,7 +7,7 @@ from services.arm.kinematics import Kinematics
 from services.bench.arms import parol6, rm1
 from services.bench.figure import Figure, rounded
 from services.bench.poses import is_solved, problems, solve
-from services.planner.goals.ik import InverseKinematics
+from services.planner.kinematics.ik import InverseKinematics
 
 UNIT = "%"
 GOAL = 99.9

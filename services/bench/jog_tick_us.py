@@ -14,8 +14,8 @@ from services.arm.kinematics import Kinematics
 from services.bench.arms import parol6, rm1
 from services.bench.figure import Figure, Goal, of_samples, quantile
 from services.bench.postures import SCENE
+from services.planner.collision.world import World
 from services.planner.jog.jog import PERIOD, Jog
-from services.planner.scene.world import World
 
 UNIT = "us"
 COMMANDS, STEPS = 40, 25  # each command is held for half a second

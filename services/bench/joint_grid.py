@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.description import Arm
-from services.planner.search.validity import Validity
+from services.planner.path.validity import Validity
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

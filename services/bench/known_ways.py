@@ -15,15 +15,16 @@ from numpy.typing import NDArray
 
 from services.arm.description import Arm
 from services.bench.problem_sets import way_length
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.scene.surroundings import Surroundings
-from services.planner.search.ompl_search import ompl_corners
-from services.planner.search.smoothing import shorten
-from services.planner.search.validity import Validity
-from services.planner.search.way import Deadline, NoWay
+from services.planner.collision.checker import CollisionChecker
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.path.ompl_search import ompl_corners
+from services.planner.path.path import NoWay
+from services.planner.path.smoothing import shorten
+from services.planner.path.validity import Validity
+from services.planner.request.deadline import Deadline
 
 if TYPE_CHECKING:
-    from services.planner.native import MotionCore
+    from services.planner.native.native_planner import NativePlanner
 
 Array = NDArray[np.float64]
 
@@ -39,16 +40,16 @@ WIDEST, NARROWEST = 0.2, 0.002  # [s at full speed] of a push, at first and at l
 class Spheres:
     """The compiled core alone: a way touches where it does not let all of it be."""
 
-    def __init__(self, core: MotionCore) -> None:
+    def __init__(self, core: NativePlanner) -> None:
         self._core = core
 
     def touching(self, positions: Array, margin: float) -> Array | None:
-        return None if self._core.way_free(positions) else np.asarray(positions[0])
+        return None if self._core.path_free(positions) else np.asarray(positions[0])
 
 
-def shortest(arm: Arm, surroundings: Surroundings, start: Array, goals: Array) -> tuple[Array, str] | None:
+def shortest(arm: Arm, surroundings: CollisionChecker, start: Array, goals: Array) -> tuple[Array, str] | None:
     """A polyline (m, n) from `start` to one of `goals` (k, n), and what found it; None where nothing did."""
-    core = surroundings.core(CLEARANCE)
+    core = surroundings.native(CLEARANCE)
     if core is None:
         raise RuntimeError("the compiled motion core is needed to look for the shortest ways: run `make setup`")
     speeds = np.array([joint.velocity for joint in arm.joints])
@@ -84,8 +85,8 @@ def tightened(rows: Array, speeds: Array, seed: int, validity: Validity, pushes:
     return rows
 
 
-def _by_core(core: MotionCore, start: Array, goals: Array) -> list[tuple[Array, str]]:
-    from services.planner.native import NoPath
+def _by_core(core: NativePlanner, start: Array, goals: Array) -> list[tuple[Array, str]]:
+    from services.planner.native.paths import NoPath
 
     paths = []
     for seed in range(SEEDS):
@@ -106,7 +107,7 @@ def _by_ompl(
             rows = ompl_corners(arm, name, start, goals, validity, seed, deadline)
         except NoWay:
             continue
-        found.append((shorten(rows, validity, seed, deadline.is_late), name))
+        found.append((shorten(rows, validity, seed, deadline), name))
     return found
 
 

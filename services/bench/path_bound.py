@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from services.bench.figure import NotMeasured
 from services.planner.timing.profile import JointLimits
-from services.planner.timing.speeds import load_toppra
+from services.planner.timing.toppra_speeds import load_toppra
 
 Array = NDArray[np.float64]
 

@@ -15,9 +15,10 @@ from schemas.planning import PlanRequest, PoseGoal
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.bench.path_bound import least_time
-from services.planner.goals.ik import InverseKinematics, never
-from services.planner.goals.targets import Target
-from services.planner.scene.world import World
+from services.planner.collision.world import World
+from services.planner.kinematics.ik import InverseKinematics
+from services.planner.kinematics.targets import Target
+from services.planner.request.deadline import NEVER
 from services.planner.timing.profile import joint_limits
 
 Array = NDArray[np.float64]
@@ -54,7 +55,7 @@ class PlainLines:
         way = np.array(request.goal.position) - pose.position
         for share in np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(way) / STEP))[1:].tolist():
             target = Target(pose.position + share * way, pose.rotation if self._is_full else None)
-            posture = next(self._solver.solutions(target, rows[-1], never), None)
+            posture = next(self._solver.solutions(target, rows[-1], NEVER), None)
             if posture is None or np.abs(posture - rows[-1]).max() > JUMP or self._world.distance(posture) <= 0.0:
                 break
             rows.append(posture)

@@ -19,9 +19,9 @@ from services.bench.figure import Figure, of_samples
 from services.bench.plan_scenes import TABLE
 from services.bench.plan_trials import spread
 from services.bench.problem_sets import ALLOWED
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.world import World
 from services.planner.core import Planner
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.scene.world import World
 
 Array = NDArray[np.float64]
 

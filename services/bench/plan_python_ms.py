@@ -17,7 +17,7 @@ from services.bench.plan_scenes import SCENES
 UNIT = "ms"
 GOAL = Goal(median=50.0, p99=1000.0)
 COUNT = 40  # problems a scene and arm, the first ones of plan_ms
-CORE = "services.planner.native"
+CORE = "services.planner.native.binding"
 LONGEST = 400.0  # [s]
 
 

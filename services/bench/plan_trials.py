@@ -18,8 +18,8 @@ from services.bench.arms import parol6, rm1
 from services.bench.figure import quantile
 from services.bench.plan_scenes import SCENES
 from services.bench.problem_sets import COUNT, Problem, problem_set, request_of
+from services.planner.collision.world import World
 from services.planner.core import Planner
-from services.planner.scene.world import World
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,9 @@ from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.arm.transforms import inverse, multiply
 from services.bench.postures import random_postures
-from services.planner.goals.ik import InverseKinematics, never
-from services.planner.goals.targets import Target
+from services.planner.kinematics.ik import InverseKinematics
+from services.planner.kinematics.targets import Target
+from services.planner.request.deadline import NEVER
 
 Array = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ def problems(arm: Arm, kinematics: Kinematics, count: int, is_full: bool) -> lis
 
 def solve(solver: InverseKinematics, problem: Problem) -> Array | None:
     """The first solution."""
-    return next(solver.solutions(problem.target, problem.near, never), None)
+    return next(solver.solutions(problem.target, problem.near, NEVER), None)
 
 
 def is_solved(arm: Arm, problem: Problem, answer: Array | None) -> bool:

@@ -21,15 +21,15 @@ from services.bench.joint_grid import JointGrid
 from services.bench.known_ways import shortest
 from services.bench.plan_scenes import SCENES
 from services.bench.problem_sets import COUNT, FILE, Problem, ProblemSet, problem_sets, request_of, text_of, way_length
-from services.planner.goals.goals import Goals
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.scene.surroundings import Surroundings
-from services.planner.scene.world import World
-from services.planner.search.native_search import NATIVE
-from services.planner.search.search import Search
-from services.planner.search.validity import Validity
-from services.planner.search.way import Deadline, NoWay, endless
-from services.planner.times import Stopwatch
+from services.planner.collision.checker import CollisionChecker
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.world import World
+from services.planner.kinematics.goals import Goals
+from services.planner.path.native_search import NATIVE
+from services.planner.path.path import NoWay
+from services.planner.path.search import Search
+from services.planner.path.validity import Validity
+from services.planner.request.deadline import NEVER, Deadline, Stopwatch, endless
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Maker:
     def __init__(self, arm: Arm, scene: str) -> None:
         self.arm, self.scene = arm, scene
         self.kinematics = Kinematics(arm)
-        self._around = Surroundings(World(arm, self.kinematics, SCENES[scene]))
+        self._around = CollisionChecker(World(arm, self.kinematics, SCENES[scene]))
         self._validity = Validity(self._around, CLEARANCE)
         self._speeds = np.array([joint.velocity for joint in arm.joints])
         self._search = Search(arm, self._around)
@@ -114,7 +114,7 @@ class Maker:
     def postures(self, problem: Problem) -> list[Array]:
         """Free postures of the pose, the problem's own among them."""
         goal = request_of(problem, self.arm, self.kinematics).goal
-        found = Goals(self.arm, self.kinematics, self._around).candidates(goal, problem.start, lambda: False)
+        found = Goals(self.arm, self.kinematics, self._around).candidates(goal, problem.start, NEVER)
         free = [np.array(posture) for posture in found if self._around.keeps(posture, CLEARANCE)]
         return [np.array(problem.goal), *free[:MOST_GOALS]]
 

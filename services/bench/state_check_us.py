@@ -14,10 +14,10 @@ from services.arm.kinematics import Kinematics
 from services.bench.arms import parol6, rm1
 from services.bench.figure import Figure, NotMeasured, of_samples, quantile
 from services.bench.postures import SCENE, CoalChecker, random_postures
-from services.planner.search.native_scene import native_scene
+from services.planner.collision.native_scene import native_scene
 
 if TYPE_CHECKING:
-    from services.planner.native import MotionCore
+    from services.planner.native.native_planner import NativePlanner
 
 Array = NDArray[np.float64]
 Question = TypeVar("Question")
@@ -31,11 +31,11 @@ TEN = 10  # calls that are timed at once: the clock of the CPU takes as long as 
 def measure() -> Figure:
     """parol6's figure; the references are of the same postures in the same run."""
     try:
-        from services.planner.native import MotionCore
+        from services.planner.native.native_planner import NativePlanner
     except ImportError as error:
         raise NotMeasured(str(error)) from error
     arm = parol6()
-    core = MotionCore(arm)
+    core = NativePlanner(arm)
     core.set_scene(native_scene(arm, SCENE)[0])
     rows = random_postures(arm, BATCH * BATCHES)
     samples = []
@@ -59,14 +59,14 @@ def measure() -> Figure:
 
 def batch_us(arm: Arm) -> float:
     """[us] median of a posture in a batch, with the motion core."""
-    from services.planner.native import MotionCore
+    from services.planner.native.native_planner import NativePlanner
 
-    core = MotionCore(arm)
+    core = NativePlanner(arm)
     core.set_scene(native_scene(arm, SCENE)[0])
     return median_us(core.free, np.array_split(random_postures(arm, BATCH * BATCHES), BATCHES)) / BATCH
 
 
-def single_us(core: MotionCore, rows: Array) -> float:
+def single_us(core: NativePlanner, rows: Array) -> float:
     """[us] median of one posture, the call from Python included."""
     each = [row[None, :] for row in rows[:ONE_BY_ONE]]
     tens = [each[first : first + TEN] for first in range(0, ONE_BY_ONE, TEN)]

@@ -14,7 +14,7 @@ from services.cli.exits import CommandError, ExitCode, usage
 if TYPE_CHECKING:
     from services.arm.collision_matrix import Verdict
 
-FIT = "services.planner.covers.collision_fit"  # in a process of its own: the command line loads no planner
+FIT = "services.collision_fitting.main"  # in a process of its own: the command line loads no planner
 
 
 def spheres(folder: Path, bulge: float) -> ExitCode:

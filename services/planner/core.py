@@ -22,22 +22,29 @@ from schemas.planning import (
 )
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
-from services.planner.blockade import Blockade
-from services.planner.errand import Errand
-from services.planner.finish import Finished, Finisher, Touching
-from services.planner.goals.goals import Goals, timed_out
-from services.planner.refusals import LEAST_SCALING, NoPlan, malformed, no_way_around, scaling_refused
-from services.planner.scene.clearance import CLEARANCE, first_collision
-from services.planner.scene.surroundings import Surroundings
-from services.planner.scene.world import World
-from services.planner.search.search import Search, require_known
-from services.planner.search.via import Via
-from services.planner.search.way import STRAIGHT, Deadline, Flag, NoWay, Start, endless
-from services.planner.start import resolve_start
-from services.planner.times import Stopwatch
+from services.planner.cartesian.tool_motions import ToolMotions
+from services.planner.collision.checker import CollisionChecker
+from services.planner.collision.clearance import CLEARANCE, first_collision
+from services.planner.collision.world import World
+from services.planner.kinematics.goals import Goals
+from services.planner.path.path import STRAIGHT, NoWay, Start
+from services.planner.path.search import Search, require_known
+from services.planner.pipeline.collision_refusals import Blockade
+from services.planner.pipeline.planning_context import Errand
+from services.planner.pipeline.trajectory_builder import Finished, Finisher, Touching
+from services.planner.pipeline.waypoints import Via
+from services.planner.request.deadline import CancelFlag, Deadline, Stopwatch, endless
+from services.planner.request.refusals import (
+    LEAST_SCALING,
+    NoPlan,
+    malformed,
+    no_way_around,
+    scaling_refused,
+    timed_out,
+)
+from services.planner.request.start_state import resolve_start
 from services.planner.timing.profile import JointLimits, joint_limits
-from services.planner.tool.tool_motions import ToolMotions
-from services.planner.verify.verify import sample
+from services.planner.verification.verify import sample
 
 Array = NDArray[np.float64]
 
@@ -55,7 +62,7 @@ class Planner:
     def __init__(self, arm: Arm, kinematics: Kinematics | None = None) -> None:
         self.arm = arm
         self.kinematics = kinematics or Kinematics(arm)
-        self.surroundings = Surroundings(World(arm, self.kinematics))
+        self.surroundings = CollisionChecker(World(arm, self.kinematics))
         self._goals = Goals(arm, self.kinematics, self.surroundings)
         self._blockade = Blockade(arm, self._goals, self.surroundings)
         self._tool_motions = ToolMotions(arm, self.kinematics, self._goals, self.surroundings)
@@ -70,7 +77,7 @@ class Planner:
         """Does now what the first plan in the newest world would wait for: seconds, in which the links are filled with
         spheres, and a large mesh with distances."""
         self.surroundings.begin()
-        self.surroundings.core(CLEARANCE)
+        self.surroundings.native(CLEARANCE)
         self._search.prepare()
 
     def plan(
@@ -79,7 +86,7 @@ class Planner:
         present: JointState | None,
         age: float = 0.0,
         clock: Callable[[], float] = endless,
-        cancel: Flag | None = None,
+        cancel: CancelFlag | None = None,
         watch: Stopwatch | None = None,
     ) -> PlanResponse:
         """The answer; `age` [s] is how old `present` is, `clock` [s] says how the allowed time goes by.
@@ -124,7 +131,7 @@ class Planner:
         fraction, stopped_by = 1.0, None
         if isinstance(request.motion, LinearMotion | CircularMotion):
             with watch.phase("search"):
-                way = self._tool_motions.plan(request, start, limits, margin, deadline.is_late)
+                way = self._tool_motions.plan(request, start, limits, margin, deadline)
             finished, planner_id = self._verified(way.trajectory, way.end, errand), TOOL
             fraction, stopped_by = way.fraction, way.stopped_by
         elif isinstance(request.goal, WaypointGoal):
@@ -162,7 +169,7 @@ class Planner:
                     return errand.finisher.line(errand.start, goal), STRAIGHT
                 except Touching:
                     goals.append(goal)
-            if errand.deadline.is_late() or len(goals) == MOST_GOALS:
+            if errand.deadline.has_passed() or len(goals) == MOST_GOALS:
                 break
         request = errand.request
         if goals:
@@ -170,13 +177,13 @@ class Planner:
                 return self._around(request.motion, np.array(goals), errand)
             raise self._blockade.line(errand.start, goals[0], errand.margin)
         if touching:
-            raise self._blockade.goal(request.goal, touching[0], errand.start, errand.deadline.is_late)
+            raise self._blockade.goal(request.goal, touching[0], errand.start, errand.deadline)
         raise timed_out()
 
     def _postures(self, errand: Errand) -> Iterator[Start]:
         """The goal's postures, nearest first, on the clock of the kinematics."""
         with errand.watch.phase("ik"):
-            postures = self._goals.candidates(errand.request.goal, errand.start, errand.deadline.is_late)
+            postures = self._goals.candidates(errand.request.goal, errand.start, errand.deadline)
         while True:
             with errand.watch.phase("ik"):
                 posture = next(postures, None)
@@ -207,7 +214,7 @@ class Planner:
                 ) from no_way
             except Touching as touching:
                 refusal = self._blockade.way(touching.posture, margin)
-            if errand.deadline.is_late():
+            if errand.deadline.has_passed():
                 break
         raise refusal or timed_out()
 
@@ -235,7 +242,7 @@ class Planner:
             return CLEARANCE
         distance = self.surroundings.distance(start)
         if distance <= 0.0:
-            raise self._blockade.start(start, deadline.is_late)
+            raise self._blockade.start(start, deadline)
         return min(CLEARANCE, NEAR_START * distance)
 
 

@@ -8,10 +8,10 @@ from schemas.deployment import Deployment
 from schemas.topics import FK, IK, JOINT_STATES
 from services.arm.description import load_arm
 from services.planner.core import Planner
-from services.planner.goals.kinematic_requests import KinematicRequests
-from services.planner.jog.jog_service import JogService
+from services.planner.jog_service import JogService
+from services.planner.kinematics.kinematic_requests import KinematicRequests
+from services.planner.request.start_state import STALE_AFTER
 from services.planner.scene.scene_keeper import SceneKeeper
-from services.planner.start import STALE_AFTER
 from services.planner.workers.plan_service import PlanService
 from services.planner.workers.workers import Workers
 from services.runtime.application import service

@@ -9,7 +9,7 @@ from services.arm.kinematics import Kinematics
 from services.bench.arms import parol6, rm1
 from services.bench.main import NAMES, module_of
 from services.bench.poses import is_solved, problems, solve
-from services.planner.goals.ik import InverseKinematics
+from services.planner.kinematics.ik import InverseKinematics
 
 
 @pytest.mark.parametrize("name", ["ik_ms", "ik_success"])

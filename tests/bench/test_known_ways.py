@@ -13,7 +13,7 @@ from services.bench.arms import rm1
 from services.bench.joint_grid import JointGrid, islands
 from services.bench.known_ways import tightened
 from services.bench.problem_sets import way_length
-from services.planner.search.validity import Validity
+from services.planner.path.validity import Validity
 
 ONES = np.ones(2)
 

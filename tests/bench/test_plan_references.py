@@ -15,7 +15,7 @@ from services.bench.plan_references import PlainOmpl, Roboplan
 from services.bench.plan_scenes import SCENES
 from services.bench.postures import CoalChecker, random_postures
 from services.bench.problem_sets import problem_set
-from services.planner.scene.world import World
+from services.planner.collision.world import World
 
 ARMS = {arm.name: arm for arm in (rm1(), parol6())}
 

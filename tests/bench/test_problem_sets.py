@@ -20,8 +20,8 @@ from services.bench.problem_sets import (
     text_of,
     way_length,
 )
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.scene.world import World
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.world import World
 
 ARMS = {arm.name: arm for arm in (rm1(), parol6())}
 KINEMATICS = {name: Kinematics(arm) for name, arm in ARMS.items()}

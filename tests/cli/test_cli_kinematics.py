@@ -16,7 +16,7 @@ from schemas.topics import FK, IK
 from services.cli import session as session_module
 from services.cli.exits import ExitCode
 from services.cli.main import run
-from services.planner.goals.kinematic_requests import KinematicRequests
+from services.planner.kinematics.kinematic_requests import KinematicRequests
 from services.runtime.memory_bus import MemoryBus
 from services.runtime.node import Node
 

@@ -23,7 +23,7 @@ from schemas.planning import (
 )
 from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, Shape, SphereShape
 from services.planner.core import Planner
-from services.planner.search.search import KNOWN
+from services.planner.path.search import KNOWN
 from tests.planner.independent import Judge
 from tests.planner.judging import asked, joints, posture_at, quaternion_of
 

@@ -14,8 +14,8 @@ from schemas.planning import JogCommand, JogStatus
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics
+from services.planner.collision.world import World
 from services.planner.jog.jog import PERIOD, Jog
-from services.planner.scene.world import World
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits
 from services.stepper_gateway.motion.target_tracker import Tracker

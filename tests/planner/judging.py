@@ -23,9 +23,9 @@ from schemas.planning import (
 )
 from schemas.scene import PlanningScene
 from services.arm.description import Arm, load_arm
+from services.planner.collision.world import World
 from services.planner.core import Planner
-from services.planner.scene.world import World
-from services.planner.verify.verify import DENSITY, LOOSE_JERK
+from services.planner.verification.verify import DENSITY, LOOSE_JERK
 from tests.planner.independent import Array, Judge, Motion, resampled
 
 ROOT = Path(__file__).resolve().parents[2]

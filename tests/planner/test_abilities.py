@@ -12,11 +12,11 @@ import pytest
 from schemas.planning import PoseGoal
 from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics
-from services.planner.goals.abilities import Abilities, abilities
-from services.planner.goals.goals import Goals
-from services.planner.goals.ik import never
-from services.planner.goals.targets import Pointing, Target
-from services.planner.refusals import NoPlan
+from services.planner.kinematics.goals import Goals
+from services.planner.kinematics.targets import Pointing, Target
+from services.planner.kinematics.task_space import Abilities, abilities
+from services.planner.request.deadline import NEVER
+from services.planner.request.refusals import NoPlan
 
 ROOT = Path(__file__).parents[2] / "urdf"
 
@@ -82,13 +82,13 @@ def test_an_arm_of_five_joints_points_its_tool_and_says_what_it_cannot_do(tmp_pa
         x, y, z = pose.position.tolist()
         direction = (pose.rotation @ [0.0, 0.0, 1.0]).tolist()
         goal = PoseGoal(position=(x, y, z), tool_axis=(0.0, 0.0, 1.0), direction=tuple(direction))
-        got = kinematics.tool(next(goals.candidates(goal, start, never)))
+        got = kinematics.tool(next(goals.candidates(goal, start, NEVER)))
         assert np.allclose(got.position, pose.position, atol=1e-6)
         assert np.allclose(got.rotation[:, 2], direction, atol=1e-5)
     turn = pin.Quaternion(pin.exp3(pose.rotation @ [0.0, 0.0, 0.5]) @ pose.rotation)
     goal = PoseGoal(position=(x, y, z), orientation=(turn.x, turn.y, turn.z, turn.w))
     with pytest.raises(NoPlan) as caught:
-        next(goals.candidates(goal, start, never))
+        next(goals.candidates(goal, start, NEVER))
     assert "has 5 joints: beside a position it can choose 2 of 3 turns" in caught.value.refusal.message
     assert "the direction of one tool axis" in caught.value.refusal.remedy
 

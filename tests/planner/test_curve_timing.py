@@ -13,14 +13,15 @@ from ruckig import InputParameter, Result, Ruckig, Trajectory
 from services.arm.description import load_arm
 from services.arm.kinematics import Kinematics
 from services.bench.plan_scenes import SCENES
-from services.planner.scene.world import World
-from services.planner.search.curve import smooth_runs
-from services.planner.search.smoothing import smooth, stopping
+from services.planner.collision.world import World
+from services.planner.path.curve import smooth_runs
+from services.planner.path.smoothing import smooth, stopping
+from services.planner.request.deadline import NEVER
 from services.planner.timing import profile
 from services.planner.timing.profile import joint_limits
 from services.planner.timing.time_optimal import time_optimal_way
 from services.planner.timing.timing import timed_way
-from services.planner.verify.verify import limit_shares, require_ends, sample
+from services.planner.verification.verify import limit_shares, require_ends, sample
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")
 LOWER = np.array([joint.lower for joint in ARM.joints])
@@ -45,15 +46,11 @@ def corners_of(seed: int, count: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(0.8 * LOWER, 0.8 * UPPER, (count, len(LOWER)))
 
 
-def never() -> bool:
-    return False
-
-
 @settings(max_examples=25)
 @given(st.integers(0, 10_000), st.integers(2, 5), st.floats(0.05, 1.0), st.floats(0.05, 1.0))
 def test_a_timed_curve_keeps_every_limit_and_its_ends(seed: int, count: int, speed: float, acceleration: float):
     corners, limits = corners_of(seed, count), joint_limits(ARM, speed, acceleration)
-    trajectory = timed_way(ARM.joint_names, smooth(corners, Everywhere(), never), limits)
+    trajectory = timed_way(ARM.joint_names, smooth(corners, Everywhere(), NEVER), limits)
     require_ends(trajectory, tuple(corners[0].tolist()), tuple(corners[-1].tolist()))
     velocity, accelerations, jerk = limit_shares(sample(trajectory, 100), limits)
     assert max(velocity, accelerations) <= 1.0
@@ -61,7 +58,7 @@ def test_a_timed_curve_keeps_every_limit_and_its_ends(seed: int, count: int, spe
 
 
 def test_a_curve_is_measured_by_its_length_with_its_derivatives():
-    for run in smooth_runs(smooth(corners_of(3, 4), Everywhere(), never), LIMITS.velocity):
+    for run in smooth_runs(smooth(corners_of(3, 4), Everywhere(), NEVER), LIMITS.velocity):
         lengths = np.linspace(0.0, run.length, 3001)
         way, step = run.at(lengths), run.length / 3000
         assert np.allclose(np.linalg.norm(way.first, axis=1), 1.0, atol=1e-9)
@@ -84,7 +81,7 @@ def test_a_way_that_cannot_be_rounded_stops_at_every_corner():
 
 def test_a_jerk_limited_way_takes_at_most_three_times_the_time_optimal_one():
     for seed in range(4):
-        control = smooth(corners_of(seed, 3), Everywhere(), never)
+        control = smooth(corners_of(seed, 3), Everywhere(), NEVER)
         limited, optimal = (make(ARM.joint_names, control, LIMITS) for make in (timed_way, time_optimal_way))
         velocity, acceleration, _ = limit_shares(sample(optimal, 100), LIMITS)
         assert max(velocity, acceleration) <= 1.0
@@ -100,7 +97,7 @@ def test_what_ruckig_is_asked_about_a_curve_has_no_waypoints(monkeypatch: pytest
             return super().calculate(demand, trajectory)
 
     monkeypatch.setattr(profile, "Ruckig", Listening)
-    timed_way(ARM.joint_names, smooth(corners_of(1, 4), Everywhere(), never), LIMITS)
+    timed_way(ARM.joint_names, smooth(corners_of(1, 4), Everywhere(), NEVER), LIMITS)
     assert asked
     assert all(demand.intermediate_positions == [] for demand in asked)
 

@@ -18,9 +18,9 @@ from schemas.planning import StepMargin
 from schemas.robot import PullOut
 from services.arm.description import Arm
 from services.arm.device_config import device_config
-from services.planner.refusals import NoPlan
+from services.planner.request.refusals import NoPlan
 from services.planner.timing.profile import joint_limits, straight_line
-from services.planner.verify.feasibility import (
+from services.planner.verification.feasibility import (
     feasible_scale,
     margins,
     queue_share,
@@ -29,7 +29,7 @@ from services.planner.verify.feasibility import (
     slowed,
     step_stream,
 )
-from services.planner.verify.verify import at_times
+from services.planner.verification.verify import at_times
 from services.stepper_gateway.links.frames import Chunk, ChunkFlag, Heartbeat, encode
 
 FAR = (1.5, -1.2, 0.1)
@@ -174,7 +174,7 @@ def test_the_margins_are_the_same_however_many_knots_are_looked_at_at_once(
 ) -> None:
     trajectory = line(rm1)
     whole = margins(rm1, step_stream(rm1, trajectory))
-    monkeypatch.setattr("services.planner.verify.feasibility.MOST_KNOTS", most)
+    monkeypatch.setattr("services.planner.verification.feasibility.MOST_KNOTS", most)
     assert require_feasible(rm1, trajectory) == whole
 
 

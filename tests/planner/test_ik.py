@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from services.arm.description import load_arm
 from services.arm.kinematics import Kinematics
-from services.planner.goals.ik import InverseKinematics, never
-from services.planner.goals.targets import Target
+from services.planner.kinematics.ik import InverseKinematics
+from services.planner.kinematics.targets import Target
+from services.planner.request.deadline import NEVER
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 KINEMATICS = Kinematics(ARM)
@@ -25,7 +26,7 @@ POSTURES = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.join
 @given(POSTURES, POSTURES)
 def test_fk_of_ik_is_the_goal(goal: tuple[float, ...], near: tuple[float, ...]):
     target = Target(KINEMATICS.tool(goal).position)
-    solution = next(IK.solutions(target, np.array(near), never))
+    solution = next(IK.solutions(target, np.array(near), NEVER))
     assert np.linalg.norm(KINEMATICS.tool(solution).position - target.position) < 1e-6
     assert all(joint.is_within(value) for joint, value in zip(ARM.joints, solution.tolist(), strict=True))
 
@@ -34,7 +35,7 @@ def test_both_elbows_are_found_and_the_nearer_one_comes_first():
     target = Target(np.array([0.25, 0.15, 0.1]))
     for side in (-1.0, 1.0):
         near = np.array([0.5 - side, 1.8 * side, 0.08])
-        first, second = islice(IK.solutions(target, near, never), 2)
+        first, second = islice(IK.solutions(target, near, NEVER), 2)
         assert np.sign(first[1]) == side
         assert np.sign(second[1]) == -side
 
@@ -44,26 +45,26 @@ def test_both_elbows_are_found_and_the_nearer_one_comes_first():
 def test_the_nearest_comes_first_of_all_that_are_found(goal: tuple[float, ...], near: tuple[float, ...]):
     start, target = np.array(near), Target(KINEMATICS.tool(goal).position)
     if IK.descend(target, start).is_solution:  # else the arm is stuck there, and comes from elsewhere
-        travels = [IK.travel(start, solution) for solution in IK.solutions(target, start, never)]
+        travels = [IK.travel(start, solution) for solution in IK.solutions(target, start, NEVER)]
         assert travels[0] <= min(travels) + 0.02  # the stretched arm's two elbows are one
 
 
 def test_it_is_deterministic():
     target, near = Target(np.array([0.1, -0.25, 0.05])), np.zeros(3)
-    again = [list(IK.solutions(target, near, never)) for _ in range(2)]
+    again = [list(IK.solutions(target, near, NEVER)) for _ in range(2)]
     assert np.array_equal(again[0], again[1])
 
 
 def test_the_way_inwards_from_the_stretched_arm_is_found():
     """Stretched, the Jacobian has no column along the arm: one start would stay there."""
     tool = KINEMATICS.tool((0.0, 0.0, 0.0)).position
-    assert next(IK.solutions(Target(0.7 * tool + [0.0, 0.0, 0.05]), np.zeros(3), never)) is not None
+    assert next(IK.solutions(Target(0.7 * tool + [0.0, 0.0, 0.05]), np.zeros(3), NEVER)) is not None
 
 
 def test_out_of_reach_gives_no_solution_but_the_nearest_posture():
     target = Target(np.array([0.6, 0.0, 0.1]))
-    assert list(IK.solutions(target, np.zeros(3), never)) == []
-    best = IK.nearest(target, np.zeros(3), never)[0]
+    assert list(IK.solutions(target, np.zeros(3), NEVER)) == []
+    best = IK.nearest(target, np.zeros(3), NEVER)[0]
     assert KINEMATICS.tool(best).position == pytest.approx((0.4063, 0.0, 0.1), abs=1e-3)
 
 
@@ -75,5 +76,5 @@ def test_a_search_that_is_late_ends():
 @given(POSTURES, POSTURES)
 def test_orientations_are_met_where_the_arm_can(goal: tuple[float, ...], near: tuple[float, ...]):
     pose = KINEMATICS.tool(goal)
-    solution = next(IK.solutions(Target(pose.position, pose.rotation), np.array(near), never))
+    solution = next(IK.solutions(Target(pose.position, pose.rotation), np.array(near), NEVER))
     assert np.allclose(KINEMATICS.tool(solution).rotation, pose.rotation, atol=1e-5)

@@ -26,8 +26,8 @@ from schemas.scene import (
 from services.arm.description import Arm, load_arm
 from services.arm.interpolation import TrajectorySampler
 from services.arm.kinematics import Kinematics
+from services.planner.collision.world import World
 from services.planner.core import Planner
-from services.planner.scene.world import World
 from tests.planner.independent import Judge, resampled
 from tests.planner.native.scenes import star_mesh
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from schemas.frames import Transform
 from schemas.planning import JogCommand
 from schemas.scene import BoxShape, PlanningScene, SceneObject, SphereShape
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.world import World
 from services.planner.jog.jog import PERIOD
 from services.planner.jog.jog_obstacles import CONTACT_SPEED
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.scene.world import World
 from tests.planner.jogging import Array, Jogged, arm_of, kinematics_of
 
 ASTRAY = 0.0002  # [m] by which the gateway's tracker, which starts every joint on its own, leaves the jog's line

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.planning import JogCommand
+from services.planner.collision.clearance import CLEARANCE
 from services.planner.jog.jog import PERIOD
-from services.planner.scene.clearance import CLEARANCE
 from tests.planner.jogging import Jogged, arm_of
 
 TIGHT = 1e-9

@@ -10,8 +10,8 @@ import pytest
 from schemas.frames import Transform
 from schemas.planning import JogCommand
 from schemas.scene import MeshShape, PlanningScene, SceneObject
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.scene.world import MANY, World
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.world import MANY, World
 from tests.planner.jogging import Array, Jogged, arm_of, kinematics_of
 
 BANDS = 40  # 3200 triangles

@@ -9,8 +9,8 @@ import pytest
 
 from schemas.joints import JointState
 from schemas.planning import JogCommand, JogLimit
+from services.planner.collision.clearance import CLEARANCE
 from services.planner.jog.jog import PERIOD, SILENCE, Jog
-from services.planner.scene.clearance import CLEARANCE
 from tests.planner.jogging import Jogged, arm_of, kinematics_of, world_of
 
 TURN = JogCommand(name=("brazo_joint",), velocity=(0.5,))

@@ -28,10 +28,10 @@ from schemas.planning import (
     Motion as AskedMotion,
 )
 from schemas.scene import PlanningScene
+from services.planner.collision.clearance import CLEARANCE
 from services.planner.core import Planner
-from services.planner.goals.kinematic_requests import KinematicRequests
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.search.search import KNOWN
+from services.planner.kinematics.kinematic_requests import KinematicRequests
+from services.planner.path.search import KNOWN
 from tests.planner.drawn_requests import INNER, cases, pose_goals, tool_cases
 from tests.planner.independent import Array, Judge, Motion
 from tests.planner.judging import (

@@ -14,10 +14,11 @@ from schemas.joints import JointState
 from schemas.planning import FkRequest, IkRequest, IkResponse, PlanCode, PoseGoal
 from services.arm.description import load_arm
 from services.arm.kinematics import Kinematics
-from services.planner.goals.ik import InverseKinematics, never
-from services.planner.goals.kinematic_requests import KinematicRequests
-from services.planner.goals.targets import Target
-from services.planner.scene.clearance import CLEARANCE
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.kinematics.ik import InverseKinematics
+from services.planner.kinematics.kinematic_requests import KinematicRequests
+from services.planner.kinematics.targets import Target
+from services.planner.request.deadline import NEVER
 
 ROOT = Path(__file__).parents[2] / "urdf"
 RM1, PAROL6 = load_arm(ROOT / "rm1"), load_arm(ROOT / "parol6")
@@ -90,7 +91,7 @@ def test_a_redundant_arm_uses_its_freedom_to_stay_away_from_its_limits():
         goal=PoseGoal(position=tuple(place.tolist())), near=corner, solutions=64, avoid_collisions=False
     )
     most_central = min(eccentricity(np.array(each.position)) for each in ik("parol6", request).solutions)
-    plain = InverseKinematics(PAROL6, kinematics).nearest(Target(place), lower, never)
+    plain = InverseKinematics(PAROL6, kinematics).nearest(Target(place), lower, NEVER)
     assert most_central <= min(eccentricity(posture) for posture in plain)
 
 

@@ -18,16 +18,16 @@ from services.arm.kinematics import Kinematics
 from services.arm.srdf_edit import with_pairs
 from services.arm.urdf_edit import with_collisions
 from services.cli.collision import plan_of
-from services.planner.covers.fit_writing import touching_states, write_fits
-from services.planner.covers.fitted_shape import Fitted, Kind
-from services.planner.covers.fitting import fitted
-from services.planner.covers.hull import smallest_ball
-from services.planner.covers.link_meshes import visual_mesh
-from services.planner.covers.mesh_fit import depths, fit_links
-from services.planner.covers.parts import shapes_around
-from services.planner.covers.shapes import Mesh
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.scene.solid_geometry import is_inside
+from services.collision_fitting.fit_writing import touching_states, write_fits
+from services.collision_fitting.fitted_shape import Fitted, Kind
+from services.collision_fitting.fitting import fitted
+from services.collision_fitting.hull import smallest_ball
+from services.collision_fitting.link_meshes import visual_mesh
+from services.collision_fitting.mesh_fit import depths, fit_links
+from services.collision_fitting.parts import shapes_around
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision_geometry.coal_shapes import is_inside
+from services.planner.collision_geometry.shapes import Mesh
 
 URDF = Path(__file__).parents[2] / "urdf"
 SEEDS = st.integers(0, 2**32 - 1)

@@ -19,8 +19,8 @@ from schemas.planning import (
     PoseGoal,
 )
 from schemas.scene import BoxShape, PlanningScene, SceneObject
+from services.planner.collision.clearance import CLEARANCE
 from services.planner.core import Planner
-from services.planner.scene.clearance import CLEARANCE
 from tests.planner.independent import Array, Judge
 from tests.planner.judging import (
     asked,

@@ -14,12 +14,11 @@ from schemas.joints import JointState
 from schemas.planning import FreeMotion, JogCommand, LinearMotion, PointToPoint, PoseGoal, Timing
 from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, SphereShape
 from services.arm.check import check
+from services.planner.collision.sphere_check import show_scene
+from services.planner.collision.world import World
 from services.planner.core import Planner
 from services.planner.jog.jog import PERIOD, Jog
-from services.planner.native import MotionCore
-from services.planner.scene.world import World
-from services.planner.search.native_scene import native_scene
-from services.planner.search.native_search import show_scene
+from services.planner.native.native_planner import NativePlanner
 from tests.planner.drawn_requests import cases, pose_goals
 from tests.planner.independent import Judge
 from tests.planner.judging import (
@@ -75,8 +74,8 @@ def test_the_judge_and_the_planner_see_the_same_arm(name: str):
 @ARMS
 def test_what_the_compiled_core_calls_free_is_free(name: str):
     planner = planner_of(name)
-    core, judge = MotionCore(planner.arm), Judge(planner.arm, THINGS)
-    show_scene(core, *native_scene(planner.arm, THINGS))
+    core, judge = NativePlanner(planner.arm), Judge(planner.arm, THINGS)
+    show_scene(core, World(planner.arm, planner.kinematics, THINGS))
     rows = postures(planner, 600)
     free = core.free(rows)
     distances = np.array([judge.nearest(row).distance for row in rows])

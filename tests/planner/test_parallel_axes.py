@@ -13,9 +13,10 @@ import pytest
 
 from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics
-from services.planner.goals.ik import InverseKinematics, never
-from services.planner.goals.parallel_axes import parallel_axes
-from services.planner.goals.targets import Target
+from services.planner.kinematics.ik import InverseKinematics
+from services.planner.kinematics.parallel_axes import parallel_axes
+from services.planner.kinematics.targets import Target
+from services.planner.request.deadline import NEVER
 
 RM1 = Path(__file__).parents[2] / "urdf" / "rm1"
 BASE, UPPER, FORE, TOOL = "base_link", "brazo_link", "antebrazo_link", "efector_link"
@@ -70,7 +71,7 @@ def test_every_posture_is_found_again_and_every_answer_is_right(arm: Arm):
     lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
     for posture, near in random.uniform(lower, upper, (60, 2, 3)):
         position = kinematics.tool(posture).position
-        found = list(inverse.solutions(Target(position), near, never))
+        found = list(inverse.solutions(Target(position), near, NEVER))
         assert min(np.abs(each - posture).max() for each in found) < 1e-6
         travels = [inverse.travel(near, each) for each in found]
         assert travels == sorted(travels)
@@ -85,7 +86,7 @@ def test_the_order_of_the_joints_in_robot_toml_does_not_matter():
     posture = np.array((0.5, -1.2, 0.1))
     kinematics = Kinematics(backwards)
     position = kinematics.tool(posture[::-1]).position
-    found = list(InverseKinematics(backwards, kinematics).solutions(Target(position), posture[::-1], never))
+    found = list(InverseKinematics(backwards, kinematics).solutions(Target(position), posture[::-1], NEVER))
     assert np.allclose(found[0], posture[::-1])
 
 
@@ -108,8 +109,8 @@ def test_it_finds_what_a_search_finds_and_no_less():
     lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
     for posture, near in random.uniform(lower, upper, (20, 2, 3)):
         target = Target(kinematics.tool(posture).position)
-        found = list(inverse.solutions(target, near, never))
-        for searched in searching.solutions(target, near, never):
+        found = list(inverse.solutions(target, near, NEVER))
+        for searched in searching.solutions(target, near, NEVER):
             assert min(np.abs(searched - each).max() for each in found) < 1e-4
 
 

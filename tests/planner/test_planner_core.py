@@ -15,7 +15,7 @@ from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGo
 from services.arm.description import Arm, load_arm
 from services.planner.core import Planner
 from services.planner.timing.profile import joint_limits
-from services.planner.verify.verify import require_within_limits, sample
+from services.planner.verification.verify import require_within_limits, sample
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 PLANNER = Planner(ARM)

@@ -26,8 +26,8 @@ from schemas.planning import (
 )
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.description import Arm, load_arm
+from services.planner.collision.world import World
 from services.planner.core import Planner
-from services.planner.scene.world import World
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 PLANNER = Planner(ARM)

@@ -9,8 +9,8 @@ from schemas.joints import JointState
 from schemas.planning import JointGoal, PlanCode, PlanRequest, PointToPoint, PoseGoal
 from schemas.scene import AllowedPair, BoxShape, PlanningScene, SceneObject, SphereShape
 from services.arm.description import Arm
+from services.planner.collision.world import World
 from services.planner.core import Planner
-from services.planner.scene.world import World
 
 GOAL = JointGoal(name=("brazo_joint",), position=(1.2,))
 REQUEST = PlanRequest(goal=GOAL, motion=PointToPoint())

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from schemas.planning import PlanCode, PoseGoal, Refusal
 from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics, Pose
-from services.planner.goals.goals import Goals, Start
-from services.planner.goals.ik import never
-from services.planner.refusals import NoPlan
+from services.planner.kinematics.goals import Goals, Start
+from services.planner.request.deadline import NEVER
+from services.planner.request.refusals import NoPlan
 
 ROOT = Path(__file__).parents[2] / "urdf"
 FORMS = ("position", "pose", "free axis", "pointing")
@@ -34,7 +34,7 @@ class Bench:
         self.ready: Start = self.arm.named_states["ready"]
 
     def postures(self, goal: PoseGoal, near: Start | None = None, most: int = 4) -> list[Start]:
-        return list(islice(self.goals.candidates(goal, near or self.ready, never), most))
+        return list(islice(self.goals.candidates(goal, near or self.ready, NEVER), most))
 
     def refusal(self, goal: PoseGoal) -> tuple[PlanCode, Refusal]:
         with pytest.raises(NoPlan) as caught:

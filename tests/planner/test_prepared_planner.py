@@ -19,7 +19,7 @@ from schemas.planning import FreeMotion, JointGoal, PlanRequest
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.description import load_arm
 from services.planner.core import Planner
-from services.planner.scene.world import World
+from services.planner.collision.world import World
 
 arm = load_arm(Path("urdf/rm1"))
 planner = Planner(arm)

@@ -17,7 +17,7 @@ from services.arm.description import load_arm
 from services.arm.interpolation import TrajectorySampler
 from services.planner.timing import profile
 from services.planner.timing.profile import joint_limits, straight_line
-from services.planner.verify.verify import require_ends, require_within_limits, sample
+from services.planner.verification.verify import require_ends, require_within_limits, sample
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 POSTURES = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from services.planner.timing.peaks import peak_shares
 from services.planner.timing.profile import JointLimits, stop_and_go, straight_line
 from services.planner.timing.time_law import TimeLaw
-from services.planner.verify.verify import limit_shares, sample_between
+from services.planner.verification.verify import limit_shares, sample_between
 
 UNIT = JointLimits(np.ones(3), np.ones(3), np.ones(3))
 

@@ -30,11 +30,11 @@ from schemas.planning import (
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.description import load_arm
 from services.arm.interpolation import TrajectorySampler
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.world import World
 from services.planner.core import Planner
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.scene.world import World
 from services.planner.timing.profile import joint_limits
-from services.planner.verify.verify import require_jerk, require_within_limits, sample
+from services.planner.verification.verify import require_jerk, require_within_limits, sample
 
 URDF = Path(__file__).parents[2] / "urdf"
 PLANNERS = {name: Planner(load_arm(URDF / name)) for name in ("rm1", "parol6")}

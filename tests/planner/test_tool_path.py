@@ -10,10 +10,10 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from services.arm.kinematics import Pose
-from services.planner.refusals import NoPlan
-from services.planner.tool.arcs import arc_about, arc_through
-from services.planner.tool.path_curve import CubicSpline, rounded_runs
-from services.planner.tool.tool_path import NO_WAY, ToolPath, polyline
+from services.planner.cartesian.arcs import arc_about, arc_through
+from services.planner.cartesian.tool_path import NO_WAY, ToolPath, polyline
+from services.planner.path.path_curve import CubicSpline, rounded_runs
+from services.planner.request.refusals import NoPlan
 
 NUMBERS = st.floats(-1.0, 1.0).map(lambda value: round(value, 4))
 POINTS = st.tuples(NUMBERS, NUMBERS, NUMBERS).map(np.array)

@@ -9,10 +9,10 @@ import pytest
 from schemas.motion import JointTrajectory
 from services.arm.description import Arm
 from services.arm.interpolation import TrajectorySampler
+from services.planner.collision.clearance import first_collision
 from services.planner.core import Planner
-from services.planner.scene.clearance import first_collision
 from services.planner.timing.profile import joint_limits, straight_line
-from services.planner.verify.verify import BadTrajectory, require_ends, require_within_limits, sample
+from services.planner.verification.verify import BadTrajectory, require_ends, require_within_limits, sample
 
 START, GOAL = (0.0, 0.0, 0.0), (1.0, -0.5, 0.1)
 

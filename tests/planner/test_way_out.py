@@ -13,10 +13,10 @@ from schemas.joints import JointState
 from schemas.planning import NamedGoal, PlanCode, PlanRequest
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.cli.jog_commands import command_of
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.world import World
 from services.planner.core import Planner
 from services.planner.jog.jog import PERIOD
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.scene.world import World
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits
 from services.stepper_gateway.motion.target_tracker import Tracker

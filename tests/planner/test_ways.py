@@ -18,16 +18,16 @@ from schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest, PlanR
 from schemas.scene import MeshShape, PlanningScene, SceneObject
 from services.arm.description import load_arm
 from services.bench.plan_scenes import SCENES, box
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.native_scene import native_scene
+from services.planner.collision.world import World
 from services.planner.core import Planner
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.scene.world import World
-from services.planner.search.curve import spline_rows
-from services.planner.search.native_scene import native_scene
-from services.planner.search.search import KNOWN, Search
-from services.planner.search.way import Deadline, NoWay, Way
-from services.planner.times import Stopwatch
+from services.planner.path.curve import spline_rows
+from services.planner.path.path import NoWay, Way
+from services.planner.path.search import KNOWN, Search
+from services.planner.request.deadline import Deadline, Stopwatch
 from services.planner.timing.profile import joint_limits
-from services.planner.verify.verify import limit_shares, require_ends, sample
+from services.planner.verification.verify import limit_shares, require_ends, sample
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.scenes import star_mesh, stl_of
 
@@ -161,7 +161,7 @@ def narrow_postures(planner: Planner) -> Iterator[np.ndarray]:
     """Those that keep the clearance, though the spheres of the compiled core do not."""
     random, world = np.random.default_rng(5), planner.surroundings.begin()
     lower, upper = np.array([(joint.lower, joint.upper) for joint in planner.arm.joints]).T
-    core = planner.surroundings.core(CLEARANCE)
+    core = planner.surroundings.native(CLEARANCE)
     assert core is not None
     while True:
         rows = random.uniform(lower, upper, (500, len(lower)))
@@ -186,7 +186,7 @@ def test_an_arm_that_stands_at_the_very_margin_is_led_away_at_once(planner: Plan
     """So near, by the spheres, that none of the compiled core's lines may begin there."""
     show(planner, SCENES["cage"])
     planner.surroundings.begin()
-    core = planner.surroundings.core(CLEARANCE)
+    core = planner.surroundings.native(CLEARANCE)
     assert core is not None
     random = np.random.default_rng(2)
     lower, upper = np.array([(joint.lower, joint.upper) for joint in planner.arm.joints]).T

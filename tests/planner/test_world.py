@@ -22,8 +22,8 @@ from schemas.scene import (
 )
 from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics
-from services.planner.scene.scene_shapes import SceneError
-from services.planner.scene.world import World
+from services.planner.collision.scene_shapes import SceneError
+from services.planner.collision.world import World
 
 LINK_PAIR_MARGIN = 0.05  # [m]
 ROUNDING = 2e-6  # [m] coal's GJK stops at 1e-6, from where it stopped last

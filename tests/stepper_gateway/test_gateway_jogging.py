@@ -10,9 +10,9 @@ from schemas.device import DeviceMode
 from schemas.planning import JogCommand, JogStatus
 from schemas.topics import DEVICE_EVENTS, JOINT_STATES
 from services.arm.kinematics import Kinematics
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.world import World
 from services.planner.jog.jog import PERIOD, Jog
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.scene.world import World
 from tests.stepper_gateway.harness import Rig, assert_within_limits, move, rm1
 
 CALM = ("boot", "armed", "hold", "connected", "accepted", "started", "finished", "stopped")

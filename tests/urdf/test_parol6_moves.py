@@ -15,10 +15,11 @@ from schemas.joints import JointState
 from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
 from services.arm.description import Joint, load_arm
 from services.planner.core import Planner
-from services.planner.goals.ik import InverseKinematics, never
-from services.planner.goals.targets import Target
+from services.planner.kinematics.ik import InverseKinematics
+from services.planner.kinematics.targets import Target
+from services.planner.request.deadline import NEVER
 from services.planner.timing.profile import joint_limits
-from services.planner.verify.verify import require_within_limits, sample
+from services.planner.verification.verify import require_within_limits, sample
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")
 PLANNER = Planner(ARM)
@@ -82,7 +83,7 @@ def test_full_poses_all_over_the_limits_are_found_from_anywhere():
     missed = 0
     for goal, near in np.random.default_rng(3).uniform(lower, upper, (200, 2, 6)):
         pose = PLANNER.kinematics.tool(goal)
-        solution = next(inverse.solutions(Target(pose.position, pose.rotation), near, never), None)
+        solution = next(inverse.solutions(Target(pose.position, pose.rotation), near, NEVER), None)
         if solution is None:
             missed += 1
             continue

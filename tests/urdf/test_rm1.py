@@ -11,10 +11,10 @@ import trimesh
 
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
-from services.planner.covers.link_spheres import link_shapes
-from services.planner.covers.shapes import ShapeKind
-from services.planner.covers.solids import Box, Cylinder
-from services.planner.scene.clearance import CLEARANCE
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision_geometry.link_shapes import link_shapes
+from services.planner.collision_geometry.shapes import ShapeKind
+from services.planner.collision_geometry.solids import Box, Cylinder
 from tests.urdf.nearness import nearest_distances
 
 SEED = {

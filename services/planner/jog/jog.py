@@ -16,12 +16,11 @@ from schemas.joints import JointState, JointTargets
 from schemas.planning import JogCommand, JogLimit, JogStatus
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
+from services.planner.collision.world import World
 from services.planner.jog.braking import Braking
-from services.planner.jog.jog_command import BadJog, JogInterpreter, Wanted
+from services.planner.jog.jog_command import BadJog, JogInterpreter, JogRefused, Wanted, standing_position
 from services.planner.jog.jog_limits import no_command, singularity
-from services.planner.jog.jog_room import Room
-from services.planner.jog.jog_start import JogRefused, standing_position
-from services.planner.scene.world import World
+from services.planner.jog.velocity_limiter import Room
 
 Array = NDArray[np.float64]
 

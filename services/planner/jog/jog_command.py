@@ -7,11 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from schemas.joints import JointState
 from schemas.planning import JogCommand, JogLimit
+from services.arm.description import Arm
 from services.arm.errors import suggestion
 from services.arm.kinematics import Kinematics
 from services.planner.jog.jog_limits import no_command, singularity, speed_limit
 from services.planner.jog.twist import TwistSolver
+from services.planner.request.refusals import NoPlan
+from services.planner.request.start_state import resolve_start
 
 Array = NDArray[np.float64]
 
@@ -100,3 +104,15 @@ class JogInterpreter:
             return Wanted(velocity, scale, notes)
         limit = speed_limit(self._arm.joints[worst], float(velocity[worst]))
         return Wanted(velocity / most, scale / most, (*notes, limit))
+
+
+class JogRefused(ValueError):
+    """The arm cannot be jogged now; the text says why and what would do."""
+
+
+def standing_position(arm: Arm, present: JointState | None, age: float) -> tuple[float, ...]:
+    """[rad] or [m] in the arm's order, of an arm that stands; raises `JogRefused`."""
+    try:
+        return resolve_start(arm, None, present, age)
+    except NoPlan as no_plan:
+        raise JogRefused(f"{no_plan.refusal.message}; {no_plan.refusal.remedy}") from no_plan

@@ -7,7 +7,7 @@ import math
 from schemas.planning import JogLimit
 from services.arm.collisions import LinkPair
 from services.arm.description import Joint
-from services.planner.scene.clearance import CLEARANCE
+from services.planner.collision.clearance import CLEARANCE
 
 
 def collision(names: LinkPair, distance: float) -> JogLimit:

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.planning import JogLimit
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.world import World
 from services.planner.jog.braking import Braking
 from services.planner.jog.jog_limits import collision
 from services.planner.jog.nearness import Nearness, Pairs
-from services.planner.scene.clearance import CLEARANCE
-from services.planner.scene.world import World
 
 Array = NDArray[np.float64]
 

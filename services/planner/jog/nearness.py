@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.collisions import LinkPair
-from services.planner.scene.world import World
+from services.planner.collision.world import World
 
 Array = NDArray[np.float64]
 Pairs = NDArray[np.int_]

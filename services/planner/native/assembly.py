@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.description import Arm
-from services.planner.covers.link_spheres import cover_shapes, link_shapes
-from services.planner.covers.shapes import Attachment, Shape
-from services.planner.covers.spheres import BULGE, Cover
-from services.planner.native.chain import frames_of
-from services.planner.native.library import motion
-from services.planner.native.obstacles import obstacle_of
+from services.planner.collision_geometry.link_shapes import link_shapes
+from services.planner.collision_geometry.shapes import Attachment, Mesh, Shape, ShapeKind
+from services.planner.native.binding import motion
+from services.planner.native.chain import frames_of, transform_row
+from services.planner.native.sphere_cover import BULGE, Cover, cover_shapes
 
 Array = NDArray[np.float64]
 
@@ -135,3 +135,35 @@ def _bulge(shapes: Sequence[Shape]) -> float:
     longest = [max(shape.size, default=0.0) for shape in shapes]
     longest += [float(np.ptp(shape.mesh.vertices, axis=0).max()) for shape in shapes if shape.mesh is not None]
     return max(BULGE, ATTACHED_SHARE * max(longest, default=0.0))
+
+
+def obstacle_of(shape: Shape, pose: Array, padding: float = 0.0, touching: int = 0) -> motion.Obstacle:
+    """The shape at `pose` (4, 4), larger by `padding` [m]; `touching` has a bit for every part that may touch it."""
+    number, size, radius = _form(shape)
+    compiled = None if shape.mesh is None else _compiled(shape.mesh)
+    around = radius + shape.padding + padding
+    return motion.obstacle(number, transform_row(pose), np.array(size), around, touching, compiled)
+
+
+@lru_cache(maxsize=64)
+def _compiled(mesh: Mesh) -> motion.Mesh:
+    """Built once for as long as it is among the newest: the costly part of a mesh."""
+    return motion.mesh(*mesh.arrays)
+
+
+def _form(shape: Shape) -> tuple[int, tuple[float, float, float], float]:
+    """Number, size and radius as views.h has them: what is round is a point, a line or a box with a radius."""
+    size = shape.size
+    match shape.kind:
+        case ShapeKind.BOX:
+            return 0, (0.5 * size[0], 0.5 * size[1], 0.5 * size[2]), 0.0
+        case ShapeKind.SPHERE:
+            return 0, (0.0, 0.0, 0.0), size[0]
+        case ShapeKind.CAPSULE:
+            return 0, (0.0, 0.0, 0.5 * size[1]), size[0]
+        case ShapeKind.CYLINDER:
+            return 1, (size[0], 0.0, 0.5 * size[1]), 0.0
+        case ShapeKind.HALF_SPACE:
+            return 2, (0.0, 0.0, 0.0), 0.0
+        case ShapeKind.MESH:
+            return 3, (0.0, 0.0, 0.0), 0.0

@@ -18,7 +18,7 @@ fi
 nanobind=$(ask 'import nanobind; print(nanobind.source_dir())')
 stamp="$compiler $headers $nanobind"
 if [ -f "$library" ] && [ "$(cat "$build/stamp" 2>/dev/null)" = "$stamp" ] && \
-        [ -z "$(find "$here" -maxdepth 1 \( -name '*.cpp' -o -name '*.h' -o -name build.sh \) -newer "$library" -print | head -n 1)" ]; then
+        [ -z "$(find "$here/src" "$here/build.sh" -type f -newer "$library" -print | head -n 1)" ]; then
     echo "motion core: up to date"
     exit 0
 fi
@@ -36,13 +36,13 @@ warnings="-Wall -Wextra -Wconversion -Wshadow ${CI:+-Werror}"
 system="-isystem $nanobind/../include -isystem $nanobind/../ext/robin_map/include -isystem $headers"
 objects="$build/nanobind.o $build/module.o $build/vector.o $build/plain.o"
 
-$compiler $common $exact $warnings -c "$here/kernel.cpp" -o "$build/vector.o"
-$compiler $common $exact $warnings -fno-tree-vectorize -DGEMELO_PLAIN_LANES -c "$here/kernel.cpp" -o "$build/plain.o"
+$compiler $common $exact $warnings -c "$here/src/kernel.cpp" -o "$build/vector.o"
+$compiler $common $exact $warnings -fno-tree-vectorize -DGEMELO_PLAIN_LANES -c "$here/src/kernel.cpp" -o "$build/plain.o"
 if $compiler -dM -E -x c++ /dev/null | grep -q __x86_64__; then
-    $compiler $common $exact $warnings -mavx2 -c "$here/kernel.cpp" -o "$build/avx2.o"
+    $compiler $common $exact $warnings -mavx2 -c "$here/src/kernel.cpp" -o "$build/avx2.o"
     objects="$objects $build/avx2.o"
 fi
-$compiler $common -O3 -ffp-contract=off $warnings $system -c "$here/module.cpp" -o "$build/module.o"
+$compiler $common -O3 -ffp-contract=off $warnings $system -c "$here/src/module.cpp" -o "$build/module.o"
 [ "$(cat "$build/nanobind.stamp" 2>/dev/null)" = "$stamp" ] && [ -f "$build/nanobind.o" ] || {
     $compiler $common -Os -w -fno-strict-aliasing $system -c "$nanobind/nb_combined.cpp" -o "$build/nanobind.o"
     printf '%s\n' "$stamp" >"$build/nanobind.stamp"

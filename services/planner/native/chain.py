@@ -11,7 +11,7 @@ from services.arm.chain import origin_of
 from services.arm.description import Arm
 from services.arm.errors import DescriptionError
 from services.arm.urdf import JointKind, UrdfJoint
-from services.planner.covers.shapes import matrix_of
+from services.planner.collision_geometry.shapes import matrix_of
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import msgspec
 from schemas.scene import AllowedPair, PlaneShape, PlanningScene, SceneObject
 from services.arm.description import Arm
 from services.arm.errors import suggestion
-from services.planner.scene.scene_shapes import ANY, Folders, SceneError, shape_of
+from services.planner.collision.scene_shapes import ANY, Folders, SceneError, shape_of
 
 LONGEST_NAME = 64
 MOST_OBJECTS = 1000

@@ -11,8 +11,8 @@ from schemas.scene import AllowedPair, PlanningScene, SceneAction, SceneObject, 
 from services.arm.description import Arm
 from services.arm.errors import suggestion
 from services.arm.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
+from services.planner.collision.scene_shapes import SceneError, pose_of
 from services.planner.scene.scene_check import require_link
-from services.planner.scene.scene_shapes import SceneError, pose_of
 
 LinkPoses = Callable[
     [], Mapping[str, Transform] | None

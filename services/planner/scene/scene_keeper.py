@@ -15,13 +15,13 @@ from schemas.scene import Contacts, PlanningScene, SceneRequest, SceneResponse
 from schemas.topics import CONTACTS, SCENE, SCENE_EDIT
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
-from services.planner.scene.clearance import CLEARANCE, ROUNDING
+from services.planner.collision.clearance import CLEARANCE, ROUNDING
+from services.planner.collision.scene_shapes import SceneError
+from services.planner.collision.world import World
+from services.planner.request.start_state import STALE_AFTER
 from services.planner.scene.scene_check import usable_part
 from services.planner.scene.scene_file import FILE, DamagedScene, load_scene, put_aside, save_scene
-from services.planner.scene.scene_shapes import SceneError
 from services.planner.scene.scene_store import SceneStore, drawn_epoch
-from services.planner.scene.world import World
-from services.planner.start import STALE_AFTER
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.runtime.topics import Latest

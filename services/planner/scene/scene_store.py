@@ -11,9 +11,9 @@ import msgspec
 
 from schemas.scene import PlanningScene, SceneRequest, SceneResponse
 from services.arm.description import Arm
+from services.planner.collision.scene_shapes import Folders, SceneError
 from services.planner.scene.scene_check import require_scene
 from services.planner.scene.scene_edit import LinkPoses, edited
-from services.planner.scene.scene_shapes import Folders, SceneError
 
 
 class SceneStore:

@@ -7,7 +7,6 @@ q_s s''' (Biagiotti and Melchiorri 2008, section 9.1). Between stretches the spe
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -17,14 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.planning import Timing
+from services.planner.path.path_curve import PathCurve
+from services.planner.request.deadline import Deadline
 from services.planner.timing.profile import JointLimits, NoProfile, require_short
 from services.planner.timing.sections import Section
 from services.planner.timing.time_law import TimeLaw
+from services.planner.timing.time_optimal import time_optimal_law
 from services.planner.timing.timing import stretches_through
-from services.planner.tool.path_curve import PathCurve
 
 Array = NDArray[np.float64]
-Heed = Callable[[], None]  # raises where the time is up
 
 NEAR = 1e-4  # share of the length: marks that are nearer to one another are one
 ASIDE = 1e-6  # share of the length from a mark at which the way is that of one side
@@ -80,17 +80,15 @@ class Demand:
 
 
 def law_along(
-    curve: PathCurve, limits: JointLimits, tool: tuple[float, float], marks: Array, timing: Timing, heed: Heed
+    curve: PathCurve, limits: JointLimits, tool: tuple[float, float], marks: Array, timing: Timing, deadline: Deadline
 ) -> Law:
     """Of the kind that was asked for; `tool` is its speed [m/s] and acceleration [m/s^2], 0 for no limit.
 
-    Its position is in the columns behind the joints; raises `NoProfile`, and what `heed` raises.
+    Its position is in the columns behind the joints; raises `NoProfile`, and `NoPlan` once the deadline has passed.
     """
     if timing is Timing.JERK_LIMITED:
-        return time_law(demand_of(curve, limits, tool, marks), heed)
-    from services.planner.timing.time_optimal import time_optimal_law
-
-    heed()
+        return time_law(demand_of(curve, limits, tool, marks), deadline)
+    deadline.check()
     return time_optimal_law(curve, limits, tool)
 
 
@@ -117,7 +115,7 @@ def demand_of(curve: PathCurve, limits: JointLimits, tool: tuple[float, float], 
     )
 
 
-def time_law(demand: Demand, heed: Heed) -> TimeLaw:
+def time_law(demand: Demand, deadline: Deadline) -> TimeLaw:
     """The fastest of several divisions into stretches; raises `NoProfile`."""
     whole, *finer = _divisions(demand)
     tries = [(edges, share) for edges in reversed(finer) for share in SHARES[:2]]
@@ -125,7 +123,7 @@ def time_law(demand: Demand, heed: Heed) -> TimeLaw:
     best: TimeLaw | None = None
     why = NoProfile(f"no jerk-limited profile for a way of {float(demand.along[-1]):.3g}")
     for edges, share in tries:
-        heed()
+        deadline.check()
         try:
             if best is None or demand.least_duration(edges) < share * best.duration:
                 law = TimeLaw(stretches_through(_sections(demand, edges, share)))

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.search.curve import Curve
+from services.planner.path.curve import Curve
 from services.planner.timing.profile import JointLimits
 
 Array = NDArray[np.float64]

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory
-from services.planner.search.curve import Curve
+from services.planner.path.curve import Curve
+from services.planner.path.path_curve import PathCurve
 from services.planner.timing.profile import JointLimits
-from services.planner.timing.speeds import optimal_speeds
 from services.planner.timing.timing import States, along_runs, states_along
-from services.planner.tool.path_curve import PathCurve
+from services.planner.timing.toppra_speeds import optimal_speeds
 
 Array = NDArray[np.float64]
 

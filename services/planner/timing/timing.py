@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ruckig import InputParameter, Trajectory
 
 from schemas.motion import JointTrajectory, TrajectoryPoint
-from services.planner.search.curve import Curve, smooth_runs
+from services.planner.path.curve import Curve, smooth_runs
 from services.planner.timing.peaks import peak_shares
 from services.planner.timing.profile import (
     MARGIN,

@@ -15,11 +15,11 @@ from typing import IO
 
 from schemas.planning import PlanPhase, PlanResponse, Refusal, Timing
 from services.arm.description import load_arm
+from services.planner.collision.sphere_check import cancel_flag
+from services.planner.collision.world import World
 from services.planner.core import Planner
-from services.planner.scene.world import World
-from services.planner.search.native_search import cancel_flag
-from services.planner.times import Stopwatch
-from services.planner.timing.speeds import load_toppra
+from services.planner.request.deadline import Stopwatch
+from services.planner.timing.toppra_speeds import load_toppra
 from services.planner.workers.jobs import (
     ORDERS,
     Ask,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from services.arm.configuration import Configuration
 from services.arm.description import Arm
-from services.planner.covers.shapes import Shape, ShapeKind
+from services.planner.collision_geometry.shapes import Shape, ShapeKind
 
 Array = NDArray[np.float64]
 

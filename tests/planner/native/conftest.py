@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from services.arm.description import Arm, load_arm
-from services.planner.native import MotionCore
+from services.planner.native.native_planner import NativePlanner
 
 ARMS = ("rm1", "parol6")
 
@@ -27,9 +27,9 @@ def arm(request: pytest.FixtureRequest) -> Arm:
 
 
 @pytest.fixture
-def core(arm: Arm) -> MotionCore:
+def core(arm: Arm) -> NativePlanner:
     """A core of its own for each test, which may change its scene."""
-    return MotionCore(arm)
+    return NativePlanner(arm)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.transforms import Rigid
-from services.planner.covers.shapes import Mesh, Shape, ShapeKind
+from services.planner.collision_geometry.shapes import Mesh, Shape, ShapeKind
 
 Array = NDArray[np.float64]
 REACH = 0.5  # [m] of both arms, about

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from services.planner.native import MotionCore, Shape, ShapeKind
-from services.planner.native.library import motion
+from services.planner.collision_geometry.shapes import Shape, ShapeKind
+from services.planner.native.binding import motion
+from services.planner.native.native_planner import NativePlanner
 from tests.planner.native.conftest import load
 
 STUB = Path(motion.__file__).with_name("_motion.pyi")
@@ -18,7 +19,7 @@ WITHOUT = """
 import sys
 sys.modules["services.planner.native._motion"] = None
 try:
-    import services.planner.native
+    import services.planner.native.binding
 except ImportError as error:
     print(type(error).__name__, error)
 """
@@ -39,7 +40,7 @@ def test_without_the_compiled_module_the_remedy_is_said():
 
 
 def test_two_hundred_obstacles_are_no_more_than_the_same_asked_one_by_one():
-    core = MotionCore(load("parol6"))
+    core = NativePlanner(load("parol6"))
     rng = np.random.default_rng(2)
     angles, radii, heights = rng.uniform([0.0, 0.25, 0.0], [6.28, 0.6, 0.6], (200, 3)).T
     places = np.column_stack((radii * np.cos(angles), radii * np.sin(angles), heights)).tolist()

@@ -10,9 +10,9 @@ import pinocchio as pin
 import pytest
 
 from services.arm.kinematics import Kinematics
-from services.planner.covers.shapes import ShapeKind
-from services.planner.native import MotionCore
-from services.planner.native.library import motion
+from services.planner.collision_geometry.shapes import ShapeKind
+from services.planner.native.binding import motion
+from services.planner.native.native_planner import NativePlanner
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import random_shape
 
@@ -44,7 +44,7 @@ def test_angles_of_many_turns_lose_little(arm, core):
 
 @pytest.mark.parametrize("name", [name for name in motion.kernel_names() if name != "plain"])
 def test_every_build_gives_the_same_bits_as_the_plain_one(name, arm, postures):
-    fast, plain = MotionCore(arm, kernel=name), MotionCore(arm, kernel="plain")
+    fast, plain = NativePlanner(arm, kernel=name), NativePlanner(arm, kernel="plain")
     rows = postures(4003, 2)  # the last lanes are not all used
     assert np.array_equal(fast.sphere_centres(rows[:200]), plain.sphere_centres(rows[:200]))
     rng = np.random.default_rng(3)
@@ -77,4 +77,4 @@ def test_no_function_built_for_one_processor_can_be_linked_into_the_others():
 
 def test_a_kernel_that_is_not_there_is_named_with_those_that_are():
     with pytest.raises(ValueError, match=r'no kernel "avx9" on this processor, only .*plain'):
-        MotionCore(load("rm1"), kernel="avx9")
+        NativePlanner(load("rm1"), kernel="avx9")

@@ -9,7 +9,10 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from services.planner.native import CancelFlag, FreePath, MotionCore, NoPath, Shape, ShapeKind, Why
+from services.planner.collision_geometry.shapes import Shape, ShapeKind
+from services.planner.native.binding import CancelFlag
+from services.planner.native.native_planner import NativePlanner
+from services.planner.native.paths import FreePath, NoPath, Why
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.conftest import load
 
@@ -84,7 +87,7 @@ def test_the_same_seed_gives_the_same_path_and_another_seed_another(core, postur
     assert not np.array_equal(once.control, other.control)
 
 
-def _bent(core: MotionCore, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _bent(core: NativePlanner, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The first two neighbouring free rows that no straight line joins, but a path does."""
     for start, goal in pairwise(rows[core.free(rows)]):
         path = core.plan(start, goal, seed=7, time_limit=0.5)
@@ -96,7 +99,7 @@ def _bent(core: MotionCore, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def test_every_build_of_the_check_finds_the_same_path(arm, postures):
     paths = []
     for kernel in ("plain", "vector", ""):
-        core = MotionCore(arm, kernel=kernel)
+        core = NativePlanner(arm, kernel=kernel)
         core.set_scene(SHELF)
         rows = postures(60, 4)
         rows = rows[core.free(rows)]
@@ -110,7 +113,7 @@ def test_every_build_of_the_check_finds_the_same_path(arm, postures):
 
 
 def test_any_of_several_goals_will_do():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     core.set_scene([crate("crate", (0.1, 0.1, 0.3), (0.4, 0.0, 0.15))])
     inside, outside = [0.0, 0.0, 0.1], [1.0, 0.5, 0.1]
     path = core.plan([-1.0, 0.0, 0.1], [inside, outside], seed=1, time_limit=5.0)
@@ -119,16 +122,16 @@ def test_any_of_several_goals_will_do():
 
 
 def test_a_start_and_a_goal_that_touch_are_told_apart():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     core.set_scene([crate("crate", (0.1, 0.1, 0.3), (0.4, 0.0, 0.15))])
     inside, outside = [0.0, 0.0, 0.1], [1.0, 0.5, 0.1]
     assert core.plan(inside, outside).why is Why.START_TOUCHES
     assert core.plan(outside, inside).why is Why.GOAL_TOUCHES
 
 
-def walled() -> tuple[MotionCore, list[float], list[float]]:
+def walled() -> tuple[NativePlanner, list[float], list[float]]:
     """A goal behind a wall that rm1 cannot get around: the search never ends by itself."""
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     sheet = (1.0, 0.02, 1.0)
     core.set_scene([crate("wall", sheet, (0.6, 0.0, 0.5)), crate("rear", sheet, (-0.6, 0.0, 0.5))])
     return core, [1.2, 0.0, 0.1], [-1.2, 0.0, 0.1]
@@ -162,7 +165,7 @@ def test_another_thread_can_end_a_search_and_do_other_things_meanwhile():
 
 def test_a_search_that_finds_nothing_had_nothing_to_find():
     """Against a flood over a grid of postures, which may squeeze through where the search may not."""
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     rng = np.random.default_rng(5)
     counts = (41, 41, 5)
     axes = [np.linspace(joint.lower, joint.upper, n) for joint, n in zip(core.arm.joints, counts, strict=True)]
@@ -183,7 +186,7 @@ def test_a_search_that_finds_nothing_had_nothing_to_find():
     assert solved > 5
 
 
-def _flood(core: MotionCore, grid: np.ndarray, free: np.ndarray, start: tuple[int, ...]) -> set[tuple[int, ...]]:
+def _flood(core: NativePlanner, grid: np.ndarray, free: np.ndarray, start: tuple[int, ...]) -> set[tuple[int, ...]]:
     """The cells that can be reached from one to the next along free lines."""
     reached, waiting = {start}, [start]
     while waiting:
@@ -199,7 +202,7 @@ def _flood(core: MotionCore, grid: np.ndarray, free: np.ndarray, start: tuple[in
 
 
 def test_a_plan_of_nonsense_is_refused():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     with pytest.raises(ValueError, match="is not within 100 rad or m of 0"):
         core.plan([0.0, 0.0, 0.1], [0.0, float("nan"), 0.1])
     with pytest.raises(ValueError, match=r"\(3,\)"):
@@ -209,7 +212,7 @@ def test_a_plan_of_nonsense_is_refused():
 
 
 def test_an_arm_that_stands_close_to_something_gets_away_from_it():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     start, goal = [0.3, 0.2, 0.05], [-1.5, 0.4, 0.15]
     tables = (Shape("table", ShapeKind.HALF_SPACE, (), ((0.0, 0.0, z), UPRIGHT)) for z in np.arange(0.0, 0.06, 0.0002))
     for table in tables:

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from services.planner.native import Attachment, Contact, Mesh, MotionCore, Shape, ShapeKind
+from services.planner.collision_geometry.shapes import Attachment, Mesh, Shape, ShapeKind
+from services.planner.native.native_planner import Contact, NativePlanner
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import box_mesh, random_shape
@@ -52,7 +53,7 @@ def test_the_distance_is_never_more_than_the_true_one_and_never_much_less(arm, c
 
 
 def test_a_contact_bears_the_names_of_both():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     core.set_scene([Shape("far", ShapeKind.SPHERE, (0.01,), ((2.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)))])
     home = [0.0, 0.0, 0.1]
     assert core.first_contact(home) is None
@@ -65,7 +66,7 @@ def test_a_contact_bears_the_names_of_both():
 
 
 def test_the_nearest_is_named_before_it_is_touched():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     core.set_scene([Shape("post", ShapeKind.CYLINDER, (0.02, 0.5), ((0.5, 0.0, 0.25), (0.0, 0.0, 0.0, 1.0)))])
     home = [0.0, 0.0, 0.1]
     assert core.nearest(home) == Contact("efector_link", "post")
@@ -73,7 +74,7 @@ def test_the_nearest_is_named_before_it_is_touched():
 
 
 def test_an_obstacle_may_be_touched_by_the_links_it_names():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     place = ((0.4, 0.0, 0.1), (0.0, 0.0, 0.0, 1.0))
     home = [[0.0, 0.0, 0.1]]
     core.set_scene([Shape("crate", ShapeKind.BOX, (0.05, 0.05, 0.05), place)])
@@ -83,7 +84,7 @@ def test_an_obstacle_may_be_touched_by_the_links_it_names():
 
 
 def test_padding_keeps_the_arm_farther_away():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     home = [[0.0, 0.0, 0.1]]
     place = ((0.5, 0.0, 0.2), (0.0, 0.0, 0.0, 1.0))
     core.set_scene([Shape("ball", ShapeKind.SPHERE, (0.05,), place)])
@@ -93,7 +94,7 @@ def test_padding_keeps_the_arm_farther_away():
 
 
 def test_the_inside_of_a_closed_mesh_is_solid_and_that_of_an_open_one_is_not():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     room = box_mesh(np.random.default_rng(0))
     room = Mesh(room.vertices / np.abs(room.vertices).max(axis=0), room.faces)  # 2 m wide: all of the arm is in it
     middle = ((0.0, 0.0, 0.2), (0.0, 0.0, 0.0, 1.0))
@@ -105,7 +106,7 @@ def test_the_inside_of_a_closed_mesh_is_solid_and_that_of_an_open_one_is_not():
 
 
 def test_a_held_box_is_part_of_the_arm():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     wall = Shape("wall", ShapeKind.BOX, (0.02, 1.0, 1.0), ((0.48, 0.0, 0.2), (0.0, 0.0, 0.0, 1.0)))
     core.set_scene([wall])
     home = [[0.0, 0.0, 0.15]]
@@ -121,14 +122,14 @@ def test_a_held_box_is_part_of_the_arm():
 
 
 def test_a_held_box_must_not_touch_the_arm_that_holds_it():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     beam = Shape("beam", ShapeKind.BOX, (0.4, 0.03, 0.03), ((-0.2, 0.0, -0.16), (0.0, 0.0, 0.0, 1.0)))
     core.attach(Attachment("beam", "efector_link", (beam,), frozenset()))
     assert core.first_contact([0.0, 0.0, 0.0]) is not None
 
 
 def test_padding_and_touching_and_names_are_checked():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     ball = Shape("ball", ShapeKind.SPHERE, (0.05,))
     with pytest.raises(ValueError, match=r'"ball" twice'):
         core.set_scene([ball, ball])
@@ -147,14 +148,14 @@ def test_padding_and_touching_and_names_are_checked():
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e9])
 def test_joint_values_that_nobody_can_mean_are_refused(bad):
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     for ask in (lambda q: core.free([q]), core.distance, core.first_contact, lambda q: core.edge_free(q, q)):
         with pytest.raises(ValueError, match=r"is not within 100 rad or m of 0"):
             ask([0.0, bad, 0.0])
 
 
 def test_wrong_shapes_of_arrays_are_refused():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     with pytest.raises(ValueError, match=r"3 columns, not 4"):
         core.free(np.zeros((2, 4)))
     with pytest.raises(ValueError, match=r"\(rows, 3\)"):
@@ -167,7 +168,7 @@ def test_wrong_shapes_of_arrays_are_refused():
 def test_a_mesh_of_a_hundred_thousand_triangles_is_built_and_asked():
     from tests.planner.native.scenes import star_mesh
 
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     mesh = star_mesh(np.random.default_rng(1), rings=224, sectors=224)
     assert len(mesh.faces) > 99_000
     core.set_scene([Shape("rock", ShapeKind.MESH, (), ((0.3, 0.1, 0.1), (0.0, 0.0, 0.0, 1.0)), mesh)])

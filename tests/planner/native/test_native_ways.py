@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from services.planner.native import FreePath, MotionCore, Shape, ShapeKind
-from services.planner.native.paths import Effort
+from services.planner.collision_geometry.shapes import Shape, ShapeKind
+from services.planner.native.native_planner import NativePlanner
+from services.planner.native.paths import Effort, FreePath
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import random_shape
@@ -71,8 +72,8 @@ def test_what_is_not_in_doubt_is_free_by_coal_too(arm, core, postures):
     truth, wholly = Truth(arm, scene), 0
     for corners in postures(90, 50).reshape(30, 3, -1):
         rows = corners[0] + 0.3 * (corners - corners[0])
-        doubts = core.doubts(rows)
-        assert (len(doubts) == 0) == core.way_free(rows)
+        doubts = core.unresolved_intervals(rows)
+        assert (len(doubts) == 0) == core.path_free(rows)
         assert (doubts[:, 0] < doubts[:, 1]).all()
         assert (doubts[:-1, 1] < doubts[1:, 0]).all()
         wholly += len(doubts) == 0
@@ -86,7 +87,7 @@ def test_what_is_not_in_doubt_is_free_by_coal_too(arm, core, postures):
 
 @pytest.mark.parametrize("thickness", [0.02, 0.002, 0.0002, 0.00002])
 def test_the_thinnest_sheet_is_not_tunnelled_through(thickness):
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     sheet = Shape("sheet", ShapeKind.BOX, (0.5, thickness, 0.5), ((0.35, 0.0, 0.25), UPRIGHT))
     core.set_scene([sheet])
     left, right = [1.0, 0.0, 0.1], [-1.0, 0.0, 0.1]
@@ -95,7 +96,7 @@ def test_the_thinnest_sheet_is_not_tunnelled_through(thickness):
 
 
 def test_a_thin_wire_is_not_tunnelled_through_from_any_side():
-    core = MotionCore(load("parol6"))
+    core = NativePlanner(load("parol6"))
     rng = np.random.default_rng(3)
     for _ in range(20):
         place = rng.uniform([0.15, -0.3, 0.1], [0.35, 0.3, 0.4]).tolist()
@@ -124,11 +125,11 @@ def test_a_polyline_is_free_where_all_its_lines_are(core, postures):
     for start in range(0, len(rows) - 3, 3):
         some = rows[start : start + 3]
         both = core.edge_free(some[0], some[1]) and core.edge_free(some[1], some[2])
-        assert core.way_free(some) == both
+        assert core.path_free(some) == both
 
 
 def test_a_curve_is_looked_at_where_it_goes():
-    core = MotionCore(load("rm1"))
+    core = NativePlanner(load("rm1"))
     post = Shape("post", ShapeKind.CYLINDER, (0.01, 0.5), ((0.4, 0.0, 0.25), UPRIGHT))
     core.set_scene([post])
     left, right, folded = [1.0, 0.0, 0.1], [-1.0, 0.0, 0.1], [0.0, 2.6, 0.1]

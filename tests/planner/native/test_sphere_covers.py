@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.planner.covers.link_spheres import cover_shapes, link_shapes
-from services.planner.covers.shapes import Shape, ShapeKind
-from services.planner.covers.solids import Box, Capsule, Cylinder, Solid
-from services.planner.covers.spheres import cover_of, mesh_cover
+from services.planner.collision_geometry.link_shapes import link_shapes
+from services.planner.collision_geometry.shapes import Shape, ShapeKind
+from services.planner.collision_geometry.solids import Box, Capsule, Cylinder, Solid
+from services.planner.native.sphere_cover import cover_of, cover_shapes, mesh_cover
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import star_mesh
 

@@ -1,0 +1,92 @@
+"""Fitted shapes as elements of a URDF, written into it in place of what is there, and held against the meshes again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from services.arm.description import Arm, load_arm
+from services.arm.errors import DescriptionError
+from services.arm.kinematics import Kinematics
+from services.arm.urdf import Triple
+from services.arm.urdf_edit import with_collisions
+from services.collision_fitting.fitted_shape import Fitted
+from services.collision_fitting.mesh_fit import LinkFit, depths
+from services.planner.collision_geometry.link_shapes import link_shapes
+from services.planner.collision_geometry.shapes import Shape, ShapeKind
+
+OUTSIDE = 1e-6  # [m] that a corner may be outside the shapes as they are loaded again: a rounding
+
+
+def elements_of(fitted: Fitted) -> list[str]:
+    """As <collision> elements; URDF knows no capsule, so that it and a plate are three."""
+    return [_element(shape, fitted.origin.rpy) for shape in fitted.shapes]
+
+
+def _element(shape: Shape, rpy: Triple) -> str:
+    origin = f'<origin xyz="{_words(shape.pose[0])}" rpy="{_words(rpy)}"/>'
+    return f"<collision>\n  {origin}\n  <geometry>{_geometry(shape)}</geometry>\n</collision>"
+
+
+def _geometry(shape: Shape) -> str:
+    match shape.kind:
+        case ShapeKind.BOX:
+            return f'<box size="{_words(shape.size)}"/>'
+        case ShapeKind.CYLINDER:
+            return f'<cylinder radius="{_words(shape.size[:1])}" length="{_words(shape.size[1:])}"/>'
+    return f'<sphere radius="{_words(shape.size)}"/>'
+
+
+def _words(values: Sequence[float]) -> str:
+    return " ".join(f"{round(value, 9) + 0.0:.9g}" for value in values)
+
+
+def write_fits(arm: Arm, fits: Sequence[LinkFit]) -> Arm:
+    """Puts the shapes into the URDF in place of those that the links have, and returns the arm, loaded again.
+
+    Raises `DescriptionError` where not every shape is there then or a corner of a mesh is outside them, and the file is
+    as it was. Raises OSError where it cannot be read or written.
+    """
+    wanted = {fit.link: [element for shape in fit.shapes for element in elements_of(shape)] for fit in fits}
+    before = arm.urdf_path.read_bytes()
+    try:
+        after = with_collisions(before.decode("utf-8"), wanted).encode("utf-8")
+    except ValueError as error:
+        raise DescriptionError(f"{arm.urdf_path} cannot be edited: {error}") from error
+    arm.urdf_path.write_bytes(after)
+    try:
+        changed = load_arm(arm.folder)
+        _require_there(changed, fits, wanted)
+    except ValueError:
+        arm.urdf_path.write_bytes(before)
+        raise
+    return changed
+
+
+def touching_states(arm: Arm) -> list[str]:
+    """The named states in which two links touch that are no neighbours, in words: shapes hold more than meshes do."""
+    own = Kinematics(arm).collisions
+    neighbours = {frozenset((joint.parent, joint.child)) for joint in arm.model.joints}
+    return [
+        f'in the state "{state}" {" and ".join(pair)} touch'
+        for state, posture in arm.named_states.items()
+        for pair in own.pairs_within(posture)
+        if frozenset(pair) not in neighbours
+    ]
+
+
+def _require_there(arm: Arm, fits: Sequence[LinkFit], wanted: dict[str, list[str]]) -> None:
+    loaded = link_shapes(arm)
+    for fit in fits:
+        shapes = loaded.get(fit.link, ())
+        if len(shapes) != len(wanted[fit.link]):
+            raise DescriptionError(
+                f'{arm.urdf_path}: link "{fit.link}" has {len(shapes)} collision shapes once it is loaded, not '
+                f"{len(wanted[fit.link])}"
+            )
+        deepest = np.max([depths(shape, fit.mesh.vertices) for shape in shapes], axis=0)
+        if deepest.min() < -OUTSIDE:
+            raise DescriptionError(
+                f'{arm.urdf_path}: link "{fit.link}" sticks {-1000.0 * deepest.min():.3g} mm out of its shapes'
+            )

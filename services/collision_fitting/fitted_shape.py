@@ -1,0 +1,63 @@
+"""A shape that was fitted to points, and the one or three that a URDF has for it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from services.arm.transforms import compose, from_rpy
+from services.arm.urdf import Origin, Triple
+from services.planner.collision_geometry.shapes import Shape, ShapeKind
+
+
+class Kind(StrEnum):
+    """And what `Fitted.size` means for each, in m; along z."""
+
+    BOX = "box"  # x, y, z: whole lengths of the edges
+    SPHERE = "sphere"  # radius
+    CYLINDER = "cylinder"  # radius, length
+    CAPSULE = "capsule"  # radius, length of the straight part
+    PLATE = "plate with round ends"  # radius of the ends, distance of their middles along x, thickness
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What holds all its points."""
+
+    kind: Kind
+    size: tuple[float, ...]
+    origin: Origin  # in the link
+
+    @property
+    def volume(self) -> float:
+        """[m^3]."""
+        match self.kind, self.size:
+            case Kind.BOX, (x, y, z):
+                return x * y * z
+            case Kind.CYLINDER, (radius, length):
+                return math.pi * radius**2 * length
+            case Kind.CAPSULE, (radius, length):
+                return math.pi * radius**2 * (length + 4.0 / 3.0 * radius)
+            case Kind.PLATE, (radius, length, thickness):
+                return (math.pi * radius + 2.0 * length) * radius * thickness
+        return 4.0 / 3.0 * math.pi * self.size[0] ** 3
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """It in the link's frame, as what a URDF knows: a capsule and a plate are three."""
+        match self.kind, self.size:
+            case Kind.CAPSULE, (radius, length):
+                balls = (self._shape(ShapeKind.SPHERE, (radius,), (0.0, 0.0, side * length)) for side in (-0.5, 0.5))
+                return self._shape(ShapeKind.CYLINDER, (radius, length)), *balls
+            case Kind.PLATE, (radius, length, thickness):
+                ends = (
+                    self._shape(ShapeKind.CYLINDER, (radius, thickness), (side * length, 0.0, 0.0))
+                    for side in (-0.5, 0.5)
+                )
+                return self._shape(ShapeKind.BOX, (length, 2.0 * radius, thickness)), *ends
+        return (self._shape(ShapeKind(self.kind), self.size),)
+
+    def _shape(self, kind: ShapeKind, size: tuple[float, ...], at: Triple = (0.0, 0.0, 0.0)) -> Shape:
+        turn = from_rpy(*self.origin.rpy)
+        return Shape(str(kind), kind, size, compose((self.origin.xyz, turn), (at, (0.0, 0.0, 0.0, 1.0))))

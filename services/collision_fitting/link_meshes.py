@@ -1,0 +1,78 @@
+"""What a link looks like, as one mesh in the link's frame: read by trimesh, and refused where it cannot be a link."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.errors import DescriptionError
+from services.arm.transforms import from_rpy
+from services.arm.urdf import Geometry, UrdfLink
+from services.planner.collision_geometry.shapes import Mesh, matrix_of
+
+Array = NDArray[np.float64]
+
+SMALLEST, LARGEST = 0.002, 3.0  # [m] along its longest side; what is beyond is in another unit
+FLAT = 1e-3  # thickness as a share of the longest side below which a mesh is no solid
+MOST_TRIANGLES = 500_000
+
+
+def visual_mesh(link: UrdfLink, folder: Path) -> Mesh | None:
+    """All visual meshes of a link in its frame [m], None where it has none; raises `DescriptionError` with the file."""
+    found = [_placed(visual, link.name, folder) for visual in link.visuals if visual.mesh is not None]
+    if not found:
+        return None
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in found)])
+    faces = np.vstack([mesh.faces + start for mesh, start in zip(found, starts[:-1], strict=True)])
+    return Mesh(np.vstack([mesh.vertices for mesh in found]), faces.astype(np.int32))
+
+
+def _placed(visual: Geometry, link: str, folder: Path) -> Mesh:
+    assert visual.mesh is not None
+    if visual.mesh.startswith("package://"):
+        raise DescriptionError(
+            f'link "{link}": mesh "{visual.mesh}" is a ROS package path: write one relative to {folder}'
+        )
+    path = folder / visual.mesh.removeprefix("file://")
+    where = f'link "{link}": mesh {path}'
+    mesh = _read(path, where)
+    scaled = mesh.vertices * np.array(visual.scale)
+    _require_solid(scaled, where)
+    pose = matrix_of((visual.origin.xyz, from_rpy(*visual.origin.rpy)))
+    return Mesh(scaled @ pose[:3, :3].T + pose[:3, 3], mesh.faces)
+
+
+def _read(path: Path, where: str) -> Mesh:
+    """Vertices that a triangle uses, in the file's unit."""
+    import trimesh  # half a second
+
+    if not path.is_file():
+        raise DescriptionError(f"{where} is not there")
+    try:
+        whole = trimesh.load_scene(path).to_mesh()
+        vertices, faces = np.asarray(whole.vertices, dtype=float), np.asarray(whole.faces, dtype=np.int32)
+    except Exception as error:  # whatever its many readers raise for a damaged file
+        raise DescriptionError(f"{where} cannot be read: {type(error).__name__}: {error}") from error
+    if not len(faces):
+        raise DescriptionError(f"{where} holds no triangle")
+    if len(faces) > MOST_TRIANGLES:
+        raise DescriptionError(f"{where} has {len(faces)} triangles, more than {MOST_TRIANGLES}: simplify it")
+    used, numbers = np.unique(faces, return_inverse=True)
+    if not np.isfinite(vertices[used]).all():
+        raise DescriptionError(f"{where}: a corner of it is not finite: export it again")
+    return Mesh(vertices[used], numbers.reshape(-1, 3).astype(np.int32))
+
+
+def _require_solid(vertices: Array, where: str) -> None:
+    """Raises `DescriptionError` for what has no thickness in some direction, or the size of no link."""
+    longest = float(np.ptp(vertices, axis=0).max())
+    if longest > LARGEST:
+        raise DescriptionError(f'{where} is {longest:.4g} m long: if it is in mm, write scale="0.001 0.001 0.001"')
+    if longest < SMALLEST:
+        raise DescriptionError(f"{where} is {1000.0 * longest:.3g} mm long: see its scale in the URDF")
+    across = np.linalg.svd(vertices - vertices.mean(axis=0), full_matrices=False)[2]
+    thickness = float(np.ptp(vertices @ across.T, axis=0).min())
+    if thickness < FLAT * longest:
+        raise DescriptionError(f"{where} is flat ({1000.0 * thickness:.2g} mm thick): it bounds no solid")

@@ -1,0 +1,102 @@
+"""`gemelo collision fit`: shapes for the links from their meshes, and the spheres that cover those for the core."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from schemas.errors import ConfigurationError
+from services.arm.description import load_arm
+from services.planner.collision_geometry.link_shapes import link_shapes
+from services.planner.native.sphere_cover import BULGE, cover_shapes
+
+if TYPE_CHECKING:
+    from services.collision_fitting.mesh_fit import LinkFit
+
+
+def report(folder: Path, bulge: float = BULGE) -> str:
+    """A line for every link with collision shapes, and their sum; `bulge` [m] is what is allowed."""
+    rows = [("link", "shapes", "spheres", "bulge [mm]")]
+    total = 0
+    for link, shapes in link_shapes(load_arm(folder)).items():
+        cover = cover_shapes(shapes, bulge)
+        total += len(cover.spheres)
+        rows.append((link, str(len(shapes)), str(len(cover.spheres)), f"{1000.0 * cover.bulge:.2f}"))
+    return _table([*rows, ("all", "", str(total), "")])
+
+
+def fit_meshes(folder: Path, most: int, only: Sequence[str], write: bool) -> str:
+    """What is fitted to each link, and its elements for the URDF, or that they are written there."""
+    # Not above: trimesh takes half a second.
+    from services.collision_fitting.fit_writing import elements_of, touching_states, write_fits
+    from services.collision_fitting.mesh_fit import fit_links
+
+    arm = load_arm(folder)
+    fits = fit_links(arm, most, only)
+    rows = [("link", "shapes", "of its hull [%]", "beyond [mm]", "")]
+    for fit in fits:
+        figures = str(len(fit.shapes)), f"{100.0 * fit.share:.0f}", f"{1000.0 * fit.overshoot:.1f}"
+        rows.append((fit.link, *figures, _kinds(fit)))
+    lines = [_table(rows)]
+    if write:
+        changed = write_fits(arm, fits)
+        return "\n".join(
+            [
+                *lines,
+                *(
+                    f"{said}: write finer shapes by hand, or do without with --link"
+                    for said in touching_states(changed)
+                ),
+                f"{arm.urdf_path} is changed, loaded again, and every corner of the meshes is in its shapes",
+                f"see next which pairs touch: `gemelo collision matrix {folder} --write`",
+            ]
+        )
+    for fit in fits:
+        lines += [f"{fit.link}:", *(element for shape in fit.shapes for element in elements_of(shape))]
+    return "\n".join([*lines, "nothing is written: give --write for that"])
+
+
+def _kinds(fit: LinkFit) -> str:
+    return ", ".join(f"{count} {kind}" for kind, count in Counter(shape.kind for shape in fit.shapes).items())
+
+
+def _table(rows: Sequence[tuple[str, ...]]) -> str:
+    """The first column and words at the end to the left, figures to the right."""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return "\n".join(
+        "  ".join([row[0].ljust(widths[0]), *(row[k].rjust(widths[k]) for k in (1, 2, 3)), *row[4:]]).rstrip()
+        for row in rows
+    )
+
+
+def _options(arguments: list[str] | None) -> Namespace:
+    parser = ArgumentParser(prog="gemelo collision fit")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--bulge", type=float, default=1000.0 * BULGE)
+    parser.add_argument("--meshes", action="store_true")
+    parser.add_argument("--write", action="store_true")
+    parser.add_argument("--most", type=int, default=1)
+    parser.add_argument("--link", action="append", default=[])
+    return parser.parse_args(arguments)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """0, or 1 with what is wrong on stderr."""
+    options = _options(arguments)
+    try:
+        if options.meshes:
+            print(fit_meshes(options.folder, options.most, options.link, options.write))
+        else:
+            print(report(options.folder, options.bulge / 1000.0))
+    except (ConfigurationError, ValueError, ImportError, OSError) as error:
+        print(f"gemelo: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,83 @@
+"""An arc of the tool from what was asked: a point on it, or its centre; what is no arc is refused with the figure."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from schemas.planning import PlanCode, Refusal
+from services.arm.kinematics import Pose
+from services.planner.cartesian.tool_path import Arc
+from services.planner.request.refusals import NoPlan
+
+Array = NDArray[np.float64]
+
+SAME_POINT = 1e-6  # [m]
+SAME_RADIUS = 1e-4  # [m] by which a centre may be nearer to one end: it is then moved to the middle
+STRAIGHT = 1e-4  # sine of an angle below which three points are on a line
+FARTHEST = 1e6  # [m]
+
+
+def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
+    """From start through `interim` (3,) to end; raises `NoPlan`."""
+    to_interim, to_end = interim - start.position, end.position - start.position
+    _require_way("interim", interim, start.position, end.position)
+    normal = np.cross(to_interim, to_end)
+    sine = float(np.linalg.norm(normal)) / float(np.linalg.norm(to_interim) * np.linalg.norm(to_end))
+    if sine < STRAIGHT:
+        raise _refused("interim", sine, STRAIGHT, "start, interim and goal are on one line", "go there by a line (LIN)")
+    squares = float(to_interim @ to_interim) * to_end - float(to_end @ to_end) * to_interim
+    centre = start.position + np.cross(squares, normal) / (2.0 * float(normal @ normal))
+    normal = normal / float(np.linalg.norm(normal))
+    return _arc(start, end, centre, normal, _angle(start.position - centre, end.position - centre, normal))
+
+
+def arc_about(start: Pose, centre: Array, end: Pose) -> Arc:
+    """The shorter one about `centre` (3,); raises `NoPlan`."""
+    _require_way("center", centre, start.position, end.position)
+    first, last = start.position - centre, end.position - centre
+    radii = float(np.linalg.norm(first)), float(np.linalg.norm(last))
+    if abs(radii[0] - radii[1]) > SAME_RADIUS:
+        message = f"the centre is {radii[0]:.6g} m from the start and {radii[1]:.6g} m from the goal"
+        remedy = "give a centre as far from both, or a point on the arc (interim)"
+        raise _refused("center", abs(radii[0] - radii[1]), SAME_RADIUS, message, remedy)
+    normal = np.cross(first, last)
+    sine = float(np.linalg.norm(normal)) / (radii[0] * radii[1])
+    if sine < STRAIGHT:
+        message = "start, centre and goal are on one line: there are many arcs"
+        raise _refused("center", sine, STRAIGHT, message, "give a point on the arc (interim)")
+    chord = end.position - start.position
+    centre = centre - chord * float((centre - 0.5 * (start.position + end.position)) @ chord) / float(chord @ chord)
+    normal = normal / float(np.linalg.norm(normal))
+    return _arc(start, end, centre, normal, _angle(start.position - centre, end.position - centre, normal))
+
+
+def _arc(start: Pose, end: Pose, centre: Array, normal: Array, angle: float) -> Arc:
+    return Arc(start, centre, normal, angle, pin.log3(end.rotation @ start.rotation.T))
+
+
+def _angle(first: Array, last: Array, normal: Array) -> float:
+    """(0, 2 pi) [rad] from one to the other about the normal."""
+    return math.atan2(float(np.cross(first, last) @ normal), float(first @ last)) % math.tau
+
+
+def _require_way(name: str, point: Array, start: Array, end: Array) -> None:
+    if not np.abs(point).max() < FARTHEST:
+        raise _refused(name, float(np.abs(point).max()), FARTHEST, f"the {name} is no place for an arm", "give it in m")
+    for what, one, other in (("goal", start, end), (name, start, point), (name, end, point)):
+        distance = float(np.linalg.norm(one - other))
+        if distance < SAME_POINT:
+            where = "start" if one is start else "goal"
+            message = f"the {what} is where the {where} is, {1000 * distance:.3g} mm away: that is no arc"
+            remedy = "give another point, or go by a line (LIN)"
+            if end is other and what == "goal":
+                remedy = "for a full circle ask for one half, then for the other; else give another point"
+            raise _refused(what, distance, SAME_POINT, message, remedy)
+
+
+def _refused(subject: str, value: float, limit: float, message: str, remedy: str) -> NoPlan:
+    refusal = Refusal(check="arc", subject=subject, value=value, limit=limit, message=message, remedy=remedy)
+    return NoPlan(PlanCode.INVALID_GOAL_CONSTRAINTS, refusal)

@@ -1,0 +1,250 @@
+"""Joint values along a way of the tool, each from the one before; where they end, and why they go no further."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics, Pose
+from services.planner.cartesian.tool_path import ToolPath
+from services.planner.cartesian.tool_solver import ToolSolver
+from services.planner.path.path_curve import CubicSpline
+from services.planner.request.deadline import Deadline
+
+Array = NDArray[np.float64]
+
+SPACING = 0.02  # of length between postures; halved until the spline between them is exact enough
+LEAST_POSTURES = 12
+FINEST = 2e-5  # of length: nearer postures are not tried, and a place is not told more exactly
+MOST_POSTURES = 5000
+JUMP = 0.3  # [rad] or [m] a joint may move between two postures, before shorter steps are tried
+CLOSE = 1e-5  # [m] by which the spline between postures may be off the way
+NEARLY = 0.98  # of the way to a limit, as it seems from before it
+LEAST = 0.05  # of a step is tried, where it seems to be none of it
+ROUNDING = 1e-9  # [rad] or [m] beyond a limit that is put back onto it
+SAME = 1e-6  # [rad] or [m] by which postures differ that are meant to be one
+ROUNDS = 8
+LOOKS = 8  # at the joints' limits between two postures
+ORDER = 4  # postures by which the next one is guessed
+TOO_FINE = f"max_step is so fine that the way would have more than {MOST_POSTURES} postures"
+
+
+@dataclass(frozen=True)
+class Stop:
+    """What is in the way of the next posture; `subject` is a joint, a link pair or the tool.
+
+    About `share` of the step to it can be gone.
+    """
+
+    check: str
+    subject: str
+    value: float
+    limit: float
+    what: str  # completes "at 0.123 m of 0.300 m ..."
+    remedy: str
+    share: float = 0.5
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Postures (m, n) at lengths (m,) of a path, from its start, the spline through them with the tool's position (3,)
+    behind the joints, and why there are no more."""
+
+    lengths: Array
+    postures: Array
+    curve: CubicSpline
+    stop: Stop | None
+
+
+class Continuation:
+    """Follows ways of the tool with one arm; of an arm that cannot turn its tool freely only the position is held."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics, holds_turn: bool) -> None:
+        self._arm, self._kinematics = arm, kinematics
+        self.solver = ToolSolver(kinematics, holds_turn)
+        self._lower = np.array([joint.lower for joint in arm.joints])
+        self._upper = np.array([joint.upper for joint in arm.joints])
+
+    def follow(self, path: ToolPath, start: Array, max_step: float, jump: float, deadline: Deadline) -> Followed | Stop:
+        """As far as it goes from `start`, which is at the path's beginning; 0 for the default step and jump.
+
+        A way of less than four postures of the finest spacing is none.
+        """
+        spacing = min(max_step or SPACING, path.length / LEAST_POSTURES)
+        if path.length / spacing > MOST_POSTURES:
+            return Stop("max_step", "max_step", max_step, path.length / MOST_POSTURES, TOO_FINE, "leave it at 0")
+        lengths, postures, stop = self._march(path, start, spacing, jump, deadline)
+        if stop is not None and lengths[-1] < 4 * FINEST:
+            return stop
+        if len(lengths) < 4:
+            lengths, postures = self._four(path, lengths, postures)
+        return self._refined(path, lengths, postures, stop, deadline)
+
+    def shortened(
+        self, path: ToolPath, followed: Followed, length: float, stop: Stop, deadline: Deadline
+    ) -> Followed | Stop:
+        """The way up to `length`, because of `stop`."""
+        kept = int(np.searchsorted(followed.lengths, length - FINEST))
+        guess = followed.curve.at(np.array([length])).value[0, : followed.postures.shape[1]]
+        last = self.solver.solve(path.at(length), guess)
+        lengths = [*followed.lengths[:kept].tolist(), length]
+        postures = [*followed.postures[:kept], self._clipped(guess if last is None else last)]
+        if len(lengths) < 4:
+            lengths, postures = self._four(path, lengths, postures)
+        return self._refined(path, lengths, postures, stop, deadline)
+
+    def ending(self, followed: Followed, end: Array) -> Followed:
+        """The same, with `end` (n,) as its last posture where that is where it leads."""
+        if not is_same(followed.postures[-1], end):
+            return followed
+        postures = np.vstack((followed.postures[:-1], end))
+        curve = self._spline(followed.lengths.tolist(), list(postures))
+        return Followed(followed.lengths, postures, curve, followed.stop)
+
+    def _march(
+        self, path: ToolPath, start: Array, spacing: float, jump: float, deadline: Deadline
+    ) -> tuple[list[float], list[Array], Stop | None]:
+        lengths, postures, step, marks = [0.0], [start], spacing, [*path.marks, path.length]
+        while lengths[-1] < path.length:
+            deadline.check()
+            ahead = lengths[-1] + step
+            mark = next(mark for mark in marks if mark > lengths[-1] + FINEST or mark == path.length)
+            ahead = mark if ahead > mark - 0.1 * step else ahead
+            guess = _extrapolated(lengths, postures, ahead)
+            found = self._next(path.at(ahead), postures[-1], guess, jump or math.inf)
+            if not isinstance(found, Stop) and len(lengths) < MOST_POSTURES:
+                lengths.append(ahead)
+                postures.append(found)
+                step = min(2.0 * step, spacing)
+            elif step > FINEST and len(lengths) < MOST_POSTURES and not _is_jump(found):
+                share = found.share if isinstance(found, Stop) else 0.5
+                step = max(0.999 * FINEST, min(0.9 * step, share * (ahead - lengths[-1])))
+            else:
+                return lengths, postures, found if isinstance(found, Stop) else self._lost(postures[-1])
+        return lengths, postures, None
+
+    def _next(self, pose: Pose, last: Array, guess: Array, jump: float) -> Array | Stop:
+        found = self.solver.solve(pose, guess)
+        if found is None:
+            return self._lost(last)
+        excess = np.maximum(found - self._upper, self._lower - found)
+        worst = int(np.argmax(excess))
+        if excess[worst] > ROUNDING:
+            return self._beyond(worst, last, found)
+        farthest = float(np.abs(found - last).max())
+        if farthest > jump:
+            return self._jump("jump", last, found, jump)
+        return self._jump("singularity", last, found, JUMP) if farthest > JUMP else self._clipped(found)
+
+    def _four(self, path: ToolPath, lengths: list[float], postures: list[Array]) -> tuple[list[float], list[Array]]:
+        """What a cubic spline needs."""
+        wanted = np.linspace(0.0, lengths[-1], 4).tolist()
+        guesses = np.array([np.interp(wanted, lengths, column) for column in np.array(postures).T]).T
+        between = [
+            self.solver.solve(path.at(along), guess) for along, guess in zip(wanted[1:3], guesses[1:3], strict=True)
+        ]
+        found = [guess if row is None else self._clipped(row) for row, guess in zip(between, guesses[1:3], strict=True)]
+        return wanted, [postures[0], *found, postures[-1]]
+
+    def _refined(
+        self, path: ToolPath, lengths: list[float], postures: list[Array], stop: Stop | None, deadline: Deadline
+    ) -> Followed | Stop:
+        """With postures between, wherever the spline is off the way; it ends where even those do not help."""
+        for _ in range(ROUNDS):
+            deadline.check()
+            curve = self._spline(lengths, postures)
+            middles = self._off(path, curve)
+            if not middles:
+                followed = Followed(np.array(lengths), np.array(postures), curve, stop)
+                return self._within_limits(path, followed, deadline)
+            # The spline may have strayed to where another branch is nearer; a mean of the neighbours has not.
+            guesses = np.array([np.interp(middles, lengths, column) for column in np.array(postures).T]).T
+            solved = [self.solver.solve(path.at(middle), guess) for middle, guess in zip(middles, guesses, strict=True)]
+            new = {middle: self._clipped(row) for middle, row in zip(middles, solved, strict=True) if row is not None}
+            merged = dict(zip(lengths, postures, strict=True)) | new
+            lengths = sorted(merged)
+            postures = [merged[length] for length in lengths]
+        kept = sum(length < middles[0] for length in lengths)
+        stop = stop or self._lost(postures[kept - 1])
+        return stop if kept < 4 else self._refined(path, lengths[:kept], postures[:kept], stop, deadline)
+
+    def _within_limits(self, path: ToolPath, followed: Followed, deadline: Deadline) -> Followed | Stop:
+        """Only as far as no joint is beyond its limit between two postures that are within it."""
+        knots = np.arange(len(followed.lengths))
+        looked = np.interp(np.linspace(0, knots[-1], LOOKS * int(knots[-1]) + 1), knots, followed.lengths)
+        rows = followed.curve.at(looked).value[:, : len(self._lower)]
+        excess = np.maximum(rows - self._upper, self._lower - rows)
+        beyond = np.flatnonzero(excess.max(axis=1) > ROUNDING)
+        if not len(beyond):
+            return followed
+        first = int(beyond[0])
+        last = max(0, first - 1)
+        stop = self._beyond(int(np.argmax(excess[first])), rows[last], rows[first])
+        within = float(looked[last])
+        return stop if within < 4 * FINEST else self.shortened(path, followed, within, stop, deadline)
+
+    def _off(self, path: ToolPath, curve: CubicSpline) -> list[float]:
+        """The middles between knots at which the spline is off the way."""
+        middles = 0.5 * (curve.knots[:-1] + curve.knots[1:])
+        rows = curve.at(middles).value[:, : len(self._lower)]
+        pairs = zip(middles.tolist(), rows, strict=True)
+        return [middle for middle, row in pairs if self.solver.error(path.at(middle), row) > CLOSE]
+
+    def _spline(self, lengths: list[float], postures: list[Array]) -> CubicSpline:
+        tools = [self._kinematics.tool(posture).position for posture in postures]
+        return CubicSpline(np.array(lengths), np.hstack((postures, tools)))
+
+    def _clipped(self, posture: Array) -> Array:
+        clipped: Array = np.minimum(np.maximum(posture, self._lower), self._upper)
+        return clipped
+
+    def _beyond(self, index: int, last: Array, found: Array) -> Stop:
+        joint, value = self._arm.joints[index], float(found[index])
+        limit = joint.clamp(value)
+        side = "upper" if value > joint.upper else "lower"
+        what = f'joint "{joint.name}" is at its {side} limit of {limit:g} {joint.unit}'
+        share = max(LEAST, NEARLY * float((self._clipped(found) - last)[index] / (found - last)[index]))
+        remedy = "go around by another posture, or end before it"
+        return Stop("joint limit", joint.name, value, limit, what, remedy, share)
+
+    def _lost(self, last: Array) -> Stop:
+        value = self.solver.manipulability(last)
+        what = f"the arm is stretched out or its axes line up (singularity, manipulability {value:.2g})"
+        remedy = "keep away from there, or go there freely instead of on a given way"
+        return Stop("singularity", self._arm.tool_frame, value, 0.0, what, remedy)
+
+    def _jump(self, check: str, last: Array, found: Array, jump: float) -> Stop:
+        index = int(np.argmax(np.abs(found - last)))
+        joint, value = self._arm.joints[index], float(abs(found[index] - last[index]))
+        what = (
+            f'joint "{joint.name}" would jump by {value:.3g} {joint.unit}, more than {jump:g}'
+            f" (singularity, manipulability {self.solver.manipulability(last):.2g})"
+        )
+        remedy = "keep away from the singularity, or go there freely instead of on a given way"
+        return Stop(check, joint.name, value, jump, what, remedy)
+
+
+def is_same(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:
+    """Postures that differ by no more than rounding."""
+    return float(np.abs(np.subtract(one, other)).max()) <= SAME
+
+
+def _is_jump(found: Array | Stop) -> bool:
+    """Beyond the threshold that was asked for: shorter steps would only hide it."""
+    return isinstance(found, Stop) and found.check == "jump"
+
+
+def _extrapolated(lengths: list[float], postures: list[Array], ahead: float) -> Array:
+    """By the polynomial through the last few postures (Lagrange); nearby, lest it strays to another branch."""
+    knots = np.array(lengths[-ORDER:])
+    apart = knots[:, None] - knots + np.eye(len(knots))
+    gaps = (ahead - knots) / apart
+    np.fill_diagonal(gaps, 1.0)
+    guess: Array = gaps.prod(axis=1) @ np.array(postures[-ORDER:])
+    near = 0.5 * JUMP
+    return np.clip(guess, postures[-1] - near, postures[-1] + near)

@@ -1,0 +1,181 @@
+"""From a request for a line or an arc of the tool to its way: where it ends, what lies between, and how far it goes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from schemas.message import Vector
+from schemas.planning import (
+    CircularMotion,
+    Goal,
+    LinearMotion,
+    PlanCode,
+    PlanRequest,
+    PoseGoal,
+    Refusal,
+    WaypointGoal,
+)
+from services.arm.description import Arm, Joint
+from services.arm.kinematics import Kinematics, Pose
+from services.arm.transforms import IDENTITY, compose
+from services.planner.cartesian.arcs import arc_about, arc_through
+from services.planner.cartesian.cartesian_planner import CartesianPlanner, CartesianWay, Terms
+from services.planner.cartesian.tool_limits import ToolLimits, require_tool_limits
+from services.planner.cartesian.tool_path import ToolPath, polyline
+from services.planner.collision.clearance import Sweeper
+from services.planner.kinematics.goals import Goals
+from services.planner.kinematics.pose_goals import target_of
+from services.planner.kinematics.targets import ROTATION_TOLERANCE, Target, turn_between
+from services.planner.kinematics.task_space import Abilities
+from services.planner.path.path import Start
+from services.planner.request.deadline import NEVER, Deadline
+from services.planner.request.refusals import NoPlan, malformed
+from services.planner.timing.profile import JointLimits
+
+Array = NDArray[np.float64]
+
+INVALID = PlanCode.INVALID_GOAL_CONSTRAINTS
+FARTHEST = 1e3  # [m] a blend beyond it is a mistake
+
+
+class ToolMotions:
+    """Lines and arcs of one arm's tool."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics, goals: Goals, checker: Sweeper) -> None:
+        self._arm, self._kinematics, self._goals = arm, kinematics, goals
+        self._abilities: Abilities = goals.abilities
+        self._planner = CartesianPlanner(arm, kinematics, checker, self._abilities.is_full)
+
+    def plan(
+        self, request: PlanRequest, start: Start, limits: JointLimits, margin: float, deadline: Deadline
+    ) -> CartesianWay:
+        """The timed way, to be verified; raises `NoPlan`."""
+        tool = _tool_limits(request.motion)
+        require_tool_limits(tool)
+
+        try:
+            wanted = self._wanted(request.goal, start)
+            paths, end = self._paths(request, start, wanted), wanted[-1]
+            way = self._planner.plan(paths, start, end, Terms(limits, tool, margin, request.timing, deadline))
+        except NoPlan as ended:
+            if tool.least_fraction == 1.0 and not deadline.has_passed():
+                self._require_reachable(request.goal, start, ended.fraction, deadline)
+            raise
+        if way.fraction == 1.0:
+            self._require_turned(request.goal, start, way.end)
+            self._require_joints(way.end, end)
+        return way
+
+    def _paths(self, request: PlanRequest, start: Start, wanted: list[Start | None]) -> list[ToolPath]:
+        goal, begin = request.goal, self._kinematics.tool(start)
+        if isinstance(request.motion, CircularMotion):
+            return [self._arc(request.motion, goal, start, begin, wanted[-1])]
+        poses = [begin]
+        for point, posture in zip(points_of(goal), wanted, strict=True):
+            poses.append(self._pose(point, start, poses[-1], posture))
+        return polyline(poses, goal.blend if isinstance(goal, WaypointGoal) else 0.0)
+
+    def _arc(self, motion: CircularMotion, goal: Goal, start: Start, begin: Pose, wanted: Start | None) -> ToolPath:
+        if isinstance(goal, WaypointGoal):
+            raise malformed(INVALID, "goal", "an arc has one goal, not waypoints", "ask for one arc after the other")
+        if bool(motion.interim) == bool(motion.center):
+            given = "both an interim point and a center" if motion.interim else "neither an interim point nor a center"
+            raise malformed(INVALID, "interim", f"the arc has {given}", "give one of them, x y z in m")
+        end = self._pose(goal, start, begin, wanted)
+        name, values = ("interim", motion.interim) if motion.interim else ("center", motion.center)
+        point = self._point(name, values, goal, start)
+        return ToolPath([arc_through(begin, point, end) if motion.interim else arc_about(begin, point, end)])
+
+    def _point(self, name: str, values: Vector, goal: Goal, start: Start) -> Array:
+        """In the base frame; given in the goal's."""
+        if len(values) != 3:
+            raise malformed(INVALID, name, f"{name} has 3 numbers, not {len(values)}", "give x y z in m")
+        frame = self._goals.frame(goal, start) if isinstance(goal, PoseGoal) else IDENTITY
+        x, y, z = values
+        return np.array(compose(frame, ((x, y, z), IDENTITY[1]))[0])
+
+    def _pose(self, goal: Goal, start: Start, before: Pose, wanted: Start | None) -> Pose:
+        """Where the tool is to be; as it was turned before, where the goal leaves that open."""
+        if wanted is not None:
+            return self._kinematics.tool(wanted)
+        assert isinstance(goal, PoseGoal)
+        target = self._target(goal, start)
+        if target.rotation is not None:
+            return Pose(target.position, target.rotation)
+        if target.pointing is None:
+            return Pose(target.position, before.rotation)
+        turn = turn_between(before.rotation @ target.pointing.axis, target.pointing.direction)
+        return Pose(target.position, pin.exp3(turn) @ before.rotation)
+
+    def _target(self, goal: PoseGoal, start: Start) -> Target:
+        return target_of(goal, self._goals.frame(goal, start))
+
+    def _require_reachable(self, goal: Goal, start: Start, fraction: float, deadline: Deadline) -> None:
+        """Raises the better refusal of a goal that no posture meets, wherever the way to it ends."""
+        try:
+            for point in points_of(goal):
+                next(self._goals.candidates(point, start, deadline), None)
+        except NoPlan as better:
+            raise NoPlan(better.code, better.refusal, fraction) from better
+
+    def _require_turned(self, goal: Goal, start: Start, end: Start) -> None:
+        """An arm whose tool turns as its position has it may end turned otherwise than asked."""
+        last = points_of(goal)[-1]
+        if self._abilities.is_full or not isinstance(last, PoseGoal):
+            return
+        target = self._target(last, start)
+        missing = target.misses(self._kinematics.tool(end))[1]
+        if missing > max(ROTATION_TOLERANCE, target.rotation_tolerance):
+            next(self._goals.candidates(last, start, NEVER), None)
+            message = f"on this way the tool ends {np.degrees(missing):.3g} deg from the orientation that was asked for"
+            raise malformed(INVALID, "orientation", message, self._abilities.remedy, check="orientation")
+
+    def _wanted(self, goal: Goal, start: Start) -> list[Start | None]:
+        """The postures of those points that are joint values, None for poses; a joint that is not named stays as the
+        last of them has it, or the start."""
+        wanted: list[Start | None] = []
+        for point in points_of(goal):
+            known = next((posture for posture in reversed(wanted) if posture is not None), start)
+            is_pose = isinstance(point, PoseGoal)
+            wanted.append(None if is_pose else next(self._goals.candidates(point, known, NEVER)))
+        return wanted
+
+    def _require_joints(self, end: Start, wanted: Start | None) -> None:
+        """Joint values are what was asked for, not only the pose of the tool that belongs to them."""
+        if wanted is not None and end != wanted:
+            worst = int(np.argmax(np.abs(np.subtract(end, wanted))))
+            raise _other_posture(self._arm.joints[worst], end, wanted[worst], end[worst])
+
+
+def points_of(goal: Goal) -> tuple[Goal, ...]:
+    """The goals to be passed in order; raises `NoPlan` where there is none, or the blend is no length."""
+    if not isinstance(goal, WaypointGoal):
+        return (goal,)
+    if not goal.points:
+        raise malformed(INVALID, "points", "the goal has no waypoint", "give at least one")
+    if not 0.0 <= goal.blend <= FARTHEST:
+        message = f"blend is {goal.blend:g} m: it must be 0 or more, and no more than {FARTHEST:g}"
+        raise malformed(INVALID, "blend", message, "give 0 to stop at every point, or a radius in m")
+    return goal.points
+
+
+def _other_posture(joint: Joint, end: Start, wanted: float, reached: float) -> NoPlan:
+    """The tool is where it should be, the joints are not."""
+    refusal = Refusal(
+        check="posture",
+        subject=joint.name,
+        value=reached,
+        limit=wanted,
+        nearest=end,
+        message=f'the tool can go there so, but "{joint.name}" ends at {reached:.4g} {joint.unit}, not at {wanted:.4g}',
+        remedy="ask for the pose of the tool instead of joint values, or go there freely",
+    )
+    return NoPlan(PlanCode.GOAL_VIOLATES_PATH_CONSTRAINTS, refusal)
+
+
+def _tool_limits(motion: object) -> ToolLimits:
+    if not isinstance(motion, LinearMotion | CircularMotion):
+        return ToolLimits()
+    return ToolLimits(motion.speed, motion.acceleration, motion.max_step, motion.jump_threshold, motion.least_fraction)

@@ -1,0 +1,89 @@
+"""The posture near another that has the tool where it is to be, by Newton's steps; and how far the tool is off."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from services.arm.kinematics import Kinematics, Pose
+from services.planner.cartesian.tool_path import METRES_PER_RADIAN
+
+Array = NDArray[np.float64]
+
+LARGEST_STEP = 0.3  # [rad] or [m] of a joint in one iteration
+EXACT = 1e-11  # [m] at which the tool is where it should be; as much for its turn
+LAST_STEP = 1e-5  # [rad] or [m]: what is left after a step so small is its square
+ITERATIONS = 10
+DAMPING = 1e-12
+NULL_DAMPING = 1e-6
+WEIGHTS = np.array([[1.0]] * 3 + [[METRES_PER_RADIAN]] * 3)
+
+
+class ToolSolver:
+    """For one arm; of one that cannot turn its tool freely only the position is held."""
+
+    def __init__(self, kinematics: Kinematics, holds_turn: bool) -> None:
+        self._kinematics, self._holds_turn = kinematics, holds_turn
+
+    def solve(self, pose: Pose, guess: Array) -> Array | None:
+        """The posture near `guess` that has the tool there, limits apart; None where there is none."""
+        posture = guess
+        for _ in range(ITERATIONS):
+            step, missing, left = self._newton(pose, posture)
+            if missing < EXACT:
+                return posture
+            largest = float(np.abs(step).max())
+            if largest < LAST_STEP and left < EXACT:
+                return posture + step
+            posture = posture + step * min(1.0, LARGEST_STEP / max(largest, LARGEST_STEP))
+        return None
+
+    def manipulability(self, posture: Array) -> float:
+        """The smallest singular value of what is held of the tool, turns counted as the path counts them."""
+        jacobian = self._kinematics.jacobian(posture)
+        held = WEIGHTS * jacobian if self._holds_turn else jacobian[:3]
+        return float(np.linalg.svd(held, compute_uv=False)[-1])
+
+    def error(self, pose: Pose, posture: Array) -> float:
+        """[m] that the tool is off; turns counted as the path counts them, where they are held."""
+        now = self._kinematics.tool(posture)
+        missing = _length(pose.position - now.position)
+        if not self._holds_turn:
+            return missing
+        return max(missing, METRES_PER_RADIAN * _length(pin.log3(pose.rotation @ now.rotation.T)))
+
+    def _newton(self, pose: Pose, posture: Array) -> tuple[Array, float, float]:
+        """The step of the joints, what is missing [m], and what of that a straight arm would still miss after it.
+
+        The turn that is not held is followed as far as it may.
+        """
+        now, jacobian = self._kinematics.tool_and_jacobian(posture)
+        missing = pose.position - now.position
+        turn = pin.log3(pose.rotation @ now.rotation.T)
+        if self._holds_turn:
+            missing = np.concatenate((missing, METRES_PER_RADIAN * turn))
+            held = WEIGHTS * jacobian
+            step = _damped(held, missing, DAMPING)
+            return step, _length(missing), _length(missing - held @ step)
+        held = jacobian[:3]
+        step = _damped(held, missing, DAMPING)
+        if len(posture) > 3:
+            free = np.eye(len(posture)) - np.linalg.pinv(held) @ held
+            left = jacobian[3:] @ free
+            step = step + free @ _damped(left, turn - jacobian[3:] @ step, NULL_DAMPING)
+        return step, _length(missing), _length(missing - held @ step)
+
+
+def _damped(jacobian: Array, missing: Array, damping: float) -> Array:
+    """The least-squares step, the shortest where there are many (Nakamura and Hanafusa 1986)."""
+    square = jacobian @ jacobian.T
+    square.flat[:: len(square) + 1] += damping
+    step: Array = jacobian.T @ np.linalg.solve(square, missing)
+    return step
+
+
+def _length(vector: Array) -> float:
+    return math.sqrt(float(vector @ vector))

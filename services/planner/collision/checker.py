@@ -1,0 +1,76 @@
+"""Collision checks of one plan: one world from its beginning to its end, however often the scene changes meanwhile.
+
+The sphere check is asked first: what it calls free is free on the exact shapes too. Coal decides what it leaves open.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.scene import Contact
+from services.arm.collisions import LinkPair
+from services.planner.collision.sphere_check import sphere_check
+from services.planner.collision.world import Positions, World
+
+if TYPE_CHECKING:
+    from services.planner.native.native_planner import NativePlanner
+
+Array = NDArray[np.float64]
+
+
+class CollisionChecker:
+    """Distances and contacts in `world`, the one of the plan at hand; `newest` is the next plan's.
+
+    Joint values are (n,) or rows (m, n) [rad] or [m] in the arm's order; distances and margins are in m.
+    """
+
+    def __init__(self, world: World) -> None:
+        self.newest = world
+        self.world = world
+        self._spheres = sphere_check(world.arm)
+
+    def begin(self) -> World:
+        """Makes the newest world the one that counts, and returns it."""
+        self.world = self.newest
+        return self.world
+
+    def native(self, margin: float) -> NativePlanner | None:
+        """The native planner in this world, to keep `margin` [m]; None if it is not built."""
+        return self._spheres.planner(self.world, margin)
+
+    @property
+    def reach(self) -> Array:
+        """(n,) [m/rad] or [m/m] that any point of the arm moves at most per unit of each joint."""
+        return self.world.reach
+
+    def keeps(self, positions: Positions, margin: float) -> bool:
+        """True if everything is farther than `margin` [m] in this configuration (n,)."""
+        return self._spheres.is_free(self.world, positions, margin) or self.world.distance(positions) > margin
+
+    def distance(self, positions: Positions) -> float:
+        """Distance [m] of the nearest pair, as `World.distance`."""
+        return self.world.distance(positions)
+
+    def touching(self, positions: Array, margin: float) -> Array | None:
+        """A configuration (n,) on the polyline through `positions` (m, n) nearer than `margin` [m], or None."""
+        if len(positions) < 2:
+            return self.world.touching(positions, margin)
+        found = self._spheres.resolve(self.world, positions, margin)
+        if found.touching is not None:
+            return found.touching
+        for stretch in found.unresolved:
+            touching = self.world.touching(stretch, margin)
+            if touching is not None:
+                return touching
+        return None
+
+    def pairs_within(self, positions: Positions, margin: float = 0.0) -> list[LinkPair]:
+        """Names of the pairs nearer than `margin` [m], as `World.pairs_within`."""
+        return self.world.pairs_within(positions, margin)
+
+    def contacts(self, positions: Positions, margin: float = 0.0) -> list[Contact]:
+        """The pairs nearer than `margin` [m] with distance and point, as `World.contacts`."""
+        return self.world.contacts(positions, margin)

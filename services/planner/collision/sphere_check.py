@@ -1,0 +1,129 @@
+"""The choice between the native planner and the exact shapes alone, made here and nowhere else.
+
+Both stand behind `SphereCheck`: what it says is certain, and what it leaves unresolved is for coal on the exact shapes.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+from services.planner.collision.native_scene import native_scene
+from services.planner.collision.world import Positions, World
+from services.planner.request.deadline import CancelFlag
+
+try:
+    from services.planner.native import native_planner as native
+    from services.planner.native.binding import CancelFlag as NativeCancelFlag
+except ImportError:  # not built for this interpreter, or hidden
+    IS_BUILT = False
+else:
+    IS_BUILT = True
+
+if TYPE_CHECKING:
+    from services.planner.native.native_planner import NativePlanner
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """Answer about a polyline: a configuration (n,) that surely touches, or the stretches (m, n) left unresolved."""
+
+    touching: Array | None = None
+    unresolved: tuple[Array, ...] = ()
+
+
+class SphereCheck(Protocol):
+    """A fast check in a world, with `margin` [m] to keep; joint values are (n,) or (m, n) [rad] or [m]."""
+
+    def planner(self, world: World, margin: float) -> NativePlanner | None:
+        """The native planner in this world, or None if it is not built."""
+
+    def is_free(self, world: World, positions: Positions, margin: float) -> bool:
+        """True if the configuration (n,) surely keeps the margin."""
+
+    def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
+        """What can be said of the polyline through `rows` (m, n), m >= 2."""
+
+
+class NativeCheck:
+    """By the native planner: spheres around the links of one arm."""
+
+    def __init__(self, arm: Arm) -> None:
+        self._arm = arm
+        self._shown: World | None = None
+
+    def planner(self, world: World, margin: float) -> NativePlanner:
+        planner = self._planner
+        if self._shown is not world:
+            show_scene(planner, world)
+            self._shown = world
+        planner.margin = margin
+        return planner
+
+    def is_free(self, world: World, positions: Positions, margin: float) -> bool:
+        return bool(self.planner(world, margin).free(np.array([positions]))[0])
+
+    def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
+        planner = self.planner(world, margin)
+        if planner.path_free(rows):
+            return Resolution()
+        touching = planner.touching(rows)
+        if touching is not None:
+            return Resolution(touching)
+        intervals = planner.unresolved_intervals(rows).tolist()
+        return Resolution(unresolved=tuple(rows_between(rows, begin, end) for begin, end in intervals))
+
+    @cached_property
+    def _planner(self) -> NativePlanner:
+        """Takes a second the first time, in which spheres are fitted to the links."""
+        return native.NativePlanner(self._arm)
+
+
+class ExactShapesOnly:
+    """Where the native planner is not built: nothing is known before coal looks."""
+
+    def planner(self, world: World, margin: float) -> None:
+        return None
+
+    def is_free(self, world: World, positions: Positions, margin: float) -> bool:
+        return False
+
+    def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
+        return Resolution(unresolved=(rows,))
+
+
+def sphere_check(arm: Arm) -> SphereCheck:
+    """The native planner's check where it is built, else the one that resolves nothing."""
+    return NativeCheck(arm) if IS_BUILT else ExactShapesOnly()
+
+
+def cancel_flag() -> CancelFlag:
+    """A flag that ends the native planner's search too, where that is built."""
+    return NativeCancelFlag() if IS_BUILT else threading.Event()
+
+
+def show_scene(planner: NativePlanner, world: World) -> None:
+    """Replaces what the planner is to keep clear of by the scene of `world`; raises ValueError for an unusable one."""
+    obstacles, attachments = native_scene(world.arm, world.scene, world.folders)
+    planner.set_scene(())
+    for name in planner.attached:
+        planner.detach(name)
+    for attachment in attachments:
+        planner.attach(attachment)
+    planner.set_scene(obstacles)
+
+
+def rows_between(rows: Array, begin: float, end: float) -> Array:
+    """(k, n) the part of the polyline through `rows` (m, n) from one fractional row number to another."""
+    begin, end = max(begin, 0.0), min(end, len(rows) - 1.0)
+    ends = [(1.0 - place % 1.0) * rows[int(place)] + place % 1.0 * rows[math.ceil(place)] for place in (begin, end)]
+    return np.vstack((ends[0], rows[int(begin) + 1 : math.ceil(end)], ends[1]))

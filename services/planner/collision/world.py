@@ -1,0 +1,193 @@
+"""Whether the arm touches itself, what it carries, or what stands around it: coal on the exact shapes.
+
+The reference of every faster check, with the names that `SelfCollisions` has for the arm alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from schemas.scene import Contact, PlanningScene
+from services.arm.collisions import LinkPair
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.collision.continuous import Sweep
+from services.planner.collision.world_geometry import LowerBounds, WorldGeometry
+from services.planner.collision_geometry.coal_shapes import is_inside
+
+Array = NDArray[np.float64]
+MANY = 2000  # triangles
+Positions = Sequence[float] | Array
+
+
+class Side(NamedTuple):
+    """A point (3,) in a mesh's frame, how far [m] its shape was from the surface, and on which side of it."""
+
+    point: Array
+    distance: float
+    is_inside: bool
+
+
+class World:
+    """One arm in one state of the scene, never changed; joint values are (n,) [rad] or [m] in the arm's order."""
+
+    def __init__(
+        self,
+        arm: Arm,
+        kinematics: Kinematics,
+        scene: PlanningScene | None = None,
+        folders: Sequence[Path] = (),
+    ) -> None:
+        """Mesh files are looked for in `folders`; raises `SceneError` for a scene that cannot be."""
+        self.arm = arm
+        self.scene, self.folders = scene or PlanningScene(), tuple(folders)
+        self._kinematics = kinematics
+        self._geometry = WorldGeometry(arm, kinematics, self.scene, folders)
+        self._bounds = LowerBounds(self._geometry)
+        self._data = kinematics.model.createData()
+        self._placed = self._geometry.model.createData()
+        for index in self._bounds.pairs:
+            self._placed.deactivateCollisionPair(index)
+        self.reach: Array = self._geometry.reach
+        self._sides: dict[tuple[int, int], Side] = {}  # the shapes' numbers, outer first
+        self._sweep = Sweep(arm, kinematics, self._geometry, self.distances)
+
+    @property
+    def version(self) -> int:
+        """Of the scene."""
+        return self.scene.version
+
+    @property
+    def objects(self) -> dict[str, str]:
+        """What each object of the scene is: "box", "sphere", ... by name."""
+        return {item.name: str(item.shape.__struct_config__.tag) for item in self.scene.objects}
+
+    @property
+    def geometry_count(self) -> int:
+        """How many shapes there are, of links and of objects; never zero."""
+        return int(self._geometry.model.ngeoms)
+
+    @property
+    def pairs(self) -> tuple[LinkPair, ...]:
+        """The names of links and objects that are checked against one another."""
+        return tuple(dict.fromkeys(self._geometry.names))
+
+    def distance(self, positions: Positions, padding: float = 0.0) -> float:
+        """[m] between the nearest pair that is checked, less `padding`; negative inside, infinite where nothing is."""
+        self._place(positions)
+        nearest = min((distance for _, distance in self._direct()), default=math.inf)
+        bounds = self._bounds.of(self._placed)
+        for place in np.argsort(bounds).tolist():
+            if bounds[place] >= nearest:
+                break
+            nearest = min(nearest, self._exact(self._bounds.pairs[place]))
+        return nearest - padding
+
+    def distances(self, positions: Positions, numbers: Sequence[int]) -> Array:
+        """(k,) [m] between the shapes of these pairs alone; a number is the place in `pair_names`."""
+        q = self._kinematics.configuration.to_pinocchio(positions)
+        pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
+        return np.array([self._exact(index) for index in numbers])
+
+    def least_distances(self, positions: Positions) -> Array:
+        """(pairs,) [m] that each pair is apart at least, cheaply; minus infinity where that says nothing."""
+        q = self._kinematics.configuration.to_pinocchio(positions)
+        pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
+        bounds = self._bounds.of(self._placed)
+        return np.concatenate((np.full(len(self._geometry.pairs) - len(bounds), -np.inf), bounds))
+
+    @property
+    def is_dear(self) -> NDArray[np.bool_]:
+        """(pairs,) where a look takes as long as a thousand others: meshes of many triangles."""
+        sizes = [0 if mesh is None else len(mesh.faces) for mesh in self._geometry.meshes]
+        return np.array([sizes[one] + sizes[other] > MANY for one, other in self._geometry.pairs], dtype=bool)
+
+    @property
+    def pair_names(self) -> Sequence[LinkPair]:
+        """Of every pair of shapes; a link may have several shapes."""
+        return self._geometry.names
+
+    @property
+    def pair_reach(self) -> Array:
+        """(pairs, n) how far at most [m] two shapes move against one another per unit of each joint."""
+        return self._sweep.reach
+
+    def touching(self, positions: Array, margin: float) -> Array | None:
+        """Any posture along the rows of `positions` (m, n) at which something is nearer than `margin` [m], or None."""
+        return self._sweep.touching(positions, margin)
+
+    def pairs_within(self, positions: Positions, margin: float = 0.0) -> list[LinkPair]:
+        """The pairs of names nearer than `margin` [m], each once."""
+        near = (self._geometry.names[index] for index, _ in self._near(positions, margin))
+        return list(dict.fromkeys(near))
+
+    def contacts(self, positions: Positions, margin: float = 0.0) -> list[Contact]:
+        """The pairs nearer than `margin` [m] with their distance and the point between them, the nearest first."""
+        found: dict[LinkPair, Contact] = {}
+        for index, distance in sorted(self._near(positions, margin), key=lambda near: near[1]):
+            pair = self._geometry.names[index]
+            point = self._point_between(index)
+            found.setdefault(pair, Contact(first=pair[0], second=pair[1], distance=distance, point=point))
+        return list(found.values())
+
+    def _place(self, positions: Positions) -> None:
+        """Moves the shapes, and computes the distances of the pairs that are looked at in every posture."""
+        q = self._kinematics.configuration.to_pinocchio(positions)
+        pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
+        pin.computeDistances(self._geometry.model, self._placed)
+
+    def _direct(self) -> Iterator[tuple[int, float]]:
+        """Number and distance [m] of the pairs that `_place` has looked at."""
+        results = self._placed.distanceResults
+        for index, padding in enumerate(self._geometry.padding[: self._geometry.direct]):
+            yield index, results[index].min_distance - padding
+
+    def _near(self, positions: Positions, margin: float) -> Iterator[tuple[int, float]]:
+        """Number and distance [m] of the pairs nearer than `margin`."""
+        self._place(positions)
+        yield from (near for near in self._direct() if near[1] <= margin)
+        for place in np.flatnonzero(self._bounds.of(self._placed) <= margin).tolist():
+            index = self._bounds.pairs[place]
+            distance = self._exact(index)
+            if distance <= margin:
+                yield index, distance
+
+    def _exact(self, index: int) -> float:
+        """[m] between the two shapes of a pair, less their padding."""
+        result = pin.computeDistance(self._geometry.model, self._placed, index)
+        distance = float(result.min_distance)
+        if distance > 0.0 and self._is_swallowed(index, distance):
+            distance = -distance
+        return distance - self._geometry.padding[index]
+
+    def _is_swallowed(self, index: int, distance: float) -> bool:
+        """Whether one shape is wholly inside the other, a mesh: coal sees only its surface, `distance` [m] away."""
+        one, other = self._geometry.pairs[index]
+        return self._holds(one, other, distance) or self._holds(other, one, distance)
+
+    def _holds(self, outer: int, inner: int, distance: float) -> bool:
+        """No point that moves less than the surface was and is away from it has changed sides."""
+        mesh = self._geometry.meshes[outer]
+        if mesh is None or not np.isfinite(self._geometry.boxes[inner]).all():
+            return False
+        filling = self._geometry.meshes[inner]
+        point = self._geometry.boxes[inner][0] if filling is None else filling.vertices[0]
+        there = self._placed.oMg[outer].actInv(self._placed.oMg[inner].act(point))
+        known = self._sides.get((outer, inner))
+        if known is None or float(np.linalg.norm(there - known.point)) >= distance + known.distance:
+            known = Side(there, distance, is_inside(mesh, there))
+        self._sides[outer, inner] = Side(there, distance, known.is_inside)
+        return known.is_inside
+
+    def _point_between(self, index: int) -> tuple[float, ...]:
+        """(3,) [m] in the base frame, of the distance that was computed last for this pair."""
+        result = self._placed.distanceResults[index]
+        middle = 0.5 * (result.getNearestPoint1() + result.getNearestPoint2())
+        return tuple(self._kinematics.base.actInv(middle).tolist())

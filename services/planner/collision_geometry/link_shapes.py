@@ -1,0 +1,68 @@
+"""The collision shapes of an arm's links, read from its URDF."""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from services.arm.collisions import load_shapes
+from services.arm.description import Arm
+from services.arm.errors import DescriptionError
+from services.planner.collision_geometry.shapes import Mesh, Shape, ShapeKind
+from services.planner.collision_geometry.solids import Box, Capsule, Cylinder, Solid
+
+Array = NDArray[np.float64]
+Form = tuple[ShapeKind, tuple[float, ...], Mesh | None]
+
+
+def link_shapes(arm: Arm) -> dict[str, tuple[Shape, ...]]:
+    """The collision shapes of every link that has any, in the link's frame; raises `DescriptionError` where one could
+    not be loaded."""
+    model = pin.buildModelFromUrdf(str(arm.urdf_path))
+    shapes: dict[str, tuple[Shape, ...]] = {}
+    for item in load_shapes(arm, model).geometryObjects:
+        frame = model.frames[item.parentFrame]
+        placement = frame.placement.actInv(item.placement)
+        x, y, z, w = pin.Quaternion(placement.rotation).coeffs().tolist()
+        form, size, mesh = _form_of(item.geometry, frame.name)
+        shape = Shape(item.name, form, size, (tuple(placement.translation.tolist()), (x, y, z, w)), mesh)
+        shapes[frame.name] = (*shapes.get(frame.name, ()), shape)
+    return shapes
+
+
+def _form_of(geometry: coal.CollisionGeometry, link: str) -> Form:
+    """A shape of coal's as one of ours."""
+    match geometry:
+        case coal.Box():
+            return ShapeKind.BOX, tuple((2.0 * geometry.halfSide).tolist()), None
+        case coal.Cylinder():
+            return ShapeKind.CYLINDER, (float(geometry.radius), 2.0 * float(geometry.halfLength)), None
+        case coal.Capsule():
+            return ShapeKind.CAPSULE, (float(geometry.radius), 2.0 * float(geometry.halfLength)), None
+        case coal.Sphere():
+            return ShapeKind.SPHERE, (float(geometry.radius),), None
+        case coal.BVHModelBase():
+            vertices = np.array([geometry.vertex(i) for i in range(geometry.num_vertices)]).reshape(-1, 3)
+            triangles = map(geometry.tri_indices, range(geometry.num_tris))
+            faces = np.array([[triangle[k] for k in range(3)] for triangle in triangles], dtype=np.int32)
+            return ShapeKind.MESH, (), Mesh(vertices, faces)
+    raise DescriptionError(
+        f'link "{link}": there are no spheres for a {type(geometry).__name__}; use box, cylinder, sphere or mesh'
+    )
+
+
+def solid_of(shape: Shape) -> Solid:
+    """Its solid about its own origin; raises ValueError for a mesh and for what has no end."""
+    size = shape.size
+    match shape.kind:
+        case ShapeKind.BOX:
+            return Box((0.5 * size[0], 0.5 * size[1], 0.5 * size[2]))
+        case ShapeKind.SPHERE:
+            return Capsule(size[0], 0.0)
+        case ShapeKind.CYLINDER:
+            return Cylinder(size[0], 0.5 * size[1])
+        case ShapeKind.CAPSULE:
+            return Capsule(size[0], 0.5 * size[1])
+    raise ValueError(f'"{shape.name}": a {shape.kind} has no end and cannot be covered')

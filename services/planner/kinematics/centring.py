@@ -1,0 +1,71 @@
+"""What a redundant arm does with the freedom that its target leaves it: its joints go towards their middles."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.kinematics.descent import Descent
+from services.planner.kinematics.targets import Target
+
+Array = NDArray[np.float64]
+
+STEPS = 6
+LARGEST_STEP = 0.5  # [rad] or [m]
+LEAST_GAIN = 1e-3  # share of the eccentricity by which a step must improve
+RANK = 1e-6  # share of the largest singular value below which a direction of the tool is none
+
+
+class Centring:
+    """Moves solutions of one arm within what leaves the tool where it is to be."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics, descent: Descent) -> None:
+        self._kinematics = kinematics
+        self._descent = descent
+        spans = [(joint.lower, joint.upper) for joint in arm.joints]
+        is_limited = [bool(np.isfinite(upper - lower)) for lower, upper in spans]
+        self._middle = np.array(
+            [0.5 * sum(span) if limited else 0.0 for span, limited in zip(spans, is_limited, strict=True)]
+        )
+        self._weight = np.array([2.0 / (upper - lower) for lower, upper in spans])  # 0 without limits
+
+    def is_redundant(self, target: Target, solution: Array) -> bool:
+        """Whether the joints can move there without the tool leaving its target."""
+        return len(self._free_motions(target, solution)) > 0
+
+    def centred(self, target: Target, solution: Array) -> Array:
+        """A solution whose joints stand nearer to the middle, reached by self-motion; this one if there is none."""
+        for _ in range(STEPS):
+            motions = self._free_motions(target, solution)
+            if not len(motions):
+                break
+            offset = (solution - self._middle) * self._weight
+            amounts = np.linalg.lstsq((motions * self._weight).T, -offset, rcond=None)[0]
+            step = amounts @ motions
+            step *= min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), LARGEST_STEP))
+            attempt = self._descent.descend(target, solution + step)
+            gained = self.eccentricity(attempt.positions) < (1.0 - LEAST_GAIN) * self.eccentricity(solution)
+            if not (attempt.is_solution and gained):
+                break
+            solution = attempt.positions
+        return solution
+
+    def drawn(self, target: Target, solution: Array, near: Array) -> Array:
+        """The solution, and what its self-motion, straight as at a singularity, does to come near to `near`."""
+        motions = self._free_motions(target, solution)
+        moved: Array = solution + (motions @ (near - solution)) @ motions
+        return moved
+
+    def eccentricity(self, positions: Array) -> float:
+        """How far the joints are from their middles: the sum of squares, each 1 at a limit."""
+        return float(np.sum(((positions - self._middle) * self._weight) ** 2))
+
+    def _free_motions(self, target: Target, positions: Array) -> Array:
+        """(k, n) orthonormal motions of the joints that leave the tool as it is to be."""
+        _, jacobian = target.error_and_jacobian(self._kinematics, positions)
+        _, values, rows = np.linalg.svd(jacobian)
+        rank = int(np.sum(values > RANK * float(values[0])))
+        motions: Array = rows[rank:]
+        return motions

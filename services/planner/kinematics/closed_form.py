@@ -1,0 +1,140 @@
+"""Inverse kinematics in closed form for arms that EAIK can decompose (Ostermeier, Külz, Althoff 2025, RA-L 10(10)).
+
+The arm is given to it as the axes of its joints at zero, read from the kinematics, and is held against them.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.kinematics.joint_ranges import Turns
+from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, Target, any_normal
+
+if TYPE_CHECKING:
+    from eaik.pybindings.EAIK import Robot
+
+Array = NDArray[np.float64]
+
+JOINTS = 6  # with fewer, EAIK answers positions or pairs of turns only
+SAMPLES = 8  # postures at which EAIK's forward kinematics is held against ours
+AGREEMENT = 1e-9  # [m], and per entry of the rotation
+
+log = logging.getLogger(__name__)
+
+
+class ClosedForm:
+    """All postures of one arm for a full tool pose; joint values are (n,) [rad] in the arm's order."""
+
+    def __init__(self, arm: Arm, robot: Robot, order: list[int]) -> None:
+        self._robot = robot
+        self._order = order  # the arm's joints from the base to the tool
+        self.turns = Turns(arm)
+
+    def postures(self, position: Array, rotation: Array, near: Array) -> tuple[list[Array], list[Array]]:
+        """The exact ones within the limits, with every full turn, in no order; and what EAIK calls least squares.
+
+        Those are out of reach, or, where axes coincide, a solution that lacks one turn.
+        """
+        branches, is_guess = self.branches(position, rotation)
+        return self.turns.within_limits(branches[~is_guess], near), [
+            *branches[is_guess & np.isfinite(branches).all(axis=1)]
+        ]
+
+    def branches(self, position: Array, rotation: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """EAIK's answers (m, n), whatever the limits, and which of them are least squares alone."""
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = rotation, position
+        answer = self._robot.calculate_IK(pose)
+        branches = np.empty_like(answer.Q)
+        branches[:, self._order] = answer.Q
+        return branches, np.array(answer.is_LS, dtype=bool)
+
+
+def closed_form(arm: Arm, kinematics: Kinematics) -> ClosedForm | None:
+    """The arm's closed form, or None where it has none or EAIK is not there."""
+    if len(arm.joints) != JOINTS or any(joint.unit != "rad" for joint in arm.joints):
+        return None
+    try:
+        from eaik.pybindings.EAIK import Robot
+    except ImportError as error:
+        log.warning(f"no inverse kinematics in closed form, it is searched for instead: {error}")
+        return None
+    order = chain_order(arm)
+    pose, jacobian = kinematics.tool_and_jacobian(np.zeros(JOINTS))
+    axes = jacobian[3:, order].T
+    if not np.allclose(np.linalg.norm(axes, axis=1), 1.0, atol=AGREEMENT):
+        return None  # a mimic turns with one of them
+    # With v the tool point's velocity when a joint turns at 1 rad/s: tool + axis x v lies on the joint's axis.
+    on_axes = pose.position + np.cross(axes, jacobian[:3, order].T)
+    ways = np.diff(np.vstack((np.zeros(3), on_axes, pose.position)), axis=0)
+    robot = Robot(axes.T, ways.T, pose.rotation, [], True)
+    if not robot.has_known_decomposition() or not _agrees(arm, kinematics, robot, order):
+        return None
+    return ClosedForm(arm, robot, order)
+
+
+def turns_about(direction: Array, axis: Array, rotation: Array, count: int) -> list[Array]:
+    """`count` rotations (3, 3), evenly spread, that bring the tool's `axis` along `direction`.
+
+    The first one keeps the tool's present `rotation` about it as well as it can.
+    """
+    across = any_normal(axis)
+    wanted = rotation @ across
+    wanted = wanted - direction * float(direction @ wanted)
+    length = float(np.linalg.norm(wanted))
+    wanted = any_normal(direction) if length < 1e-6 else wanted / length
+    tool = np.column_stack((axis, across, np.cross(axis, across)))
+    side = np.cross(direction, wanted)
+    turns = (math.tau * index / count for index in range(count))
+    firsts = (math.cos(turn) * wanted + math.sin(turn) * side for turn in turns)
+    return [np.column_stack((direction, first, np.cross(direction, first))) @ tool.T for first in firsts]
+
+
+def chain_order(arm: Arm) -> list[int]:
+    """The arm's joints as they follow one another from the base to the tool."""
+    by_child = {joint.child: joint for joint in arm.model.joints}
+    link, names = arm.tool_frame, []
+    while link in by_child:
+        names.append(by_child[link].name)
+        link = by_child[link].parent
+    known = {name: index for index, name in enumerate(arm.joint_names)}
+    chain = [known[name] for name in reversed(names) if name in known]
+    return chain + [index for index in range(len(arm.joints)) if index not in chain]
+
+
+def _agrees(arm: Arm, kinematics: Kinematics, robot: Robot, order: list[int]) -> bool:
+    """Whether EAIK's forward kinematics is ours."""
+    for values in np.random.default_rng(1).uniform(-math.pi, math.pi, (SAMPLES, JOINTS)):
+        ours, theirs = kinematics.tool(values), robot.fwdkin(values[order])
+        if max(np.abs(theirs[:3, 3] - ours.position).max(), np.abs(theirs[:3, :3] - ours.rotation).max()) > AGREEMENT:
+            return False
+    return True
+
+
+def completed(target: Target, kinematics: Kinematics, guess: Array) -> list[Array]:
+    """`guess` with the turn that is missing made by one joint or another; none where more than one turn is missing.
+
+    A posture that is out of reach has its orientation right and its position wrong, and is left soonest.
+    """
+    far, away = target.misses(kinematics.tool(guess))
+    if away < ROTATION_TOLERANCE:
+        return [guess] if far < POSITION_TOLERANCE else []
+    pose, jacobian = kinematics.tool_and_jacobian(guess)
+    missing = target.turn(pose.rotation)
+    found = []
+    for joint, axis in enumerate(jacobian[3:].T):
+        amount = float(axis @ missing)
+        if float(np.linalg.norm(missing - amount * axis)) < ROTATION_TOLERANCE:
+            turned = guess.copy()
+            turned[joint] += amount
+            far, away = target.misses(kinematics.tool(turned))
+            if far < POSITION_TOLERANCE and away < ROTATION_TOLERANCE:
+                found.append(turned)
+    return found

@@ -1,0 +1,101 @@
+"""One descent towards a tool target within the joint limits: damped least squares after Levenberg and Marquardt, with
+the joints that press against a limit left out of the step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.kinematics.targets import Target
+
+Array = NDArray[np.float64]
+Residual = Callable[[Array], tuple[Array, Array]]  # what is missing at a posture, and how the joints change that
+Test = Callable[[Array], bool]
+
+ITERATIONS = 40
+STALL = 1e-5  # share of the squared error by which an iteration must improve
+LARGEST_STEP = 0.8  # [rad] or [m] a joint may move in one iteration
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """Where one descent ended: joint values (n,), and how far the tool is from its target."""
+
+    positions: Array
+    error: float  # [m], turns weighted in
+    is_solution: bool
+
+
+class Descent:
+    """Descends for one arm."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics) -> None:
+        self._kinematics = kinematics
+        self._lower = np.array([joint.lower for joint in arm.joints])
+        self._upper = np.array([joint.upper for joint in arm.joints])
+        self._identity = np.eye(len(arm.joints))
+
+    def clip(self, positions: Array) -> Array:
+        """The nearest posture within the limits."""
+        clipped: Array = np.minimum(np.maximum(positions, self._lower), self._upper)
+        return clipped
+
+    def descend(self, target: Target, start: Array) -> Attempt:
+        """The nearest local optimum from `start`: exact where it can be, else at the edge of the tolerances."""
+        attempt = self._descend(
+            target, start, lambda q: target.error_and_jacobian(self._kinematics, q), target.is_exact
+        )
+        if attempt.is_solution or not target.is_tolerant:
+            return attempt
+        edge = self._descend(target, attempt.positions, lambda q: self._tolerant(target, q), target.is_at_edge)
+        error, _ = target.error_and_jacobian(self._kinematics, edge.positions)
+        return Attempt(edge.positions, math.sqrt(float(error @ error)), target.is_met(error))
+
+    def _tolerant(self, target: Target, positions: Array) -> tuple[Array, Array]:
+        return target.beyond_tolerances(*target.error_and_jacobian(self._kinematics, positions))
+
+    def _descend(self, target: Target, start: Array, residual: Residual, is_there: Test) -> Attempt:
+        positions = self.clip(start)
+        error, jacobian = residual(positions)
+        cost, damping = float(error @ error), 1e-6
+        for _ in range(ITERATIONS):
+            if is_there(error):
+                break
+            pull = error @ jacobian
+            free = self._is_free(positions, pull)
+            if not free.any() or float(np.abs(pull[free]).max()) < 1e-10:
+                break
+            trial = self._step(positions, jacobian, pull, free, damping)
+            trial_error, trial_jacobian = residual(trial)
+            trial_cost = float(trial_error @ trial_error)
+            if trial_cost < cost:
+                has_stalled = trial_cost > cost * (1.0 - STALL)
+                positions, error, jacobian, cost = trial, trial_error, trial_jacobian, trial_cost
+                damping = max(damping * 0.1, 1e-12)
+                if has_stalled:
+                    break
+            else:
+                damping *= 10.0
+                if damping > 1e4:
+                    break
+        return Attempt(positions, math.sqrt(cost), is_there(error))
+
+    def _is_free(self, positions: Array, pull: Array) -> NDArray[np.bool_]:
+        """The joints that no limit holds back."""
+        above, below = positions > self._lower, positions < self._upper
+        free: NDArray[np.bool_] = (above | (pull > 0.0)) & (below | (pull < 0.0))
+        return free
+
+    def _step(self, positions: Array, jacobian: Array, pull: Array, free: NDArray[np.bool_], damping: float) -> Array:
+        active = jacobian if free.all() else jacobian * free
+        step = np.linalg.solve(active.T @ active + damping * self._identity, pull * free)
+        longest = float(np.abs(step).max())
+        if longest > LARGEST_STEP:
+            step *= LARGEST_STEP / longest
+        return self.clip(positions + step)

@@ -1,0 +1,117 @@
+"""From what was asked to joint values: named, joint and pose goals, each with the refusals that belong to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.message import Vector
+from schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.arm.transforms import IDENTITY, Rigid, from_message
+from services.planner.collision.clearance import Checker
+from services.planner.kinematics.ik import InverseKinematics
+from services.planner.kinematics.pose_goals import target_of
+from services.planner.kinematics.task_space import abilities
+from services.planner.kinematics.unreachable import Unreachable
+from services.planner.request.deadline import Deadline
+from services.planner.request.refusals import beyond_limit, malformed, timed_out, unknown_name
+from services.planner.request.start_state import require_parallel, require_unwound
+
+Array = NDArray[np.float64]
+Start = tuple[float, ...]
+
+INVALID = PlanCode.INVALID_GOAL_CONSTRAINTS
+
+
+class Goals:
+    """Joint values for every kind of goal, nearest to the start first."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics, checker: Checker | None = None) -> None:
+        """`checker` says what touches; without one it is the arm alone."""
+        self._arm = arm
+        self._kinematics = kinematics
+        self.abilities = abilities(arm, kinematics)
+        self._ik = InverseKinematics(arm, kinematics)
+        self._unreachable = Unreachable(arm, kinematics, self._ik, self.abilities, checker or kinematics.collisions)
+
+    def travel(self, first: Start, second: Start) -> float:
+        """[s] that the slowest joint takes between two postures at full speed."""
+        return self._ik.travel(np.array(first), np.array(second))
+
+    def candidates(
+        self, goal: Goal, start: Start, deadline: Deadline, standing: Start | None = None
+    ) -> Iterator[Start]:
+        """Postures that fulfil the goal, lazily; raises `NoPlan` where there is none.
+
+        A link's frame is where the arm has it when it stands in `standing`: at the start, where that is absent.
+        """
+        match goal:
+            case NamedGoal():
+                return iter([self._named(goal, start)])
+            case JointGoal():
+                return iter([self._joints(goal, start)])
+            case PoseGoal():
+                return self._poses(goal, self.frame(goal, standing or start), start, deadline)
+            case WaypointGoal():
+                raise malformed(
+                    INVALID, "goal", "this planner takes one goal at a time", "ask for the first point alone"
+                )
+
+    def _named(self, goal: NamedGoal, start: Start) -> Start:
+        values = self._arm.named_state(goal.name, start)
+        if values is None:
+            where = f"{self._arm.srdf_path.name} of {self._arm.name}"
+            raise unknown_name(INVALID, "unknown state", goal.name, self._arm.state_names, where)
+        self._require_limits(self._arm.joint_names, values)
+        return values
+
+    def _joints(self, goal: JointGoal, start: Start) -> Start:
+        if not goal.name:
+            raise malformed(INVALID, "joints", "the goal names no joint", "name at least one joint and its position")
+        require_parallel(goal.name, goal.position, "the joint goal")
+        for name in goal.name:
+            if name not in self._arm.joint_names:
+                raise unknown_name(INVALID, "unknown joint", name, self._arm.joint_names, self._arm.name)
+        self._require_limits(goal.name, goal.position)
+        values = dict(zip(goal.name, goal.position, strict=True))
+        return tuple(values.get(name, value) for name, value in zip(self._arm.joint_names, start, strict=True))
+
+    def _require_limits(self, names: tuple[str, ...], positions: Vector) -> None:
+        joints = [self._arm.joint(name) for name in names]
+        nearest = tuple(joint.clamp(position) for joint, position in zip(joints, positions, strict=True))
+        for joint, position in zip(joints, positions, strict=True):
+            require_unwound(INVALID, joint, position)
+            if not joint.is_within(position):
+                raise beyond_limit(self._arm, joint, position, nearest)
+
+    def _poses(self, goal: PoseGoal, frame: Rigid, start: Start, deadline: Deadline) -> Iterator[Start]:
+        target = target_of(goal, frame)
+        near = np.array(start)
+        if not self.abilities.allows(target):
+            raise self._unreachable.refusal(goal, target, frame, near, deadline)
+        found = False
+        for positions in self._ik.solutions(target, near, deadline):
+            found = True
+            yield tuple(positions.tolist())
+        if found:
+            return
+        if deadline.has_passed():
+            raise timed_out()
+        raise self._unreachable.refusal(goal, target, frame, near, deadline)
+
+    def frame(self, goal: PoseGoal, start: Start) -> Rigid:
+        """The goal's frame in the base."""
+        if goal.frame in ("", self._arm.base_frame):
+            return IDENTITY
+        links = self._kinematics.link_poses(start)
+        if goal.frame not in links:
+            raise unknown_name(PlanCode.FRAME_TRANSFORM_FAILURE, "unknown frame", goal.frame, links, self._arm.name)
+        return from_message(links[goal.frame])
+
+    def shown_point(self, goal: PoseGoal, start: Start, posture: Array, deadline: Deadline) -> Vector:
+        """Where the tool is in `posture`, in the goal's form; a mere point is reachable as printed."""
+        return self._unreachable.shown(goal, posture, self.frame(goal, start), deadline)

@@ -1,0 +1,180 @@
+"""Inverse kinematics: in closed form where the arm has one, else descents from many deterministic starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain, islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.kinematics.centring import Centring
+from services.planner.kinematics.closed_form import ClosedForm, chain_order, closed_form, completed, turns_about
+from services.planner.kinematics.descent import Attempt, Descent
+from services.planner.kinematics.joint_ranges import one_turn, spread
+from services.planner.kinematics.parallel_axes import ParallelAxes, parallel_axes
+from services.planner.kinematics.targets import Target
+from services.planner.request.deadline import Deadline
+
+Array = NDArray[np.float64]
+
+STARTS = 24  # beside the present posture
+FULL_POSE_JOINTS, MORE_STARTS = 6, 64  # that many where a full pose has to be searched for
+BATCH = 4  # starts that are tried together before their solutions are handed out
+FEW = 4  # starts where the closed form finds nothing, which it has never missed
+FINE_TURNS, MOST_AT_LIMITS = 120, 12  # the same, where none of those has a posture, and postures that are tried then
+TURNS = 16  # rotations about the axis of a tool that only has to point somewhere
+SAME = 1e-4  # [s] at full speed: solutions nearer than that are one
+SAME_REDUNDANT = 0.1  # [s] the same, where solutions lie in a continuum
+
+
+class InverseKinematics:
+    """Joint values for tool targets."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics, is_numeric: bool = False) -> None:
+        self._kinematics = kinematics
+        self._descent = Descent(arm, kinematics)
+        self._centring = Centring(arm, kinematics, self._descent)
+        self._closed: ClosedForm | None = None if is_numeric else closed_form(arm, kinematics)
+        self._parallel: ParallelAxes | None = None if is_numeric else parallel_axes(arm, kinematics)
+        self._lower, self._upper = one_turn(arm)
+        self._speed = np.array([joint.velocity for joint in arm.joints])
+        # The first joint of the chain turns the whole arm as it is: its mirror image is no other posture.
+        self._mirrored = [index for index in chain_order(arm)[1:] if arm.joints[index].unit == "rad"]
+        self._starts = spread(arm, self._start_count(arm))
+
+    @property
+    def is_closed_form(self) -> bool:
+        """Whether full poses are solved in closed form."""
+        return self._closed is not None
+
+    def solutions(self, target: Target, near: Array, deadline: Deadline) -> Iterator[Array]:
+        """Distinct joint values that meet the target: all of the closed form, the nearest first; where that gives none,
+        what `near` leads to and its mirror images, then batches, each nearest first."""
+        found: list[Array] = []
+        for positions in chain(self._closed_form_solutions(target, near), self._at_limits(target, near, found)):
+            if self._is_new(positions, found, SAME):
+                found.append(positions)
+                yield positions
+        if not found:
+            is_known = self._parallel is not None or (self._closed is not None and target.rotation is not None)
+            starts = FEW if is_known and not target.is_tolerant else len(self._starts)
+            yield from self._searched(target, near, deadline, starts)
+
+    def nearest(self, target: Target, near: Array, deadline: Deadline) -> list[Array]:
+        """Postures that bring the tool as near to the target as their start allows, the best one first."""
+        attempts = [self.descend(target, near), *self._attempts(target, near, deadline)]
+        return [attempt.positions for attempt in sorted(attempts, key=lambda attempt: attempt.error)]
+
+    def travel(self, first: Array, second: Array) -> float:
+        """[s] that the slowest joint takes between two postures at full speed: the distance that counts."""
+        return float(np.max(np.abs(first - second) / self._speed))
+
+    def descend(self, target: Target, start: Array) -> Attempt:
+        """The nearest local optimum from `start`."""
+        return self._descent.descend(target, start)
+
+    def _closed_form_solutions(self, target: Target, near: Array) -> Iterator[Array]:
+        """The closed form's postures, each refined until it meets the target; lazily, the nearest first."""
+        postures = self._closed_form_postures(target, near)
+        for positions in sorted(postures, key=lambda positions: self.travel(near, positions)):
+            attempt = self._descent.descend(target, positions)
+            if attempt.is_solution:
+                yield attempt.positions
+
+    def _closed_form_postures(self, target: Target, near: Array) -> list[Array]:
+        if self._parallel is not None:
+            return self._parallel.postures(target.position, near)
+        if self._closed is None:
+            return []
+        postures: list[Array] = []
+        for rotation in self._rotations(target, near):
+            exact, guesses = self._closed.postures(target.position, rotation, near)
+            postures += exact
+            postures += [
+                posture for guess in guesses for posture in self._from_guess(self._closed, target, guess, near)
+            ]
+        return postures
+
+    def _at_limits(self, target: Target, near: Array, found: list[Array]) -> Iterator[Array]:
+        """Where nothing was found, for the free turn leaves hardly any posture within the limits: what those of a fine
+        turn lead to that miss the limits least."""
+        if found or self._closed is None or target.pointing is None:
+            return
+        closed, present = self._closed, self._kinematics.tool(near).rotation
+        rotations = turns_about(target.pointing.direction, target.pointing.axis, present, FINE_TURNS)
+        answers = [closed.branches(target.position, rotation) for rotation in rotations]
+        exact = np.concatenate([branches[~is_guess] for branches, is_guess in answers])
+        postures, missed = closed.turns.nearly(exact[np.isfinite(exact).all(axis=1)])
+        for place in np.argsort(missed)[:MOST_AT_LIMITS].tolist():
+            attempt = self.descend(target, postures[place])
+            if attempt.is_solution:
+                yield attempt.positions
+
+    def _rotations(self, target: Target, near: Array) -> list[Array]:
+        """The tool's rotations that the target asks for, or some of them where it leaves one turn free."""
+        if target.rotation is not None:
+            return [target.rotation]
+        if target.pointing is None:
+            return []
+        present = self._kinematics.tool(near).rotation
+        return turns_about(target.pointing.direction, target.pointing.axis, present, TURNS)
+
+    def _from_guess(self, closed: ClosedForm, target: Target, guess: Array, near: Array) -> Iterator[Array]:
+        """Where axes coincide, how two joints share one turn is free: as nearly as they can to how they stand now."""
+        alike = completed(target, self._kinematics, guess)
+        for turned in closed.turns.within_limits(np.array(alike), near) if alike else []:
+            attempt = self.descend(target, self._centring.drawn(target, turned, near))
+            if attempt.is_solution:
+                yield attempt.positions
+
+    def _start_count(self, arm: Arm) -> int:
+        return MORE_STARTS if len(arm.joints) >= FULL_POSE_JOINTS and self._closed is None else STARTS
+
+    def _searched(self, target: Target, near: Array, deadline: Deadline, starts: int) -> Iterator[Array]:
+        found = self._first(target, near)
+        yield from list(found)
+        attempts = islice(self._attempts(target, near, deadline), starts)
+        while batch := list(islice(attempts, BATCH)):
+            new: list[Array] = []
+            for attempt in batch:
+                if attempt.is_solution:
+                    self._collect(target, attempt.positions, found, new)
+            yield from sorted(new, key=lambda positions: self.travel(near, positions))
+
+    def _first(self, target: Target, near: Array) -> list[Array]:
+        """What `near` leads to and, for an arm of few joints, its mirror image in each elbow; nearest first."""
+        first = self.descend(target, near)
+        if not first.is_solution:
+            return []
+        found = [first.positions]
+        if len(near) < FULL_POSE_JOINTS and not self._centring.is_redundant(target, first.positions):
+            for joint in self._mirrored:
+                start = first.positions.copy()
+                start[joint] = self._lower[joint] + self._upper[joint] - start[joint]
+                attempt = self.descend(target, start)
+                if attempt.is_solution and self._is_new(attempt.positions, found, SAME):
+                    found.append(attempt.positions)
+        return sorted(found, key=lambda positions: self.travel(near, positions))
+
+    def _collect(self, target: Target, positions: Array, found: list[Array], new: list[Array]) -> None:
+        """Puts a solution that is none of those found into both lists; far from `near`, freedom goes to the middles."""
+        is_redundant = self._centring.is_redundant(target, positions)
+        if is_redundant:
+            positions = self._centring.centred(target, positions)
+        if self._is_new(positions, found, SAME_REDUNDANT if is_redundant else SAME):
+            found.append(positions)
+            new.append(positions)
+
+    def _is_new(self, positions: Array, found: list[Array], same: float) -> bool:
+        return all(self.travel(positions, other) > same for other in found)
+
+    def _attempts(self, target: Target, near: Array, deadline: Deadline) -> Iterator[Attempt]:
+        """Descents from starts spread over the limits; the first few lie around `near`."""
+        for index, point in enumerate(self._starts):
+            if deadline.has_passed():
+                return
+            start = near + 0.25 * (point - 0.5 * (self._lower + self._upper)) if index < 4 else point
+            yield self.descend(target, start)

@@ -1,0 +1,91 @@
+"""Joint values within the limits: full turns of a closed-form solution, and starts spread over the joint ranges."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm, Joint
+
+Array = NDArray[np.float64]
+
+NEVER = 1e9  # [m] after which a slide would be where it was
+MOST_TURNS = 64  # combinations of full turns of one branch
+ROUNDING = 1e-9  # [rad] or [m] by which a solution may be beyond a limit before it is put onto it
+
+
+class Turns:
+    """For one arm; joint values are (n,) [rad] or [m] in the arm's order."""
+
+    def __init__(self, arm: Arm) -> None:
+        self._lower = np.array([joint.lower - ROUNDING for joint in arm.joints])
+        self._upper = np.array([joint.upper + ROUNDING for joint in arm.joints])
+        self._period = np.array([math.tau if joint.unit == "rad" else NEVER for joint in arm.joints])
+
+    def within_limits(self, branches: Array, near: Array) -> list[Array]:
+        """The branches (m, n) or one of them (n,) with every full turn; joints without limits as near as they can."""
+        branches = np.atleast_2d(branches)
+        lower = np.where(np.isinf(self._lower), near - 0.5 * self._period, self._lower)
+        upper = np.where(np.isinf(self._upper), near + 0.5 * self._period, self._upper)
+        first = branches + self._period * np.ceil((lower - branches) / self._period)
+        more = np.floor((upper - first) / self._period)
+        postures: list[Array] = []
+        for values, turns in zip(first, more, strict=True):
+            if turns.min() >= 0.0:  # false for what is not a number, too
+                postures.extend(_turned(values, turns) if turns.any() else [values])
+        return postures
+
+    def nearly(self, branches: Array) -> tuple[Array, Array]:
+        """The branches (m, n) with the full turns that bring them nearest to the limits, and by how much (m,) they
+        miss those."""
+        middle, half = 0.5 * (self._lower + self._upper), 0.5 * (self._upper - self._lower)
+        middle = np.where(np.isfinite(middle), middle, 0.0)
+        away = branches - middle
+        away = away - self._period * np.rint(away / self._period)
+        return middle + away, np.maximum(np.abs(away) - half, 0.0).max(axis=1)
+
+
+def _turned(values: Array, turns: Array) -> list[Array]:
+    """`values` with up to `turns` full turns added to each."""
+    while np.prod(turns + 1.0) > MOST_TURNS:
+        turns = np.minimum(turns, turns.max() - 1.0)
+    amounts = product(*(range(int(most) + 1) for most in turns))
+    return [values + math.tau * np.array(amount) for amount in amounts]
+
+
+_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)
+
+
+def spread(arm: Arm, count: int) -> list[Array]:
+    """The first points (n,) of Halton's sequence within one turn of every joint."""
+    lower, upper = one_turn(arm)
+    bases = [_PRIMES[joint % len(_PRIMES)] for joint in range(len(arm.joints))]
+    shares = (np.array([_radical_inverse(index, base) for base in bases]) for index in range(1, count + 1))
+    return [lower + share * (upper - lower) for share in shares]
+
+
+def one_turn(arm: Arm) -> tuple[Array, Array]:
+    """Lower and upper (n,) [rad] or [m] of where starts are spread."""
+    lower, upper = np.array([_turn_of(joint) for joint in arm.joints]).T
+    return lower, upper
+
+
+def _turn_of(joint: Joint) -> tuple[float, float]:
+    """Where starts are spread [rad] or [m]: the limits, or the turn nearest to zero within wider ones."""
+    if joint.upper - joint.lower <= math.tau:
+        return joint.lower, joint.upper
+    middle = min(max(0.0, joint.lower + math.pi), joint.upper - math.pi)
+    return middle - math.pi, middle + math.pi
+
+
+def _radical_inverse(index: int, base: int) -> float:
+    """The digits of `index` in `base`, mirrored at the point (van der Corput)."""
+    value, weight = 0.0, 1.0 / base
+    while index:
+        index, digit = divmod(index, base)
+        value += digit * weight
+        weight /= base
+    return value

@@ -1,0 +1,112 @@
+"""The answers to `ik` and `fk`: postures for a pose, poses for a posture, each with the reason where there is none."""
+
+from __future__ import annotations
+
+from itertools import islice
+
+import msgspec
+
+from schemas.joints import JointState
+from schemas.planning import FkRequest, FkResponse, IkRequest, IkResponse, IkSolution, PlanCode
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.collision.clearance import CLEARANCE, Checker
+from services.planner.kinematics.goals import INVALID, Goals, Start
+from services.planner.kinematics.pose_goals import FARTHEST
+from services.planner.request.deadline import NEVER, Deadline
+from services.planner.request.refusals import NoPlan, in_collision, malformed, unknown_name
+from services.planner.request.start_state import require_parallel, resolve_start
+
+MOST_SOLUTIONS = 64
+LOOKED_THROUGH = 256  # postures, of which all may touch something
+
+
+class KinematicRequests:
+    """Answers for one arm; `present` is its newest joint state and `age` [s] how old that is."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics | None = None) -> None:
+        self._arm = arm
+        self._kinematics = kinematics or Kinematics(arm)
+        self._goals = Goals(arm, self._kinematics)
+
+    def ik(
+        self,
+        request: IkRequest,
+        present: JointState | None,
+        age: float = 0.0,
+        checker: Checker | None = None,
+        deadline: Deadline = NEVER,
+    ) -> IkResponse:
+        """The postures for a pose, the nearest first, or why there is none; `checker` says what they must not touch."""
+        try:
+            _require_count(request.solutions)
+            near = self._standing(request.near, present, age)
+            postures = list(islice(self._goals.candidates(request.goal, near, deadline), LOOKED_THROUGH))
+            if request.avoid_collisions:
+                postures = _free(postures, checker or self._kinematics.collisions)
+        except NoPlan as no_plan:
+            return IkResponse(code=no_plan.code, refusal=no_plan.refusal)
+        solutions = (IkSolution(position=posture, distance=self._goals.travel(near, posture)) for posture in postures)
+        nearest_first = sorted(solutions, key=lambda solution: solution.distance)[: request.solutions]
+        return IkResponse(code=PlanCode.SUCCESS, name=self._arm.joint_names, solutions=tuple(nearest_first))
+
+    def fk(self, request: FkRequest, present: JointState | None, age: float = 0.0) -> FkResponse:
+        """The poses of the links asked for, or why there are none; limits do not matter here."""
+        try:
+            positions = self._completed(request, present, age)
+            poses = self._kinematics.link_poses(positions)
+            links = request.links or (self._arm.tool_frame,)
+            for link in links:
+                if link not in poses:
+                    raise unknown_name(PlanCode.FRAME_TRANSFORM_FAILURE, "unknown link", link, poses, self._arm.name)
+        except NoPlan as no_plan:
+            return FkResponse(code=no_plan.code, refusal=no_plan.refusal)
+        return FkResponse(code=PlanCode.SUCCESS, links=links, poses=tuple(poses[link] for link in links))
+
+    def _standing(self, given: JointState | None, present: JointState | None, age: float) -> Start:
+        """Where distances are measured from; that the arm moves does not matter."""
+        return resolve_start(self._arm, _at_rest(given), _at_rest(present), age)
+
+    def _completed(self, request: FkRequest, present: JointState | None, age: float) -> Start:
+        """The named joints where they are said to be, beyond their limits too; the others where they are now."""
+        require_parallel(request.name, request.position, "the request")
+        for name, value in zip(request.name, request.position, strict=True):
+            if name not in self._arm.joint_names:
+                raise unknown_name(INVALID, "unknown joint", name, self._arm.joint_names, self._arm.name)
+            if abs(value) > FARTHEST:
+                raise malformed(
+                    INVALID,
+                    name,
+                    f"{value:g} is no position for {name}",
+                    "give rad for a turning joint, m for a sliding one",
+                )
+        given = dict(zip(request.name, request.position, strict=True))
+        if len(given) == len(self._arm.joints):
+            return tuple(given[name] for name in self._arm.joint_names)
+        standing = self._standing(None, present, age)
+        return tuple(given.get(name, value) for name, value in zip(self._arm.joint_names, standing, strict=True))
+
+
+def _free(postures: list[Start], checker: Checker) -> list[Start]:
+    """Those that touch nothing; raises `NoPlan` where all do."""
+    free = [posture for posture in postures if checker.distance(posture) > CLEARANCE]
+    if free:
+        return free
+    where = "in every posture for this pose" if len(postures) > 1 else "in the only posture for this pose"
+    remedy = "ask for another pose, or for postures that touch as well (avoid_collisions false)"
+    pairs = checker.pairs_within(postures[0], CLEARANCE)
+    raise in_collision(PlanCode.GOAL_IN_COLLISION, where, pairs, CLEARANCE, (), remedy)
+
+
+def _at_rest(state: JointState | None) -> JointState | None:
+    return None if state is None else msgspec.structs.replace(state, velocity=())
+
+
+def _require_count(count: int) -> None:
+    if not 1 <= count <= MOST_SOLUTIONS:
+        raise malformed(
+            INVALID,
+            "solutions",
+            f"{count} solutions cannot be asked for",
+            f"ask for 1 to {MOST_SOLUTIONS}",
+        )

@@ -1,0 +1,167 @@
+"""From a pose goal, in any of its forms, to the tool's target in the base frame; what contradicts itself is refused."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from schemas.message import Vector
+from schemas.planning import PlanCode, PoseGoal
+from services.arm.kinematics import Pose
+from services.arm.transforms import IDENTITY, Point, Quaternion, Rigid, compose, inverse, rotate
+from services.planner.kinematics.targets import Pointing, Target, turn_between
+from services.planner.request.refusals import malformed
+
+Array = NDArray[np.float64]
+
+INVALID = PlanCode.INVALID_GOAL_CONSTRAINTS
+UNIT = 1e-3  # that a quaternion's length may be off by
+LEAST_AXIS = 1e-9  # length below which an axis has no direction
+FARTHEST = 1e6  # [m] beyond which a position is a mistake, and squares lose their digits
+
+
+def target_of(goal: PoseGoal, frame: Rigid) -> Target:
+    """The target of `goal`, given in `frame` (its pose in the base); raises `NoPlan`."""
+    _require_form(goal)
+    x, y, z = goal.position
+    position = np.array(compose(frame, ((x, y, z), IDENTITY[1]))[0])
+    tolerances = (goal.position_tolerance, goal.orientation_tolerance)
+    if goal.tool_axis:
+        axis, direction = _unit(goal.tool_axis), rotate(frame[1], _unit(goal.direction))
+        return Target(position, None, Pointing(np.array(axis), np.array(direction)), *tolerances)
+    if not goal.orientation:
+        return Target(position, None, None, *tolerances)
+    rotation = _matrix(compose(frame, (IDENTITY[0], _quaternion(goal.orientation)))[1])
+    if goal.free_axis:
+        axis_ = np.array(_unit(goal.free_axis))
+        return Target(position, None, Pointing(axis_, rotation @ axis_), *tolerances)
+    return Target(position, rotation, None, *tolerances)
+
+
+def as_goal(goal: PoseGoal, pose: Pose, frame: Rigid) -> Vector:
+    """`pose` (in the base) in the form of `goal` and its frame: position, then the orientation or the direction."""
+    back = inverse(frame)
+    x, y, z = pose.position.tolist()
+    point = compose(back, ((x, y, z), IDENTITY[1]))[0]
+    if goal.tool_axis:
+        a, b, c = (pose.rotation @ np.array(_unit(goal.tool_axis))).tolist()
+        return (*point, *rotate(back[1], (a, b, c)))
+    if not goal.orientation:
+        return point
+    rotation = pose.rotation
+    if goal.free_axis:
+        rotation = _least_turned(_matrix(compose(frame, (IDENTITY[0], _quaternion(goal.orientation)))[1]), goal, pose)
+    turn = pin.Quaternion(rotation)
+    return (*point, *compose(back, (IDENTITY[0], (turn.x, turn.y, turn.z, turn.w)))[1])
+
+
+def _least_turned(asked: Array, goal: PoseGoal, pose: Pose) -> Array:
+    """Of the rotations that have the free axis where `pose` has it, the one nearest to what was asked."""
+    axis = np.array(_unit(goal.free_axis))
+    turned: Array = pin.exp3(turn_between(asked @ axis, pose.rotation @ axis)) @ asked
+    return turned
+
+
+def _require_form(goal: PoseGoal) -> None:
+    """Raises `NoPlan` for what is no pose, or two at once."""
+    if len(goal.position) != 3:
+        raise malformed(
+            INVALID, "position", f"a tool position has 3 numbers, not {len(goal.position)}", "give x y z in m"
+        )
+    if max(abs(value) for value in goal.position) > FARTHEST:
+        raise malformed(
+            INVALID, "position", f"the position {_shown(goal.position)} m is no place for an arm", "give x y z in m"
+        )
+    if goal.orientation:
+        _require_quaternion(goal.orientation)
+    for name in ("free_axis", "tool_axis", "direction"):
+        _require_axis(name, getattr(goal, name))
+    for name in ("position_tolerance", "orientation_tolerance"):
+        _require_tolerance(name, getattr(goal, name))
+    _require_one_meaning(goal)
+
+
+def _require_one_meaning(goal: PoseGoal) -> None:
+    if goal.orientation and (goal.tool_axis or goal.direction):
+        raise malformed(
+            INVALID,
+            "orientation",
+            "the goal has an orientation, and a tool_axis or a direction as well",
+            "give either an orientation (with a free_axis, if turning about that is free), or tool_axis and direction",
+        )
+    if bool(goal.tool_axis) != bool(goal.direction):
+        given, missing = ("tool_axis", "direction") if goal.tool_axis else ("direction", "tool_axis")
+        raise malformed(
+            INVALID,
+            missing,
+            f"the goal has a {given} of {_shown(getattr(goal, given))}, and no {missing}",
+            f"give both, as tool_axis 0 0 1 along direction 0 0 -1, or leave {given} empty",
+        )
+    if goal.free_axis and not goal.orientation:
+        raise malformed(
+            INVALID,
+            "free_axis",
+            f"the goal has a free_axis of {_shown(goal.free_axis)}, and no orientation that it frees",
+            "give an orientation, or tool_axis and direction instead",
+        )
+
+
+def _require_quaternion(values: Vector) -> None:
+    if len(values) != 4:
+        raise malformed(
+            INVALID, "orientation", f"an orientation has 4 numbers, not {len(values)}", "give x y z w of length 1"
+        )
+    length = math.hypot(*values)
+    if abs(length - 1.0) > UNIT:
+        remedy = "give x y z w of length 1"
+        if LEAST_AXIS < length < 1.0 / LEAST_AXIS:
+            remedy += f", as {_shown(tuple(value / length for value in values))}"
+        raise malformed(
+            INVALID,
+            "orientation",
+            f"the orientation {_shown(values)} is no unit quaternion: its length is {length:.4g}",
+            remedy,
+        )
+
+
+def _require_axis(name: str, values: Vector) -> None:
+    """Any length but zero will do: only the direction counts."""
+    if not values:
+        return
+    if len(values) != 3:
+        raise malformed(INVALID, name, f"{name} has 3 numbers, not {len(values)}", "give x y z, as 0 0 1")
+    length = math.hypot(*values)
+    if not LEAST_AXIS < length < 1.0 / LEAST_AXIS:
+        raise malformed(
+            INVALID, name, f"{name} {_shown(values)} has length {length:.4g}: it shows nowhere", "give x y z, as 0 0 1"
+        )
+
+
+def _require_tolerance(name: str, value: float) -> None:
+    if value < 0.0:
+        unit = "m" if name == "position_tolerance" else "rad"
+        raise malformed(INVALID, name, f"{name} is {value:g} {unit}, below 0", "give 0 for exact, or a larger one")
+
+
+def _unit(values: Vector) -> Point:
+    length = math.hypot(*values)
+    x, y, z = values
+    return x / length, y / length, z / length
+
+
+def _quaternion(values: Vector) -> Quaternion:
+    length = math.hypot(*values)
+    x, y, z, w = values
+    return x / length, y / length, z / length, w / length
+
+
+def _matrix(quaternion: Quaternion) -> Array:
+    matrix: Array = pin.Quaternion(np.array(quaternion)).normalized().matrix()
+    return matrix
+
+
+def _shown(values: Vector) -> str:
+    return " ".join(f"{value:.4g}" for value in values)

@@ -1,0 +1,134 @@
+"""What an arm can do with its tool, known from its joints before any goal is asked for.
+
+The rotations of the tool over all postures are read from the Jacobian; where they are turns about one axis only, how
+far a goal is from them is plain geometry.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm
+from services.arm.kinematics import Kinematics
+from services.planner.kinematics.targets import ROTATION_TOLERANCE, Target
+
+Array = NDArray[np.float64]
+
+SAMPLES = 32
+RANK = 1e-6  # singular value [m] or [rad] per joint below which a direction is none
+UPRIGHT = 1.0 - 1e-6  # cosine to the vertical from which a turn is called yaw
+
+
+@dataclass(frozen=True)
+class Abilities:
+    """`axes` (r, 3): the directions in the base frame about which the tool can be turned at all, over all postures.
+
+    `chosen`: how many of these turns can be chosen beside a position. `rotation` (3, 3): the tool's in some posture.
+    """
+
+    arm: str
+    joints: int
+    axes: Array
+    chosen: int
+    rotation: Array
+
+    @property
+    def is_full(self) -> bool:
+        """Whether every orientation can be asked for beside a position."""
+        return self.chosen == 3
+
+    @property
+    def sentence(self) -> str:
+        """What the arm can do with its tool, as a person says it."""
+        turns = len(self.axes)
+        if self.is_full:
+            return f"{self.arm} can turn its tool as it likes"
+        if turns == 0:
+            return f"{self.arm} cannot turn its tool"
+        if turns == 1 and self.chosen == 1:
+            return f"{self.arm} {self._no_tilt}, only {self._turn}"
+        if turns == 1:
+            return f"{self.arm} {self._no_tilt}, and {self._its_turn} follows from the position"
+        if self.chosen == 0:
+            return f"{self.arm} has {self.joints} joints: how its tool is turned follows from the position"
+        return f"{self.arm} has {self.joints} joints: beside a position it can choose {self.chosen} of 3 turns"
+
+    @property
+    def remedy(self) -> str:
+        """What to ask for instead."""
+        turns = len(self.axes)
+        if turns == 0 or (self.chosen == 0 and turns > 1):
+            return "ask for the position alone"
+        if turns == 1:
+            return f"ask for the position, or for the position + {self._yaw}"
+        if self.chosen == 1:
+            return "ask for the position alone, or give the orientation a tolerance"
+        return "ask for the position + the direction of one tool axis, or leave an axis free"
+
+    @property
+    def turning(self) -> str:
+        """The name of what the arm lacks."""
+        return "tilt" if self._is_upright else "orientation"
+
+    def allows(self, target: Target) -> bool:
+        """Whether any posture at all, wherever the tool then is, turns it like that."""
+        return self.missing_tilt(target) <= max(ROTATION_TOLERANCE, target.rotation_tolerance)
+
+    def missing_tilt(self, target: Target) -> float:
+        """[rad] at least between the target and the nearest orientation of any posture; 0 where that is not known."""
+        if not target.has_turn or len(self.axes) > 1:
+            return 0.0
+        if len(self.axes) == 0:
+            return float(np.linalg.norm(target.turn(self.rotation)))
+        axis = self.axes[0]
+        in_tool = self.rotation.T @ axis
+        if target.pointing is not None:
+            there = angle_between(axis, target.pointing.direction)
+            return abs(there - angle_between(in_tool, target.pointing.axis))
+        assert target.rotation is not None
+        return angle_between(axis, target.rotation @ in_tool)
+
+    @property
+    def _is_upright(self) -> bool:
+        return len(self.axes) == 1 and abs(float(self.axes[0][2])) > UPRIGHT
+
+    @property
+    def _no_tilt(self) -> str:
+        return "cannot tilt its tool" if self._is_upright else "turns its tool about one axis only"
+
+    @property
+    def _turn(self) -> str:
+        return "turn it about the vertical" if self._is_upright else "about that"
+
+    @property
+    def _its_turn(self) -> str:
+        return "its yaw" if self._is_upright else "how far"
+
+    @property
+    def _yaw(self) -> str:
+        return "yaw" if self._is_upright else "the turn about that axis"
+
+
+def abilities(arm: Arm, kinematics: Kinematics) -> Abilities:
+    """Read from the Jacobians of some postures within the limits; those at a stretch do not hide what others can."""
+    lower = [max(joint.lower, -math.pi) for joint in arm.joints]
+    upper = [min(joint.upper, math.pi) for joint in arm.joints]
+    postures = np.random.default_rng(1).uniform(lower, upper, (SAMPLES, len(arm.joints)))
+    jacobians = [kinematics.jacobian(posture) for posture in postures]
+    _, values, rows = np.linalg.svd(np.hstack([jacobian[3:] for jacobian in jacobians]).T)
+    axes = rows[: int(np.sum(values > RANK))]
+    chosen = max(_rank(jacobian) - _rank(jacobian[:3]) for jacobian in jacobians)
+    return Abilities(arm.name, len(arm.joints), axes, chosen, kinematics.tool(postures[0]).rotation)
+
+
+def angle_between(first: Array, second: Array) -> float:
+    """[rad] between two unit vectors, exact for small ones too."""
+    return math.atan2(float(np.linalg.norm(np.cross(first, second))), float(first @ second))
+
+
+def _rank(jacobian: Array) -> int:
+    return int(np.linalg.matrix_rank(jacobian, tol=RANK))

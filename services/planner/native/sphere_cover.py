@@ -1,0 +1,135 @@
+"""Spheres that cover a solid: every point of it is in one of them, and none bulges out by more than is allowed.
+
+The solid is cut into cells, small ones at its surface, and each cell is in a ball. A sphere at depth d in a solid may
+have the radius d + bulge. Greedily (native/src/cover.h), the sphere that holds the most cells not yet held is taken, and
+shrunk to what it is needed for. The same solid gives the same spheres.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.planner.collision_geometry.link_shapes import solid_of
+from services.planner.collision_geometry.shapes import Shape
+from services.planner.collision_geometry.solids import Capsule, Solid
+from services.planner.native.binding import motion
+
+Array = NDArray[np.float64]
+
+BULGE = 0.005  # [m]
+FINENESS = 0.75  # a surface cell's edge as a share of the bulge; its ball must be smaller than the smallest sphere
+MESH_FINENESS = 0.4  # the same for a mesh: half a cell's diagonal is lost on either side of its surface
+MOST_MESH_CELLS = 48  # along a mesh's longest side; a larger mesh has larger cells, and more bulge
+LEVELS = 3  # times that cells are halved from the coarsest to those at the surface
+DEEP = 2.5  # balls deep: such a cell is not halved
+MEDIAL = 0.9  # the slope of the depth below which a point has several nearest ones on the surface
+
+
+@dataclass(frozen=True)
+class Cover:
+    """`spheres` (n, 4): centres and radii [m]; `bulge` [m]: how far the farthest one reaches beyond the solid."""
+
+    spheres: Array
+    bulge: float
+
+
+def cover_shapes(shapes: Sequence[Shape], bulge: float) -> Cover:
+    """The spheres of several shapes in the frame that their poses are in; raises ValueError for one without an end."""
+    covers = [_placed(shape, bulge) for shape in shapes]
+    return Cover(np.vstack([cover.spheres for cover in covers]), max(cover.bulge for cover in covers))
+
+
+def _placed(shape: Shape, bulge: float) -> Cover:
+    cover = mesh_cover(*shape.mesh.arrays, bulge) if shape.mesh else cover_of(solid_of(shape), bulge)
+    spheres = cover.spheres.copy()
+    spheres[:, :3] = spheres[:, :3] @ shape.rotation.T + shape.pose[0]
+    spheres[:, 3] += shape.padding
+    return Cover(spheres, cover.bulge)
+
+
+@lru_cache(maxsize=256)
+def cover_of(solid: Solid, bulge: float = BULGE) -> Cover:
+    """The spheres of a convex solid in its own frame."""
+    if isinstance(solid, Capsule) and solid.half_length == 0.0:
+        return Cover(np.array([[0.0, 0.0, 0.0, solid.radius]]), 0.0)
+    cells = cells_of(solid, FINENESS * bulge)
+    centres = medial(solid, FINENESS * bulge)
+    candidates = with_radii(centres, np.maximum(solid.depth(centres), 0.0) + bulge)
+    spheres = _chosen(cells, candidates, bulge)
+    return Cover(spheres, float((spheres[:, 3] - solid.depth(spheres[:, :3])).max()))
+
+
+def mesh_cover(vertices: Array, faces: NDArray[np.int32], bulge: float = BULGE) -> Cover:
+    """The spheres of a mesh: of what its surface encloses and of the surface.
+
+    The bulge is a bound here: of a cell at the surface only the cell is known.
+    """
+    longest = float(np.ptp(vertices, axis=0).max())
+    pitch = max(MESH_FINENESS * bulge, longest / MOST_MESH_CELLS)
+    bulge = max(bulge, pitch / MESH_FINENESS)
+    rows = motion.solid_cells(vertices, faces, pitch)
+    radius = 0.5 * math.sqrt(3.0) * pitch
+    promised = rows[:, 3]  # for any point of a cell; half a diagonal more for its centre
+    depths = np.where(promised > 0.0, promised + radius, np.where(promised < 0.0, -radius, 0.0))
+    cells = with_radii(rows[:, :3], np.full(len(rows), radius * (1.0 + 1e-9)))
+    return Cover(_chosen(cells, with_radii(rows[:, :3], depths + bulge), bulge - radius), bulge)
+
+
+def _chosen(cells: Array, candidates: Array, least: float) -> Array:
+    """(n, 4) spheres that hold all cells."""
+    return motion.cover(cells, candidates, least)
+
+
+def cells_of(solid: Solid, pitch: float) -> Array:
+    """(m, 4) balls that together hold the solid: cells of at most `pitch` [m] at the surface, larger ones deep inside.
+
+    A cell whose centre lies outside is held by the ball around the solid's nearest point: projection on a convex
+    solid never brings points farther apart.
+    """
+    counts = np.ceil(2.0 * solid.half / (pitch * 2**LEVELS)).astype(int)
+    steps = 2.0 * solid.half / counts
+    centres = lattice(solid.half, steps)
+    points, radii = [], []
+    for level in range(LEVELS + 1):
+        radius = 0.5 * float(np.linalg.norm(steps)) * (1.0 + 1e-9)
+        depth = solid.depth(centres)
+        done = depth >= DEEP * radius if level < LEVELS else depth >= -radius
+        points.append(solid.nearest(centres[done]))
+        radii.append(np.full(int(done.sum()), radius))
+        steps = 0.5 * steps
+        corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * steps
+        centres = (centres[~done & (depth >= -radius)][:, None, :] + corners).reshape(-1, 3)
+    return with_radii(np.vstack(points), np.concatenate(radii))
+
+
+def medial(solid: Solid, pitch: float) -> Array:
+    """(k, 3) points of a lattice at the solid's medial axis: any sphere of the same bulge is in one around them.
+
+    Away from the nearest point of the surface the depth grows by as much as one moves, and so spheres grow around one
+    another, until a second point of the surface is as near.
+    """
+    counts = np.ceil(2.0 * solid.half / pitch).astype(int) | 1  # odd: some points are on planes of symmetry
+    steps = 2.0 * solid.half / counts
+    points = lattice(solid.half, steps)
+    reach = 0.5 * steps
+    shifts = np.diag(reach)
+    slopes = [(solid.depth(points + shifts[i]) - solid.depth(points - shifts[i])) / (2.0 * reach[i]) for i in range(3)]
+    chosen: Array = points[(np.linalg.norm(slopes, axis=0) < MEDIAL) & (solid.depth(points) > 0.0)]
+    return chosen
+
+
+def lattice(half: Array, steps: Array) -> Array:
+    """(n, 3) centres of the cells that a box of `half` sizes is cut into."""
+    axes = [np.arange(0.5 * steps[i] - half[i], half[i], steps[i]) for i in range(3)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def with_radii(points: Array, radii: Array) -> Array:
+    """(n, 4)."""
+    return np.ascontiguousarray(np.column_stack((points, radii)))

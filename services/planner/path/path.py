@@ -1,0 +1,45 @@
+"""What a search ends with, and how much time it has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.planner.request.refusals import SearchFailure
+
+Array = NDArray[np.float64]
+Start = tuple[float, ...]
+
+STRAIGHT = "straight"  # the planner_id of joint lines, which no search is needed for
+
+
+class NoWay(Exception):
+    """None was found."""
+
+    def __init__(self, why: SearchFailure) -> None:
+        super().__init__(why.value)
+        self.why = why
+
+
+@dataclass(frozen=True)
+class Way:
+    """A free way: the polyline of `corners` (m, n), and the uniform cubic B-spline of `control` (k, n) in its place.
+
+    Both ends of the curve are there three times, so that it begins and ends exactly there.
+    """
+
+    corners: Array
+    control: Array
+    planner_id: str
+
+    @property
+    def start(self) -> Start:
+        """Where it begins, to the bit."""
+        return tuple(self.control[0].tolist())
+
+    @property
+    def goal(self) -> Start:
+        """Where it ends, to the bit."""
+        return tuple(self.control[-1].tolist())

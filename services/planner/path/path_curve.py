@@ -1,0 +1,136 @@
+"""Joint values by the length of a way, with their derivatives: a cubic spline, or lines with rounded corners."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.planner.path.curve import Derivatives
+
+Array = NDArray[np.float64]
+
+NO_WAY = 1e-7  # [m] a leg that is shorter is none
+
+
+class PathCurve(Protocol):
+    """Continuous in its second derivative; `knots` (j,) are where its third one jumps."""
+
+    @property
+    def knots(self) -> Array: ...
+    def at(self, along: Array) -> Derivatives: ...
+
+
+class CubicSpline:
+    """Through `values` (m, k) at the ascending `knots` (m,), m >= 4; at its ends as steep as the cubic through four of
+    them (Biagiotti and Melchiorri 2008, section 4.4)."""
+
+    def __init__(self, knots: Array, values: Array) -> None:
+        self.knots = knots
+        self._h = np.diff(knots)[:, None]
+        self._values = values
+        self._slopes = self._solved(np.diff(values, axis=0) / self._h)
+
+    def at(self, along: Array) -> Derivatives:
+        """At lengths (m,) within the knots."""
+        index = np.clip(np.searchsorted(self.knots, along, side="right") - 1, 0, len(self.knots) - 2)
+        h, x = self._h[index], (along - self.knots[index])[:, None]
+        start, slope = self._values[index], self._slopes[index]
+        chord = (self._values[index + 1] - start) / h
+        square = (3.0 * chord - 2.0 * slope - self._slopes[index + 1]) / h
+        cube = (slope + self._slopes[index + 1] - 2.0 * chord) / (h * h)
+        value = start + x * (slope + x * (square + x * cube))
+        return Derivatives(
+            value, slope + x * (2.0 * square + x * 3.0 * cube), 2.0 * square + x * 6.0 * cube, 6.0 * cube
+        )
+
+    def _solved(self, chords: Array) -> Array:
+        """(m, k) the slopes that make the second derivative continuous: the tridiagonal system, after Thomas."""
+        h = self._h[:, 0]
+        slopes = np.empty_like(self._values)
+        slopes[0] = _end_slope(self.knots[:4], self._values[:4])
+        slopes[-1] = _end_slope(self.knots[-4:][::-1], self._values[-4:][::-1])
+        right = 3.0 * (chords[:-1] * self._h[1:] + chords[1:] * self._h[:-1])
+        upper, before = np.zeros(len(h)), slopes[0]
+        for row in range(1, len(h)):
+            pivot = 2.0 * (h[row - 1] + h[row]) - h[row] * upper[row - 1]
+            upper[row] = h[row - 1] / pivot
+            before = slopes[row] = (right[row - 1] - h[row] * before) / pivot
+        for row in range(len(h) - 1, 0, -1):
+            slopes[row] -= upper[row] * slopes[row + 1]
+        return slopes
+
+
+class RoundedLines:
+    """Straight from row to row of `postures` (m, n), corners cut at `radii` (m - 2,) of the length before and after."""
+
+    def __init__(self, postures: Array, lengths: Array, radii: Array) -> None:
+        self.start, self.end = postures[0], postures[-1]
+        self._corners = np.concatenate(([0.0], np.cumsum(lengths)))
+        self._postures = postures
+        self._directions = np.diff(postures, axis=0) / lengths[:, None]
+        self._radii = radii
+        inner = self._corners[1:-1]
+        self.marks = np.unique(np.concatenate((inner - radii, inner + radii, self._corners[[0, -1]])))
+        self.knots = np.unique(np.concatenate((self.marks, inner)))
+
+    def at(self, along: Array) -> Derivatives:
+        """At lengths (m,) within the knots."""
+        leg = np.clip(np.searchsorted(self._corners, along, side="right") - 1, 0, len(self._directions) - 1)
+        first = self._directions[leg].copy()
+        value = self._postures[leg] + (along - self._corners[leg])[:, None] * first
+        second, third = np.zeros_like(first), np.zeros_like(first)
+        for index, radius in enumerate(self._radii.tolist()):
+            near = np.abs(along - self._corners[index + 1]) < radius
+            coming, leaving = self._directions[index : index + 2]
+            way, change = 2.0 * radius, (leaving - coming)[None, :]
+            offset = (along[near] - self._corners[index + 1])[:, None]
+            u = (offset + radius) / way
+            value[near] = self._postures[index + 1] + offset * coming + way * blending(u) * change
+            first[near] = coming + u * u * (3.0 - 2.0 * u) * change
+            second[near] = 6.0 * u * (1.0 - u) / way * change
+            third[near] = (6.0 - 12.0 * u) / way**2 * change
+        return Derivatives(value, first, second, third)
+
+
+def rounded_runs(postures: Array, scale: Array, reach: Array, blend: float) -> list[RoundedLines]:
+    """The polyline of `postures` (m, n) as runs from rest to rest; its length is in `scale` (n,) units of the joints.
+
+    A corner is cut only as far as no point of the arm leaves it by more than `blend` [m], by how far it can move at
+    most per unit of each joint, `reach` (n,).
+    """
+    lengths = np.linalg.norm(np.diff(postures, axis=0) / scale, axis=1)
+    keep = lengths > NO_WAY
+    postures, lengths = np.vstack((postures[:1], postures[1:][keep])), lengths[keep]
+    if not len(lengths):
+        return []
+    movement = np.abs(np.diff(postures, axis=0)) @ reach / lengths  # [m] per unit of length
+    radii = [
+        cut(float(lengths[i]), float(lengths[j]), blend / max(float(movement[i]), float(movement[j]), NO_WAY))
+        for i, j in pairwise(range(len(lengths)))
+    ]
+    stops = [0, *(index + 1 for index, radius in enumerate(radii) if radius == 0.0), len(lengths)]
+    return [
+        RoundedLines(postures[low : high + 1], lengths[low:high], np.array(radii[low : high - 1]))
+        for low, high in pairwise(stops)
+    ]
+
+
+def _end_slope(knots: Array, values: Array) -> Array:
+    """Of the cubic through four points, at the first of them."""
+    powers = (knots - knots[0])[1:, None] ** np.arange(1, 4)
+    slope: Array = np.linalg.solve(powers, values[1:] - values[0])[0]
+    return slope
+
+
+def cut(before: float, after: float, blend: float) -> float:
+    """How far from a corner between two legs the way may leave them; 0 where it has to stop there."""
+    radius = min(blend, 0.5 * before, 0.5 * after)
+    return radius if radius > NO_WAY else 0.0
+
+
+def blending(u: float | Array) -> float | Array:
+    """The integral of the step 3 u^2 - 2 u^3 from 0 to u: how far the second direction has taken over."""
+    return u * u * u * (1.0 - 0.5 * u)

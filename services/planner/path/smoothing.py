@@ -1,0 +1,113 @@
+"""A polyline made shorter by straight cuts, and its corners round: what the compiled core does for its own ways."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.planner.path.validity import Validity
+from services.planner.request.deadline import Deadline
+
+Array = NDArray[np.float64]
+
+CUTS = 60  # tried; each costs the check of a line
+FRUITLESS = 15  # of them in a row are enough
+WIDEST = 0.5  # share of an edge that its corner may be rounded over
+LEAST = 1.0 / 64.0
+SHARED = 2  # control points from one corner to the next, where these share the one between them
+
+
+def shorten(corners: Array, validity: Validity, seed: int, deadline: Deadline) -> Array:
+    """The polyline (m, n) with straight cuts between random places on it, for as long as there is time.
+
+    At last it loses the corners that it can do without: two that nearly coincide let the arm creep around them.
+    """
+    random = np.random.default_rng(seed)
+    fruitless = 0
+    for _ in range(CUTS):
+        if len(corners) <= 2 or fruitless >= FRUITLESS or deadline.has_passed():
+            break
+        low, high = sorted(random.uniform(0.0, len(corners) - 1.0, 2).tolist())
+        cut = _cut(corners, low, high, validity)
+        fruitless = fruitless + 1 if cut is None else 0
+        corners = corners if cut is None else cut
+    return _needed(corners, validity, deadline)
+
+
+def smooth(corners: Array, validity: Validity, deadline: Deadline) -> Array:
+    """Control points (k, n) of a uniform cubic B-spline along the polyline, free as a whole.
+
+    Every corner keeps its own control point, with one before and one after it on its edges; where the curve touches,
+    they come nearer to the corner, and at last the curve goes to the corner itself and stops there.
+    """
+    shares = np.full(len(corners), WIDEST)
+    shares[[0, -1]] = 0.0
+    waiting = set(range(1, len(corners) - 1))
+    control, places = _lay(corners, shares)
+    while waiting and not deadline.has_passed():
+        touching = {corner for corner in sorted(waiting) if not validity.is_curve_free(control[_bent(places, corner)])}
+        for corner in touching:
+            shares[corner] = 0.5 * shares[corner] if shares[corner] > LEAST else 0.0
+        near = touching | {corner + side for corner in touching for side in (-1, 1)}  # they share its edges
+        waiting = {corner for corner in near if shares[corner] > 0.0}
+        control, places = _lay(corners, shares)
+    return stopping(corners) if waiting else control
+
+
+def continued(corners: Array, end: Array, validity: Validity) -> Array:
+    """The polyline from `end` (n,) straight to its first corner, or past it to the second where that is free."""
+    is_needless = len(corners) > 1 and validity.is_line_free(end, corners[1])
+    return np.vstack((end, corners[1:] if is_needless else corners))
+
+
+def stopping(corners: Array) -> Array:
+    """As `smooth`, stopping at every corner: the polyline itself."""
+    return np.repeat(corners, 3, axis=0)
+
+
+def _needed(corners: Array, validity: Validity, deadline: Deadline) -> Array:
+    """The polyline without each corner that a straight line may pass by."""
+    kept = [corners[0]]
+    for corner, after in pairwise(corners[1:]):
+        if deadline.has_passed() or not validity.is_line_free(kept[-1], after):
+            kept.append(corner)
+    return np.array([*kept, corners[-1]])
+
+
+def _cut(corners: Array, low: float, high: float, validity: Validity) -> Array | None:
+    """The polyline that goes straight from one place on it to another; None where it is not free or no shorter."""
+    first, last = int(low), int(high)
+    if first == last:
+        return None
+    begin = corners[first] + (low - first) * (corners[first + 1] - corners[first])
+    end = corners[last] + (high - last) * (corners[min(last + 1, len(corners) - 1)] - corners[last])
+    if not validity.is_line_free(begin, end):
+        return None
+    rows = np.vstack((corners[: first + 1], begin, end, corners[last + 1 :]))
+    moving = np.concatenate(([True], np.any(np.abs(np.diff(rows, axis=0)) > 1e-9, axis=1)))
+    moving[-1] = True
+    return np.asarray(rows[moving])
+
+
+def _bent(places: list[int], corner: int) -> slice:
+    """The control points of the spans that bend at this corner; others that it has a part in lie on one edge."""
+    before, here, after = places[corner - 1 : corner + 2]
+    shares_before, shares_after = here - before == SHARED, after - here == SHARED and corner + 2 < len(places)
+    return slice(here - (3 if shares_before else 2), here + (4 if shares_after else 3))
+
+
+def _lay(corners: Array, shares: Array) -> tuple[Array, list[int]]:
+    """The control points, and the place of each corner's own among them."""
+    rows, places = [corners[0]] * 3, [0]
+    for index in range(1, len(corners) - 1):
+        before, corner, after = corners[index - 1 : index + 2]
+        share = shares[index]
+        is_shared = share == WIDEST and shares[index - 1] == WIDEST and index > 1
+        if not is_shared:
+            rows.append(corner + share * (before - corner))
+        places.append(len(rows))
+        rows += [corner, corner + share * (after - corner)]
+    places.append(len(rows))
+    return np.array([*rows, *[corners[-1]] * 3]), places

@@ -1,0 +1,95 @@
+"""For an arm that touches something by little: the nearest posture that touches nothing, and how to jog there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.description import Arm, Joint
+from services.planner.collision.checker import CollisionChecker
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.jog.jog_obstacles import CONTACT_SPEED, comes_away
+from services.planner.path.path import Start
+from services.planner.request.deadline import Deadline
+
+Array = NDArray[np.float64]
+
+FREE = CLEARANCE + 0.001  # [m] that is clear of everything there, so that a plan can begin
+NEAREST, FARTHEST, GROWTH = 0.003, 0.15, 1.25  # [m] that any point of the arm moves at most on the ways that are tried
+DIRECTIONS = 24  # of all joints together, at each distance, besides those of one joint
+LEAST_REACH = 0.02  # [m/rad] of a joint that moves hardly anything
+LOOKS = 8  # at what touches, along a way
+LEAST_SECONDS, SHARE = 0.5, 0.7  # and of a joint's velocity limit at most
+DECIMALS, TINY = 4, 1e-4  # of [rad] or [m], in which a posture is told; what moves less does not move
+
+
+@dataclass(frozen=True)
+class WayOut:
+    """A posture (n,) [rad] or [m], and whether what touches only comes away on the straight way there, as jogging
+    demands."""
+
+    posture: Start
+    can_be_jogged: bool
+
+
+def way_out(arm: Arm, surroundings: CollisionChecker, start: Start, deadline: Deadline) -> WayOut | None:
+    """The nearest that can be jogged to, or else the nearest; None where there is none near."""
+    nearest: WayOut | None = None
+    for row in _around(arm, surroundings.reach, np.array(start)):
+        if deadline.has_passed():
+            break
+        if surroundings.keeps(row, FREE):
+            found = WayOut(tuple(row.tolist()), _comes_away(surroundings, np.array(start), row))
+            if found.can_be_jogged:
+                return found
+            nearest = nearest or found
+    return nearest
+
+
+def jog_words(arm: Arm, reach: Array, start: Start, posture: Start) -> str:
+    """The command that moves from `start` to `posture`; `reach` as a world's."""
+    moves = [after - before for before, after in zip(start, posture, strict=True)]
+    fastest = max(abs(move) / joint.velocity for joint, move in zip(arm.joints, moves, strict=True))
+    needed = max(LEAST_SECONDS, float(np.abs(moves) @ reach) / CONTACT_SPEED, fastest / SHARE)
+    seconds = math.ceil(10.0 * needed) / 10.0
+    speeds = (_speed(joint, move / seconds) for joint, move in zip(arm.joints, moves, strict=True) if abs(move) > TINY)
+    return f"gemelo jog --joint {' '.join(speeds)} --for {seconds:g}"
+
+
+def _speed(joint: Joint, velocity: float) -> str:
+    if joint.unit == "rad":
+        return f"{joint.name}={math.degrees(velocity):.3g}deg/s"
+    return f"{joint.name}={1000.0 * velocity:.3g}mm/s"
+
+
+def _around(arm: Arm, reach: Array, start: Array) -> Iterator[Array]:
+    """Postures within the limits, the near ones first: of one joint moved, then of all; the same every time."""
+    lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
+    random, size = np.random.default_rng(0), len(start)
+    away = NEAREST
+    while away < FARTHEST:
+        mixed = random.normal(size=(DIRECTIONS, size))
+        mixed /= np.abs(mixed).sum(axis=1, keepdims=True)
+        for direction in np.vstack((np.eye(size), -np.eye(size), mixed)):
+            row = np.round(start + away * direction / np.maximum(reach, LEAST_REACH), DECIMALS)
+            if (lower <= row).all() and (row <= upper).all():
+                yield row
+        away *= GROWTH
+
+
+def _comes_away(surroundings: CollisionChecker, start: Array, end: Array) -> bool:
+    """Whether nothing that is nearer than the clearance comes nearer on the straight way."""
+    before: dict[tuple[str, str], float] | None = None
+    for share in np.linspace(0.0, 1.0, LOOKS + 1).tolist():
+        near = surroundings.contacts(start + share * (end - start), CLEARANCE)
+        now = {(each.first, each.second): each.distance for each in near}
+        if before is not None and any(
+            not comes_away(before.get(pair, math.inf), distance) for pair, distance in now.items()
+        ):
+            return False
+        before = now
+    return True

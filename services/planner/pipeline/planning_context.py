@@ -1,0 +1,24 @@
+"""One request on its way to a trajectory, with all that holds for the whole of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from schemas.planning import PlanRequest
+from services.planner.path.path import Start
+from services.planner.pipeline.trajectory_builder import Finisher
+from services.planner.request.deadline import Deadline, Stopwatch
+from services.planner.timing.profile import JointLimits
+
+
+@dataclass(frozen=True)
+class Errand:
+    """From `start`, within `limits`, `margin` [m] away from everything."""
+
+    request: PlanRequest
+    start: Start
+    limits: JointLimits
+    margin: float
+    finisher: Finisher
+    deadline: Deadline
+    watch: Stopwatch

@@ -1,0 +1,89 @@
+"""The time of one request: its deadline, its cancellation, and where the time went."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from schemas.planning import PlanningTimes
+from services.planner.request.refusals import timed_out
+
+
+def endless() -> float:
+    """A clock [s] that stands still, so that no deadline ever passes."""
+    return 0.0
+
+
+class CancelFlag(Protocol):
+    """Set from another thread to cancel a plan: the native planner's `CancelFlag`, or a `threading.Event`."""
+
+    def set(self) -> None: ...
+
+    def is_set(self) -> bool: ...
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """`allowed` seconds from `began`, both by `clock` [s]; it has passed as soon as `cancel` is set.
+
+    Without arguments it never passes.
+    """
+
+    clock: Callable[[], float] = endless
+    allowed: float = math.inf
+    began: float = 0.0
+    cancel: CancelFlag | None = None
+
+    @property
+    def left(self) -> float:
+        """Time left [s], at least 0."""
+        if self.cancel is not None and self.cancel.is_set():
+            return 0.0
+        return max(0.0, self.allowed - (self.clock() - self.began))
+
+    def has_passed(self) -> bool:
+        """True if no time is left, or the plan is cancelled."""
+        return self.left <= 0.0
+
+    def check(self) -> None:
+        """Raises `PlanRefused` (TIMED_OUT) if the deadline has passed."""
+        if self.has_passed():
+            raise timed_out()
+
+    def share(self, part: float) -> Deadline:
+        """A deadline within this one: only `part`, in (0, 1], of the time that is left."""
+        now = self.clock()
+        return replace(self, allowed=part * (self.allowed - (now - self.began)), began=now)
+
+
+NEVER = Deadline()
+
+
+class Stopwatch:
+    """Adds up the phases of `PlanningTimes` [s] by `clock`; a phase inside another one counts for the inner one."""
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._spent = dict.fromkeys(PlanningTimes.__struct_fields__, 0.0)
+        self._inner = 0.0
+        self.newest = ""  # name of the phase begun last; may be read from another thread
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Counts the time of the `with` block for the field `name` of `PlanningTimes`."""
+        began, outer, self._inner = self._clock(), self._inner, 0.0
+        self.newest = name
+        try:
+            yield
+        finally:
+            took = self._clock() - began
+            self._spent[name] += took - self._inner
+            self._inner = outer + took
+
+    @property
+    def times(self) -> PlanningTimes:
+        """The seconds spent in each phase so far."""
+        return PlanningTimes(**self._spent)

@@ -1,0 +1,247 @@
+"""Why there is no plan: every refusal names the check, the thing, its value, its limit and what would do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from enum import StrEnum
+
+from schemas.message import Vector
+from schemas.planning import PlanCode, Refusal
+from services.arm.description import Arm, Joint
+from services.arm.errors import nearest_name, suggestion
+
+Point = Sequence[float]
+
+LEAST_SCALING = 1e-300  # with less, a time is no longer a number
+LONGEST_NAME = 64  # characters of a name that is not known, which a person is shown
+
+
+class NoPlan(Exception):
+    """A refusal on its way out of the planner; `fraction` of a Cartesian way could have been gone."""
+
+    def __init__(self, code: PlanCode, refusal: Refusal, fraction: float = 0.0) -> None:
+        super().__init__(refusal.message)
+        self.code = code
+        self.refusal = refusal
+        self.fraction = fraction
+
+
+class SearchFailure(StrEnum):
+    """Reason why a search found no path."""
+
+    TIMED_OUT = "timed out"
+    START_TOUCHES = "start touches"
+    GOAL_TOUCHES = "goal touches"
+
+
+def timed_out() -> NoPlan:
+    """The refusal (TIMED_OUT) of a plan that used up the time it was allowed."""
+    return malformed(
+        PlanCode.TIMED_OUT,
+        "allowed_time",
+        "no plan was found within the time allowed",
+        "allow more time, or ask for a goal nearer to where the arm is",
+        check="allowed time",
+    )
+
+
+def scaling_refused(which: str, value: float) -> NoPlan:
+    """0 is not 1: it is refused."""
+    must = f"below {LEAST_SCALING:g} no way ends" if 0.0 < value < 1.0 else "it must be above 0 and at most 1"
+    return NoPlan(
+        PlanCode.INVALID_GOAL_CONSTRAINTS,
+        Refusal(
+            check="scaling",
+            subject=which,
+            value=value if value == value and abs(value) < 1e300 else None,
+            limit=1.0,
+            nearest=(1.0 if value > 1.0 else 0.1,),
+            message=f"{which} is {value}: {must}",
+            remedy=f"give {which} in (0, 1]; 1 is the arm's full speed",
+        ),
+    )
+
+
+def unknown_name(code: PlanCode, check: str, name: str, known: Iterable[str], where: str) -> NoPlan:
+    """A joint, state or frame that is not there."""
+    names = sorted(known)
+    name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
+    near = nearest_name(name, names)
+    meant = suggestion(name, names) if near else ""  # else the remedy names them all
+    return NoPlan(
+        code,
+        Refusal(
+            check=check,
+            subject=name,
+            message=f'{where} has no {check.removeprefix("unknown ")} "{name}"{meant}',
+            remedy=f'use "{near}"' if near else f"use one of {', '.join(names)}",
+        ),
+    )
+
+
+def malformed(code: PlanCode, subject: str, message: str, remedy: str, check: str = "request") -> NoPlan:
+    """A request that says too little, too much or two things at once."""
+    return NoPlan(code, Refusal(check=check, subject=subject, message=message, remedy=remedy))
+
+
+def beyond_limit(arm: Arm, joint: Joint, value: float, nearest: Vector) -> NoPlan:
+    """A goal beyond a joint's limit."""
+    limit = joint.clamp(value)
+    side = "above its upper" if value > joint.upper else "below its lower"
+    off = f"{abs(value - limit):.4g} {joint.unit}"  # value and limit may look alike in few digits
+    return NoPlan(
+        PlanCode.INVALID_GOAL_CONSTRAINTS,
+        Refusal(
+            check="joint limit",
+            subject=joint.name,
+            value=value,
+            limit=limit,
+            nearest=nearest,
+            message=f'joint "{joint.name}": {value:.6g} {joint.unit} is {off} {side} limit of {limit:g} {joint.unit}'
+            f" ({arm.urdf_path.name})",
+            remedy=f"the nearest is {limit:g} {joint.unit}",
+        ),
+    )
+
+
+def start_beyond_limit(joint: Joint, value: float) -> NoPlan:
+    """The arm stands, or is said to stand, where it must not be."""
+    limit = joint.clamp(value)
+    return NoPlan(
+        PlanCode.INVALID_ROBOT_STATE,
+        Refusal(
+            check="start state",
+            subject=joint.name,
+            value=value,
+            limit=limit,
+            nearest=(limit,),
+            message=f'the start of "{joint.name}" is {value:.6g} {joint.unit}, beyond its limit of {limit:g}',
+            remedy="move the joint back by hand and reference the arm again with `gemelo reference`",
+        ),
+    )
+
+
+def moving_start(joint: Joint, velocity: float, limit: float) -> NoPlan:
+    """Plans begin at rest."""
+    return NoPlan(
+        PlanCode.INVALID_ROBOT_STATE,
+        Refusal(
+            check="moving start",
+            subject=joint.name,
+            value=velocity,
+            limit=limit,
+            message=f'"{joint.name}" moves at {velocity:.4g} {joint.unit}/s; a plan begins at rest'
+            f" (below {limit:.4g} {joint.unit}/s)",
+            remedy="wait until the arm stands, or cancel what it does",
+        ),
+    )
+
+
+def stale_state(age: float | None, limit: float) -> NoPlan:
+    """Nobody knows where the arm is now."""
+    told = "no joint state has come yet" if age is None else f"the newest joint state is {age:.3f} s old"
+    return NoPlan(
+        PlanCode.ROBOT_STATE_STALE,
+        Refusal(
+            check="joint state",
+            subject="joint_states",
+            value=age,
+            limit=limit,
+            message=f"{told}, so where the arm is now is not known (at most {limit:g} s)",
+            remedy="see that stepper_gateway runs and the device is online (`gemelo state`), or give a start state",
+        ),
+    )
+
+
+def in_collision(
+    code: PlanCode,
+    where: str,
+    pairs: Sequence[tuple[str, str]],
+    margin: float,
+    nearest: Vector,
+    remedy: str,
+    posture: Vector = (),
+    objects: Mapping[str, str] | None = None,
+) -> NoPlan:
+    """Two links, or a link and one of the scene's `objects` (their kinds by name), would touch in `posture`."""
+    known = objects or {}
+    shown = [[f"{known[name]} {name}" if name in known else name for name in pair] for pair in pairs]
+    named = " and ".join(f"{first} with {second}" for first, second in shown)
+    is_own = not any(name in known for pair in pairs for name in pair)
+    near = f"would be nearer than {1000 * margin:.2g} mm" if margin > 0.0 else "touch"
+    return NoPlan(
+        code,
+        Refusal(
+            check="self-collision" if is_own else "collision",
+            subject=" / ".join(pairs[0]),
+            limit=margin,
+            nearest=nearest,
+            posture=posture,
+            message=f"{where}, {named} {near}",
+            remedy=remedy,
+        ),
+    )
+
+
+def no_way_around(why: SearchFailure, blocked: NoPlan) -> NoPlan:
+    """No search has found a way around what is on the straight one."""
+    told, subject, posture = f"{blocked.refusal.message}; and", blocked.refusal.subject, blocked.refusal.posture
+    if why is SearchFailure.TIMED_OUT:
+        return NoPlan(
+            PlanCode.TIMED_OUT,
+            Refusal(
+                check="allowed time",
+                subject=subject,
+                posture=posture,
+                message=f"{told} no way around it was found within the time allowed",
+                remedy="allow more time, go by way of another posture, or make room",
+            ),
+        )
+    where = "the start" if why is SearchFailure.START_TOUCHES else "every posture of the goal"
+    return NoPlan(
+        PlanCode.PLANNING_FAILED,
+        Refusal(
+            check="clearance",
+            subject=subject,
+            posture=posture,
+            message=f"{told} {where} is too near to something for the compiled core, which is cautious",
+            remedy='ask for planner_id "RRTConnect", which looks at the exact shapes',
+        ),
+    )
+
+
+def not_verified(why: str) -> NoPlan:
+    """A trajectory was made, and may not be executed."""
+    return NoPlan(
+        PlanCode.PLANNING_FAILED,
+        Refusal(
+            check="verification",
+            message=f"the timed trajectory did not pass its verification: {why}",
+            remedy="a larger scaling or a goal farther away; if it stays, report this as a defect",
+        ),
+    )
+
+
+def out_of_reach(arm: Arm, goal: Point, nearest: Point, shown: Vector, held: Sequence[str]) -> NoPlan:
+    """No posture brings the tool there; `shown` is the nearest point in the goal's own frame."""
+    missing = [a - b for a, b in zip(goal, nearest, strict=True)]
+    distance = sum(value * value for value in missing) ** 0.5
+    axis = max(range(3), key=lambda index: abs(missing[index]))
+    is_one_axis = abs(missing[axis]) > 0.98 * distance
+    limits = f", held by {', '.join(held)}" if held else ""
+    return NoPlan(
+        PlanCode.NO_IK_SOLUTION,
+        Refusal(
+            check="reach",
+            subject="xyz"[axis] if is_one_axis else "tool position",
+            value=goal[axis] if is_one_axis else distance,
+            limit=nearest[axis] if is_one_axis else 0.0,
+            nearest=shown,
+            message=f"{arm.tool_frame} cannot be at {_point(goal)} m: {1000 * distance:.1f} mm out of reach{limits}",
+            remedy=f"the nearest point it can be at is {_point(shown)} m",
+        ),
+    )
+
+
+def _point(values: Sequence[float]) -> str:
+    return " ".join(f"{value:.4f}" for value in values)

@@ -1,0 +1,88 @@
+"""Where a plan begins: the request's start, completed by the present state, and checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from schemas.joints import JointState
+from schemas.planning import PlanCode
+from services.arm.description import Arm, Joint
+from services.planner.request.refusals import malformed, moving_start, stale_state, start_beyond_limit, unknown_name
+
+STALE_AFTER = 0.5  # [s] without a joint state: as long as the device waits for a heartbeat
+REST = 0.01  # share of a joint's velocity limit below which it stands
+MOST_TURNED = 90.0  # [rad] of a joint without limits: the compiled core takes 100, and a search goes half a turn more
+ROUNDING = 0.51  # [steps] executed positions are whole steps, so they may be this far beyond a limit
+
+
+def resolve_start(arm: Arm, given: JointState | None, present: JointState | None, age: float) -> tuple[float, ...]:
+    """Joint values [rad] or [m] in the arm's order, within the limits; raises `NoPlan`."""
+    values = {} if given is None else _values(arm, given)
+    if len(values) < len(arm.joints):
+        values = {**_present(arm, present, age), **values}
+    for joint in arm.joints:
+        value = values[joint.name]
+        require_unwound(PlanCode.INVALID_ROBOT_STATE, joint, value)
+        if abs(value - joint.clamp(value)) > ROUNDING * joint.steps.resolution:
+            raise start_beyond_limit(joint, value)
+    return tuple(joint.clamp(values[joint.name]) for joint in arm.joints)
+
+
+def _present(arm: Arm, present: JointState | None, age: float) -> dict[str, float]:
+    if present is None:
+        raise stale_state(None, STALE_AFTER)
+    if age > STALE_AFTER:
+        raise stale_state(age, STALE_AFTER)
+    values = _values(arm, present)
+    missing = [name for name in arm.joint_names if name not in values]
+    if missing:
+        raise malformed(
+            PlanCode.INVALID_ROBOT_STATE,
+            missing[0],
+            f"the joint state has no position for {', '.join(missing)}",
+            "give a start state with every joint, or see what stepper_gateway publishes",
+            check="joint state",
+        )
+    return values
+
+
+def _values(arm: Arm, state: JointState) -> dict[str, float]:
+    """The positions by name; the joints must stand."""
+    require_parallel(state.name, state.position, "the start state")
+    for name in state.name:
+        if name not in arm.joint_names:
+            raise unknown_name(PlanCode.INVALID_ROBOT_STATE, "unknown joint", name, arm.joint_names, arm.name)
+    for name, velocity in zip(state.name, state.velocity, strict=False):
+        joint = arm.joint(name)
+        if abs(velocity) > REST * joint.velocity:
+            raise moving_start(joint, velocity, REST * joint.velocity)
+    return dict(zip(state.name, state.position, strict=True))
+
+
+def require_unwound(code: PlanCode, joint: Joint, value: float) -> None:
+    """Raises `NoPlan` for a joint without limits that has turned, or is to turn, too often."""
+    if math.isinf(joint.upper) and abs(value) > MOST_TURNED:
+        raise malformed(
+            code,
+            joint.name,
+            f'"{joint.name}" at {value:.6g} rad is more than {MOST_TURNED:g} rad from 0, where angles lose digits',
+            "count from where it is now (`gemelo reference`), or give the same angle with fewer turns",
+            check="joint limit",
+        )
+
+
+def require_parallel(names: Sequence[str], positions: Sequence[float], where: str) -> None:
+    """As many positions as names, and no name twice; raises `NoPlan`."""
+    if len(names) != len(positions):
+        raise malformed(
+            PlanCode.INVALID_GOAL_CONSTRAINTS,
+            where,
+            f"{where} has {len(names)} names and {len(positions)} positions",
+            "give one position for every name",
+        )
+    for name in names:
+        if names.count(name) > 1:
+            raise malformed(
+                PlanCode.INVALID_GOAL_CONSTRAINTS, name, f'{where} names "{name}" twice', "name every joint once"
+            )

@@ -1,0 +1,207 @@
+"""Whether the steppers can do a trajectory: its exact step stream against rates, pulses, torque and the device's queue.
+
+The stream is the gateway's and the device's own: knots every 20 ms in 1/256 steps, cubic Hermite between them, and
+floor(p + 0.5) steps made by the end of every millisecond (firmware/PROTOCOL.md, "The path").
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from schemas.motion import JointTrajectory, TrajectoryPoint
+from schemas.planning import PlanCode, Refusal, StepMargin
+from services.arm.description import Arm, Joint
+from services.planner.request.refusals import NoPlan
+from services.planner.timing.profile import LONGEST
+from services.planner.verification.verify import at_times
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+KNOT = 0.02  # [s] between knots
+SLOT = 0.001  # [s] in which the device spreads its steps evenly
+LEAD = 0.30  # [s] of path that the gateway keeps in the queue, besides half of what braking takes
+Q8 = 256
+FULL = 1.0 + 1e-3  # knots are rounded to 1/256 step, so a profile that touches its limit may look so much beyond
+MOST_KNOTS = 30_000  # that are looked at at once
+SLOWEST = 0.01  # time scale below which slowing down is no remedy
+HALVINGS = 24
+
+
+@dataclass(frozen=True)
+class StepStream:
+    """What the device will make of a trajectory: rows are slots of 1 ms, columns joints."""
+
+    steps: Counts  # (m + 1, n) executed at the slots' ends; the first row is the start
+    rates: Array  # (m, n) [steps/s] of the path
+    accelerations: Array  # (m, n) [steps/s^2]
+
+
+def step_stream(arm: Arm, trajectory: JointTrajectory, part: tuple[int, int] | None = None) -> StepStream:
+    """The integer steps of `trajectory`, whose points have velocities and accelerations, played as planned.
+
+    Of all of it, or from one knot to another.
+    """
+    duration = trajectory.points[-1].time_from_start
+    last = _knots(trajectory)
+    begin, end = part or (0, last)
+    samples = at_times(trajectory, np.minimum(np.arange(begin, end + 1) * KNOT, duration))
+    scale = np.array([joint.steps.per_unit * Q8 for joint in arm.joints])
+    position = np.rint(samples.positions * scale)
+    slope = np.rint(samples.velocities * scale) * KNOT
+    if end == last:
+        slope[-1] = 0.0
+    u = (np.arange(1, round(KNOT / SLOT) + 1) * SLOT / KNOT)[None, :, None]
+    first, start, end = position[:-1, None], slope[:-1, None], slope[1:, None]
+    rise = position[1:, None] - first
+    square, cube = 3 * rise - 2 * start - end, start + end - 2 * rise
+    path = first + u * (start + u * (square + u * cube))
+    columns = position.shape[1]
+    speed = (start + u * (2 * square + u * 3 * cube)) / KNOT
+    bend = (2 * square + u * 6 * cube) / KNOT**2
+    made = np.floor(np.concatenate((position[:1], path.reshape(-1, columns))) / Q8 + 0.5).astype(np.int64)
+    return StepStream(made, speed.reshape(-1, columns) / Q8, bend.reshape(-1, columns) / Q8)
+
+
+def margins(arm: Arm, stream: StepStream) -> tuple[StepMargin, ...]:
+    """How near each stepper comes to what it can do."""
+    return tuple(_margin(arm, joint, index, stream) for index, joint in enumerate(arm.joints))
+
+
+def _margins(arm: Arm, trajectory: JointTrajectory) -> tuple[StepMargin, ...]:
+    """Of all of it, by parts that the memory holds."""
+    knots = _knots(trajectory)
+    parts = [(begin, min(begin + MOST_KNOTS, knots)) for begin in range(0, knots, MOST_KNOTS)]
+    found = [margins(arm, step_stream(arm, trajectory, part)) for part in parts]
+    worst = (max(of_joint, key=lambda margin: margin.share) for of_joint in zip(*found, strict=True))
+    peaks = np.max([[margin.peak_rate for margin in part] for part in found], axis=0).tolist()
+    return tuple(replace(margin, peak_rate=peak) for margin, peak in zip(worst, peaks, strict=True))
+
+
+def _knots(trajectory: JointTrajectory) -> int:
+    return max(1, math.ceil(trajectory.points[-1].time_from_start / KNOT - 1e-9))
+
+
+def queue_share(arm: Arm, trajectory: JointTrajectory) -> float:
+    """The share of the device's queue that the gateway fills to play `trajectory` at full speed."""
+    peaks = np.max(np.abs([point.velocities for point in trajectory.points]), axis=0)
+    braking = max(peak / joint.acceleration for joint, peak in zip(arm.joints, peaks.tolist(), strict=True))
+    return float(LEAD + 0.5 * braking) / (arm.device.queue_capacity * KNOT)
+
+
+def sentence(margin: StepMargin) -> str:
+    """ "brazo_joint peaks at 91 % of 4665.6 steps/s"."""
+    if margin.limited_by == "pull-out torque":
+        return f"{margin.name} needs {margin.share:.0%} of its motor's pull-out torque"
+    return f"{margin.name} peaks at {margin.share:.0%} of {margin.rate_limit:g} steps/s ({margin.limited_by})"
+
+
+def require_feasible(arm: Arm, trajectory: JointTrajectory) -> tuple[StepMargin, ...]:
+    """The margins; raises `NoPlan` with the joint that cannot, and the scaling that would do."""
+    found = _margins(arm, trajectory)
+    worst = max(found, key=lambda margin: margin.share)
+    filled = queue_share(arm, trajectory)
+    if worst.share <= FULL and filled <= 1.0:
+        return found
+    scale = feasible_scale(arm, trajectory)
+    remedy = f"slow down to {scale:.2f} of this speed, or let step_policy do so" if scale else "see robot.toml"
+    if worst.share > FULL:
+        raise NoPlan(
+            PlanCode.PLANNING_FAILED,
+            Refusal(
+                check=worst.limited_by,
+                subject=worst.name,
+                value=worst.share,
+                limit=1.0,
+                message=f"the stepper cannot follow: {sentence(worst)}",
+                remedy=remedy,
+            ),
+        )
+    raise NoPlan(
+        PlanCode.PLANNING_FAILED,
+        Refusal(
+            check="device queue",
+            subject=arm.device.name,
+            value=filled,
+            limit=1.0,
+            message=f"braking from this speed takes {filled:.0%} of the device's {arm.device.queue_capacity} knots",
+            remedy=remedy,
+        ),
+    )
+
+
+def feasible_scale(arm: Arm, trajectory: JointTrajectory) -> float:
+    """The largest time scale in (0, 1] at which the steppers can, by bisection; 0.0 where none above 1 % does, or none
+    in a time that a plan may take."""
+    slowest = max(SLOWEST, trajectory.points[-1].time_from_start / LONGEST)
+    if slowest >= 1.0 or not _can(arm, slowed(trajectory, slowest)):
+        return 0.0
+    if _can(arm, trajectory):
+        return 1.0
+    low, high = slowest, 1.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _can(arm, slowed(trajectory, middle)) else (low, middle)
+        if high - low < 1e-3 * low:
+            break
+    return low
+
+
+def slowed(trajectory: JointTrajectory, scale: float) -> JointTrajectory:
+    """The same path at `scale` in (0, 1] of its speed."""
+    points = tuple(
+        TrajectoryPoint(
+            positions=point.positions,
+            velocities=tuple(value * scale for value in point.velocities),
+            accelerations=tuple(value * scale * scale for value in point.accelerations),
+            time_from_start=point.time_from_start / scale,
+        )
+        for point in trajectory.points
+    )
+    return JointTrajectory(stamp=trajectory.stamp, joint_names=trajectory.joint_names, points=points)
+
+
+def _can(arm: Arm, trajectory: JointTrajectory) -> bool:
+    found = _margins(arm, trajectory)
+    return max(margin.share for margin in found) <= FULL and queue_share(arm, trajectory) <= 1.0
+
+
+def _margin(arm: Arm, joint: Joint, index: int, stream: StepStream) -> StepMargin:
+    rates, accelerations = np.abs(stream.rates[:, index]), stream.accelerations[:, index]
+    peak = float(rates.max())
+    limit, by = _rate_limit(arm, joint)
+    share, torque = peak / limit, _torque_share(joint, rates, accelerations, stream.rates[:, index])
+    if torque > share:
+        share, by = torque, "pull-out torque"
+    return StepMargin(name=joint.name, peak_rate=peak, rate_limit=limit, share=share, limited_by=by)
+
+
+def _rate_limit(arm: Arm, joint: Joint) -> tuple[float, str]:
+    """[steps/s] and what sets it: the joint's own speed, one pulse in two ticks, or the driver's pulse width."""
+    driver = joint.driver
+    return min(
+        (joint.velocity * joint.steps.per_unit, "step rate"),
+        (arm.device.tick_hz / 2.0, "step rate"),
+        (1e6 / (driver.step_high_us + driver.step_low_us), "pulse width"),
+    )
+
+
+def _torque_share(joint: Joint, rates: Array, accelerations: Array, signed: Array) -> float:
+    """The largest share of the pull-out torque that inertia and friction ask for; 0 for a motor without a curve.
+
+    T = J dw/dt + friction at the motor's shaft, w = 2 pi steps / pulses_per_turn (any text on stepper selection).
+    """
+    curve = joint.drive.motor.pull_out
+    if curve is None:
+        return 0.0
+    turn = math.tau / joint.drive.motor.pulses_per_turn
+    needed = np.abs(curve.inertia * accelerations * turn + curve.friction * np.sign(signed))
+    available = np.interp(rates, curve.speed, curve.torque, right=0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.where(needed > 0.0, needed / available, 0.0)
+    return float(min(shares.max(), 1e6))
