@@ -136,8 +136,8 @@ class Refusal(Message, frozen=True, kw_only=True):
     value: float | None = None
     limit: float | None = None
     nearest: Vector = ()  # the nearest goal that can be reached, in the goal's own form
-    posture: Vector = ()  # [rad] or [m] of all joints, where the arm would touch something
-    way_out: Vector = ()  # [rad] or [m] of all joints, the nearest to a start that touches at which nothing does
+    configuration: Vector = ()  # [rad] or [m] of all joints, where the arm would touch something
+    nearest_free: Vector = ()  # [rad] or [m] of all joints, the nearest to a start that touches at which nothing does
     message: str = ""  # one sentence for a person
     remedy: str = ""
 
@@ -236,14 +236,14 @@ class IkRequest(Message, frozen=True, kw_only=True):
 
 
 class IkSolution(Message, frozen=True, kw_only=True):
-    """One posture."""
+    """One configuration."""
 
     position: Vector = ()  # [rad] or [m]
     distance: float = 0.0  # [s] that the slowest joint takes from `near`
 
 
 class IkResponse(Message, frozen=True, kw_only=True):
-    """The postures, or why there is none."""
+    """The configurations, or why there is none."""
 
     code: PlanCode = PlanCode.FAILURE
     name: tuple[str, ...] = ()

@@ -114,9 +114,9 @@ class Contact(Message, frozen=True, kw_only=True):
 
 
 class Contacts(Message, frozen=True, kw_only=True):
-    """What touches in the posture that was refused last, or now; empty when nothing does."""
+    """What touches in the configuration that was refused last, or now; empty when nothing does."""
 
     stamp: int = 0  # [ns] UNIX time
     name: tuple[str, ...] = ()
-    position: Vector = ()  # [rad] or [m] the posture
+    position: Vector = ()  # [rad] or [m] the configuration
     contacts: tuple[Contact, ...] = ()

@@ -1,6 +1,6 @@
 """Which pairs of links need no collision check, found by sampling: neighbours, always in touch, never near.
 
-As MoveIt's setup assistant does it, but what seems never to be near is also searched for nearer postures.
+As MoveIt's setup assistant does it, but what seems never to be near is also searched for nearer configurations.
 """
 
 from __future__ import annotations
@@ -51,16 +51,16 @@ def collision_matrix(arm: Arm, samples: int = SAMPLES) -> list[Verdict]:
     bare = replace(arm, disabled_collisions=frozenset())
     checker = SelfCollisions(bare, kinematics.model, kinematics.configuration)
     random = np.random.default_rng(SEED)
-    postures = _postures(arm, samples, random)
-    distances = [checker.distances(posture) for posture in postures]
-    return [_verdict(arm, checker, pair, postures, distances, random) for pair in checker.pairs]
+    configurations = _configurations(arm, samples, random)
+    distances = [checker.distances(configuration) for configuration in configurations]
+    return [_verdict(arm, checker, pair, configurations, distances, random) for pair in checker.pairs]
 
 
 def _verdict(
     arm: Arm,
     checker: SelfCollisions,
     pair: LinkPair,
-    postures: Array,
+    configurations: Array,
     distances: list[dict[LinkPair, float]],
     random: np.random.Generator,
 ) -> Verdict:
@@ -71,7 +71,7 @@ def _verdict(
     if farthest <= 0.0:
         return Verdict(pair, Reason.ALWAYS, nearest, farthest)
     if nearest > NEVER_BELOW:
-        starts = postures[np.argsort(seen, kind="stable")[:SEARCHES]]
+        starts = configurations[np.argsort(seen, kind="stable")[:SEARCHES]]
         nearest = min(nearest, *(_nearest_from(arm, checker, pair, start, random) for start in starts))
     return Verdict(pair, Reason.NEVER if nearest > NEVER_BELOW else None, nearest, farthest)
 
@@ -81,19 +81,19 @@ def _nearest_from(
 ) -> float:
     """[m] by a random search in a shrinking neighbourhood."""
     lower, upper = _limits(arm)
-    best, posture = checker.distances(start)[pair], start
+    best, configuration = checker.distances(start)[pair], start
     reach = 0.2 * (upper - lower)
     for _ in range(STEPS):
-        tried = np.clip(posture + reach * random.uniform(-1.0, 1.0, len(start)), lower, upper)
+        tried = np.clip(configuration + reach * random.uniform(-1.0, 1.0, len(start)), lower, upper)
         distance = checker.distances(tried)[pair]
         if distance < best:
-            best, posture = distance, tried
+            best, configuration = distance, tried
         else:
             reach = SHRINK * reach
     return best
 
 
-def _postures(arm: Arm, samples: int, random: np.random.Generator) -> Array:
+def _configurations(arm: Arm, samples: int, random: np.random.Generator) -> Array:
     """(m, n) the named ones and random ones within the limits."""
     lower, upper = _limits(arm)
     named = [np.array(state) for state in arm.named_states.values()]

@@ -36,10 +36,10 @@ def measure() -> Figure:
     return of_samples(ticks(parol6(), SCENE), UNIT, GOAL, reference, note)
 
 
-def ticks(arm: Arm, surroundings: PlanningScene) -> list[float]:
+def ticks(arm: Arm, checker: PlanningScene) -> list[float]:
     """[us] of every step; the arm follows at once."""
     kinematics = Kinematics(arm)
-    jog = Jog(arm, kinematics, World(arm, kinematics, surroundings))
+    jog = Jog(arm, kinematics, World(arm, kinematics, checker))
     rng = np.random.default_rng(1)
     state = JointState(name=arm.joint_names, position=arm.named_states["ready"])
     samples: list[float] = []

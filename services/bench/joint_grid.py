@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.description import Arm
-from services.planner.path.validity import Validity
+from services.planner.path.validity import ValidityChecker
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -20,7 +20,7 @@ NOWHERE = -1
 class JointGrid:
     """Which postures of a grid can be reached from which."""
 
-    def __init__(self, arm: Arm, reach: Array, validity: Validity) -> None:
+    def __init__(self, arm: Arm, reach: Array, validity: ValidityChecker) -> None:
         """`reach` (n,) says how far any point moves at most per unit of a joint."""
         self._axes = [
             np.linspace(joint.lower, joint.upper, 2 + int((joint.upper - joint.lower) * most / STEP))

@@ -18,9 +18,9 @@ from services.bench.problem_sets import way_length
 from services.planner.collision.checker import CollisionChecker
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.path.ompl_search import ompl_corners
-from services.planner.path.path import NoWay
+from services.planner.path.path import PathNotFound
 from services.planner.path.smoothing import shorten
-from services.planner.path.validity import Validity
+from services.planner.path.validity import ValidityChecker
 from services.planner.request.deadline import Deadline
 
 if TYPE_CHECKING:
@@ -47,13 +47,13 @@ class Spheres:
         return None if self._core.path_free(positions) else np.asarray(positions[0])
 
 
-def shortest(arm: Arm, surroundings: CollisionChecker, start: Array, goals: Array) -> tuple[Array, str] | None:
+def shortest(arm: Arm, checker: CollisionChecker, start: Array, goals: Array) -> tuple[Array, str] | None:
     """A polyline (m, n) from `start` to one of `goals` (k, n), and what found it; None where nothing did."""
-    core = surroundings.native(CLEARANCE)
+    core = checker.native(CLEARANCE)
     if core is None:
         raise RuntimeError("the compiled motion core is needed to look for the shortest ways: run `make setup`")
     speeds = np.array([joint.velocity for joint in arm.joints])
-    cautious, exact = Validity(Spheres(core), CLEARANCE), Validity(surroundings, CLEARANCE)
+    cautious, exact = ValidityChecker(Spheres(core), CLEARANCE), ValidityChecker(checker, CLEARANCE)
     found = _by_core(core, start, goals)
     found += _by_ompl(arm, cautious, LONG_RUNS, start, goals) if found else []
     found = found or _by_ompl(arm, exact, NARROW_RUNS, start, goals)
@@ -67,7 +67,7 @@ def shortest(arm: Arm, surroundings: CollisionChecker, start: Array, goals: Arra
     return tightened(rows, speeds, TIGHTENED, exact, LAST_PUSHES), name
 
 
-def tightened(rows: Array, speeds: Array, seed: int, validity: Validity, pushes: int) -> Array:
+def tightened(rows: Array, speeds: Array, seed: int, validity: ValidityChecker, pushes: int) -> Array:
     """The polyline pulled tight: with one more corner on every edge, all of them pushed about."""
     if len(rows) == 2:
         return rows
@@ -98,14 +98,14 @@ def _by_core(core: NativePlanner, start: Array, goals: Array) -> list[tuple[Arra
 
 
 def _by_ompl(
-    arm: Arm, validity: Validity, runs: Sequence[tuple[str, int]], start: Array, goals: Array
+    arm: Arm, validity: ValidityChecker, runs: Sequence[tuple[str, int]], start: Array, goals: Array
 ) -> list[tuple[Array, str]]:
     found = []
     for name, seed in runs:
         deadline = Deadline(time.perf_counter, PATIENCE, time.perf_counter())
         try:
             rows = ompl_corners(arm, name, start, goals, validity, seed, deadline)
-        except NoWay:
+        except PathNotFound:
             continue
         found.append((shorten(rows, validity, seed, deadline), name))
     return found

@@ -26,9 +26,9 @@ from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.world import World
 from services.planner.kinematics.goals import Goals
 from services.planner.path.native_search import NATIVE
-from services.planner.path.path import NoWay
+from services.planner.path.path import PathNotFound
 from services.planner.path.search import Search
-from services.planner.path.validity import Validity
+from services.planner.path.validity import ValidityChecker
 from services.planner.request.deadline import NEVER, Deadline, Stopwatch, endless
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ class Maker:
         self.arm, self.scene = arm, scene
         self.kinematics = Kinematics(arm)
         self._around = CollisionChecker(World(arm, self.kinematics, SCENES[scene]))
-        self._validity = Validity(self._around, CLEARANCE)
+        self._validity = ValidityChecker(self._around, CLEARANCE)
         self._speeds = np.array([joint.velocity for joint in arm.joints])
         self._search = Search(arm, self._around)
         is_small = len(arm.joints) <= FEW_JOINTS
@@ -95,7 +95,7 @@ class Maker:
             try:
                 way = self._search.find(start, goal[None], CLEARANCE, planner_id, SEED, deadline, Stopwatch(endless))
                 return way.corners, planner_id
-            except NoWay:
+            except PathNotFound:
                 continue
         print(f"{self.arm.name} {self.scene}: nothing finds a way {start.tolist()} {goal.tolist()}", flush=True)
         return (np.array([start, goal]), "grid") if self._grid else None

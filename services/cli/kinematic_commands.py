@@ -51,7 +51,7 @@ def ik_options(parser: Parser) -> None:
         nargs="+",
         default=[],
         metavar="JOINT=VALUE",
-        help="the posture to be near to; where the arm is, if none",
+        help="the configuration to be near to; where the arm is, if none",
     )
     parser.add_argument("--solutions", type=positive_integer, default=1, help="at most so many, the nearest first")
     parser.add_argument("--touching", action="store_true", help="those at which links touch as well")

@@ -1,4 +1,5 @@
-"""`gemelo ik` and `gemelo fk`: postures for a tool pose, and poses of links for a posture. Nothing moves."""
+"""`gemelo ik` and `gemelo fk`: configurations for a tool pose, and poses of links for a configuration. Nothing
+moves."""
 
 from __future__ import annotations
 
@@ -21,11 +22,11 @@ PATIENCE = 10.0  # [s] that the planner may search
 
 
 def ik(session: Session, request: IkRequest, as_json: bool) -> ExitCode:
-    """Prints the postures, the nearest first; a refusal is raised with its reason and what would do."""
+    """Prints the configurations, the nearest first; a refusal is raised with its reason and what would do."""
     response: IkResponse = session.node.call(IK, request, timeout=PATIENCE)
     if response.refusal is not None:
         raise CommandError(refusal_text(response.refusal, request.goal, session.arm))
-    print(as_text(response) if as_json else postures(session.arm, response))
+    print(as_text(response) if as_json else configurations(session.arm, response))
     return ExitCode.OK
 
 
@@ -43,8 +44,8 @@ def as_text(response: IkResponse | FkResponse) -> str:
     return msgspec.json.encode(response).decode()
 
 
-def postures(arm: Arm, response: IkResponse) -> str:
-    """A row a posture."""
+def configurations(arm: Arm, response: IkResponse) -> str:
+    """A row a configuration."""
     units = [SHOWN[arm.joint(name).unit] for name in response.name]
     headings = [f"{name} [{unit}]" for name, (unit, _) in zip(response.name, units, strict=True)]
     rows = [

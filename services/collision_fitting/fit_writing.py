@@ -14,7 +14,7 @@ from services.arm.urdf_edit import with_collisions
 from services.collision_fitting.fitted_shape import Fitted
 from services.collision_fitting.mesh_fit import LinkFit, depths
 from services.planner.collision_geometry.link_shapes import link_shapes
-from services.planner.collision_geometry.shapes import Shape, ShapeKind
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 OUTSIDE = 1e-6  # [m] that a corner may be outside the shapes as they are loaded again: a rounding
 
@@ -24,12 +24,12 @@ def elements_of(fitted: Fitted) -> list[str]:
     return [_element(shape, fitted.origin.rpy) for shape in fitted.shapes]
 
 
-def _element(shape: Shape, rpy: Triple) -> str:
+def _element(shape: CollisionShape, rpy: Triple) -> str:
     origin = f'<origin xyz="{_words(shape.pose[0])}" rpy="{_words(rpy)}"/>'
     return f"<collision>\n  {origin}\n  <geometry>{_geometry(shape)}</geometry>\n</collision>"
 
 
-def _geometry(shape: Shape) -> str:
+def _geometry(shape: CollisionShape) -> str:
     match shape.kind:
         case ShapeKind.BOX:
             return f'<box size="{_words(shape.size)}"/>'
@@ -70,8 +70,8 @@ def touching_states(arm: Arm) -> list[str]:
     neighbours = {frozenset((joint.parent, joint.child)) for joint in arm.model.joints}
     return [
         f'in the state "{state}" {" and ".join(pair)} touch'
-        for state, posture in arm.named_states.items()
-        for pair in own.pairs_within(posture)
+        for state, configuration in arm.named_states.items()
+        for pair in own.pairs_within(configuration)
         if frozenset(pair) not in neighbours
     ]
 

@@ -8,7 +8,7 @@ from enum import StrEnum
 
 from services.arm.transforms import compose, from_rpy
 from services.arm.urdf import Origin, Triple
-from services.planner.collision_geometry.shapes import Shape, ShapeKind
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 
 class Kind(StrEnum):
@@ -44,7 +44,7 @@ class Fitted:
         return 4.0 / 3.0 * math.pi * self.size[0] ** 3
 
     @property
-    def shapes(self) -> tuple[Shape, ...]:
+    def shapes(self) -> tuple[CollisionShape, ...]:
         """It in the link's frame, as what a URDF knows: a capsule and a plate are three."""
         match self.kind, self.size:
             case Kind.CAPSULE, (radius, length):
@@ -58,6 +58,6 @@ class Fitted:
                 return self._shape(ShapeKind.BOX, (length, 2.0 * radius, thickness)), *ends
         return (self._shape(ShapeKind(self.kind), self.size),)
 
-    def _shape(self, kind: ShapeKind, size: tuple[float, ...], at: Triple = (0.0, 0.0, 0.0)) -> Shape:
+    def _shape(self, kind: ShapeKind, size: tuple[float, ...], at: Triple = (0.0, 0.0, 0.0)) -> CollisionShape:
         turn = from_rpy(*self.origin.rpy)
-        return Shape(str(kind), kind, size, compose((self.origin.xyz, turn), (at, (0.0, 0.0, 0.0, 1.0))))
+        return CollisionShape(str(kind), kind, size, compose((self.origin.xyz, turn), (at, (0.0, 0.0, 0.0, 1.0))))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from services.arm.errors import DescriptionError
 from services.arm.transforms import from_rpy
 from services.arm.urdf import Geometry, UrdfLink
-from services.planner.collision_geometry.shapes import Mesh, matrix_of
+from services.planner.collision_geometry.shapes import TriangleMesh, matrix_of
 
 Array = NDArray[np.float64]
 
@@ -19,17 +19,17 @@ FLAT = 1e-3  # thickness as a share of the longest side below which a mesh is no
 MOST_TRIANGLES = 500_000
 
 
-def visual_mesh(link: UrdfLink, folder: Path) -> Mesh | None:
+def visual_mesh(link: UrdfLink, folder: Path) -> TriangleMesh | None:
     """All visual meshes of a link in its frame [m], None where it has none; raises `DescriptionError` with the file."""
     found = [_placed(visual, link.name, folder) for visual in link.visuals if visual.mesh is not None]
     if not found:
         return None
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in found)])
     faces = np.vstack([mesh.faces + start for mesh, start in zip(found, starts[:-1], strict=True)])
-    return Mesh(np.vstack([mesh.vertices for mesh in found]), faces.astype(np.int32))
+    return TriangleMesh(np.vstack([mesh.vertices for mesh in found]), faces.astype(np.int32))
 
 
-def _placed(visual: Geometry, link: str, folder: Path) -> Mesh:
+def _placed(visual: Geometry, link: str, folder: Path) -> TriangleMesh:
     assert visual.mesh is not None
     if visual.mesh.startswith("package://"):
         raise DescriptionError(
@@ -41,10 +41,10 @@ def _placed(visual: Geometry, link: str, folder: Path) -> Mesh:
     scaled = mesh.vertices * np.array(visual.scale)
     _require_solid(scaled, where)
     pose = matrix_of((visual.origin.xyz, from_rpy(*visual.origin.rpy)))
-    return Mesh(scaled @ pose[:3, :3].T + pose[:3, 3], mesh.faces)
+    return TriangleMesh(scaled @ pose[:3, :3].T + pose[:3, 3], mesh.faces)
 
 
-def _read(path: Path, where: str) -> Mesh:
+def _read(path: Path, where: str) -> TriangleMesh:
     """Vertices that a triangle uses, in the file's unit."""
     import trimesh  # half a second
 
@@ -62,7 +62,7 @@ def _read(path: Path, where: str) -> Mesh:
     used, numbers = np.unique(faces, return_inverse=True)
     if not np.isfinite(vertices[used]).all():
         raise DescriptionError(f"{where}: a corner of it is not finite: export it again")
-    return Mesh(vertices[used], numbers.reshape(-1, 3).astype(np.int32))
+    return TriangleMesh(vertices[used], numbers.reshape(-1, 3).astype(np.int32))
 
 
 def _require_solid(vertices: Array, where: str) -> None:

@@ -1,4 +1,5 @@
-"""`gemelo collision fit`: shapes for the links from their meshes, and the spheres that cover those for the core."""
+"""`gemelo collision fit`: shapes for the links from their meshes, and the spheres that cover those for the native
+planner."""
 
 from __future__ import annotations
 

@@ -17,12 +17,12 @@ from services.collision_fitting.link_meshes import visual_mesh
 from services.collision_fitting.parts import shapes_around
 from services.planner.collision_geometry.coal_shapes import tree_of
 from services.planner.collision_geometry.link_shapes import solid_of
-from services.planner.collision_geometry.shapes import Mesh, Shape
+from services.planner.collision_geometry.shapes import CollisionShape, TriangleMesh
 
 Array = NDArray[np.float64]
 
 MOST = 6  # shapes of a link
-FACETS = 12  # along each edge of the box around a shape, where the way to the mesh is measured
+FACETS = 12  # along each edge of the box around a shape, where the path to the mesh is measured
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class LinkFit:
     """The shapes around one link's mesh; `share` of the volume of the mesh's convex hull that they add up to."""
 
     link: str
-    mesh: Mesh
+    mesh: TriangleMesh
     shapes: tuple[Fitted, ...]
     share: float
     overshoot: float  # [m] that the farthest point of the shapes is away from the mesh
@@ -52,13 +52,13 @@ def fit_links(arm: Arm, most: int = MOST, only: Sequence[str] = ()) -> list[Link
     return [_fit(name, mesh, most) for name, mesh in meshes.items() if mesh is not None]
 
 
-def _fit(link: str, mesh: Mesh, most: int) -> LinkFit:
+def _fit(link: str, mesh: TriangleMesh, most: int) -> LinkFit:
     shapes = tuple(shapes_around(mesh, most))
     hull = float(trimesh.convex.convex_hull(mesh.vertices).volume)
     return LinkFit(link, mesh, shapes, sum(shape.volume for shape in shapes) / hull, overshoot(shapes, mesh))
 
 
-def overshoot(fitted: Sequence[Fitted], mesh: Mesh) -> float:
+def overshoot(fitted: Sequence[Fitted], mesh: TriangleMesh) -> float:
     """[m] from the mesh to the farthest point of the shapes' surface, of those that are in no other shape."""
     tree, point = tree_of(mesh), coal.Sphere(1e-9)
     shapes = [shape for each in fitted for shape in each.shapes]
@@ -75,7 +75,7 @@ def overshoot(fitted: Sequence[Fitted], mesh: Mesh) -> float:
     return farthest
 
 
-def _surface(shape: Shape) -> Array:
+def _surface(shape: CollisionShape) -> Array:
     """(k, 3) points on it, its corners and rims among them: nearest to those of a box around it."""
     solid = solid_of(shape)
     steps = np.linspace(-1.0, 1.0, FACETS + 1)
@@ -85,6 +85,6 @@ def _surface(shape: Shape) -> Array:
     return local @ shape.rotation.T + shape.pose[0]
 
 
-def depths(shape: Shape, points: Array) -> Array:
+def depths(shape: CollisionShape, points: Array) -> Array:
     """(n,) [m] that points (n, 3) are inside the shape, below 0 outside."""
     return solid_of(shape).depth((points - shape.pose[0]) @ shape.rotation)

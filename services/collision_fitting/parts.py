@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from services.collision_fitting.fitted_shape import Fitted
 from services.collision_fitting.fitting import fitted, spread
-from services.planner.collision_geometry.shapes import Mesh
+from services.planner.collision_geometry.shapes import TriangleMesh
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -48,7 +48,7 @@ class _Part:
     fitted: Fitted
 
 
-def shapes_around(mesh: Mesh, most: int) -> list[Fitted]:
+def shapes_around(mesh: TriangleMesh, most: int) -> list[Fitted]:
     """At most so many shapes that together hold the mesh [m]; the same mesh gives the same shapes."""
     parts = [_part(_pieces(mesh))]
     cuts = [_best_cut(parts[0])]
@@ -71,7 +71,7 @@ def _volume(parts: list[_Part]) -> float:
     return sum(part.fitted.volume for part in parts) if parts else np.inf
 
 
-def _pieces(mesh: Mesh) -> _Pieces:
+def _pieces(mesh: TriangleMesh) -> _Pieces:
     """None with a long edge; corners at one place are one, whatever normals they have in the file."""
     places, numbers = np.unique(np.round(mesh.vertices / SAME), axis=0, return_inverse=True)
     edges = numbers.reshape(-1)[mesh.faces][:, [[0, 1], [1, 2]]].reshape(-1, 2)

@@ -27,18 +27,18 @@ from services.planner.collision.checker import CollisionChecker
 from services.planner.collision.clearance import CLEARANCE, first_collision
 from services.planner.collision.world import World
 from services.planner.kinematics.goals import Goals
-from services.planner.path.path import STRAIGHT, NoWay, Start
+from services.planner.path.path import STRAIGHT, PathNotFound, Start
 from services.planner.path.search import Search, require_known
-from services.planner.pipeline.collision_refusals import Blockade
-from services.planner.pipeline.planning_context import Errand
-from services.planner.pipeline.trajectory_builder import Finished, Finisher, Touching
-from services.planner.pipeline.waypoints import Via
+from services.planner.pipeline.collision_refusals import CollisionRefusals
+from services.planner.pipeline.planning_context import PlanningContext
+from services.planner.pipeline.trajectory_builder import TrajectoryBuilder, TrajectoryTouches, VerifiedTrajectory
+from services.planner.pipeline.waypoints import WaypointPlanner
 from services.planner.request.deadline import CancelFlag, Deadline, Stopwatch, endless
 from services.planner.request.refusals import (
     LEAST_SCALING,
-    NoPlan,
+    PlanRefused,
     malformed,
-    no_way_around,
+    no_path_around,
     scaling_refused,
     timed_out,
 )
@@ -49,35 +49,35 @@ from services.planner.verification.verify import sample
 Array = NDArray[np.float64]
 
 PATH_POINTS = 100
-MOST_GOALS = 8  # postures of one goal that are tried
+MOST_GOALS = 8  # configurations of one goal that are tried
 LONGEST = 120.0  # [s] that may be allowed
-ATTEMPTS = 3  # searches, where the finished way fails its verification
+ATTEMPTS = 3  # searches, where the finished path fails its verification
 NEAR_START = 0.9  # of the distance at the start is kept on the way, where that is less than the clearance
 TOOL = "tool"  # the planner_id of lines and arcs of the tool
 
 
 class Planner:
-    """Plans from rest to rest for one arm: the straight line of the joints, or a way around."""
+    """Plans from rest to rest for one arm: the straight line of the joints, or a path around."""
 
     def __init__(self, arm: Arm, kinematics: Kinematics | None = None) -> None:
         self.arm = arm
         self.kinematics = kinematics or Kinematics(arm)
-        self.surroundings = CollisionChecker(World(arm, self.kinematics))
-        self._goals = Goals(arm, self.kinematics, self.surroundings)
-        self._blockade = Blockade(arm, self._goals, self.surroundings)
-        self._tool_motions = ToolMotions(arm, self.kinematics, self._goals, self.surroundings)
-        self._search = Search(arm, self.surroundings)
-        self._via = Via(arm, self._goals, self.surroundings, self._blockade, self._search)
+        self.checker = CollisionChecker(World(arm, self.kinematics))
+        self._goals = Goals(arm, self.kinematics, self.checker)
+        self._collision_refusals = CollisionRefusals(arm, self._goals, self.checker)
+        self._tool_motions = ToolMotions(arm, self.kinematics, self._goals, self.checker)
+        self._search = Search(arm, self.checker)
+        self._waypoints = WaypointPlanner(arm, self._goals, self.checker, self._collision_refusals, self._search)
 
     def set_world(self, world: World) -> None:
         """What later plans heed; a plan that is being made is held against it at its end."""
-        self.surroundings.newest = world
+        self.checker.newest = world
 
     def prepare(self) -> None:
         """Does now what the first plan in the newest world would wait for: seconds, in which the links are filled with
         spheres, and a large mesh with distances."""
-        self.surroundings.begin()
-        self.surroundings.native(CLEARANCE)
+        self.checker.begin()
+        self.checker.native(CLEARANCE)
         self._search.prepare()
 
     def plan(
@@ -93,19 +93,19 @@ class Planner:
 
         Another thread may set `cancel`, and see on `watch` what the plan is at.
         """
-        self.surroundings.begin()
+        self.checker.begin()
         watch, deadline = watch or Stopwatch(clock), Deadline(clock, request.allowed_time, clock(), cancel)
         try:
             response = self._plan(request, present, age, deadline, watch)
-        except NoPlan as no_plan:
-            response = PlanResponse(code=no_plan.code, refusal=no_plan.refusal, fraction=no_plan.fraction)
-        scene = self.surroundings.world.scene
+        except PlanRefused as refused:
+            response = PlanResponse(code=refused.code, refusal=refused.refusal, fraction=refused.fraction)
+        scene = self.checker.world.scene
         return msgspec.structs.replace(
             response, times=watch.times, scene_version=scene.version, scene_epoch=scene.epoch
         )
 
     def planned_path(self, trajectory: JointTrajectory, stamp: int) -> PlannedPath:
-        """The way of the tool, for eyes; `stamp` [ns] UNIX."""
+        """The path of the tool, for eyes; `stamp` [ns] UNIX."""
         rows = trajectory.points
         chosen = {round(index * (len(rows) - 1) / (PATH_POINTS - 1)) for index in range(PATH_POINTS)}
         shown = [rows[index] for index in sorted(chosen)]
@@ -126,18 +126,18 @@ class Planner:
         limits = self._limits(request)
         start = resolve_start(self.arm, request.start, present, age)
         margin = self._start_margin(start, deadline)
-        finisher = Finisher(self.arm, self.surroundings, request, limits, margin, watch)
-        errand = Errand(request, start, limits, margin, finisher, deadline, watch)
+        builder = TrajectoryBuilder(self.arm, self.checker, request, limits, margin, watch)
+        context = PlanningContext(request, start, limits, margin, builder, deadline, watch)
         fraction, stopped_by = 1.0, None
         if isinstance(request.motion, LinearMotion | CircularMotion):
             with watch.phase("search"):
-                way = self._tool_motions.plan(request, start, limits, margin, deadline)
-            finished, planner_id = self._verified(way.trajectory, way.end, errand), TOOL
-            fraction, stopped_by = way.fraction, way.stopped_by
+                path = self._tool_motions.plan(request, start, limits, margin, deadline)
+            finished, planner_id = self._verified(path.trajectory, path.end, context), TOOL
+            fraction, stopped_by = path.fraction, path.stopped_by
         elif isinstance(request.goal, WaypointGoal):
-            finished, planner_id = self._via.plan(request.goal, errand)
+            finished, planner_id = self._waypoints.plan(request.goal, context)
         else:
-            finished, planner_id = self._found(errand)
+            finished, planner_id = self._found(context)
         self._hold_against_newest(finished.trajectory, deadline)
         return PlanResponse(
             code=PlanCode.SUCCESS,
@@ -151,83 +151,83 @@ class Planner:
             stopped_by=stopped_by,
         )
 
-    def _verified(self, trajectory: JointTrajectory, end: Start, errand: Errand) -> Finished:
+    def _verified(self, trajectory: JointTrajectory, end: Start, context: PlanningContext) -> VerifiedTrajectory:
         try:
-            return errand.finisher.finish(trajectory, errand.start, end)
-        except Touching as touching:
-            raise self._blockade.way(touching.posture, errand.margin) from touching
+            return context.builder.verified(trajectory, context.start, end)
+        except TrajectoryTouches as touching:
+            raise self._collision_refusals.path(touching.configuration, context.margin) from touching
 
-    def _found(self, errand: Errand) -> tuple[Finished, str]:
-        """The straight line to the first posture to which there is one, or else a way around to any."""
+    def _found(self, context: PlanningContext) -> tuple[VerifiedTrajectory, str]:
+        """The straight line to the first configuration to which there is one, or else a path around to any."""
         touching: list[Start] = []
         goals: list[Start] = []
-        for goal in self._postures(errand):
-            if not self.surroundings.keeps(goal, CLEARANCE):
+        for goal in self._configurations(context):
+            if not self.checker.keeps(goal, CLEARANCE):
                 touching.append(goal)
             else:
                 try:
-                    return errand.finisher.line(errand.start, goal), STRAIGHT
-                except Touching:
+                    return context.builder.line(context.start, goal), STRAIGHT
+                except TrajectoryTouches:
                     goals.append(goal)
-            if errand.deadline.has_passed() or len(goals) == MOST_GOALS:
+            if context.deadline.has_passed() or len(goals) == MOST_GOALS:
                 break
-        request = errand.request
+        request = context.request
         if goals:
             if isinstance(request.motion, FreeMotion):
-                return self._around(request.motion, np.array(goals), errand)
-            raise self._blockade.line(errand.start, goals[0], errand.margin)
+                return self._around(request.motion, np.array(goals), context)
+            raise self._collision_refusals.line(context.start, goals[0], context.margin)
         if touching:
-            raise self._blockade.goal(request.goal, touching[0], errand.start, errand.deadline)
+            raise self._collision_refusals.goal(request.goal, touching[0], context.start, context.deadline)
         raise timed_out()
 
-    def _postures(self, errand: Errand) -> Iterator[Start]:
-        """The goal's postures, nearest first, on the clock of the kinematics."""
-        with errand.watch.phase("ik"):
-            postures = self._goals.candidates(errand.request.goal, errand.start, errand.deadline)
+    def _configurations(self, context: PlanningContext) -> Iterator[Start]:
+        """The goal's configurations, nearest first, on the clock of the kinematics."""
+        with context.watch.phase("ik"):
+            configurations = self._goals.candidates(context.request.goal, context.start, context.deadline)
         while True:
-            with errand.watch.phase("ik"):
-                posture = next(postures, None)
-            if posture is None:
+            with context.watch.phase("ik"):
+                configuration = next(configurations, None)
+            if configuration is None:
                 return
-            yield posture
+            yield configuration
 
-    def _around(self, motion: FreeMotion, goals: Array, errand: Errand) -> tuple[Finished, str]:
-        """A way around what is on the straight one; another one, where the finished trajectory touches."""
-        start, margin = errand.start, errand.margin
-        refusal: NoPlan | None = None
+    def _around(self, motion: FreeMotion, goals: Array, context: PlanningContext) -> tuple[VerifiedTrajectory, str]:
+        """A path around what is on the straight one; another one, where the finished trajectory touches."""
+        start, margin = context.start, context.margin
+        refusal: PlanRefused | None = None
         for attempt in range(ATTEMPTS):
             try:
-                with errand.watch.phase("search"):
-                    way = self._search.find(
+                with context.watch.phase("search"):
+                    path = self._search.find(
                         np.array(start),
                         goals,
                         margin,
                         motion.planner_id,
                         motion.seed + attempt,
-                        errand.deadline,
-                        errand.watch,
+                        context.deadline,
+                        context.watch,
                     )
-                return errand.finisher.way(way), way.planner_id
-            except NoWay as no_way:
-                raise no_way_around(
-                    no_way.why, self._blockade.line(start, tuple(goals[0].tolist()), margin)
-                ) from no_way
-            except Touching as touching:
-                refusal = self._blockade.way(touching.posture, margin)
-            if errand.deadline.has_passed():
+                return context.builder.path(path), path.planner_id
+            except PathNotFound as not_found:
+                raise no_path_around(
+                    not_found.reason, self._collision_refusals.line(start, tuple(goals[0].tolist()), margin)
+                ) from not_found
+            except TrajectoryTouches as touching:
+                refusal = self._collision_refusals.path(touching.configuration, margin)
+            if context.deadline.has_passed():
                 break
         raise refusal or timed_out()
 
     def _hold_against_newest(self, trajectory: JointTrajectory, deadline: Deadline) -> None:
-        """Raises `NoPlan` where the scene has changed since the plan was begun and is in its way now."""
-        if self.surroundings.newest is self.surroundings.world:
+        """Raises `PlanRefused` where the scene has changed since the plan was begun and is in its way now."""
+        if self.checker.newest is self.checker.world:
             return
-        world = self.surroundings.begin()
+        world = self.checker.begin()
         margin = self._start_margin(trajectory.points[0].positions, deadline)
         touching = first_collision(world, sample(trajectory).positions, margin)
         if touching is not None:
             where = "in the scene as it has become meanwhile"
-            raise self._blockade.refusal(PlanCode.PLANNING_FAILED, where, touching, margin, (), "plan again")
+            raise self._collision_refusals.refusal(PlanCode.PLANNING_FAILED, where, touching, margin, (), "plan again")
 
     def _limits(self, request: PlanRequest) -> JointLimits:
         for name in ("velocity_scaling", "acceleration_scaling"):
@@ -238,16 +238,16 @@ class Planner:
 
     def _start_margin(self, start: Start, deadline: Deadline) -> float:
         """[m] to keep on the way: an arm that already stands nearer than the clearance may come away from there."""
-        if self.surroundings.keeps(start, CLEARANCE / NEAR_START):
+        if self.checker.keeps(start, CLEARANCE / NEAR_START):
             return CLEARANCE
-        distance = self.surroundings.distance(start)
+        distance = self.checker.distance(start)
         if distance <= 0.0:
-            raise self._blockade.start(start, deadline)
+            raise self._collision_refusals.start(start, deadline)
         return min(CLEARANCE, NEAR_START * distance)
 
 
 def _require_known(request: PlanRequest) -> None:
-    """Raises `NoPlan` for what this planner cannot do."""
+    """Raises `PlanRefused` for what this planner cannot do."""
     if not 0.0 < request.allowed_time <= LONGEST:
         message = f"allowed_time is {request.allowed_time:g} s: it must be above 0 and at most {LONGEST:g}"
         raise malformed(PlanCode.INVALID_GOAL_CONSTRAINTS, "allowed_time", message, "allow 1 s, which is the default")

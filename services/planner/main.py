@@ -32,7 +32,7 @@ def run(node: Node, deployment: Deployment) -> None:
     JogService(node, arm, states, lambda: keeper.world)
     node.serve(
         IK,
-        lambda request: kinematic.ik(request, states.message, states.age(), planner.surroundings.newest),
+        lambda request: kinematic.ik(request, states.message, states.age(), planner.checker.newest),
         worker=True,
     )
     node.serve(FK, lambda request: kinematic.fk(request, states.message, states.age()), worker=True)

@@ -1,4 +1,4 @@
-"""Postures of the arm as poses of its moving links."""
+"""Configurations of the arm as poses of its moving links."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from services.visualizer.updates import Poses, Times, Update
 
 
 def arm_poses(model: Model, root: str, times: Times, rows: Array) -> list[Update]:
-    """The arm under `root` in the postures `rows` (n, joints), in the order of `model.moving`, at `times` (n,)."""
+    """The arm under `root` in the configurations `rows` (n, joints), in the order of `model.moving`, at `times`
+    (n,)."""
     names = [joint.name for joint in model.moving]
     return [
         Poses(f"{root}/{model.paths[joint.child]}", times, *joint.poses(model.positions(joint, rows, names)))
@@ -19,6 +20,6 @@ def arm_poses(model: Model, root: str, times: Times, rows: Array) -> list[Update
     ]
 
 
-def arm_at(model: Model, root: str, now: int, posture: Array) -> list[Update]:
-    """The arm under `root` in one `posture` (joints,) from `now` on."""
-    return arm_poses(model, root, np.array([now], dtype=np.int64), posture[None, :])
+def arm_at(model: Model, root: str, now: int, configuration: Array) -> list[Update]:
+    """The arm under `root` in one `configuration` (joints,) from `now` on."""
+    return arm_poses(model, root, np.array([now], dtype=np.int64), configuration[None, :])

@@ -57,7 +57,7 @@ class Preview:
         self._began = None
 
     def take(self, now: int) -> list[Update]:
-        """The posture of this moment; `now` in ns UNIX."""
+        """The configuration of this moment; `now` in ns UNIX."""
         now = bounded(now)
         if self._is_over:
             gone: list[Update] = [Gone(entities.PLANNED, now)] if self._began is not None else []
@@ -70,5 +70,5 @@ class Preview:
                      *self._carried(entities.PLANNED, palette.PLANNED, now)]  # fmt: skip
         played, phase = divmod((now - self._began) / 1e9, float(self._times[-1]) + REST)
         self._is_over = played >= TIMES
-        posture = np.array([np.interp(phase, self._times, column) for column in self._rows.T])
-        return [*drawn, *arm_at(self._model, entities.PLANNED, now, posture)]
+        configuration = np.array([np.interp(phase, self._times, column) for column in self._rows.T])
+        return [*drawn, *arm_at(self._model, entities.PLANNED, now, configuration)]

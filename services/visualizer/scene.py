@@ -57,11 +57,11 @@ class SceneView:
         self._scene, self._is_new = message, True
 
     def on_contacts(self, message: Contacts) -> None:
-        """What touches in the posture that was refused last."""
+        """What touches in the configuration that was refused last."""
         self._contacts, self._is_new = message, True
 
     def on_motion(self) -> None:
-        """The real arm goes: a posture that was refused is of the past."""
+        """The real arm goes: a configuration that was refused is of the past."""
         if self._contacts.contacts:
             self._contacts, self._is_new = Contacts(), True
 
@@ -92,7 +92,7 @@ class SceneView:
     def _wanted(self, item: SceneObject) -> Drawn:
         root = entities.carried(entities.MEASURED, self._model.paths[item.frame]) if item.attached else entities.SCENE
         color = palette.CARRIED if item.attached else palette.OBJECT
-        # A carried object touches in the refused posture, where the shadow shows it; here it is where the arm is.
+        # A carried object touches in the refused configuration, where the shadow shows it; here it is where the arm is.
         is_red = item.name in self._touching() and not item.attached
         return Drawn(item, f"{root}/{entities.part(item.name)}", palette.TOUCHING if is_red else color)
 
@@ -106,21 +106,22 @@ class SceneView:
         return [Thing(entity, now, mesh, item.pose.translation, item.pose.rotation, color)]
 
     def _refused(self, now: int) -> list[Update]:
-        """The arm in the refused posture, with what touches in red and named; nothing once nothing does."""
+        """The arm in the refused configuration, with what touches in red and named; nothing once nothing does."""
         # A nanosecond before: Rerun forgets a pose that is told at the very time of a clearing, told later or not.
         updates: list[Update] = [Gone(entities.REFUSED, now - 1)]
-        posture = dict(zip(self._contacts.name, self._contacts.position, strict=False))
+        configuration = dict(zip(self._contacts.name, self._contacts.position, strict=False))
         names = [joint.name for joint in self._model.moving]
-        if not self._contacts.contacts or any(name not in posture for name in names):
+        if not self._contacts.contacts or any(name not in configuration for name in names):
             return updates
         touching = self._touching()
         updates.append(Shadow(entities.REFUSED, now, touching, palette.SHADOW))
-        updates += arm_at(self._model, entities.REFUSED, now, np.array([posture[name] for name in names]))
+        updates += arm_at(self._model, entities.REFUSED, now, np.array([configuration[name] for name in names]))
         updates += self.carried(entities.REFUSED, palette.SHADOW, now)
         return [*updates, *self._labels(now)]
 
     def carried(self, root: str, color: palette.Rgba, now: int) -> list[Update]:
-        """What the arm carries, in the hand of another arm under `root`; what touches in a refused posture is red."""
+        """What the arm carries, in the hand of another arm under `root`; what touches in a refused configuration is
+        red."""
         red = self._touching() if root == entities.REFUSED else frozenset()
         updates: list[Update] = []
         for item in self._scene.objects:

@@ -113,7 +113,7 @@ class Labels:
 
 @dataclass(frozen=True)
 class Shadow:
-    """A translucent arm under `entity`, with the links `touching` in red; `Poses` say its posture."""
+    """A translucent arm under `entity`, with the links `touching` in red; `Poses` say its configuration."""
 
     entity: str
     time: int

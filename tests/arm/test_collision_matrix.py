@@ -42,10 +42,10 @@ def test_distances_name_every_pair_with_its_nearest_shapes(rm1_folder: Path) -> 
     arm = load_arm(rm1_folder.parent / "parol6")
     kinematics = Kinematics(arm)
     checker = SelfCollisions(arm, kinematics.model, kinematics.configuration)
-    for posture in arm.named_states.values():
-        distances = checker.distances(posture)
+    for configuration in arm.named_states.values():
+        distances = checker.distances(configuration)
         assert tuple(distances) == checker.pairs
-        assert min(distances.values()) == pytest.approx(checker.distance(posture), abs=2e-6)
+        assert min(distances.values()) == pytest.approx(checker.distance(configuration), abs=2e-6)
 
 
 def test_links_without_a_shape_do_not_keep_neighbours_apart(tmp_path: Path, rm1_folder: Path) -> None:

@@ -20,7 +20,7 @@ from services.arm.transforms import from_message
 
 RM1 = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 KINEMATICS = Kinematics(RM1)
-POSTURES = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in RM1.joints])
+CONFIGURATIONS = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in RM1.joints])
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def test_every_link_is_where_yourdfpy_has_it(peer: Any):
         assert np.allclose(KINEMATICS.tool(q).rotation, theirs[:3, :3], atol=1e-9)
 
 
-@given(POSTURES)
+@given(CONFIGURATIONS)
 def test_the_light_chain_agrees_with_pinocchio(q: tuple[float, ...]):
     poses = KINEMATICS.link_poses(q)
     for name, (point, turn) in link_transforms(RM1.model, dict(zip(RM1.joint_names, q, strict=True))).items():
@@ -53,7 +53,7 @@ def test_the_light_chain_agrees_with_pinocchio(q: tuple[float, ...]):
         assert abs(float(np.dot(turn, from_message(poses[name])[1]))) == pytest.approx(1.0, abs=1e-12)
 
 
-@given(POSTURES)
+@given(CONFIGURATIONS)
 def test_the_jacobian_is_the_finite_difference(q: tuple[float, ...]):
     jacobian, h = KINEMATICS.jacobian(q), 1e-6
     for column in range(len(q)):
@@ -90,7 +90,7 @@ def test_a_margin_sees_what_is_only_near():
 
 
 @settings(max_examples=200)
-@given(POSTURES, POSTURES)
+@given(CONFIGURATIONS, CONFIGURATIONS)
 def test_no_distance_changes_faster_than_the_reach_says(a: tuple[float, ...], b: tuple[float, ...]):
     moved = float(np.abs(np.subtract(a, b)) @ KINEMATICS.collisions.reach)
     change = abs(KINEMATICS.collisions.distance(a) - KINEMATICS.collisions.distance(b))

@@ -10,6 +10,7 @@ from services.bench.arms import parol6, rm1
 from services.bench.main import NAMES, module_of
 from services.bench.poses import is_solved, problems, solve
 from services.planner.kinematics.ik import InverseKinematics
+from services.planner.request.deadline import NEVER
 
 
 @pytest.mark.parametrize("name", ["ik_ms", "ik_success"])
@@ -35,5 +36,5 @@ def test_a_solution_counts_and_what_is_off_does_not():
 def test_of_a_position_the_orientation_does_not_count():
     arm = rm1()
     [problem] = problems(arm, Kinematics(arm), 1, is_full=False)
-    other = InverseKinematics(arm, Kinematics(arm)).solutions(problem.target, -problem.posture, lambda: False)
+    other = InverseKinematics(arm, Kinematics(arm)).solutions(problem.target, -problem.posture, NEVER)
     assert all(is_solved(arm, problem, answer) for answer in other)

@@ -13,7 +13,7 @@ from services.bench.arms import rm1
 from services.bench.joint_grid import JointGrid, islands
 from services.bench.known_ways import tightened
 from services.bench.problem_sets import way_length
-from services.planner.path.validity import Validity
+from services.planner.path.validity import ValidityChecker
 
 ONES = np.ones(2)
 
@@ -43,7 +43,7 @@ class Wall:
 
 def test_a_detour_is_pulled_tight_around_what_is_in_its_way():
     rows = np.array([[-1.0, 0.0], [-1.0, 2.0], [1.0, 2.0], [1.0, 0.0]])
-    tight = tightened(rows, ONES, 1, Validity(Disc(), 0.0), pushes=2000)
+    tight = tightened(rows, ONES, 1, ValidityChecker(Disc(), 0.0), pushes=2000)
     tangent = 2.0 * (np.sqrt(0.75) + 0.5 * np.pi / 6.0)
     assert tangent <= way_length(tight, ONES) < 1.1 * tangent
     assert tight[[0, -1]].tolist() == rows[[0, -1]].tolist()
@@ -52,7 +52,7 @@ def test_a_detour_is_pulled_tight_around_what_is_in_its_way():
 
 def test_a_straight_way_is_as_tight_as_it_can_be():
     rows = np.array([[-1.0, 1.0], [1.0, 1.0]])
-    assert tightened(rows, ONES, 1, Validity(Disc(), 0.0), pushes=10) is rows
+    assert tightened(rows, ONES, 1, ValidityChecker(Disc(), 0.0), pushes=10) is rows
 
 
 def test_islands_are_what_is_joined():
@@ -69,6 +69,6 @@ def test_islands_are_what_is_joined():
 def test_a_grid_knows_whether_there_is_any_way(monkeypatch: pytest.MonkeyPatch, gap: float, is_open: bool):
     monkeypatch.setattr(joint_grid, "STEP", 0.25)
     arm = dataclasses.replace(rm1(), joints=rm1().joints[:2])
-    grid = JointGrid(arm, ONES, Validity(Wall(gap), 0.0))
+    grid = JointGrid(arm, ONES, ValidityChecker(Wall(gap), 0.0))
     assert grid.is_connected(np.array([-1.0, 1.0]), np.array([1.0, 1.0])) is is_open
     assert grid.is_connected(np.array([1.0, 1.0]), np.array([2.0, -1.0]))

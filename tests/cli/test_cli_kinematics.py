@@ -55,7 +55,7 @@ def said(line: str) -> ExitCode:
     return run(line.split())
 
 
-def test_postures_are_printed_the_nearest_first(asked, capsys):
+def test_configurations_are_printed_the_nearest_first(asked, capsys):
     assert said("ik --to 0.25 0.15 0.10 --solutions 4") is ExitCode.OK
     heading, _, *rows = capsys.readouterr().out.splitlines()
     assert heading.split("  ")[0].strip() == "brazo_joint [deg]"

@@ -25,7 +25,7 @@ from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, S
 from services.planner.core import Planner
 from services.planner.path.search import KNOWN
 from tests.planner.independent import Judge
-from tests.planner.judging import asked, joints, posture_at, quaternion_of
+from tests.planner.judging import asked, configuration_at, joints, quaternion_of
 
 MOST_JOINTS = 7
 Numbers = tuple[float, ...]
@@ -75,13 +75,13 @@ def held(planner: Planner, shape: Shape) -> SceneObject:
 
 @st.composite
 def pose_goals(draw: st.DrawFn, planner: Planner, start: Numbers) -> PoseGoal:
-    """A pose that some posture has, in every form that this arm can fulfil."""
-    judge, abilities = Judge(planner.arm), planner._goals.abilities
-    position, rotation = judge.tool(np.array(posture_at(planner, draw(INNER))))
+    """A pose that some configuration has, in every form that this arm can fulfil."""
+    judge, task_space = Judge(planner.arm), planner._goals.task_space
+    position, rotation = judge.tool(np.array(configuration_at(planner, draw(INNER))))
     frame = draw(st.sampled_from(("", planner.arm.base_frame, planner.arm.model.links[1].name)))
     origin, turned = judge.pose(frame or planner.arm.base_frame, np.array(start))
     place, turn = tuple((turned.T @ (position - origin)).tolist()), turned.T @ rotation
-    forms = ["position", "near"] + (["orientation", "free axis", "pointing", "about"] if abilities.is_full else [])
+    forms = ["position", "near"] + (["orientation", "free axis", "pointing", "about"] if task_space.is_full else [])
     axis = unit(draw(WAYS))
     match draw(st.sampled_from(forms)):
         case "near":
@@ -104,7 +104,7 @@ def pose_goals(draw: st.DrawFn, planner: Planner, start: Numbers) -> PoseGoal:
 @st.composite
 def goals(draw: st.DrawFn, planner: Planner, start: Numbers) -> Goal:
     """One point to be at."""
-    whole = joints(planner, posture_at(planner, draw(SHARES)))
+    whole = joints(planner, configuration_at(planner, draw(SHARES)))
     return draw(
         st.one_of(
             st.just(whole),
@@ -121,7 +121,7 @@ def cases(draw: st.DrawFn, planner: Planner) -> tuple[PlanningScene, PlanRequest
     scene = draw(scenes())
     if draw(st.integers(0, 3)) == 0:
         scene = with_object(scene, held(planner, draw(SHAPES)))
-    start, whole = draw(free_postures(planner, scene)), draw(free_postures(planner, scene))
+    start, whole = draw(free_configurations(planner, scene)), draw(free_configurations(planner, scene))
     middle = planner.kinematics.tool(0.5 * np.add(start, whole)).position
     post = SceneObject(name="post", shape=draw(SHAPES), pose=Transform(translation=tuple(middle.tolist())))
     crowded, ends = with_object(scene, post), [np.array(start), np.array(whole)]
@@ -142,7 +142,7 @@ def cases(draw: st.DrawFn, planner: Planner) -> tuple[PlanningScene, PlanRequest
 def tool_cases(draw: st.DrawFn, planner: Planner, is_arc: bool) -> tuple[PlanningScene, PlanRequest]:
     """Lines of up to 15 cm, and arcs of a few, from where the tool is."""
     scene = draw(scenes())
-    start = draw(free_postures(planner, scene, INNER))
+    start = draw(free_configurations(planner, scene, INNER))
     position, rotation = Judge(planner.arm).tool(np.array(start))
     reach = 0.04 if is_arc else 0.15
     places = [tuple((position + draw(st.floats(0.005, reach)) * np.array(unit(draw(WAYS)))).tolist()) for _ in range(2)]
@@ -159,14 +159,14 @@ def tool_cases(draw: st.DrawFn, planner: Planner, is_arc: bool) -> tuple[Plannin
 
 
 @st.composite
-def free_postures(
+def free_configurations(
     draw: st.DrawFn, planner: Planner, scene: PlanningScene, shares: st.SearchStrategy[Numbers] = SHARES
 ) -> Numbers:
     """The first of some that touches nothing, or the last of them."""
     judge = Judge(planner.arm, scene)
-    postures = [posture_at(planner, draw(shares)) for _ in range(4)]
-    free = (posture for posture in postures if judge.nearest(np.array(posture)).distance > 0.0)
-    return next(free, postures[-1])
+    configurations = [configuration_at(planner, draw(shares)) for _ in range(4)]
+    free = (configuration for configuration in configurations if judge.nearest(np.array(configuration)).distance > 0.0)
+    return next(free, configurations[-1])
 
 
 def with_object(scene: PlanningScene, item: SceneObject) -> PlanningScene:

@@ -21,7 +21,7 @@ FAR = 10.0  # [m] beyond which no distance is told
 
 
 class Touch(NamedTuple):
-    """What is nearest in a posture."""
+    """What is nearest in a configuration."""
 
     distance: float  # [m] negative inside
     first: str

@@ -62,13 +62,13 @@ def joints(planner: Planner, goal: Array | tuple[float, ...]) -> JointGoal:
     return JointGoal(name=planner.arm.joint_names, position=tuple(map(float, goal)))
 
 
-def posture_at(planner: Planner, shares: tuple[float, ...]) -> tuple[float, ...]:
-    """A posture by the share of each joint's travel, which is a turn where there is no limit."""
-    posture = []
+def configuration_at(planner: Planner, shares: tuple[float, ...]) -> tuple[float, ...]:
+    """A configuration by the share of each joint's travel, which is a turn where there is no limit."""
+    configuration = []
     for joint, share in zip(planner.arm.joints, shares, strict=False):
         low, high = (joint.lower, joint.upper) if math.isfinite(joint.lower) else (-math.pi, math.pi)
-        posture.append(float(joint.clamp(low + share * (high - low))))
-    return tuple(posture)
+        configuration.append(float(joint.clamp(low + share * (high - low))))
+    return tuple(configuration)
 
 
 def require_refused(response: PlanResponse) -> Refusal:
@@ -97,7 +97,7 @@ def require_sound(planner: Planner, request: PlanRequest, response: PlanResponse
     assert response.duration == points[-1].time_from_start
     motion = resampled(response.trajectory, FINER * DENSITY)
     require_within_limits(planner.arm, request, motion)
-    touch = Judge(planner.arm, planner.surroundings.newest.scene).touch(motion.positions)
+    touch = Judge(planner.arm, planner.checker.newest.scene).touch(motion.positions)
     assert touch is None, touch
     return motion
 
@@ -129,12 +129,12 @@ def require_reached(planner: Planner, request: PlanRequest, response: PlanRespon
         require_pose(planner, goal, request, last)
 
 
-def require_pose(planner: Planner, goal: PoseGoal, request: PlanRequest, posture: Array) -> None:
+def require_pose(planner: Planner, goal: PoseGoal, request: PlanRequest, configuration: Array) -> None:
     """In all forms of a pose goal; in a link's frame as it stands at the start."""
     judge = Judge(planner.arm)
     assert request.start is not None
     origin, frame = judge.pose(goal.frame or planner.arm.base_frame, np.array(request.start.position))
-    position, rotation = judge.tool(posture)
+    position, rotation = judge.tool(configuration)
     assert np.linalg.norm(origin + frame @ goal.position - position) <= goal.position_tolerance + REACHED
     most = goal.orientation_tolerance + REACHED
     if goal.tool_axis:

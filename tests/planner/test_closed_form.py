@@ -26,7 +26,7 @@ KINEMATICS = Kinematics(PAROL6)
 IK = InverseKinematics(PAROL6, KINEMATICS)
 SEARCHED = InverseKinematics(PAROL6, KINEMATICS, is_numeric=True)
 READY = np.array(PAROL6.named_states["ready"])
-POSTURES = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in PAROL6.joints])
+CONFIGURATIONS = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in PAROL6.joints])
 UNIT = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(np.array).filter(lambda v: np.linalg.norm(v) > 0.1)
 
 
@@ -43,8 +43,8 @@ def test_parol6_has_one_and_rm1_does_not():
 
 
 @settings(max_examples=300)
-@given(POSTURES)
-def test_the_posture_that_a_pose_was_made_of_is_among_the_solutions(goal: tuple[float, ...]):
+@given(CONFIGURATIONS)
+def test_the_configuration_that_a_pose_was_made_of_is_among_the_solutions(goal: tuple[float, ...]):
     pose = KINEMATICS.tool(goal)
     solutions = list(IK.solutions(Target(pose.position, pose.rotation), READY, NEVER))
     assert solutions
@@ -53,10 +53,10 @@ def test_the_posture_that_a_pose_was_made_of_is_among_the_solutions(goal: tuple[
 
 
 @settings(max_examples=100)
-@given(POSTURES)
-def test_an_arm_with_a_straight_wrist_that_is_there_already_stays_there(posture: tuple[float, ...]):
+@given(CONFIGURATIONS)
+def test_an_arm_with_a_straight_wrist_that_is_there_already_stays_there(configuration: tuple[float, ...]):
     """joint_4 and joint_6 then turn about one axis, and only their sum is given."""
-    here = np.array((*posture[:4], 0.0, posture[5]))
+    here = np.array((*configuration[:4], 0.0, configuration[5]))
     pose = KINEMATICS.tool(here)
     first = next(IK.solutions(Target(pose.position, pose.rotation), here, NEVER))
     assert IK.travel(here, first) < 1e-4
@@ -90,8 +90,8 @@ def test_the_order_of_the_joints_in_robot_toml_does_not_matter():
 
 
 @settings(max_examples=20)
-@given(POSTURES, POSTURES)
-def test_searching_finds_no_nearer_posture_than_the_closed_form(goal: tuple[float, ...], near: tuple[float, ...]):
+@given(CONFIGURATIONS, CONFIGURATIONS)
+def test_searching_finds_no_nearer_configuration_than_the_closed_form(goal: tuple[float, ...], near: tuple[float, ...]):
     pose = KINEMATICS.tool(goal)
     target, start = Target(pose.position, pose.rotation), np.array(near)
     first = next(IK.solutions(target, start, NEVER))
@@ -113,12 +113,12 @@ def test_without_eaik_the_arm_is_searched_and_the_log_says_so_once(
     assert np.allclose(KINEMATICS.tool(found).position, pose.position, atol=1e-6)
 
 
-@given(UNIT, UNIT, POSTURES)
+@given(UNIT, UNIT, CONFIGURATIONS)
 def test_turns_about_a_direction_all_point_along_it(
-    direction: np.ndarray, axis: np.ndarray, posture: tuple[float, ...]
+    direction: np.ndarray, axis: np.ndarray, configuration: tuple[float, ...]
 ):
     direction, axis = direction / np.linalg.norm(direction), axis / np.linalg.norm(axis)
-    turns = turns_about(direction, axis, KINEMATICS.tool(posture).rotation, 5)
+    turns = turns_about(direction, axis, KINEMATICS.tool(configuration).rotation, 5)
     for turn in turns:
         assert np.allclose(turn @ axis, direction)
         assert np.allclose(turn @ turn.T, np.eye(3))

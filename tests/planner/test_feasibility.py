@@ -18,7 +18,7 @@ from schemas.planning import StepMargin
 from schemas.robot import PullOut
 from services.arm.description import Arm
 from services.arm.device_config import device_config
-from services.planner.request.refusals import NoPlan
+from services.planner.request.refusals import PlanRefused
 from services.planner.timing.profile import joint_limits, straight_line
 from services.planner.verification.feasibility import (
     feasible_scale,
@@ -123,7 +123,7 @@ def test_the_margin_is_the_share_of_the_speed_that_was_asked_for(ideal: Arm, sca
 def test_a_motor_too_weak_is_named_and_a_slower_move_offered(ideal: Arm) -> None:
     weak = with_motor(ideal, 0, PullOut(speed=(0.0, 2000.0, 4000.0), torque=(0.5, 0.3, 0.1), inertia=2e-4))
     trajectory = line(weak, (2.5, 0.0, 0.0))
-    with pytest.raises(NoPlan) as refused:
+    with pytest.raises(PlanRefused) as refused:
         require_feasible(weak, trajectory)
     assert refused.value.refusal.subject == "brazo_joint"
     assert refused.value.refusal.check == "pull-out torque"
@@ -131,7 +131,7 @@ def test_a_motor_too_weak_is_named_and_a_slower_move_offered(ideal: Arm) -> None
     assert 0.0 < scale < 1.0
     assert f"{scale:.2f}" in refused.value.refusal.remedy
     require_feasible(weak, slowed(trajectory, scale))
-    with pytest.raises(NoPlan):
+    with pytest.raises(PlanRefused):
         require_feasible(weak, slowed(trajectory, min(1.0, scale * 1.05)))
 
 
@@ -139,7 +139,7 @@ def test_a_driver_whose_pulses_are_too_wide_is_named(ideal: Arm) -> None:
     joint = ideal.joints[0]
     slow = msgspec.structs.replace(joint.driver, step_high_us=200.0, step_low_us=200.0)
     arm = dataclasses.replace(ideal, joints=(dataclasses.replace(joint, driver=slow), *ideal.joints[1:]))
-    with pytest.raises(NoPlan) as refused:
+    with pytest.raises(PlanRefused) as refused:
         require_feasible(arm, line(arm, (2.5, 0.0, 0.0)))
     assert refused.value.refusal.check == "pulse width"
 
@@ -148,7 +148,7 @@ def test_a_queue_too_short_to_brake_in_is_named(ideal: Arm) -> None:
     arm = dataclasses.replace(ideal, device=msgspec.structs.replace(ideal.device, queue_capacity=20))
     trajectory = line(arm, (2.5, 0.0, 0.0))
     assert queue_share(arm, trajectory) > 1.0
-    with pytest.raises(NoPlan) as refused:
+    with pytest.raises(PlanRefused) as refused:
         require_feasible(arm, trajectory)
     assert refused.value.refusal.check == "device queue"
     require_feasible(arm, slowed(trajectory, feasible_scale(arm, trajectory)))

@@ -14,16 +14,16 @@ from services.arm.description import load_arm
 from services.arm.kinematics import Kinematics
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.targets import Target
-from services.planner.request.deadline import NEVER
+from services.planner.request.deadline import NEVER, Deadline
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 KINEMATICS = Kinematics(ARM)
 IK = InverseKinematics(ARM, KINEMATICS)
-POSTURES = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])
+CONFIGURATIONS = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])
 
 
 @settings(max_examples=300)
-@given(POSTURES, POSTURES)
+@given(CONFIGURATIONS, CONFIGURATIONS)
 def test_fk_of_ik_is_the_goal(goal: tuple[float, ...], near: tuple[float, ...]):
     target = Target(KINEMATICS.tool(goal).position)
     solution = next(IK.solutions(target, np.array(near), NEVER))
@@ -41,7 +41,7 @@ def test_both_elbows_are_found_and_the_nearer_one_comes_first():
 
 
 @settings(max_examples=100)
-@given(POSTURES, POSTURES)
+@given(CONFIGURATIONS, CONFIGURATIONS)
 def test_the_nearest_comes_first_of_all_that_are_found(goal: tuple[float, ...], near: tuple[float, ...]):
     start, target = np.array(near), Target(KINEMATICS.tool(goal).position)
     if IK.descend(target, start).is_solution:  # else the arm is stuck there, and comes from elsewhere
@@ -61,7 +61,7 @@ def test_the_way_inwards_from_the_stretched_arm_is_found():
     assert next(IK.solutions(Target(0.7 * tool + [0.0, 0.0, 0.05]), np.zeros(3), NEVER)) is not None
 
 
-def test_out_of_reach_gives_no_solution_but_the_nearest_posture():
+def test_out_of_reach_gives_no_solution_but_the_nearest_configuration():
     target = Target(np.array([0.6, 0.0, 0.1]))
     assert list(IK.solutions(target, np.zeros(3), NEVER)) == []
     best = IK.nearest(target, np.zeros(3), NEVER)[0]
@@ -69,11 +69,11 @@ def test_out_of_reach_gives_no_solution_but_the_nearest_posture():
 
 
 def test_a_search_that_is_late_ends():
-    assert list(IK.solutions(Target(np.array([0.6, 0.0, 0.1])), np.zeros(3), lambda: True)) == []
+    assert list(IK.solutions(Target(np.array([0.6, 0.0, 0.1])), np.zeros(3), Deadline(allowed=0.0))) == []
 
 
 @settings(max_examples=50)
-@given(POSTURES, POSTURES)
+@given(CONFIGURATIONS, CONFIGURATIONS)
 def test_orientations_are_met_where_the_arm_can(goal: tuple[float, ...], near: tuple[float, ...]):
     pose = KINEMATICS.tool(goal)
     solution = next(IK.solutions(Target(pose.position, pose.rotation), np.array(near), NEVER))

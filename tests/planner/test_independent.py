@@ -123,7 +123,7 @@ def test_a_touch_of_a_moment_is_found_in_a_long_way():
 @pytest.mark.parametrize("name", ARMS)
 def test_it_has_the_tool_where_pinocchio_has_it(name: str):
     arm, judge, kinematics = ARMS[name], Judge(ARMS[name]), Kinematics(ARMS[name])
-    for row in postures(arm, 200):
+    for row in configurations(arm, 200):
         position, rotation = judge.tool(row)
         assert position == pytest.approx(kinematics.tool(row).position, abs=1e-12)
         assert rotation == pytest.approx(kinematics.tool(row).rotation, abs=1e-12)
@@ -150,7 +150,7 @@ def test_it_and_coal_tell_the_same_distances(name: str):
             allowed=(AllowedPair(first="box", second="ball"),),
         )  # fmt: skip
         world, judge = World(arm, kinematics, scene), Judge(arm, scene)
-        for row in postures(arm, 150):
+        for row in configurations(arm, 150):
             told, judged = world.distance(row), judge.nearest(row).distance
             touches += told <= 0.0
             assert (told <= 0.0) == (judged <= 0.0)
@@ -164,7 +164,7 @@ def test_a_drawn_arm_is_about_as_large_as_its_shapes(name: str):
     crate = item("crate", BoxShape(size=(0.2, 0.2, 0.2)), (0.3, 0.0, 0.15))
     scene = PlanningScene(objects=(crate,))
     shapes, drawn = Judge(ARMS[name], scene), Judge(ARMS[name], scene, is_drawn=True)
-    rows = postures(ARMS[name], 300)
+    rows = configurations(ARMS[name], 300)
     both = np.array([(shapes.nearest(row).distance, drawn.nearest(row).distance) for row in rows])
     assert 10 < (both[:, 1] <= 0.0).sum() < 290
     free = both.min(axis=1) > 0.0
@@ -186,6 +186,6 @@ def test_its_quintics_are_those_that_the_gateway_plays():
         assert motion.accelerations[index] == pytest.approx(acceleration, abs=1e-6)
 
 
-def postures(arm: Arm, count: int) -> np.ndarray:
+def configurations(arm: Arm, count: int) -> np.ndarray:
     lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
     return np.random.default_rng(5).uniform(lower, upper, (count, len(lower)))

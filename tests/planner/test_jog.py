@@ -46,11 +46,11 @@ def test_the_tool_goes_in_the_commanded_direction_however_much_it_is_slowed(
     name: str, frame: str, direction: tuple[float, float, float]
 ) -> None:
     jogged = Jogged(name, crowded=False)
-    way = np.array(direction) / np.linalg.norm(direction)
+    displacement = np.array(direction) / np.linalg.norm(direction)
     in_frame = jogged.arm.tool_frame if frame == "tool" else ""
     pose = jogged.kinematics.tool(jogged.tracker.knot.position)
-    wanted = pose.rotation @ way if frame == "tool" else way
-    jogged.hold(JogCommand(linear=tuple(way * 0.5), frame=in_frame), 0.4)
+    wanted = pose.rotation @ displacement if frame == "tool" else displacement
+    jogged.hold(JogCommand(linear=tuple(displacement * 0.5), frame=in_frame), 0.4)
     for positions, velocity in zip(jogged.commanded[:8], jogged.velocities[:8], strict=True):
         motion = jogged.kinematics.jacobian(positions)[:3] @ velocity
         if np.linalg.norm(motion) > 1e-6:
@@ -199,9 +199,9 @@ def test_the_arm_itself_keeps_to_the_line_of_the_tool(name: str):
     begin = jogged.kinematics.tool(jogged.tracker.knot.position).position
     jogged.hold(JogCommand(linear=(0.0, 0.08, 0.0)), 0.8)
     jogged.let_go()
-    way = np.array([jogged.kinematics.tool(knot.position).position for knot in jogged.knots]) - begin
-    assert way[-1][1] > 0.04
-    assert np.max(np.linalg.norm(way[:, [0, 2]], axis=1)) < 0.0015
+    displacement = np.array([jogged.kinematics.tool(knot.position).position for knot in jogged.knots]) - begin
+    assert displacement[-1][1] > 0.04
+    assert np.max(np.linalg.norm(displacement[:, [0, 2]], axis=1)) < 0.0015
 
 
 def test_the_status_comes_ten_times_a_second():

@@ -36,16 +36,16 @@ def touched(name: str, shape: BoxShape | SphereShape = BLOCK, aside: Array | Non
     return jogged
 
 
-def depths(jogged: Jogged, way: Sequence[Sequence[float] | Array]) -> Array:
+def depths(jogged: Jogged, displacement: Sequence[Sequence[float] | Array]) -> Array:
     """(periods, pairs) [m] between the shapes of every pair along a way."""
     numbers = range(len(jogged.world.pair_names))
-    return np.array([jogged.world.distances(positions, numbers) for positions in way])
+    return np.array([jogged.world.distances(positions, numbers) for positions in displacement])
 
 
 def require_never_deeper(jogged: Jogged) -> None:
     """What was nearer than the clearance never came nearer again than it had been left at."""
-    for way, slack in ((jogged.commanded, 1e-5), ([knot.position for knot in jogged.knots], ASTRAY)):
-        track = depths(jogged, way)
+    for displacement, slack in ((jogged.commanded, 1e-5), ([knot.position for knot in jogged.knots], ASTRAY)):
+        track = depths(jogged, displacement)
         won = np.maximum.accumulate(np.minimum(track, CLEARANCE), axis=0)
         assert np.all(track > won - slack), jogged.limits()
 
@@ -127,7 +127,7 @@ def test_no_command_leads_deeper(
     name: str, aside: tuple[float, ...], shape: BoxShape | SphereShape, ways: list[tuple[float, ...]]
 ) -> None:
     jogged = touched(name, shape, np.array(aside))
-    for way in ways:
-        jogged.hold(JogCommand(linear=way), 40 * PERIOD)
+    for displacement in ways:
+        jogged.hold(JogCommand(linear=displacement), 40 * PERIOD)
     jogged.let_go()
     require_never_deeper(jogged)

@@ -69,9 +69,9 @@ def test_what_was_seen_before_changes_no_distance() -> None:
     for _ in range(12):
         ends = [np.array([rng.uniform(joint.lower, joint.upper) for joint in joints]) for _ in range(2)]
         for share in np.linspace(0.0, 1.0, 5):
-            posture: Array = (1.0 - share) * ends[0] + share * ends[1]
-            distance = seen.distance(posture)
+            configuration: Array = (1.0 - share) * ends[0] + share * ends[1]
+            distance = seen.distance(configuration)
             fresh = World(seen.arm, kinematics_of("rm1"), seen.scene)
-            assert distance == pytest.approx(fresh.distance(posture), abs=1e-5)
+            assert distance == pytest.approx(fresh.distance(configuration), abs=1e-5)
             inside += distance < -0.02
     assert inside > 3

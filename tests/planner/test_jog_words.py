@@ -63,13 +63,13 @@ class Watched:
         names = arm_of("rm1").joint_names
         self.state = JointState(name=names, position=arm_of("rm1").named_states["ready"], velocity=(0.0,) * len(names))
 
-    def hold(self, command: JogCommand | None, seconds: float, hindrance: str = "") -> None:
+    def hold(self, command: JogCommand | None, seconds: float, not_ready: str = "") -> None:
         for _ in range(round(seconds / PERIOD)):
             if command is not None:
                 self.jog.on_command(command, self.now)
-            output = self.jog.step(self.now, 0, self.state, 0.0, goal_is_active=False, hindrance=hindrance)
+            output = self.jog.step(self.now, 0, self.state, 0.0, goal_is_active=False, not_ready=not_ready)
             self.said += [output.status.limited_by] if output.status is not None else []
-            if self.jog.commanded is not None and not hindrance:
+            if self.jog.commanded is not None and not not_ready:
                 position = tuple(self.jog.commanded[0].tolist())
                 self.state = JointState(name=self.state.name, position=position, velocity=(0.0,) * len(position))
             self.now += PERIOD

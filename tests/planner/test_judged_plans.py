@@ -37,9 +37,9 @@ from tests.planner.independent import Array, Judge, Motion
 from tests.planner.judging import (
     arm_of,
     asked,
+    configuration_at,
     joints,
     planner_of,
-    posture_at,
     require_pose,
     require_reached,
     require_refused,
@@ -62,8 +62,8 @@ def judged(planner: Planner, request: PlanRequest, scene: PlanningScene) -> tupl
         assert (response.code is PlanCode.START_STATE_IN_COLLISION) == (begin < 0.0)
     if response.code is not PlanCode.SUCCESS:
         refusal = require_refused(response)
-        if refusal.posture:
-            near = Judge(planner.arm, scene).nearest(np.array(refusal.posture)).distance
+        if refusal.configuration:
+            near = Judge(planner.arm, scene).nearest(np.array(refusal.configuration)).distance
             assert near <= CLEARANCE + 0.001, refusal
         return response, None
     motion = require_sound(planner, request, response)
@@ -154,7 +154,7 @@ def require_tool_limits(request: PlanRequest, motion: Motion, rows: Array) -> No
 
 
 @ARMS
-def test_every_posture_that_ik_gives_has_the_pose_that_was_asked_for(name: str):
+def test_every_configuration_that_ik_gives_has_the_pose_that_was_asked_for(name: str):
     planner = planner_of(name)
     served = KinematicRequests(planner.arm, planner.kinematics)
     ready = planner.arm.named_states["ready"]
@@ -183,7 +183,7 @@ def test_half_the_scaling_is_half_the_speed(name: str, start: tuple[float, ...],
     but where the full speed is reached."""
     planner = planner_of(name)
     show(planner, PlanningScene())
-    begin, end = (posture_at(planner, shares) for shares in (start, goal))
+    begin, end = (configuration_at(planner, shares) for shares in (start, goal))
     if max(abs(a - b) for a, b in zip(begin, end, strict=True)) < 0.01:
         return
     peaks, durations = [], []
@@ -252,7 +252,7 @@ def test_a_links_frame_is_where_it_is_at_the_start_whatever_comes_before(name: s
     require_reached(planner, request, response)
 
 
-def test_an_arc_that_leaves_a_joints_limit_between_two_postures_ends_at_the_limit():
+def test_an_arc_that_leaves_a_joints_limit_between_two_configurations_ends_at_the_limit():
     """joint_5 bulges 0.03 degrees beyond its limit, and comes back, all within one step along the arc."""
     planner = planner_of("parol6")
     show(planner, PlanningScene())

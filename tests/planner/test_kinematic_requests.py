@@ -37,8 +37,8 @@ def ik(name: str, request: IkRequest, age: float = 0.0) -> IkResponse:
 @given(where=st.lists(st.floats(0.0, 1.0), min_size=6, max_size=6))
 def test_ik_of_fk_leads_back_to_the_pose(name: str, where: list[float]):
     arm, served = ARMS[name], SERVED[name]
-    posture = tuple(j.lower + share * (j.upper - j.lower) for j, share in zip(arm.joints, where, strict=False))
-    [pose] = served.fk(FkRequest(name=arm.joint_names, position=posture), None).poses
+    configuration = tuple(j.lower + share * (j.upper - j.lower) for j, share in zip(arm.joints, where, strict=False))
+    [pose] = served.fk(FkRequest(name=arm.joint_names, position=configuration), None).poses
     goal = PoseGoal(position=pose.translation, orientation=pose.rotation)
     response = ik(name, IkRequest(goal=goal, avoid_collisions=False, solutions=8))
     assert response.code is PlanCode.SUCCESS
@@ -51,7 +51,7 @@ def test_ik_of_fk_leads_back_to_the_pose(name: str, where: list[float]):
 
 
 @pytest.mark.parametrize("near", [(-0.5, 1.8, 0.08), (1.5, -1.8, 0.08)])
-def test_the_solution_nearest_to_the_given_posture_comes_first(near: tuple[float, ...]):
+def test_the_solution_nearest_to_the_given_configuration_comes_first(near: tuple[float, ...]):
     start = JointState(name=RM1.joint_names, position=near)
     response = ik("rm1", IkRequest(goal=BOTH_ELBOWS, near=start, solutions=8, avoid_collisions=False))
     distances = [solution.distance for solution in response.solutions]
@@ -83,8 +83,8 @@ def test_a_redundant_arm_uses_its_freedom_to_stay_away_from_its_limits():
     place = kinematics.tool(PAROL6.named_states["ready"]).position
     lower, upper = np.array([(joint.lower, joint.upper) for joint in PAROL6.joints]).T
 
-    def eccentricity(posture: tuple[float, ...] | np.ndarray) -> float:
-        return float(np.sum(((posture - 0.5 * (lower + upper)) / (0.5 * (upper - lower))) ** 2))
+    def eccentricity(configuration: tuple[float, ...] | np.ndarray) -> float:
+        return float(np.sum(((configuration - 0.5 * (lower + upper)) / (0.5 * (upper - lower))) ** 2))
 
     corner = JointState(name=PAROL6.joint_names, position=tuple(lower.tolist()))
     request = IkRequest(
@@ -92,10 +92,10 @@ def test_a_redundant_arm_uses_its_freedom_to_stay_away_from_its_limits():
     )
     most_central = min(eccentricity(np.array(each.position)) for each in ik("parol6", request).solutions)
     plain = InverseKinematics(PAROL6, kinematics).nearest(Target(place), lower, NEVER)
-    assert most_central <= min(eccentricity(posture) for posture in plain)
+    assert most_central <= min(eccentricity(configuration) for configuration in plain)
 
 
-def test_postures_that_touch_are_left_out_unless_asked_for():
+def test_configurations_that_touch_are_left_out_unless_asked_for():
     kinematics = Kinematics(PAROL6)
     goal = PoseGoal(position=(0.1, 0.0, 0.1))
     every = ik("parol6", IkRequest(goal=goal, solutions=8, avoid_collisions=False)).solutions
@@ -104,7 +104,7 @@ def test_postures_that_touch_are_left_out_unless_asked_for():
     assert ik("parol6", IkRequest(goal=goal, solutions=8)).solutions == tuple(expected)
 
 
-def test_a_pose_at_which_every_posture_touches_is_refused_with_the_pair():
+def test_a_pose_at_which_every_configuration_touches_is_refused_with_the_pair():
     pose = Kinematics(RM1).tool((0.3, 2.95, 0.05))
     response = ik("rm1", IkRequest(goal=PoseGoal(position=tuple(pose.position.tolist())), solutions=8))
     assert response.code is PlanCode.GOAL_IN_COLLISION
@@ -138,8 +138,8 @@ def test_out_of_reach_is_refused_with_the_nearest_point():
 def test_fk_takes_the_joints_that_are_not_named_from_where_they_are():
     served = SERVED["rm1"]
     some = served.fk(FkRequest(name=("efector_joint",), position=(0.1,)), PRESENT["rm1"])
-    posture = (*PRESENT["rm1"].position[:2], 0.1)
-    assert some == served.fk(FkRequest(name=RM1.joint_names, position=posture), None)
+    configuration = (*PRESENT["rm1"].position[:2], 0.1)
+    assert some == served.fk(FkRequest(name=RM1.joint_names, position=configuration), None)
     assert some.links == (RM1.tool_frame,)
 
 

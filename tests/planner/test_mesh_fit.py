@@ -27,7 +27,7 @@ from services.collision_fitting.mesh_fit import depths, fit_links
 from services.collision_fitting.parts import shapes_around
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision_geometry.coal_shapes import is_inside
-from services.planner.collision_geometry.shapes import Mesh
+from services.planner.collision_geometry.shapes import TriangleMesh
 
 URDF = Path(__file__).parents[2] / "urdf"
 SEEDS = st.integers(0, 2**32 - 1)
@@ -51,8 +51,8 @@ def depth(shapes: list[Fitted] | tuple[Fitted, ...], points: np.ndarray) -> np.n
     return np.max([depths(shape, points) for each in shapes for shape in each.shapes], axis=0)
 
 
-def as_mesh(made: trimesh.Trimesh, points: np.ndarray | None = None) -> Mesh:
-    return Mesh(np.array(made.vertices if points is None else points), np.array(made.faces, dtype=np.int32))
+def as_mesh(made: trimesh.Trimesh, points: np.ndarray | None = None) -> TriangleMesh:
+    return TriangleMesh(np.array(made.vertices if points is None else points), np.array(made.faces, dtype=np.int32))
 
 
 @given(SEEDS, st.integers(1, 3), st.integers(1, 60))
@@ -123,7 +123,7 @@ def test_what_is_inside_a_mesh_is_inside_its_shapes_wherever_it_was_cut(seed: in
     parts = [as_mesh(body, turned(body.vertices, random)) for body in bodies]
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     faces = np.vstack([part.faces + start for part, start in zip(parts, starts, strict=False)])
-    mesh = Mesh(np.vstack([part.vertices for part in parts]), faces)
+    mesh = TriangleMesh(np.vstack([part.vertices for part in parts]), faces)
     most = int(random.integers(1, 12))
     shapes = shapes_around(mesh, most)
     assert 1 <= len(shapes) <= most
@@ -164,8 +164,8 @@ def test_a_fitted_arm_loads_and_its_neighbours_do_not_touch_once_its_matrix_is_m
     neighbours = {frozenset((joint.parent, joint.child)) for joint in arm.model.joints}
     assert kinematics.collisions.pairs
     assert not neighbours & {frozenset(pair) for pair in kinematics.collisions.pairs}
-    for name, posture in kinematics.arm.named_states.items():
-        assert kinematics.collisions.distance(posture) > CLEARANCE, name
+    for name, configuration in kinematics.arm.named_states.items():
+        assert kinematics.collisions.distance(configuration) > CLEARANCE, name
     assert touching_states(kinematics.arm) == []
 
 
@@ -292,7 +292,7 @@ def test_a_file_that_would_not_load_again_stays_as_it_was(copied: Path):
     arm = load_arm(copied)
     fits = fit_links(arm, 1)
     before = arm.urdf_path.read_bytes()
-    outside = Mesh(fits[0].mesh.vertices + 1.0, fits[0].mesh.faces)
+    outside = TriangleMesh(fits[0].mesh.vertices + 1.0, fits[0].mesh.faces)
     wrong = type(fits[0])(fits[0].link, outside, fits[0].shapes, 1.0, 0.0)
     with pytest.raises(DescriptionError, match=r"sticks .* mm out of its shapes"):
         write_fits(arm, [wrong])

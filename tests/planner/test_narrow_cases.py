@@ -34,7 +34,7 @@ from tests.planner.judging import (
 )
 
 ARMS = pytest.mark.parametrize("name", ["rm1", "parol6"])
-Posture = tuple[float, ...]
+Configuration = tuple[float, ...]
 SWING = {
     "rm1": ((-0.6, 0.4, 0.05), (0.6, 0.4, 0.05)),
     "parol6": ((-0.7, -1.2, 3.1, 0.0, 0.0, 3.14), (0.7, -1.2, 3.1, 0.0, 0.0, 3.14)),
@@ -42,13 +42,13 @@ SWING = {
 FAR = {"rm1": (0.6, 0.0, 0.1), "parol6": (0.9, 0.2, 0.3)}  # [m]
 
 
-def box(name: str, size: Posture, place: Array, rotation: Array | None = None) -> SceneObject:
+def box(name: str, size: Configuration, place: Array, rotation: Array | None = None) -> SceneObject:
     quaternion = quaternion_of(np.eye(3) if rotation is None else rotation)
     pose = Transform(translation=tuple(map(float, place)), rotation=quaternion)
     return SceneObject(name=name, shape=BoxShape(size=size), pose=pose)
 
 
-def planned(planner: Planner, start: Posture, goal: Posture, motion: Motion) -> PlanResponse:
+def planned(planner: Planner, start: Configuration, goal: Configuration, motion: Motion) -> PlanResponse:
     """Sound and exact where it succeeds."""
     request = asked(planner, start, joints(planner, goal), motion=motion)
     response = planner.plan(request, None)
@@ -58,8 +58,8 @@ def planned(planner: Planner, start: Posture, goal: Posture, motion: Motion) -> 
     return response
 
 
-def in_slot(planner: Planner) -> tuple[Posture, Posture]:
-    """Shows two boards, one on either side of the tool; gives a posture in there, and one beside it as deep."""
+def in_slot(planner: Planner) -> tuple[Configuration, Configuration]:
+    """Shows two boards, one on either side of the tool; gives a configuration in there, and one beside it as deep."""
     inside = {"rm1": (0.5, 0.5, 0.02), "parol6": (0.0, -1.4, 3.3, 0.0, -0.33, 3.14)}[planner.arm.name]
     half, depth, out = {"rm1": (0.021, 0.1, -0.04), "parol6": (0.0310, 0.05, 0.0)}[planner.arm.name]
     position, rotation = Judge(planner.arm).tool(np.array(inside))
@@ -76,7 +76,7 @@ def in_slot(planner: Planner) -> tuple[Posture, Posture]:
 def test_the_arm_reaches_into_a_slot_and_out_again(name: str, planner_id: str):
     planner = planner_of(name)
     inside, beside = in_slot(planner)
-    assert CLEARANCE < Judge(planner.arm, planner.surroundings.newest.scene).nearest(np.array(inside)).distance < 0.013
+    assert CLEARANCE < Judge(planner.arm, planner.checker.newest.scene).nearest(np.array(inside)).distance < 0.013
     for start, goal in ((beside, inside), (inside, beside)):
         refusal = require_refused(planned(planner, start, goal, PointToPoint()))
         assert "board" in refusal.subject
@@ -94,8 +94,8 @@ def test_a_box_between_start_and_goal_is_gone_around_and_named_by_those_who_may_
     refusal = require_refused(planned(planner, start, goal, PointToPoint()))
     assert "crate" in refusal.subject
     assert "box crate" in refusal.message
-    judge = Judge(planner.arm, planner.surroundings.newest.scene)
-    assert judge.nearest(np.array(refusal.posture)).distance <= CLEARANCE + 1e-5
+    judge = Judge(planner.arm, planner.checker.newest.scene)
+    assert judge.nearest(np.array(refusal.configuration)).distance <= CLEARANCE + 1e-5
     assert planned(planner, start, goal, FreeMotion()).code is PlanCode.SUCCESS
 
 
@@ -109,7 +109,7 @@ OWN_BODY = (
 
 
 @pytest.mark.parametrize(("name", "start", "goal"), OWN_BODY)
-def test_the_arm_goes_around_its_own_body(name: str, start: Posture, goal: Posture):
+def test_the_arm_goes_around_its_own_body(name: str, start: Configuration, goal: Configuration):
     planner = planner_of(name)
     show(planner, PlanningScene())
     straight = np.array(start) + np.linspace(0.0, 1.0, 200)[:, None] * np.subtract(goal, start)
@@ -193,7 +193,7 @@ def test_a_place_out_of_reach_is_refused_with_the_nearest_that_is_not(name: str,
 
 
 @pytest.mark.parametrize(("name", "start"), [("parol6", "home"), ("rm1", (0.3, 0.0, 0.1)), ("rm1", (0.0, 2.4, 0.19))])
-def test_an_arm_in_a_singular_posture_gets_out_of_it(name: str, start: str | Posture):
+def test_an_arm_in_a_singular_configuration_gets_out_of_it(name: str, start: str | Configuration):
     """Freely always; on a line where that leads inwards, and otherwise the singularity is named."""
     planner = planner_of(name)
     show(planner, PlanningScene())
@@ -230,7 +230,7 @@ def test_the_arm_as_it_is_drawn_goes_around_too(name: str):
     show(planner, PlanningScene(version=2, objects=(box("crate", (0.06, 0.06, 0.06), middle),)))
     request = asked(planner, start, joints(planner, goal))
     motion = require_sound(planner, request, planner.plan(request, None))
-    assert Judge(planner.arm, planner.surroundings.newest.scene, is_drawn=True).touch(motion.positions) is None
+    assert Judge(planner.arm, planner.checker.newest.scene, is_drawn=True).touch(motion.positions) is None
 
 
 def test_a_lid_over_the_motor_of_rm1s_forearm_is_seen():
@@ -245,4 +245,4 @@ def test_a_lid_over_the_motor_of_rm1s_forearm_is_seen():
         asked(planner, start, joints(planner, goal)),
         planner.plan(asked(planner, start, joints(planner, goal)), None),
     )
-    assert Judge(planner.arm, planner.surroundings.newest.scene, is_drawn=True).touch(motion.positions) is None
+    assert Judge(planner.arm, planner.checker.newest.scene, is_drawn=True).touch(motion.positions) is None

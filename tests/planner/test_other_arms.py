@@ -24,9 +24,9 @@ from tests.planner.independent import Judge
 from tests.planner.judging import (
     arm_of,
     asked,
+    configuration_at,
     joints,
     planner_of,
-    posture_at,
     require_pose,
     require_reached,
     require_refused,
@@ -47,9 +47,9 @@ THINGS = PlanningScene(
 )
 
 
-def postures(planner: Planner, count: int) -> np.ndarray:
+def configurations(planner: Planner, count: int) -> np.ndarray:
     shares = np.random.default_rng(7).random((count, 7))
-    return np.array([posture_at(planner, tuple(row)) for row in shares])
+    return np.array([configuration_at(planner, tuple(row)) for row in shares])
 
 
 @ARMS
@@ -62,7 +62,7 @@ def test_the_judge_and_the_planner_see_the_same_arm(name: str):
     planner = planner_of(name)
     world, judge = World(planner.arm, planner.kinematics, THINGS), Judge(planner.arm, THINGS)
     told = []
-    for row in postures(planner, 300):
+    for row in configurations(planner, 300):
         told.append(world.distance(row))
         judged = judge.nearest(row).distance
         assert (told[-1] <= 0.0) == (judged <= 0.0)
@@ -76,7 +76,7 @@ def test_what_the_compiled_core_calls_free_is_free(name: str):
     planner = planner_of(name)
     core, judge = NativePlanner(planner.arm), Judge(planner.arm, THINGS)
     show_scene(core, World(planner.arm, planner.kinematics, THINGS))
-    rows = postures(planner, 600)
+    rows = configurations(planner, 600)
     free = core.free(rows)
     distances = np.array([judge.nearest(row).distance for row in rows])
     assert distances[free].min() > core.margin - 1e-5

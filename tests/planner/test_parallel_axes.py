@@ -64,15 +64,15 @@ def arm(request: pytest.FixtureRequest, tmp_path: Path) -> Arm:
     return arm_of(tmp_path / "arm", VARIANTS[request.param]((RM1 / "robot.urdf").read_text()))
 
 
-def test_every_posture_is_found_again_and_every_answer_is_right(arm: Arm):
+def test_every_configuration_is_found_again_and_every_answer_is_right(arm: Arm):
     kinematics = Kinematics(arm)
     assert parallel_axes(arm, kinematics) is not None
     inverse, random = InverseKinematics(arm, kinematics), np.random.default_rng(3)
     lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
-    for posture, near in random.uniform(lower, upper, (60, 2, 3)):
-        position = kinematics.tool(posture).position
+    for configuration, near in random.uniform(lower, upper, (60, 2, 3)):
+        position = kinematics.tool(configuration).position
         found = list(inverse.solutions(Target(position), near, NEVER))
-        assert min(np.abs(each - posture).max() for each in found) < 1e-6
+        assert min(np.abs(each - configuration).max() for each in found) < 1e-6
         travels = [inverse.travel(near, each) for each in found]
         assert travels == sorted(travels)
         for each in found:
@@ -83,11 +83,11 @@ def test_every_posture_is_found_again_and_every_answer_is_right(arm: Arm):
 def test_the_order_of_the_joints_in_robot_toml_does_not_matter():
     arm = load_arm(RM1)
     backwards = dataclasses.replace(arm, joints=arm.joints[::-1])
-    posture = np.array((0.5, -1.2, 0.1))
+    configuration = np.array((0.5, -1.2, 0.1))
     kinematics = Kinematics(backwards)
-    position = kinematics.tool(posture[::-1]).position
-    found = list(InverseKinematics(backwards, kinematics).solutions(Target(position), posture[::-1], NEVER))
-    assert np.allclose(found[0], posture[::-1])
+    position = kinematics.tool(configuration[::-1]).position
+    found = list(InverseKinematics(backwards, kinematics).solutions(Target(position), configuration[::-1], NEVER))
+    assert np.allclose(found[0], configuration[::-1])
 
 
 def test_a_slide_without_limits_goes_as_far_as_it_takes():
@@ -98,7 +98,7 @@ def test_a_slide_without_limits_goes_as_far_as_it_takes():
     assert solver is not None
     far = np.array((0.5, -1.2, 40.0))
     position = kinematics.tool(far).position
-    assert min(np.abs(each - far).max() for each in solver.postures(position, np.zeros(3))) < 1e-9
+    assert min(np.abs(each - far).max() for each in solver.configurations(position, np.zeros(3))) < 1e-9
 
 
 def test_it_finds_what_a_search_finds_and_no_less():
@@ -107,8 +107,8 @@ def test_it_finds_what_a_search_finds_and_no_less():
     inverse, searching = InverseKinematics(arm, kinematics), InverseKinematics(arm, kinematics, is_numeric=True)
     random = np.random.default_rng(4)
     lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
-    for posture, near in random.uniform(lower, upper, (20, 2, 3)):
-        target = Target(kinematics.tool(posture).position)
+    for configuration, near in random.uniform(lower, upper, (20, 2, 3)):
+        target = Target(kinematics.tool(configuration).position)
         found = list(inverse.solutions(target, near, NEVER))
         for searched in searching.solutions(target, near, NEVER):
             assert min(np.abs(searched - each).max() for each in found) < 1e-4
@@ -126,7 +126,7 @@ def test_an_arm_with_its_tool_on_the_axis_of_the_elbow_has_none(tmp_path: Path):
     assert parallel_axes(arm, Kinematics(arm)) is None
 
 
-def test_the_stretched_arm_has_one_posture_and_beyond_it_there_is_none():
+def test_the_stretched_arm_has_one_configuration_and_beyond_it_there_is_none():
     arm = load_arm(RM1)
     kinematics = Kinematics(arm)
     solver = parallel_axes(arm, kinematics)
@@ -134,5 +134,5 @@ def test_the_stretched_arm_has_one_posture_and_beyond_it_there_is_none():
     stretched = np.array((0.3, 0.0, 0.1))
     stretched[1] = -math.atan2(0.001, 0.20445) - math.atan2(0.00037, 0.20188)  # the links' own offsets
     position = kinematics.tool(stretched).position
-    assert min(np.abs(each - stretched).max() for each in solver.postures(position, stretched)) < 1e-6
-    assert solver.postures(position * (1.0001, 1.0001, 1.0), stretched) == []
+    assert min(np.abs(each - stretched).max() for each in solver.configurations(position, stretched)) < 1e-6
+    assert solver.configurations(position * (1.0001, 1.0001, 1.0), stretched) == []

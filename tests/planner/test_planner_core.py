@@ -19,11 +19,11 @@ from services.planner.verification.verify import require_within_limits, sample
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 PLANNER = Planner(ARM)
-POSTURES = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])
+CONFIGURATIONS = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])
 
 
-def standing(posture: tuple[float, ...]) -> JointState:
-    return JointState(name=ARM.joint_names, position=posture)
+def standing(configuration: tuple[float, ...]) -> JointState:
+    return JointState(name=ARM.joint_names, position=configuration)
 
 
 def test_the_readmes_goal_is_reached(planner: Planner, home: JointState):
@@ -110,7 +110,7 @@ def test_from_limit_to_limit_of_every_joint_and_back(planner: Planner, rm1: Arm)
 
 
 @settings(max_examples=150)
-@given(POSTURES, POSTURES)
+@given(CONFIGURATIONS, CONFIGURATIONS)
 def test_whatever_comes_out_is_within_limits_and_free(start: tuple[float, ...], goal: tuple[float, ...]):
     point = tuple(PLANNER.kinematics.tool(goal).position.tolist())
     response = PLANNER.plan(PlanRequest(goal=PoseGoal(position=point)), standing(start))

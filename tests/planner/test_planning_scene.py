@@ -43,7 +43,7 @@ def test_a_way_through_a_box_is_refused_by_its_name_and_free_without_it(planner:
     assert refused.refusal.check == "collision"
     assert "with box block" in refused.refusal.message
     assert refused.refusal.subject.endswith("/ block")
-    assert 0.0 < refused.refusal.posture[0] < 0.6
+    assert 0.0 < refused.refusal.configuration[0] < 0.6
     assert refused.scene_version == 7
     show(planner, scene(version=8))
     free = planner.plan(REQUEST, home)
@@ -51,7 +51,7 @@ def test_a_way_through_a_box_is_refused_by_its_name_and_free_without_it(planner:
     assert free.scene_version == 8
 
 
-def test_a_goal_in_a_box_is_refused_with_the_last_posture_before_it(planner: Planner, home: JointState) -> None:
+def test_a_goal_in_a_box_is_refused_with_the_last_configuration_before_it(planner: Planner, home: JointState) -> None:
     show(planner, scene(block(planner, 1.2)))
     response = planner.plan(REQUEST, home)
     assert response.code is PlanCode.GOAL_IN_COLLISION
@@ -80,7 +80,7 @@ def test_an_arm_just_beside_an_object_may_come_away_from_it(planner: Planner, ho
         name="block", shape=BoxShape(size=(0.04, 0.04, 0.04)), pose=block(planner, -0.4).pose, padding=gap - 0.002
     )
     show(planner, scene(wide))
-    assert 0.0 < planner.surroundings.newest.distance((0.0, 0.0, 0.0)) < 0.004
+    assert 0.0 < planner.checker.newest.distance((0.0, 0.0, 0.0)) < 0.004
     assert planner.plan(REQUEST, home).code is PlanCode.SUCCESS
     towards = PlanRequest(goal=JointGoal(name=("brazo_joint",), position=(-0.3,)), motion=PointToPoint())
     assert planner.plan(towards, home).code is not PlanCode.SUCCESS

@@ -18,7 +18,7 @@ from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics, Pose
 from services.planner.kinematics.goals import Goals, Start
 from services.planner.request.deadline import NEVER
-from services.planner.request.refusals import NoPlan
+from services.planner.request.refusals import PlanRefused
 
 ROOT = Path(__file__).parents[2] / "urdf"
 FORMS = ("position", "pose", "free axis", "pointing")
@@ -33,12 +33,12 @@ class Bench:
         self.goals = Goals(self.arm, self.kinematics)
         self.ready: Start = self.arm.named_states["ready"]
 
-    def postures(self, goal: PoseGoal, near: Start | None = None, most: int = 4) -> list[Start]:
+    def configurations(self, goal: PoseGoal, near: Start | None = None, most: int = 4) -> list[Start]:
         return list(islice(self.goals.candidates(goal, near or self.ready, NEVER), most))
 
     def refusal(self, goal: PoseGoal) -> tuple[PlanCode, Refusal]:
-        with pytest.raises(NoPlan) as caught:
-            self.postures(goal)
+        with pytest.raises(PlanRefused) as caught:
+            self.configurations(goal)
         return caught.value.code, caught.value.refusal
 
 
@@ -50,8 +50,8 @@ def shares(count: int = 6) -> st.SearchStrategy[list[float]]:
     return st.lists(st.floats(0.0, 1.0), min_size=count, max_size=count)
 
 
-def posture_of(bench: Bench, where: list[float]) -> Start:
-    """The posture at these shares of the joints' ranges."""
+def configuration_of(bench: Bench, where: list[float]) -> Start:
+    """The configuration at these shares of the joints' ranges."""
     return tuple(j.lower + share * (j.upper - j.lower) for j, share in zip(bench.arm.joints, where, strict=False))
 
 
@@ -96,24 +96,26 @@ def test_fk_of_ik_is_the_goal_in_every_form(
 ):
     assume(math.hypot(*axis) > 0.1)
     bench, unit = BENCHES[name], np.array(axis) / math.hypot(*axis)
-    pose = bench.kinematics.tool(posture_of(bench, where))
-    for posture in bench.postures(goal_of(form, pose, unit), posture_of(bench, near), most=3):
-        far, turned = missing(form, pose, bench.kinematics.tool(posture), unit)
+    pose = bench.kinematics.tool(configuration_of(bench, where))
+    for configuration in bench.configurations(goal_of(form, pose, unit), configuration_of(bench, near), most=3):
+        far, turned = missing(form, pose, bench.kinematics.tool(configuration), unit)
         assert far < 1e-6
         assert turned < 1e-5
-        assert all(j.is_within(value) for j, value in zip(bench.arm.joints, posture, strict=True))
+        assert all(j.is_within(value) for j, value in zip(bench.arm.joints, configuration, strict=True))
 
 
 @pytest.mark.parametrize("form", ["free axis", "pointing"])
 @pytest.mark.parametrize("where", [(1.0, 0.0, 0.0, 0.0, 0.0, 0.375), (0.0, 1.0, 1.0, 0.0, 1.0, 0.5)])
-def test_a_goal_that_one_posture_alone_meets_in_a_corner_of_the_limits_is_found(form: str, where: tuple[float, ...]):
+def test_a_goal_that_one_configuration_alone_meets_in_a_corner_of_the_limits_is_found(
+    form: str, where: tuple[float, ...]
+):
     axis = np.array([0.0, -0.125, 1.0]) / math.hypot(0.125, 1.0)
-    pose = PAROL6.kinematics.tool(posture_of(PAROL6, [*where]))
-    (posture, *_) = PAROL6.postures(goal_of(form, pose, axis), posture_of(PAROL6, [0.0] * 6), most=1)
-    far, turned = missing(form, pose, PAROL6.kinematics.tool(posture), axis)
+    pose = PAROL6.kinematics.tool(configuration_of(PAROL6, [*where]))
+    (configuration, *_) = PAROL6.configurations(goal_of(form, pose, axis), configuration_of(PAROL6, [0.0] * 6), most=1)
+    far, turned = missing(form, pose, PAROL6.kinematics.tool(configuration), axis)
     assert far < 1e-6
     assert turned < 1e-5
-    assert all(j.is_within(value) for j, value in zip(PAROL6.arm.joints, posture, strict=True))
+    assert all(j.is_within(value) for j, value in zip(PAROL6.arm.joints, configuration, strict=True))
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -121,17 +123,17 @@ def test_a_goal_that_one_posture_alone_meets_in_a_corner_of_the_limits_is_found(
 def test_solutions_are_distinct(name: str, form: str):
     bench = BENCHES[name]
     pose = bench.kinematics.tool(bench.ready)
-    postures = bench.postures(goal_of(form, pose, np.array([0.0, 0.0, 1.0])), most=20)
-    for index, posture in enumerate(postures):
-        assert all(bench.goals.travel(posture, other) > 1e-4 for other in postures[:index])
+    configurations = bench.configurations(goal_of(form, pose, np.array([0.0, 0.0, 1.0])), most=20)
+    for index, configuration in enumerate(configurations):
+        assert all(bench.goals.travel(configuration, other) > 1e-4 for other in configurations[:index])
 
 
 @pytest.mark.parametrize("form", ["pose", "pointing"])
 def test_the_closed_form_gives_the_nearest_first(form: str):
-    posture = (0.3, -1.2, 3.3, 1.5, 0.5, 1.0)  # its wrist may be flipped
-    pose, near = PAROL6.kinematics.tool(posture), tuple(value + 0.3 for value in posture)
-    postures = PAROL6.postures(goal_of(form, pose, np.array([0.0, 0.0, 1.0])), near, most=20)
-    travels = [PAROL6.goals.travel(near, posture) for posture in postures]
+    configuration = (0.3, -1.2, 3.3, 1.5, 0.5, 1.0)  # its wrist may be flipped
+    pose, near = PAROL6.kinematics.tool(configuration), tuple(value + 0.3 for value in configuration)
+    configurations = PAROL6.configurations(goal_of(form, pose, np.array([0.0, 0.0, 1.0])), near, most=20)
+    travels = [PAROL6.goals.travel(near, configuration) for configuration in configurations]
     assert len(travels) >= 2
     assert travels == sorted(travels)
 
@@ -142,7 +144,7 @@ def test_a_pose_is_met_in_a_frame_that_moves_with_the_arm():
     link = RM1.kinematics.link_poses(RM1.ready)[frame]
     turn = pin.Quaternion(np.array(link.rotation)).matrix()
     wanted = np.array(link.translation) + turn @ np.array(goal.position)
-    got = RM1.kinematics.tool(RM1.postures(goal)[0])
+    got = RM1.kinematics.tool(RM1.configurations(goal)[0])
     assert np.allclose(got.position, wanted, atol=1e-6)
     assert np.allclose(got.rotation[:, 2], turn @ [0.0, 0.0, -1.0], atol=1e-6)
 
@@ -152,13 +154,13 @@ def test_a_pose_is_met_in_a_frame_that_moves_with_the_arm():
 
 def test_rm1_takes_a_direction_straight_down():
     goal = PoseGoal(position=(0.25, 0.15, 0.1), tool_axis=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0))
-    assert len(RM1.postures(goal)) == 2
+    assert len(RM1.configurations(goal)) == 2
 
 
-def test_rm1_takes_exactly_the_yaw_that_a_posture_gives():
+def test_rm1_takes_exactly_the_yaw_that_a_configuration_gives():
     pose = RM1.kinematics.tool((0.4, 1.1, 0.05))
-    postures = RM1.postures(goal_of("pose", pose, np.zeros(3)))
-    assert [pytest.approx((0.4, 1.1, 0.05), abs=1e-5)] == postures
+    configurations = RM1.configurations(goal_of("pose", pose, np.zeros(3)))
+    assert [pytest.approx((0.4, 1.1, 0.05), abs=1e-5)] == configurations
 
 
 @pytest.mark.parametrize("degrees", [0.5, 20.0, 90.0])
@@ -194,17 +196,17 @@ def test_a_yaw_that_the_position_does_not_give_is_refused_with_the_nearest_one_t
     assert refusal.nearest == pytest.approx((*pose.position, *quaternion(pose.rotation)), abs=1e-4)
     assert "orientation_tolerance of 0.01 rad" in refusal.remedy or "0.0101 rad" in refusal.remedy
     nearest = PoseGoal(position=refusal.nearest[:3], orientation=refusal.nearest[3:])
-    assert RM1.postures(nearest)
+    assert RM1.configurations(nearest)
 
 
 @pytest.mark.parametrize(("position", "orientation"), [(0.0011, 0.0101), (0.0011, 0.1), (0.02, 0.0101)])
 def test_a_tolerance_takes_what_is_within_it(position: float, orientation: float):
     goal = slightly_out_of_reach(position, orientation)
     wanted = pin.Quaternion(np.array(goal.orientation)).matrix()
-    postures = RM1.postures(goal)
-    assert postures
-    for posture in postures:
-        got = RM1.kinematics.tool(posture)
+    configurations = RM1.configurations(goal)
+    assert configurations
+    for configuration in configurations:
+        got = RM1.kinematics.tool(configuration)
         assert np.linalg.norm(got.position - goal.position) <= position
         assert np.linalg.norm(pin.log3(wanted.T @ got.rotation)) <= orientation
 
@@ -235,26 +237,26 @@ def test_the_nearest_pose_of_a_refusal_can_be_asked_for(
 ):
     assume(math.hypot(*turn) > 0.1 and math.hypot(*turn[:3]) > 0.1)
     bench = BENCHES[name]
-    position = tuple(bench.kinematics.tool(posture_of(bench, where)).position.tolist())
+    position = tuple(bench.kinematics.tool(configuration_of(bench, where)).position.tolist())
     asked = PoseGoal(position=position, orientation=tuple(value / math.hypot(*turn) for value in turn))
     if is_pointing:
         asked = PoseGoal(position=position, tool_axis=(0.0, 0.0, 1.0), direction=turn[:3])
     try:
-        bench.postures(asked, most=1)
+        bench.configurations(asked, most=1)
         return
-    except NoPlan as no_plan:
-        nearest = no_plan.refusal.nearest
+    except PlanRefused as refused:
+        nearest = refused.refusal.nearest
     again = msgspec.structs.replace(asked, position=nearest[:3], orientation=nearest[3:])
     if is_pointing:
         again = msgspec.structs.replace(asked, position=nearest[:3], direction=nearest[3:])
-    assert bench.postures(again, most=1)
+    assert bench.configurations(again, most=1)
 
 
 def test_where_exact_can_be_had_a_tolerance_does_not_make_it_worse():
     pose = PAROL6.kinematics.tool(PAROL6.ready)
     goal = PoseGoal(position=tuple(pose.position.tolist()), position_tolerance=0.05)
     near = tuple(value + 0.02 for value in PAROL6.ready)
-    got = PAROL6.kinematics.tool(PAROL6.postures(goal, near)[0])
+    got = PAROL6.kinematics.tool(PAROL6.configurations(goal, near)[0])
     assert np.linalg.norm(got.position - pose.position) < 1e-6
 
 
@@ -268,7 +270,7 @@ def test_parol6_says_what_is_missing_at_the_edge_of_its_reach():
     assert refusal.value is not None
     assert 0.0 < refusal.value <= 2.5
     nearest = PoseGoal(position=refusal.nearest[:3], orientation=refusal.nearest[3:])
-    assert PAROL6.postures(nearest)
+    assert PAROL6.configurations(nearest)
 
 
 DOWN = (0.0, 0.0, -1.0)
@@ -335,14 +337,14 @@ def test_what_is_not_a_number_cannot_get_in(field: str):
 @example(PoseGoal(position=(0.2, 0.1, 0.1), orientation=(0.0, 0.0, 0.0, 1.0), orientation_tolerance=1e200))
 @example(PoseGoal(position=(9.2, 0.1, 0.1), position_tolerance=1e200))
 @pytest.mark.parametrize("name", BENCHES)
-def test_whatever_pose_is_asked_for_there_are_postures_or_a_reason(name: str, goal: PoseGoal):
+def test_whatever_pose_is_asked_for_there_are_configurations_or_a_reason(name: str, goal: PoseGoal):
     bench = BENCHES[name]
     try:
-        postures = bench.postures(goal, most=1)
-    except NoPlan as no_plan:
-        refusal = no_plan.refusal
+        configurations = bench.configurations(goal, most=1)
+    except PlanRefused as refused:
+        refusal = refused.refusal
     else:
-        assert postures
+        assert configurations
         return
     assert refusal.message
     assert refusal.remedy

@@ -20,7 +20,7 @@ from services.planner.timing.profile import joint_limits, straight_line
 from services.planner.verification.verify import require_ends, require_within_limits, sample
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
-POSTURES = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])
+CONFIGURATIONS = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])
 SCALINGS = st.floats(0.01, 1.0)
 
 
@@ -34,7 +34,7 @@ def dense(trajectory: JointTrajectory, parts: int = 10) -> tuple[np.ndarray, np.
 
 
 @settings(max_examples=200)
-@given(POSTURES, POSTURES, SCALINGS, SCALINGS)
+@given(CONFIGURATIONS, CONFIGURATIONS, SCALINGS, SCALINGS)
 def test_a_trajectory_never_exceeds_joint_limits(
     start: tuple[float, ...], goal: tuple[float, ...], speed: float, acceleration: float
 ):
@@ -50,7 +50,7 @@ def test_a_trajectory_never_exceeds_joint_limits(
 
 
 @settings(max_examples=100)
-@given(POSTURES, POSTURES)
+@given(CONFIGURATIONS, CONFIGURATIONS)
 def test_start_and_end_are_exact_and_at_rest(start: tuple[float, ...], goal: tuple[float, ...]):
     trajectory = straight_line(ARM.joint_names, start, goal, joint_limits(ARM))
     require_ends(trajectory, start, goal)
@@ -60,7 +60,7 @@ def test_start_and_end_are_exact_and_at_rest(start: tuple[float, ...], goal: tup
 
 
 @settings(max_examples=100)
-@given(POSTURES, POSTURES)
+@given(CONFIGURATIONS, CONFIGURATIONS)
 def test_the_joints_move_on_a_straight_line_and_never_back(start: tuple[float, ...], goal: tuple[float, ...]):
     _, p, _, _ = dense(straight_line(ARM.joint_names, start, goal, joint_limits(ARM)))
     way = np.subtract(goal, start)
@@ -70,7 +70,7 @@ def test_the_joints_move_on_a_straight_line_and_never_back(start: tuple[float, .
 
 
 @settings(max_examples=50)
-@given(POSTURES, POSTURES)
+@given(CONFIGURATIONS, CONFIGURATIONS)
 def test_jerk_is_limited_and_the_acceleration_has_no_jump(start: tuple[float, ...], goal: tuple[float, ...]):
     limits = joint_limits(ARM)
     t, _, _, a = dense(straight_line(ARM.joint_names, start, goal, limits))

@@ -114,7 +114,7 @@ def test_what_touches_is_shown_until_a_plan_succeeds(asker: Node, rm1: Arm) -> N
     assert contacts.message is not None
     assert refused.refusal is not None
     assert contacts.message.name == rm1.joint_names
-    assert contacts.message.position == refused.refusal.posture
+    assert contacts.message.position == refused.refusal.configuration
     assert contacts.message.contacts[0].second == "block"
     assert len(contacts.message.contacts[0].point) == 3
     edit(asker, SceneAction.CLEAR)

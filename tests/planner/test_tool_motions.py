@@ -44,7 +44,7 @@ SHARES = st.lists(st.floats(0.15, 0.85), min_size=6, max_size=6)
 DIRECTIONS = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(np.array)
 
 
-def posture(planner: Planner, shares: list[float]) -> tuple[float, ...]:
+def configuration(planner: Planner, shares: list[float]) -> tuple[float, ...]:
     joints = planner.arm.joints
     found = tuple(j.lower + share * (j.upper - j.lower) for j, share in zip(joints, shares, strict=False))
     assume(planner.kinematics.collisions.distance(found) > 2.0 * CLEARANCE)
@@ -86,7 +86,7 @@ def test_a_line_is_a_line_or_says_why_it_ends(
     name: str, shares: list[float], direction: np.ndarray, length: float, speed: float
 ):
     planner = PLANNERS[name]
-    start = posture(planner, shares)
+    start = configuration(planner, shares)
     assume(np.linalg.norm(direction) > 0.1)
     begin = planner.kinematics.tool(start)
     end = begin.position + length * direction / np.linalg.norm(direction)
@@ -118,7 +118,7 @@ def test_a_line_is_a_line_or_says_why_it_ends(
 @given(shares=SHARES, one=DIRECTIONS, other=DIRECTIONS)
 def test_an_arc_is_an_arc_through_its_point(name: str, shares: list[float], one: np.ndarray, other: np.ndarray):
     planner = PLANNERS[name]
-    start = posture(planner, shares)
+    start = configuration(planner, shares)
     begin = planner.kinematics.tool(start).position
     interim, end = begin + 0.05 * one, begin + 0.05 * other
     motion = CircularMotion(interim=tuple(interim.tolist()), acceleration=0.1)

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from services.arm.kinematics import Pose
 from services.planner.cartesian.arcs import arc_about, arc_through
-from services.planner.cartesian.tool_path import NO_WAY, ToolPath, polyline
-from services.planner.path.path_curve import CubicSpline, rounded_runs
-from services.planner.request.refusals import NoPlan
+from services.planner.cartesian.tool_path import ToolPath, polyline
+from services.planner.path.path_curve import NO_LENGTH, CubicSpline, rounded_runs
+from services.planner.request.refusals import PlanRefused
 
 NUMBERS = st.floats(-1.0, 1.0).map(lambda value: round(value, 4))
 POINTS = st.tuples(NUMBERS, NUMBERS, NUMBERS).map(np.array)
@@ -32,7 +32,7 @@ def turn_between(first: Pose, second: Pose) -> np.ndarray:
 def test_a_line_ends_where_it_should_and_turns_evenly(start: Pose, end: Pose):
     paths = polyline([start, end], 0.0)
     if not paths:
-        assert np.linalg.norm(end.position - start.position) <= NO_WAY
+        assert np.linalg.norm(end.position - start.position) <= NO_LENGTH
         return
     path = paths[0]
     assert path.at(path.length).position == pytest.approx(end.position, abs=1e-12)
@@ -88,8 +88,8 @@ def test_without_a_blend_every_corner_is_a_stop():
 def test_an_arc_keeps_its_radius_and_passes_its_point(start: Pose, interim: np.ndarray, end: Pose):
     try:
         arc = arc_through(start, interim, end)
-    except NoPlan as no_plan:
-        assume(no_plan.refusal.check != "arc")
+    except PlanRefused as refused:
+        assume(refused.refusal.check != "arc")
         raise
     radius = np.linalg.norm(start.position - arc.centre)
     positions = np.array([arc.at(along).position for along in np.linspace(0.0, arc.length, 100)])
@@ -124,17 +124,17 @@ def test_an_arc_about_a_centre_is_the_shorter_one(angle: float, centre: np.ndarr
     ],
 )
 def test_points_that_make_no_arc_are_refused(interim, end, subject):
-    with pytest.raises(NoPlan) as refused:
+    with pytest.raises(PlanRefused) as refused:
         arc_through(place(0, 0, 0), np.array(interim), place(*end))
     assert refused.value.refusal.subject == subject
     assert refused.value.refusal.remedy
 
 
 def test_a_centre_that_is_nearer_to_one_end_is_refused_with_the_difference():
-    with pytest.raises(NoPlan, match=r"1 m from the start and 1\.5 m from the goal") as refused:
+    with pytest.raises(PlanRefused, match=r"1 m from the start and 1\.5 m from the goal") as refused:
         arc_about(place(1, 0, 0), np.zeros(3), place(0, 1.5, 0))
     assert (refused.value.refusal.value, refused.value.refusal.limit) == (pytest.approx(0.5), 1e-4)
-    with pytest.raises(NoPlan, match="many arcs"):
+    with pytest.raises(PlanRefused, match="many arcs"):
         arc_about(place(1, 0, 0), np.zeros(3), place(-1, 0, 0))
 
 
@@ -157,8 +157,8 @@ def test_a_spline_is_exact_for_cubics_and_smooth_for_all_else():
 @given(st.lists(POINTS, min_size=2, max_size=5), st.floats(0.001, 0.2))
 @example([np.zeros(3), np.array((0.0, 1.0, 0.0)), np.array((1.0, 0.0, 0.0))], 2.0**-9)  # cut within 1 % of a leg
 def test_joint_corners_are_cut_within_what_the_arm_may_move(corners: list[np.ndarray], blend: float):
-    postures, reach = np.array(corners), np.array((0.5, 0.3, 1.0))
-    for run in rounded_runs(postures, np.array((2.0, 1.0, 0.1)), reach, blend):
+    configurations, reach = np.array(corners), np.array((0.5, 0.3, 1.0))
+    for run in rounded_runs(configurations, np.array((2.0, 1.0, 0.1)), reach, blend):
         along = np.concatenate([np.linspace(low, high, 50) for low, high in pairwise(run.knots)])
         value, first, _, _ = run.at(along)
         scaled = [corner * reach for corner in corners]

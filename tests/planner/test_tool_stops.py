@@ -91,7 +91,7 @@ def test_a_joints_limit_ends_every_kind_of_way_at_its_place(kind: str):
 @KINDS
 def test_what_is_in_the_way_ends_every_kind_of_way_before_it(kind: str):
     planner, start = planner_of("rm1"), (-0.5, 1.2, 0.1)
-    begin, end = (planner.kinematics.tool(posture).position for posture in (start, (0.9, 1.2, 0.1)))
+    begin, end = (planner.kinematics.tool(configuration).position for configuration in (start, (0.9, 1.2, 0.1)))
     place = Transform(translation=tuple((begin + 0.6 * (end - begin)).tolist()))
     crate = SceneObject(name="crate", shape=BoxShape(size=(0.04, 0.04, 0.3)), pose=place)
     scene = PlanningScene(version=1, objects=(crate,))
@@ -323,7 +323,7 @@ def test_a_line_to_joint_values_that_it_does_not_lead_to_names_the_joint_and_whe
     refused = planned("rm1", start, other, LinearMotion())
     assert refused.code is PlanCode.GOAL_VIOLATES_PATH_CONSTRAINTS
     assert refused.refusal is not None
-    assert (refused.refusal.check, refused.refusal.subject) == ("posture", "antebrazo_joint")
+    assert (refused.refusal.check, refused.refusal.subject) == ("configuration", "antebrazo_joint")
     assert refused.refusal.limit == 1.2
     there = JointGoal(name=planner.arm.joint_names, position=refused.refusal.nearest)
     assert Judge(planner.arm).tool(np.array(refused.refusal.nearest))[0] == pytest.approx(mirrored, abs=1e-6)
@@ -383,7 +383,7 @@ def test_the_time_that_is_allowed_ends_a_way_wherever_it_is(kind: str, timing: T
     request = asked(planner, start, goal, motion=replace(motion, max_step=0.001), timing=timing, allowed_time=100.0)
     needed = CountingClock()
     assert planner.plan(request, None, clock=needed).code is PlanCode.SUCCESS
-    assert needed.looks > 50  # once for each posture at least
+    assert needed.looks > 50  # once for each configuration at least
     late = 0
     for share in (0.05, 0.2, 0.4, 0.6, 0.8, 0.95):
         clock = CountingClock()

@@ -29,7 +29,7 @@ LINK_PAIR_MARGIN = 0.05  # [m]
 ROUNDING = 2e-6  # [m] coal's GJK stops at 1e-6, from where it stopped last
 
 
-def postures(arm: Arm, count: int) -> np.ndarray:
+def configurations(arm: Arm, count: int) -> np.ndarray:
     random = np.random.default_rng(4)
     lower = [max(joint.lower, -3.0) for joint in arm.joints]
     upper = [min(joint.upper, 3.0) for joint in arm.joints]
@@ -73,10 +73,10 @@ def test_a_world_without_a_scene_says_what_self_collisions_say(kinematics: Kinem
     assert world.pairs == own.pairs
     assert world.geometry_count == own.geometry_count
     assert world.reach.tolist() == own.reach.tolist()
-    for posture in postures(kinematics.arm, 200):
-        assert world.distance(posture) == pytest.approx(own.distance(posture), abs=ROUNDING)
-        within = own.pairs_within(posture, LINK_PAIR_MARGIN)
-        assert world.pairs_within(posture, LINK_PAIR_MARGIN) == within
+    for configuration in configurations(kinematics.arm, 200):
+        assert world.distance(configuration) == pytest.approx(own.distance(configuration), abs=ROUNDING)
+        within = own.pairs_within(configuration, LINK_PAIR_MARGIN)
+        assert world.pairs_within(configuration, LINK_PAIR_MARGIN) == within
 
 
 def test_distances_between_carried_and_standing_solids_are_those_of_geometry(
@@ -114,11 +114,11 @@ def test_distances_between_carried_and_standing_solids_are_those_of_geometry(
         checked = PlanningScene(objects=(carried, standing), allowed=links)
         world = World(kinematics.arm, kinematics, checked)
         assert world.pairs == (("ball", kind),)
-        for posture in postures(kinematics.arm, 30):
-            centre = np.array(kinematics.link_poses(posture)[moving_link].translation) - at
+        for configuration in configurations(kinematics.arm, 30):
+            centre = np.array(kinematics.link_poses(configuration)[moving_link].translation) - at
             c, s = np.cos(0.6), np.sin(0.6)
             local = np.array([c * centre[0] + s * centre[1], -s * centre[0] + c * centre[1], centre[2]])
-            assert world.distance(posture) == pytest.approx(expected(kind, local) - ball, abs=1e-6), kind
+            assert world.distance(configuration) == pytest.approx(expected(kind, local) - ball, abs=1e-6), kind
 
 
 def test_few_exact_looks_find_what_all_of_them_find(kinematics: Kinematics) -> None:
@@ -132,11 +132,11 @@ def test_few_exact_looks_find_what_all_of_them_find(kinematics: Kinematics) -> N
         for index in range(40)
     ]
     world = World(kinematics.arm, kinematics, PlanningScene(objects=tuple(boxes)))
-    for posture in postures(kinematics.arm, 30):
-        every = world.contacts(posture, 10.0)
+    for configuration in configurations(kinematics.arm, 30):
+        every = world.contacts(configuration, 10.0)
         assert len(every) == len(world.pairs)
-        assert every[0].distance == pytest.approx(world.distance(posture), abs=ROUNDING)
-        near = world.pairs_within(posture, every[3].distance + ROUNDING)
+        assert every[0].distance == pytest.approx(world.distance(configuration), abs=ROUNDING)
+        near = world.pairs_within(configuration, every[3].distance + ROUNDING)
         assert {(contact.first, contact.second) for contact in every[:4]} <= set(near)
 
 
@@ -144,9 +144,9 @@ def test_padding_is_kept_around_an_object(kinematics: Kinematics) -> None:
     bare = World(kinematics.arm, kinematics, scene_of(SphereShape(radius=0.25)))
     padded = World(kinematics.arm, kinematics, scene_of(SphereShape(radius=0.25), padding=0.03))
     larger = World(kinematics.arm, kinematics, scene_of(SphereShape(radius=0.28)))
-    for posture in postures(kinematics.arm, 20):
-        assert padded.distance(posture) == pytest.approx(larger.distance(posture), abs=ROUNDING)
-        assert padded.distance(posture) <= bare.distance(posture) + ROUNDING
+    for configuration in configurations(kinematics.arm, 20):
+        assert padded.distance(configuration) == pytest.approx(larger.distance(configuration), abs=ROUNDING)
+        assert padded.distance(configuration) <= bare.distance(configuration) + ROUNDING
 
 
 def test_a_carried_object_moves_with_its_link_and_makes_the_reach_longer(kinematics: Kinematics) -> None:
@@ -163,7 +163,9 @@ def test_a_carried_object_moves_with_its_link_and_makes_the_reach_longer(kinemat
     assert ("crate", "wall") in world.pairs
     assert (world.reach >= own.reach).all()
     assert world.reach[0] > own.reach[0]
-    meets = [("crate", "wall") in world.pairs_within(posture) for posture in postures(kinematics.arm, 100)]
+    meets = [
+        ("crate", "wall") in world.pairs_within(configuration) for configuration in configurations(kinematics.arm, 100)
+    ]
     assert any(meets)
     assert not all(meets)
 
@@ -177,19 +179,19 @@ def test_no_point_moves_farther_than_the_reach_says(kinematics: Kinematics) -> N
         name="pole", shape=CylinderShape(radius=0.02, length=2.0), pose=Transform(translation=(0.5, 0.0, 0.0))
     )
     world = World(kinematics.arm, kinematics, PlanningScene(objects=(stick, pole)))
-    for posture in postures(kinematics.arm, 30):
-        for joint in range(len(posture)):
-            turned = posture.copy()
+    for configuration in configurations(kinematics.arm, 30):
+        for joint in range(len(configuration)):
+            turned = configuration.copy()
             turned[joint] += 0.01
-            change = abs(world.distance(turned) - world.distance(posture))
+            change = abs(world.distance(turned) - world.distance(configuration))
             assert change <= 2.0 * world.reach[joint] * 0.01 + 1e-6
 
 
 def test_touch_links_and_allowed_pairs_are_not_checked(kinematics: Kinematics, moving_link: str) -> None:
     block = SceneObject(name="block", shape=BoxShape(size=(3.0, 3.0, 3.0)))
-    posture = postures(kinematics.arm, 1)[0]
+    configuration = configurations(kinematics.arm, 1)[0]
     blocked = World(kinematics.arm, kinematics, PlanningScene(objects=(block,)))
-    assert any(moving_link in pair for pair in blocked.pairs_within(posture))
+    assert any(moving_link in pair for pair in blocked.pairs_within(configuration))
     free = AllowedPair(first="block", second="*")
     assert World(kinematics.arm, kinematics, PlanningScene(objects=(block,), allowed=(free,))).pairs == (
         kinematics.collisions.pairs
@@ -218,7 +220,7 @@ def test_inside_a_closed_mesh_is_inside(kinematics: Kinematics) -> None:
     """coal knows a mesh's surface only; an arm wholly within it would look free."""
     shell = SceneObject(name="shell", shape=MeshShape(data=stl_box(2.0)))
     world = World(kinematics.arm, kinematics, PlanningScene(objects=(shell,)))
-    assert world.distance(postures(kinematics.arm, 1)[0]) < -0.5
+    assert world.distance(configurations(kinematics.arm, 1)[0]) < -0.5
 
 
 def test_contacts_name_both_with_depth_and_place(kinematics: Kinematics, moving_link: str) -> None:

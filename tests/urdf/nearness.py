@@ -10,7 +10,7 @@ import pinocchio as pin
 from services.arm.description import Arm
 
 
-def nearest_distances(arm: Arm, postures: Iterable[np.ndarray]) -> dict[frozenset[str], float]:
+def nearest_distances(arm: Arm, configurations: Iterable[np.ndarray]) -> dict[frozenset[str], float]:
     """[m] of every pair of links with collision shapes; negative where they have touched."""
     model = pin.buildModelFromUrdf(str(arm.urdf_path))
     geometry = pin.buildGeomFromUrdf(model, str(arm.urdf_path), pin.GeometryType.COLLISION)
@@ -18,7 +18,7 @@ def nearest_distances(arm: Arm, postures: Iterable[np.ndarray]) -> dict[frozense
     geometry.addAllCollisionPairs()
     data, geometry_data = model.createData(), geometry.createData()
     nearest: dict[frozenset[str], float] = {}
-    for q in postures:
+    for q in configurations:
         pin.computeDistances(model, data, geometry, geometry_data, q)
         for pair, result in zip(geometry.collisionPairs, geometry_data.distanceResults, strict=True):
             key = frozenset((links[pair.first], links[pair.second]))

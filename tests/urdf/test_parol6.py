@@ -150,14 +150,14 @@ def shape_bounds() -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 def test_every_named_state_is_within_limits_and_free():
     assert {"home", "rest", "ready"} <= set(ARM.named_states)
-    for name, posture in ARM.named_states.items():
-        assert all(joint.is_within(value) for joint, value in zip(ARM.joints, posture, strict=True))
-        assert KINEMATICS.self_collisions(posture, margin=0.01) == [], name
+    for name, configuration in ARM.named_states.items():
+        assert all(joint.is_within(value) for joint, value in zip(ARM.joints, configuration, strict=True))
+        assert KINEMATICS.self_collisions(configuration, margin=0.01) == [], name
 
 
 def test_excused_pairs_never_come_near_and_checked_pairs_sometimes_touch():
     """What the SRDF says, by sampling: "Never" is never, and what is checked is worth checking."""
-    nearest = nearest_distances(ARM, postures(4000))
+    nearest = nearest_distances(ARM, configurations(4000))
     never = {frozenset(p) for p in combinations(LINKS, 2)} - {frozenset(p) for p in pairwise(LINKS)}
     checked = {pair for pair in never if pair not in ARM.disabled_collisions}
     assert {frozenset(pair) for pair in KINEMATICS.collisions.pairs} == checked
@@ -165,7 +165,7 @@ def test_excused_pairs_never_come_near_and_checked_pairs_sometimes_touch():
     assert {tuple(sorted(pair)) for pair in checked if nearest[pair] > 0.0} == set()
 
 
-def postures(count: int) -> np.ndarray:
+def configurations(count: int) -> np.ndarray:
     """(count, n) at random, every other one with some joints at a limit."""
     generator = np.random.default_rng(7)
     lower, upper = np.array([(joint.lower, joint.upper) for joint in ARM.joints]).T

@@ -23,11 +23,11 @@ from services.planner.verification.verify import require_within_limits, sample
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")
 PLANNER = Planner(ARM)
-POSTURES = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])
+CONFIGURATIONS = st.tuples(*[st.floats(joint.lower, joint.upper) for joint in ARM.joints])
 
 
-def standing(posture: tuple[float, ...]) -> JointState:
-    return JointState(name=ARM.joint_names, position=posture)
+def standing(configuration: tuple[float, ...]) -> JointState:
+    return JointState(name=ARM.joint_names, position=configuration)
 
 
 @pytest.mark.parametrize(("start", "goal"), list(permutations(ARM.named_states, 2)))
@@ -45,7 +45,7 @@ def test_every_joint_can_be_sent_to_both_of_its_limits(joint: Joint):
     """From some named state: from others the arm's own body is in the way."""
     for limit in (joint.lower, joint.upper):
         request = PlanRequest(goal=JointGoal(name=(joint.name,), position=(limit,)))
-        answers = [PLANNER.plan(request, standing(posture)) for posture in ARM.named_states.values()]
+        answers = [PLANNER.plan(request, standing(configuration)) for configuration in ARM.named_states.values()]
         assert PlanCode.SUCCESS in [answer.code for answer in answers], answers[0].refusal
 
 
@@ -65,7 +65,7 @@ def test_a_pose_with_an_orientation_is_reached():
 
 
 @settings(max_examples=150)
-@given(POSTURES, POSTURES)
+@given(CONFIGURATIONS, CONFIGURATIONS)
 def test_a_tool_position_is_reached_or_refused_for_touching(start: tuple[float, ...], goal: tuple[float, ...]):
     point = tuple(PLANNER.kinematics.tool(goal).position.tolist())
     response = PLANNER.plan(PlanRequest(goal=PoseGoal(position=point)), standing(start))

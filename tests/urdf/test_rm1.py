@@ -61,20 +61,20 @@ def test_the_limits_are_the_seeds(rm1: Arm):
 def test_every_named_state_is_within_limits_and_free(rm1: Arm):
     kinematics = Kinematics(rm1)
     assert {"home", "ready"} <= set(rm1.named_states)
-    for posture in rm1.named_states.values():
-        assert all(joint.is_within(value) for joint, value in zip(rm1.joints, posture, strict=True))
-        assert kinematics.self_collisions(posture, margin=0.004) == []
+    for configuration in rm1.named_states.values():
+        assert all(joint.is_within(value) for joint, value in zip(rm1.joints, configuration, strict=True))
+        assert kinematics.self_collisions(configuration, margin=0.004) == []
 
 
 def test_base_and_forearm_never_come_near_and_the_checked_pairs_sometimes_touch(rm1: Arm):
     """What the SRDF says, by sampling: "Never" is never, and what is checked is worth checking."""
-    nearest = nearest_distances(rm1, postures(rm1, 5000))
+    nearest = nearest_distances(rm1, configurations(rm1, 5000))
     assert nearest[frozenset(("base_link", "antebrazo_link"))] > 0.06
     assert nearest[frozenset(("base_link", "efector_link"))] < 0.0
     assert nearest[frozenset(("brazo_link", "efector_link"))] < 0.0
 
 
-def postures(arm: Arm, count: int) -> np.ndarray:
+def configurations(arm: Arm, count: int) -> np.ndarray:
     generator = np.random.default_rng(7)
     return generator.uniform([j.lower for j in arm.joints], [j.upper for j in arm.joints], (count, len(arm.joints)))
 

@@ -121,7 +121,7 @@ def test_a_mesh_that_cannot_be_read_is_said_once_and_left_out(model):
     assert '"m.stl"' in said[0]
 
 
-def test_a_refused_posture_shows_what_touches_in_red_with_its_names(view):
+def test_a_refused_configuration_shows_what_touches_in_red_with_its_names(view):
     view.on_scene(PlanningScene(objects=(TABLE, CUP)))
     view.take(NOW)
     view.on_contacts(touching(("efector_link", "table"), ("cup", "table")))
@@ -152,7 +152,7 @@ def test_when_nothing_touches_any_more_the_shadow_goes_and_the_red_too(view):
     assert not any(isinstance(update, Shadow | Labels) for update in updates)
 
 
-def test_the_posture_that_was_refused_is_gone_as_soon_as_the_arm_goes(model):
+def test_the_configuration_that_was_refused_is_gone_as_soon_as_the_arm_goes(model):
     shown = Visualizer(model, "rm1", "efector_link")
     shown.scene.on_scene(PlanningScene(objects=(TABLE,)))
     shown.scene.on_contacts(touching(("efector_link", "table")))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from schemas.planning import PlanCode, Refusal
 from services.arm.kinematics import Pose
 from services.planner.cartesian.tool_path import Arc
-from services.planner.request.refusals import NoPlan
+from services.planner.request.refusals import PlanRefused
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ FARTHEST = 1e6  # [m]
 
 
 def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
-    """From start through `interim` (3,) to end; raises `NoPlan`."""
+    """From start through `interim` (3,) to end; raises `PlanRefused`."""
     to_interim, to_end = interim - start.position, end.position - start.position
     _require_way("interim", interim, start.position, end.position)
     normal = np.cross(to_interim, to_end)
@@ -36,7 +36,7 @@ def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
 
 
 def arc_about(start: Pose, centre: Array, end: Pose) -> Arc:
-    """The shorter one about `centre` (3,); raises `NoPlan`."""
+    """The shorter one about `centre` (3,); raises `PlanRefused`."""
     _require_way("center", centre, start.position, end.position)
     first, last = start.position - centre, end.position - centre
     radii = float(np.linalg.norm(first)), float(np.linalg.norm(last))
@@ -78,6 +78,6 @@ def _require_way(name: str, point: Array, start: Array, end: Array) -> None:
             raise _refused(what, distance, SAME_POINT, message, remedy)
 
 
-def _refused(subject: str, value: float, limit: float, message: str, remedy: str) -> NoPlan:
+def _refused(subject: str, value: float, limit: float, message: str, remedy: str) -> PlanRefused:
     refusal = Refusal(check="arc", subject=subject, value=value, limit=limit, message=message, remedy=remedy)
-    return NoPlan(PlanCode.INVALID_GOAL_CONSTRAINTS, refusal)
+    return PlanRefused(PlanCode.INVALID_GOAL_CONSTRAINTS, refusal)

@@ -1,4 +1,4 @@
-"""Ways of the tool: lines, arcs and rounded polylines followed by the joints, as far as they go, and timed."""
+"""Paths of the tool: lines, arcs and rounded polylines followed by the joints, as far as they go, and timed."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from schemas.motion import JointTrajectory
 from schemas.planning import PlanCode, Refusal, Timing
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
-from services.planner.cartesian.continuation import FINEST, Continuation, Followed, Stop, is_same
+from services.planner.cartesian.continuation import FINEST, Continuation, FollowedPath, StopReason, is_same
 from services.planner.cartesian.path_points import Run, between, states_of_runs
 from services.planner.cartesian.tool_limits import ToolLimits
 from services.planner.cartesian.tool_path import METRES_PER_RADIAN, ToolPath
-from services.planner.collision.clearance import Sweeper
+from services.planner.collision.clearance import PathChecker
 from services.planner.path.path import Start
 from services.planner.request.deadline import Deadline
-from services.planner.request.refusals import NoPlan, not_verified
+from services.planner.request.refusals import PlanRefused, not_verified
 from services.planner.timing.path_timing import law_along
 from services.planner.timing.profile import JointLimits, NoProfile, require_short, straight_line
 from services.planner.timing.timing import States, at_limits, at_speed, trajectory_of
 
 Array = NDArray[np.float64]
 
-DEEPER = 1.06  # share of the margin that the way keeps, so that samples taken elsewhere keep the margin itself
+DEEPER = 1.06  # share of the margin that the path keeps, so that samples taken elsewhere keep the margin itself
 LEAST_LOOK = 0.1  # share of the margin by which the arm moves on at least from one look to the next
-SHORTEST_WAY = 1e-4  # of length: less is no way
-SHORTEST_TOLD = 1e-6  # [m] of a way, of which a place is told in metres
+SHORTEST_PATH = 1e-4  # of length: less is no way
+SHORTEST_TOLD = 1e-6  # [m] of a path, of which a place is told in metres
 MOST_ROWS = 4000
 MOMENT = 0.05  # share of the time between two points, by which the tool is looked at before and after a moment
 
 
 @dataclass(frozen=True)
-class CartesianWay:
-    """A timed way, not yet verified; `stopped_by` says why it is not all of it."""
+class CartesianPath:
+    """A timed path, not yet verified; `stopped_by` says why it is not all of it."""
 
     trajectory: JointTrajectory
     end: Start
@@ -47,8 +47,8 @@ class CartesianWay:
 
 
 @dataclass(frozen=True)
-class Terms:
-    """On which a way is gone."""
+class CartesianTerms:
+    """On which a path is gone."""
 
     limits: JointLimits
     tool: ToolLimits
@@ -60,28 +60,29 @@ class Terms:
 class CartesianPlanner:
     """Takes one arm along paths of its tool, among what `checker` knows."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, checker: Sweeper, holds_turn: bool) -> None:
+    def __init__(self, arm: Arm, kinematics: Kinematics, checker: PathChecker, holds_turn: bool) -> None:
         self._arm, self._kinematics, self._checker = arm, kinematics, checker
         self._continuation = Continuation(arm, kinematics, holds_turn)
 
-    def plan(self, paths: Sequence[ToolPath], start: Start, end: Start | None, terms: Terms) -> CartesianWay:
-        """Along the paths one after the other, at rest between them; raises `NoPlan`, and what `terms.deadline` raises.
+    def plan(self, paths: Sequence[ToolPath], start: Start, end: Start | None, terms: CartesianTerms) -> CartesianPath:
+        """Along the paths one after the other, at rest between them; raises `PlanRefused`, and what `terms.deadline`
+        raises.
 
         Where it comes to `end` but for rounding, it ends there to the bit. On a path that moves no joint it stands.
         """
         whole, before = sum(path.length for path in paths), 0.0
         metres = sum(path.metres for path in paths)
         runs: list[Run] = []
-        posture, refusal, gone = np.array(start), None, 0.0
+        configuration, refusal, gone = np.array(start), None, 0.0
         for path in paths:
-            followed = self._follow(path, posture, terms)
-            stop = followed if isinstance(followed, Stop) else followed.stop
-            if isinstance(followed, Followed):
+            followed = self._follow(path, configuration, terms)
+            stop = followed if isinstance(followed, StopReason) else followed.stop
+            if isinstance(followed, FollowedPath):
                 if end is not None and stop is None and path is paths[-1]:
                     followed = self._continuation.ending(followed, np.array(end))
-                if not all(is_same(row, posture) for row in followed.postures):
+                if not all(is_same(row, configuration) for row in followed.configurations):
                     runs.append(self._run(path, followed, terms))
-                    posture = followed.postures[-1]
+                    configuration = followed.configurations[-1]
                 before += float(followed.lengths[-1])
                 gone += path.metres_to(float(followed.lengths[-1]))
             if stop is not None:
@@ -90,50 +91,50 @@ class CartesianPlanner:
         fraction = 1.0 if refusal is None else before / whole
         least = terms.tool.least_fraction
         if refusal is not None and (not runs or fraction < least):
-            raise NoPlan(_code(refusal), _too_little(refusal, fraction, least), fraction)
+            raise PlanRefused(_code(refusal), _too_little(refusal, fraction, least), fraction)
         if not runs:
             last = end if end is not None and is_same(end, start) else start
             standing = straight_line(self._arm.joint_names, start, last, terms.limits)
-            return CartesianWay(standing, last, fraction, refusal)
-        return CartesianWay(self._timed(runs, terms), tuple(posture.tolist()), fraction, refusal)
+            return CartesianPath(standing, last, fraction, refusal)
+        return CartesianPath(self._timed(runs, terms), tuple(configuration.tolist()), fraction, refusal)
 
-    def _follow(self, path: ToolPath, start: Array, terms: Terms) -> Followed | Stop:
+    def _follow(self, path: ToolPath, start: Array, terms: CartesianTerms) -> FollowedPath | StopReason:
         """As far as the joints and what stands around let it."""
         followed = self._continuation.follow(path, start, terms.tool.max_step, terms.tool.jump, terms.deadline)
-        if isinstance(followed, Stop):
+        if isinstance(followed, StopReason):
             return followed
         free, touching = self._free(followed, terms)
         if touching is None:
             return followed
         stop = self._touches(touching, terms.margin)
-        if free < SHORTEST_WAY:
+        if free < SHORTEST_PATH:
             return stop
         return self._continuation.shortened(path, followed, free, stop, terms.deadline)
 
-    def _free(self, followed: Followed, terms: Terms) -> tuple[float, Array | None]:
-        """The length up to which everything keeps clear, and the posture that does not; looked at by conservative
+    def _free(self, followed: FollowedPath, terms: CartesianTerms) -> tuple[float, Array | None]:
+        """The length up to which everything keeps clear, and the configuration that does not; looked at by conservative
         advancement, so that nothing is skipped."""
         margin = terms.margin
-        end, joints = float(followed.lengths[-1]), followed.postures.shape[1]
+        end, joints = float(followed.lengths[-1]), followed.configurations.shape[1]
         rows = np.linspace(0.0, end, min(MOST_ROWS, 8 * len(followed.lengths)))
-        postures = followed.curve.at(rows).value[:, :joints]
-        if self._checker.touching(postures, DEEPER * margin) is None:
+        configurations = followed.curve.at(rows).value[:, :joints]
+        if self._checker.touching(configurations, DEEPER * margin) is None:
             return end, None
-        moved = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(postures, axis=0)) @ self._checker.reach)))
+        moved = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(configurations, axis=0)) @ self._checker.reach)))
         along, free = 0.0, 0.0
         while True:
             terms.deadline.check()
             length = float(np.interp(along, moved, rows))
-            posture = followed.curve.at(np.array([length])).value[0, :joints]
-            clearance = self._checker.distance(posture) - DEEPER * margin
+            configuration = followed.curve.at(np.array([length])).value[0, :joints]
+            clearance = self._checker.distance(configuration) - DEEPER * margin
             if clearance <= 0.0:
-                return free, posture
+                return free, configuration
             free = length
             if along >= moved[-1]:
                 return end, None
             along = min(float(moved[-1]), along + max(clearance, LEAST_LOOK * margin))
 
-    def _run(self, path: ToolPath, followed: Followed, terms: Terms) -> Run:
+    def _run(self, path: ToolPath, followed: FollowedPath, terms: CartesianTerms) -> Run:
         tool = terms.tool.speed, terms.tool.acceleration
         end = float(followed.lengths[-1])
         marks = np.array([0.0, *(mark for mark in path.marks if FINEST < mark < end - FINEST), end])
@@ -144,14 +145,14 @@ class CartesianPlanner:
         return Run(
             followed.curve,
             law,
-            followed.postures[0],
-            followed.postures[-1],
+            followed.configurations[0],
+            followed.configurations[-1],
             marks[1:-1],
-            lambda length, posture: self._continuation.solver.error(path.at(length), posture),
+            lambda length, configuration: self._continuation.solver.error(path.at(length), configuration),
             np.maximum(self._checker.reach, METRES_PER_RADIAN),
         )
 
-    def _timed(self, runs: list[Run], terms: Terms) -> JointTrajectory:
+    def _timed(self, runs: list[Run], terms: CartesianTerms) -> JointTrajectory:
         states = self._within(states_of_runs(runs, terms.deadline), terms)
         try:
             require_short(float(states.times[-1]))
@@ -159,7 +160,7 @@ class CartesianPlanner:
             raise not_verified(str(error)) from error
         return trajectory_of(self._arm.joint_names, states)
 
-    def _within(self, states: States, terms: Terms) -> States:
+    def _within(self, states: States, terms: CartesianTerms) -> States:
         """As fast as the joints may; slower, where they or the tool would be a little faster than they may."""
         tool = terms.tool
         even = at_limits(states, terms.limits, terms.timing is Timing.JERK_LIMITED)
@@ -186,15 +187,17 @@ class CartesianPlanner:
         speed, acceleration = np.array(peaks).max(axis=0)
         return float(speed), float(acceleration)
 
-    def _touches(self, posture: Array, margin: float) -> Stop:
-        pairs = self._checker.pairs_within(posture, DEEPER * margin + 1e-9) or [("?", "?")]
+    def _touches(self, configuration: Array, margin: float) -> StopReason:
+        pairs = self._checker.pairs_within(configuration, DEEPER * margin + 1e-9) or [("?", "?")]
         named = " and ".join(f"{first} with {second}" for first, second in pairs)
         what = f"{named} would be nearer than {1000 * margin:g} mm"
-        distance = self._checker.distance(posture)
-        return Stop("collision", " / ".join(pairs[0]), distance, margin, what, "move what is in the way, or go around")
+        distance = self._checker.distance(configuration)
+        return StopReason(
+            "collision", " / ".join(pairs[0]), distance, margin, what, "move what is in the way, or go around"
+        )
 
 
-def _stopped(stop: Stop, gone: float, metres: float, fraction: float) -> Refusal:
+def _stopped(stop: StopReason, gone: float, metres: float, fraction: float) -> Refusal:
     place = f"at {gone:.4f} m of {metres:.4f} m" if metres > SHORTEST_TOLD else f"at {fraction:.1%} of the turn"
     return Refusal(
         check=stop.check,

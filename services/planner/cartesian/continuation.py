@@ -1,4 +1,4 @@
-"""Joint values along a way of the tool, each from the one before; where they end, and why they go no further."""
+"""Joint values along a path of the tool, each from the one before; where they end, and why they go no further."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 
-SPACING = 0.02  # of length between postures; halved until the spline between them is exact enough
-LEAST_POSTURES = 12
-FINEST = 2e-5  # of length: nearer postures are not tried, and a place is not told more exactly
-MOST_POSTURES = 5000
-JUMP = 0.3  # [rad] or [m] a joint may move between two postures, before shorter steps are tried
-CLOSE = 1e-5  # [m] by which the spline between postures may be off the way
-NEARLY = 0.98  # of the way to a limit, as it seems from before it
+SPACING = 0.02  # of length between configurations; halved until the spline between them is exact enough
+LEAST_CONFIGURATIONS = 12
+FINEST = 2e-5  # of length: nearer configurations are not tried, and a place is not told more exactly
+MOST_CONFIGURATIONS = 5000
+JUMP = 0.3  # [rad] or [m] a joint may move between two configurations, before shorter steps are tried
+CLOSE = 1e-5  # [m] by which the spline between configurations may be off the path
+NEARLY = 0.98  # of the path to a limit, as it seems from before it
 LEAST = 0.05  # of a step is tried, where it seems to be none of it
 ROUNDING = 1e-9  # [rad] or [m] beyond a limit that is put back onto it
-SAME = 1e-6  # [rad] or [m] by which postures differ that are meant to be one
+SAME = 1e-6  # [rad] or [m] by which configurations differ that are meant to be one
 ROUNDS = 8
-LOOKS = 8  # at the joints' limits between two postures
-ORDER = 4  # postures by which the next one is guessed
-TOO_FINE = f"max_step is so fine that the way would have more than {MOST_POSTURES} postures"
+LOOKS = 8  # at the joints' limits between two configurations
+ORDER = 4  # configurations by which the next one is guessed
+TOO_FINE = f"max_step is so fine that the way would have more than {MOST_CONFIGURATIONS} configurations"
 
 
 @dataclass(frozen=True)
-class Stop:
-    """What is in the way of the next posture; `subject` is a joint, a link pair or the tool.
+class StopReason:
+    """What is in the way of the next configuration; `subject` is a joint, a link pair or the tool.
 
     About `share` of the step to it can be gone.
     """
@@ -51,18 +51,18 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class Followed:
-    """Postures (m, n) at lengths (m,) of a path, from its start, the spline through them with the tool's position (3,)
-    behind the joints, and why there are no more."""
+class FollowedPath:
+    """Configurations (m, n) at lengths (m,) of a path, from its start, the spline through them with the tool's position
+    (3,) behind the joints, and why there are no more."""
 
     lengths: Array
-    postures: Array
+    configurations: Array
     curve: CubicSpline
-    stop: Stop | None
+    stop: StopReason | None
 
 
 class Continuation:
-    """Follows ways of the tool with one arm; of an arm that cannot turn its tool freely only the position is held."""
+    """Follows paths of the tool with one arm; of an arm that cannot turn its tool freely only the position is held."""
 
     def __init__(self, arm: Arm, kinematics: Kinematics, holds_turn: bool) -> None:
         self._arm, self._kinematics = arm, kinematics
@@ -70,65 +70,73 @@ class Continuation:
         self._lower = np.array([joint.lower for joint in arm.joints])
         self._upper = np.array([joint.upper for joint in arm.joints])
 
-    def follow(self, path: ToolPath, start: Array, max_step: float, jump: float, deadline: Deadline) -> Followed | Stop:
+    def follow(
+        self, path: ToolPath, start: Array, max_step: float, jump: float, deadline: Deadline
+    ) -> FollowedPath | StopReason:
         """As far as it goes from `start`, which is at the path's beginning; 0 for the default step and jump.
 
-        A way of less than four postures of the finest spacing is none.
+        A path of less than four configurations of the finest spacing is none.
         """
-        spacing = min(max_step or SPACING, path.length / LEAST_POSTURES)
-        if path.length / spacing > MOST_POSTURES:
-            return Stop("max_step", "max_step", max_step, path.length / MOST_POSTURES, TOO_FINE, "leave it at 0")
-        lengths, postures, stop = self._march(path, start, spacing, jump, deadline)
+        spacing = min(max_step or SPACING, path.length / LEAST_CONFIGURATIONS)
+        if path.length / spacing > MOST_CONFIGURATIONS:
+            return StopReason(
+                "max_step", "max_step", max_step, path.length / MOST_CONFIGURATIONS, TOO_FINE, "leave it at 0"
+            )
+        lengths, configurations, stop = self._march(path, start, spacing, jump, deadline)
         if stop is not None and lengths[-1] < 4 * FINEST:
             return stop
         if len(lengths) < 4:
-            lengths, postures = self._four(path, lengths, postures)
-        return self._refined(path, lengths, postures, stop, deadline)
+            lengths, configurations = self._four(path, lengths, configurations)
+        return self._refined(path, lengths, configurations, stop, deadline)
 
     def shortened(
-        self, path: ToolPath, followed: Followed, length: float, stop: Stop, deadline: Deadline
-    ) -> Followed | Stop:
-        """The way up to `length`, because of `stop`."""
+        self, path: ToolPath, followed: FollowedPath, length: float, stop: StopReason, deadline: Deadline
+    ) -> FollowedPath | StopReason:
+        """The path up to `length`, because of `stop`."""
         kept = int(np.searchsorted(followed.lengths, length - FINEST))
-        guess = followed.curve.at(np.array([length])).value[0, : followed.postures.shape[1]]
+        guess = followed.curve.at(np.array([length])).value[0, : followed.configurations.shape[1]]
         last = self.solver.solve(path.at(length), guess)
         lengths = [*followed.lengths[:kept].tolist(), length]
-        postures = [*followed.postures[:kept], self._clipped(guess if last is None else last)]
+        configurations = [*followed.configurations[:kept], self._clipped(guess if last is None else last)]
         if len(lengths) < 4:
-            lengths, postures = self._four(path, lengths, postures)
-        return self._refined(path, lengths, postures, stop, deadline)
+            lengths, configurations = self._four(path, lengths, configurations)
+        return self._refined(path, lengths, configurations, stop, deadline)
 
-    def ending(self, followed: Followed, end: Array) -> Followed:
-        """The same, with `end` (n,) as its last posture where that is where it leads."""
-        if not is_same(followed.postures[-1], end):
+    def ending(self, followed: FollowedPath, end: Array) -> FollowedPath:
+        """The same, with `end` (n,) as its last configuration where that is where it leads."""
+        if not is_same(followed.configurations[-1], end):
             return followed
-        postures = np.vstack((followed.postures[:-1], end))
-        curve = self._spline(followed.lengths.tolist(), list(postures))
-        return Followed(followed.lengths, postures, curve, followed.stop)
+        configurations = np.vstack((followed.configurations[:-1], end))
+        curve = self._spline(followed.lengths.tolist(), list(configurations))
+        return FollowedPath(followed.lengths, configurations, curve, followed.stop)
 
     def _march(
         self, path: ToolPath, start: Array, spacing: float, jump: float, deadline: Deadline
-    ) -> tuple[list[float], list[Array], Stop | None]:
-        lengths, postures, step, marks = [0.0], [start], spacing, [*path.marks, path.length]
+    ) -> tuple[list[float], list[Array], StopReason | None]:
+        lengths, configurations, step, marks = [0.0], [start], spacing, [*path.marks, path.length]
         while lengths[-1] < path.length:
             deadline.check()
             ahead = lengths[-1] + step
             mark = next(mark for mark in marks if mark > lengths[-1] + FINEST or mark == path.length)
             ahead = mark if ahead > mark - 0.1 * step else ahead
-            guess = _extrapolated(lengths, postures, ahead)
-            found = self._next(path.at(ahead), postures[-1], guess, jump or math.inf)
-            if not isinstance(found, Stop) and len(lengths) < MOST_POSTURES:
+            guess = _extrapolated(lengths, configurations, ahead)
+            found = self._next(path.at(ahead), configurations[-1], guess, jump or math.inf)
+            if not isinstance(found, StopReason) and len(lengths) < MOST_CONFIGURATIONS:
                 lengths.append(ahead)
-                postures.append(found)
+                configurations.append(found)
                 step = min(2.0 * step, spacing)
-            elif step > FINEST and len(lengths) < MOST_POSTURES and not _is_jump(found):
-                share = found.share if isinstance(found, Stop) else 0.5
+            elif step > FINEST and len(lengths) < MOST_CONFIGURATIONS and not _is_jump(found):
+                share = found.share if isinstance(found, StopReason) else 0.5
                 step = max(0.999 * FINEST, min(0.9 * step, share * (ahead - lengths[-1])))
             else:
-                return lengths, postures, found if isinstance(found, Stop) else self._lost(postures[-1])
-        return lengths, postures, None
+                return (
+                    lengths,
+                    configurations,
+                    found if isinstance(found, StopReason) else self._lost(configurations[-1]),
+                )
+        return lengths, configurations, None
 
-    def _next(self, pose: Pose, last: Array, guess: Array, jump: float) -> Array | Stop:
+    def _next(self, pose: Pose, last: Array, guess: Array, jump: float) -> Array | StopReason:
         found = self.solver.solve(pose, guess)
         if found is None:
             return self._lost(last)
@@ -141,40 +149,47 @@ class Continuation:
             return self._jump("jump", last, found, jump)
         return self._jump("singularity", last, found, JUMP) if farthest > JUMP else self._clipped(found)
 
-    def _four(self, path: ToolPath, lengths: list[float], postures: list[Array]) -> tuple[list[float], list[Array]]:
+    def _four(
+        self, path: ToolPath, lengths: list[float], configurations: list[Array]
+    ) -> tuple[list[float], list[Array]]:
         """What a cubic spline needs."""
         wanted = np.linspace(0.0, lengths[-1], 4).tolist()
-        guesses = np.array([np.interp(wanted, lengths, column) for column in np.array(postures).T]).T
+        guesses = np.array([np.interp(wanted, lengths, column) for column in np.array(configurations).T]).T
         between = [
             self.solver.solve(path.at(along), guess) for along, guess in zip(wanted[1:3], guesses[1:3], strict=True)
         ]
         found = [guess if row is None else self._clipped(row) for row, guess in zip(between, guesses[1:3], strict=True)]
-        return wanted, [postures[0], *found, postures[-1]]
+        return wanted, [configurations[0], *found, configurations[-1]]
 
     def _refined(
-        self, path: ToolPath, lengths: list[float], postures: list[Array], stop: Stop | None, deadline: Deadline
-    ) -> Followed | Stop:
-        """With postures between, wherever the spline is off the way; it ends where even those do not help."""
+        self,
+        path: ToolPath,
+        lengths: list[float],
+        configurations: list[Array],
+        stop: StopReason | None,
+        deadline: Deadline,
+    ) -> FollowedPath | StopReason:
+        """With configurations between, wherever the spline is off the path; it ends where even those do not help."""
         for _ in range(ROUNDS):
             deadline.check()
-            curve = self._spline(lengths, postures)
+            curve = self._spline(lengths, configurations)
             middles = self._off(path, curve)
             if not middles:
-                followed = Followed(np.array(lengths), np.array(postures), curve, stop)
+                followed = FollowedPath(np.array(lengths), np.array(configurations), curve, stop)
                 return self._within_limits(path, followed, deadline)
             # The spline may have strayed to where another branch is nearer; a mean of the neighbours has not.
-            guesses = np.array([np.interp(middles, lengths, column) for column in np.array(postures).T]).T
+            guesses = np.array([np.interp(middles, lengths, column) for column in np.array(configurations).T]).T
             solved = [self.solver.solve(path.at(middle), guess) for middle, guess in zip(middles, guesses, strict=True)]
             new = {middle: self._clipped(row) for middle, row in zip(middles, solved, strict=True) if row is not None}
-            merged = dict(zip(lengths, postures, strict=True)) | new
+            merged = dict(zip(lengths, configurations, strict=True)) | new
             lengths = sorted(merged)
-            postures = [merged[length] for length in lengths]
+            configurations = [merged[length] for length in lengths]
         kept = sum(length < middles[0] for length in lengths)
-        stop = stop or self._lost(postures[kept - 1])
-        return stop if kept < 4 else self._refined(path, lengths[:kept], postures[:kept], stop, deadline)
+        stop = stop or self._lost(configurations[kept - 1])
+        return stop if kept < 4 else self._refined(path, lengths[:kept], configurations[:kept], stop, deadline)
 
-    def _within_limits(self, path: ToolPath, followed: Followed, deadline: Deadline) -> Followed | Stop:
-        """Only as far as no joint is beyond its limit between two postures that are within it."""
+    def _within_limits(self, path: ToolPath, followed: FollowedPath, deadline: Deadline) -> FollowedPath | StopReason:
+        """Only as far as no joint is beyond its limit between two configurations that are within it."""
         knots = np.arange(len(followed.lengths))
         looked = np.interp(np.linspace(0, knots[-1], LOOKS * int(knots[-1]) + 1), knots, followed.lengths)
         rows = followed.curve.at(looked).value[:, : len(self._lower)]
@@ -189,36 +204,36 @@ class Continuation:
         return stop if within < 4 * FINEST else self.shortened(path, followed, within, stop, deadline)
 
     def _off(self, path: ToolPath, curve: CubicSpline) -> list[float]:
-        """The middles between knots at which the spline is off the way."""
+        """The middles between knots at which the spline is off the path."""
         middles = 0.5 * (curve.knots[:-1] + curve.knots[1:])
         rows = curve.at(middles).value[:, : len(self._lower)]
         pairs = zip(middles.tolist(), rows, strict=True)
         return [middle for middle, row in pairs if self.solver.error(path.at(middle), row) > CLOSE]
 
-    def _spline(self, lengths: list[float], postures: list[Array]) -> CubicSpline:
-        tools = [self._kinematics.tool(posture).position for posture in postures]
-        return CubicSpline(np.array(lengths), np.hstack((postures, tools)))
+    def _spline(self, lengths: list[float], configurations: list[Array]) -> CubicSpline:
+        tools = [self._kinematics.tool(configuration).position for configuration in configurations]
+        return CubicSpline(np.array(lengths), np.hstack((configurations, tools)))
 
-    def _clipped(self, posture: Array) -> Array:
-        clipped: Array = np.minimum(np.maximum(posture, self._lower), self._upper)
+    def _clipped(self, configuration: Array) -> Array:
+        clipped: Array = np.minimum(np.maximum(configuration, self._lower), self._upper)
         return clipped
 
-    def _beyond(self, index: int, last: Array, found: Array) -> Stop:
+    def _beyond(self, index: int, last: Array, found: Array) -> StopReason:
         joint, value = self._arm.joints[index], float(found[index])
         limit = joint.clamp(value)
         side = "upper" if value > joint.upper else "lower"
         what = f'joint "{joint.name}" is at its {side} limit of {limit:g} {joint.unit}'
         share = max(LEAST, NEARLY * float((self._clipped(found) - last)[index] / (found - last)[index]))
-        remedy = "go around by another posture, or end before it"
-        return Stop("joint limit", joint.name, value, limit, what, remedy, share)
+        remedy = "go around by another configuration, or end before it"
+        return StopReason("joint limit", joint.name, value, limit, what, remedy, share)
 
-    def _lost(self, last: Array) -> Stop:
+    def _lost(self, last: Array) -> StopReason:
         value = self.solver.manipulability(last)
         what = f"the arm is stretched out or its axes line up (singularity, manipulability {value:.2g})"
         remedy = "keep away from there, or go there freely instead of on a given way"
-        return Stop("singularity", self._arm.tool_frame, value, 0.0, what, remedy)
+        return StopReason("singularity", self._arm.tool_frame, value, 0.0, what, remedy)
 
-    def _jump(self, check: str, last: Array, found: Array, jump: float) -> Stop:
+    def _jump(self, check: str, last: Array, found: Array, jump: float) -> StopReason:
         index = int(np.argmax(np.abs(found - last)))
         joint, value = self._arm.joints[index], float(abs(found[index] - last[index]))
         what = (
@@ -226,25 +241,25 @@ class Continuation:
             f" (singularity, manipulability {self.solver.manipulability(last):.2g})"
         )
         remedy = "keep away from the singularity, or go there freely instead of on a given way"
-        return Stop(check, joint.name, value, jump, what, remedy)
+        return StopReason(check, joint.name, value, jump, what, remedy)
 
 
 def is_same(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:
-    """Postures that differ by no more than rounding."""
+    """Configurations that differ by no more than rounding."""
     return float(np.abs(np.subtract(one, other)).max()) <= SAME
 
 
-def _is_jump(found: Array | Stop) -> bool:
+def _is_jump(found: Array | StopReason) -> bool:
     """Beyond the threshold that was asked for: shorter steps would only hide it."""
-    return isinstance(found, Stop) and found.check == "jump"
+    return isinstance(found, StopReason) and found.check == "jump"
 
 
-def _extrapolated(lengths: list[float], postures: list[Array], ahead: float) -> Array:
-    """By the polynomial through the last few postures (Lagrange); nearby, lest it strays to another branch."""
+def _extrapolated(lengths: list[float], configurations: list[Array], ahead: float) -> Array:
+    """By the polynomial through the last few configurations (Lagrange); nearby, lest it strays to another branch."""
     knots = np.array(lengths[-ORDER:])
     apart = knots[:, None] - knots + np.eye(len(knots))
     gaps = (ahead - knots) / apart
     np.fill_diagonal(gaps, 1.0)
-    guess: Array = gaps.prod(axis=1) @ np.array(postures[-ORDER:])
+    guess: Array = gaps.prod(axis=1) @ np.array(configurations[-ORDER:])
     near = 0.5 * JUMP
-    return np.clip(guess, postures[-1] - near, postures[-1] + near)
+    return np.clip(guess, configurations[-1] - near, configurations[-1] + near)

@@ -1,4 +1,4 @@
-"""States along timed ways, from rest to rest, so near that the quintics between them keep to the way."""
+"""States along timed paths, from rest to rest, so near that the quintics between them keep to the path."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from services.planner.timing.timing import States
 from services.planner.verification.verify import Samples, sample_between
 
 Array = NDArray[np.float64]
-Error = Callable[[float, Array], float]  # [m] that the posture (n,) at a length is off the way
+Error = Callable[[float, Array], float]  # [m] that the configuration (n,) at a length is off the path
 
 SPACING = 0.04  # [s] between points, before it is halved where that is too much
 HALVINGS = 6
-OFF = 5e-5  # [m] by which the finished motion may leave the way
-SURE = 3e-5  # [m] by which it may leave the curve, which is nearly the way, without being looked at
+OFF = 5e-5  # [m] by which the finished motion may leave the path
+SURE = 3e-5  # [m] by which it may leave the curve, which is nearly the path, without being looked at
 
 
 @dataclass(frozen=True)
 class Run:
-    """A way from rest to rest: its curve, whose first columns are the joints, and when it is where."""
+    """A path from rest to rest: its curve, whose first columns are the joints, and when it is where."""
 
     curve: PathCurve
     law: Law
@@ -38,7 +38,8 @@ class Run:
 
 
 def states_of_runs(runs: Sequence[Run], deadline: Deadline) -> States:
-    """One run after the other, at rest between them; every end is exact to the bit. Raises `NoPlan` if it is late."""
+    """One run after the other, at rest between them; every end is exact to the bit. Raises `PlanRefused` if it is
+    late."""
     parts: list[States] = []
     clock = 0.0
     for run in runs:
@@ -58,7 +59,7 @@ def between(states: States, parts: int) -> Samples:
 
 
 def _near_enough(run: Run, deadline: Deadline) -> States:
-    """With points so dense that what is executed is not off the way."""
+    """With points so dense that what is executed is not off the path."""
     times = run.law.times(run.marks, max(SPACING, run.law.duration / MOST_POINTS))
     states, doubtful = _states(run, times), np.arange(len(times) - 1)
     for _ in range(HALVINGS):
@@ -72,7 +73,7 @@ def _near_enough(run: Run, deadline: Deadline) -> States:
 
 
 def _off(run: Run, states: States, segments: NDArray[np.int64], deadline: Deadline) -> NDArray[np.int64]:
-    """Those of the segments that leave the way.
+    """Those of the segments that leave the path.
 
     Two quintics that agree in position, velocity and acceleration at both ends are farthest apart in the middle.
     """
@@ -91,10 +92,10 @@ def _off(run: Run, states: States, segments: NDArray[np.int64], deadline: Deadli
 
 def _states(run: Run, times: Array) -> States:
     lengths, speeds, rises = run.law.at(times)
-    way, joints = run.curve.at(lengths), len(run.start)
+    derivatives, joints = run.curve.at(lengths), len(run.start)
     speed, rise = speeds[:, None], rises[:, None]
-    positions, velocities = way.value[:, :joints].copy(), (way.first * speed)[:, :joints]
-    accelerations = (way.second * speed**2 + way.first * rise)[:, :joints]
+    positions, velocities = derivatives.value[:, :joints].copy(), (derivatives.first * speed)[:, :joints]
+    accelerations = (derivatives.second * speed**2 + derivatives.first * rise)[:, :joints]
     positions[0], positions[-1] = run.start, run.end
     velocities[[0, -1]] = accelerations[[0, -1]] = 0.0
     return States(times, positions, velocities, accelerations)

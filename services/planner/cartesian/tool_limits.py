@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 
 from schemas.planning import PlanCode, Refusal
-from services.planner.request.refusals import NoPlan
+from services.planner.request.refusals import PlanRefused
 
 
 @dataclass(frozen=True)
 class ToolLimits:
-    """Of the tool, 0 for none; and how the way is walked."""
+    """Of the tool, 0 for none; and how the path is walked."""
 
     speed: float = 0.0  # [m/s]
     acceleration: float = 0.0  # [m/s^2]
@@ -21,7 +21,7 @@ class ToolLimits:
 
 
 def require_tool_limits(tool: ToolLimits) -> None:
-    """Raises `NoPlan` for what is no limit."""
+    """Raises `PlanRefused` for what is no limit."""
     for name, value in (
         ("speed", tool.speed),
         ("acceleration", tool.acceleration),
@@ -35,7 +35,7 @@ def require_tool_limits(tool: ToolLimits) -> None:
         raise _no_limit("least_fraction", tool.least_fraction, 1.0, message)
 
 
-def _no_limit(name: str, value: float, limit: float, message: str) -> NoPlan:
+def _no_limit(name: str, value: float, limit: float, message: str) -> PlanRefused:
     refusal = Refusal(
         check="tool limit",
         subject=name,
@@ -44,4 +44,4 @@ def _no_limit(name: str, value: float, limit: float, message: str) -> NoPlan:
         message=message,
         remedy=f"leave {name} at its default",
     )
-    return NoPlan(PlanCode.INVALID_GOAL_CONSTRAINTS, refusal)
+    return PlanRefused(PlanCode.INVALID_GOAL_CONSTRAINTS, refusal)

@@ -21,17 +21,17 @@ from services.arm.description import Arm, Joint
 from services.arm.kinematics import Kinematics, Pose
 from services.arm.transforms import IDENTITY, compose
 from services.planner.cartesian.arcs import arc_about, arc_through
-from services.planner.cartesian.cartesian_planner import CartesianPlanner, CartesianWay, Terms
+from services.planner.cartesian.cartesian_planner import CartesianPath, CartesianPlanner, CartesianTerms
 from services.planner.cartesian.tool_limits import ToolLimits, require_tool_limits
 from services.planner.cartesian.tool_path import ToolPath, polyline
-from services.planner.collision.clearance import Sweeper
+from services.planner.collision.clearance import PathChecker
 from services.planner.kinematics.goals import Goals
 from services.planner.kinematics.pose_goals import target_of
 from services.planner.kinematics.targets import ROTATION_TOLERANCE, Target, turn_between
-from services.planner.kinematics.task_space import Abilities
+from services.planner.kinematics.task_space import TaskSpace
 from services.planner.path.path import Start
 from services.planner.request.deadline import NEVER, Deadline
-from services.planner.request.refusals import NoPlan, malformed
+from services.planner.request.refusals import PlanRefused, malformed
 from services.planner.timing.profile import JointLimits
 
 Array = NDArray[np.float64]
@@ -43,38 +43,38 @@ FARTHEST = 1e3  # [m] a blend beyond it is a mistake
 class ToolMotions:
     """Lines and arcs of one arm's tool."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, goals: Goals, checker: Sweeper) -> None:
+    def __init__(self, arm: Arm, kinematics: Kinematics, goals: Goals, checker: PathChecker) -> None:
         self._arm, self._kinematics, self._goals = arm, kinematics, goals
-        self._abilities: Abilities = goals.abilities
-        self._planner = CartesianPlanner(arm, kinematics, checker, self._abilities.is_full)
+        self._task_space: TaskSpace = goals.task_space
+        self._planner = CartesianPlanner(arm, kinematics, checker, self._task_space.is_full)
 
     def plan(
         self, request: PlanRequest, start: Start, limits: JointLimits, margin: float, deadline: Deadline
-    ) -> CartesianWay:
-        """The timed way, to be verified; raises `NoPlan`."""
+    ) -> CartesianPath:
+        """The timed path, to be verified; raises `PlanRefused`."""
         tool = _tool_limits(request.motion)
         require_tool_limits(tool)
 
         try:
             wanted = self._wanted(request.goal, start)
             paths, end = self._paths(request, start, wanted), wanted[-1]
-            way = self._planner.plan(paths, start, end, Terms(limits, tool, margin, request.timing, deadline))
-        except NoPlan as ended:
+            path = self._planner.plan(paths, start, end, CartesianTerms(limits, tool, margin, request.timing, deadline))
+        except PlanRefused as ended:
             if tool.least_fraction == 1.0 and not deadline.has_passed():
                 self._require_reachable(request.goal, start, ended.fraction, deadline)
             raise
-        if way.fraction == 1.0:
-            self._require_turned(request.goal, start, way.end)
-            self._require_joints(way.end, end)
-        return way
+        if path.fraction == 1.0:
+            self._require_turned(request.goal, start, path.end)
+            self._require_joints(path.end, end)
+        return path
 
     def _paths(self, request: PlanRequest, start: Start, wanted: list[Start | None]) -> list[ToolPath]:
         goal, begin = request.goal, self._kinematics.tool(start)
         if isinstance(request.motion, CircularMotion):
             return [self._arc(request.motion, goal, start, begin, wanted[-1])]
         poses = [begin]
-        for point, posture in zip(points_of(goal), wanted, strict=True):
-            poses.append(self._pose(point, start, poses[-1], posture))
+        for point, configuration in zip(points_of(goal), wanted, strict=True):
+            poses.append(self._pose(point, start, poses[-1], configuration))
         return polyline(poses, goal.blend if isinstance(goal, WaypointGoal) else 0.0)
 
     def _arc(self, motion: CircularMotion, goal: Goal, start: Start, begin: Pose, wanted: Start | None) -> ToolPath:
@@ -113,31 +113,31 @@ class ToolMotions:
         return target_of(goal, self._goals.frame(goal, start))
 
     def _require_reachable(self, goal: Goal, start: Start, fraction: float, deadline: Deadline) -> None:
-        """Raises the better refusal of a goal that no posture meets, wherever the way to it ends."""
+        """Raises the better refusal of a goal that no configuration meets, wherever the path to it ends."""
         try:
             for point in points_of(goal):
                 next(self._goals.candidates(point, start, deadline), None)
-        except NoPlan as better:
-            raise NoPlan(better.code, better.refusal, fraction) from better
+        except PlanRefused as better:
+            raise PlanRefused(better.code, better.refusal, fraction) from better
 
     def _require_turned(self, goal: Goal, start: Start, end: Start) -> None:
         """An arm whose tool turns as its position has it may end turned otherwise than asked."""
         last = points_of(goal)[-1]
-        if self._abilities.is_full or not isinstance(last, PoseGoal):
+        if self._task_space.is_full or not isinstance(last, PoseGoal):
             return
         target = self._target(last, start)
         missing = target.misses(self._kinematics.tool(end))[1]
         if missing > max(ROTATION_TOLERANCE, target.rotation_tolerance):
             next(self._goals.candidates(last, start, NEVER), None)
             message = f"on this way the tool ends {np.degrees(missing):.3g} deg from the orientation that was asked for"
-            raise malformed(INVALID, "orientation", message, self._abilities.remedy, check="orientation")
+            raise malformed(INVALID, "orientation", message, self._task_space.remedy, check="orientation")
 
     def _wanted(self, goal: Goal, start: Start) -> list[Start | None]:
-        """The postures of those points that are joint values, None for poses; a joint that is not named stays as the
-        last of them has it, or the start."""
+        """The configurations of those points that are joint values, None for poses; a joint that is not named stays as
+        the last of them has it, or the start."""
         wanted: list[Start | None] = []
         for point in points_of(goal):
-            known = next((posture for posture in reversed(wanted) if posture is not None), start)
+            known = next((configuration for configuration in reversed(wanted) if configuration is not None), start)
             is_pose = isinstance(point, PoseGoal)
             wanted.append(None if is_pose else next(self._goals.candidates(point, known, NEVER)))
         return wanted
@@ -146,11 +146,11 @@ class ToolMotions:
         """Joint values are what was asked for, not only the pose of the tool that belongs to them."""
         if wanted is not None and end != wanted:
             worst = int(np.argmax(np.abs(np.subtract(end, wanted))))
-            raise _other_posture(self._arm.joints[worst], end, wanted[worst], end[worst])
+            raise _other_configuration(self._arm.joints[worst], end, wanted[worst], end[worst])
 
 
 def points_of(goal: Goal) -> tuple[Goal, ...]:
-    """The goals to be passed in order; raises `NoPlan` where there is none, or the blend is no length."""
+    """The goals to be passed in order; raises `PlanRefused` where there is none, or the blend is no length."""
     if not isinstance(goal, WaypointGoal):
         return (goal,)
     if not goal.points:
@@ -161,10 +161,10 @@ def points_of(goal: Goal) -> tuple[Goal, ...]:
     return goal.points
 
 
-def _other_posture(joint: Joint, end: Start, wanted: float, reached: float) -> NoPlan:
+def _other_configuration(joint: Joint, end: Start, wanted: float, reached: float) -> PlanRefused:
     """The tool is where it should be, the joints are not."""
     refusal = Refusal(
-        check="posture",
+        check="configuration",
         subject=joint.name,
         value=reached,
         limit=wanted,
@@ -172,7 +172,7 @@ def _other_posture(joint: Joint, end: Start, wanted: float, reached: float) -> N
         message=f'the tool can go there so, but "{joint.name}" ends at {reached:.4g} {joint.unit}, not at {wanted:.4g}',
         remedy="ask for the pose of the tool instead of joint values, or go there freely",
     )
-    return NoPlan(PlanCode.GOAL_VIOLATES_PATH_CONSTRAINTS, refusal)
+    return PlanRefused(PlanCode.GOAL_VIOLATES_PATH_CONSTRAINTS, refusal)
 
 
 def _tool_limits(motion: object) -> ToolLimits:

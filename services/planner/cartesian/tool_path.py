@@ -1,4 +1,5 @@
-"""The way of the tool by its length: straight lines, arcs, and rounded corners, with the orientation turning evenly."""
+"""The path of the tool by its length: straight lines, arcs, and rounded corners, with the orientation turning
+evenly."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from services.arm.kinematics import Pose
-from services.planner.path.path_curve import NO_WAY, blending, cut
+from services.planner.path.path_curve import NO_LENGTH, blending, cut
 
 Array = NDArray[np.float64]
 
@@ -22,7 +23,7 @@ CORNER_ROWS = 16  # along a corner, for its length in metres
 
 
 class Piece(Protocol):
-    """A smooth part of the way; `length` is [m] where it moves more than it turns, `metres` those of the tool."""
+    """A smooth part of the path; `length` is [m] where it moves more than it turns, `metres` those of the tool."""
 
     @property
     def length(self) -> float: ...
@@ -47,7 +48,7 @@ class Straight:
         return moved(self.start, along * self.twist)
 
     def part(self, begin: float, end: float) -> Straight:
-        """The way between two lengths of it."""
+        """The path between two lengths of it."""
         return Straight(self.at(begin), self.twist, end - begin)
 
 
@@ -55,7 +56,7 @@ class Straight:
 class Corner:
     """Around `corner` from one twist to another: begins and ends `radius` of length away, continuous in acceleration.
 
-    The twist is at every moment a mean of both, so the way stays in the triangle of its ends and the corner.
+    The twist is at every moment a mean of both, so the path stays in the triangle of its ends and the corner.
     """
 
     corner: Pose
@@ -138,7 +139,7 @@ def polyline(poses: Sequence[Pose], blend: float) -> list[ToolPath]:
     Empty where all poses are one.
     """
     lines = [straight(*pair) for pair in pairwise(poses)]
-    legs = [leg for leg in lines if leg.length > NO_WAY]
+    legs = [leg for leg in lines if leg.length > NO_LENGTH]
     cuts = [0.0, *(cut(one.length, other.length, blend) for one, other in pairwise(legs)), 0.0]
     runs: list[list[Piece]] = []
     for index, leg in enumerate(legs):
@@ -147,7 +148,7 @@ def polyline(poses: Sequence[Pose], blend: float) -> list[ToolPath]:
             runs.append([])
         else:
             runs[-1].append(Corner(leg.start, legs[index - 1].twist, leg.twist, before))
-        if leg.length - before - after > NO_WAY:
+        if leg.length - before - after > NO_LENGTH:
             runs[-1].append(leg.part(before, leg.length - after))
     return [ToolPath(run) for run in runs]
 

@@ -1,4 +1,5 @@
-"""The posture near another that has the tool where it is to be, by Newton's steps; and how far the tool is off."""
+"""The configuration near another that has the tool where it is to be, by Newton's steps; and how far the tool is
+off."""
 
 from __future__ import annotations
 
@@ -29,38 +30,38 @@ class ToolSolver:
         self._kinematics, self._holds_turn = kinematics, holds_turn
 
     def solve(self, pose: Pose, guess: Array) -> Array | None:
-        """The posture near `guess` that has the tool there, limits apart; None where there is none."""
-        posture = guess
+        """The configuration near `guess` that has the tool there, limits apart; None where there is none."""
+        configuration = guess
         for _ in range(ITERATIONS):
-            step, missing, left = self._newton(pose, posture)
+            step, missing, left = self._newton(pose, configuration)
             if missing < EXACT:
-                return posture
+                return configuration
             largest = float(np.abs(step).max())
             if largest < LAST_STEP and left < EXACT:
-                return posture + step
-            posture = posture + step * min(1.0, LARGEST_STEP / max(largest, LARGEST_STEP))
+                return configuration + step
+            configuration = configuration + step * min(1.0, LARGEST_STEP / max(largest, LARGEST_STEP))
         return None
 
-    def manipulability(self, posture: Array) -> float:
+    def manipulability(self, configuration: Array) -> float:
         """The smallest singular value of what is held of the tool, turns counted as the path counts them."""
-        jacobian = self._kinematics.jacobian(posture)
+        jacobian = self._kinematics.jacobian(configuration)
         held = WEIGHTS * jacobian if self._holds_turn else jacobian[:3]
         return float(np.linalg.svd(held, compute_uv=False)[-1])
 
-    def error(self, pose: Pose, posture: Array) -> float:
+    def error(self, pose: Pose, configuration: Array) -> float:
         """[m] that the tool is off; turns counted as the path counts them, where they are held."""
-        now = self._kinematics.tool(posture)
+        now = self._kinematics.tool(configuration)
         missing = _length(pose.position - now.position)
         if not self._holds_turn:
             return missing
         return max(missing, METRES_PER_RADIAN * _length(pin.log3(pose.rotation @ now.rotation.T)))
 
-    def _newton(self, pose: Pose, posture: Array) -> tuple[Array, float, float]:
+    def _newton(self, pose: Pose, configuration: Array) -> tuple[Array, float, float]:
         """The step of the joints, what is missing [m], and what of that a straight arm would still miss after it.
 
         The turn that is not held is followed as far as it may.
         """
-        now, jacobian = self._kinematics.tool_and_jacobian(posture)
+        now, jacobian = self._kinematics.tool_and_jacobian(configuration)
         missing = pose.position - now.position
         turn = pin.log3(pose.rotation @ now.rotation.T)
         if self._holds_turn:
@@ -70,8 +71,8 @@ class ToolSolver:
             return step, _length(missing), _length(missing - held @ step)
         held = jacobian[:3]
         step = _damped(held, missing, DAMPING)
-        if len(posture) > 3:
-            free = np.eye(len(posture)) - np.linalg.pinv(held) @ held
+        if len(configuration) > 3:
+            free = np.eye(len(configuration)) - np.linalg.pinv(held) @ held
             left = jacobian[3:] @ free
             step = step + free @ _damped(left, turn - jacobian[3:] @ step, NULL_DAMPING)
         return step, _length(missing), _length(missing - held @ step)

@@ -1,4 +1,4 @@
-"""How near things may come, and how far along a way the arm can go before they do."""
+"""How near things may come, and how far along a path the arm can go before they do."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 CLEARANCE = 0.004  # [m] that links which may not touch keep between them
-ROUNDING = 0.0002  # [m] more, for a posture that is rounded before it is told
+ROUNDING = 0.0002  # [m] more, for a configuration that is rounded before it is told
 MOST_LOOKS = 50_000
 
 
-class Checker(Protocol):
+class DistanceChecker(Protocol):
     """Distances of the arm to itself, or to everything around it as well."""
 
     @property
@@ -25,24 +25,25 @@ class Checker(Protocol):
     def pairs_within(self, positions: Sequence[float] | Array, margin: float = 0.0) -> list[tuple[str, str]]: ...
 
 
-class Sweeper(Checker, Protocol):
-    """And of whole ways, pair by pair."""
+class PathChecker(DistanceChecker, Protocol):
+    """And of whole paths, pair by pair."""
 
     def touching(self, positions: Array, margin: float) -> Array | None: ...
 
 
-def first_collision(checker: Checker, positions: Array, margin: float) -> Array | None:
-    """The first posture along the rows of `positions` (m, n) that does not keep `margin` [m], or None."""
+def first_collision(checker: DistanceChecker, positions: Array, margin: float) -> Array | None:
+    """The first configuration along the rows of `positions` (m, n) that does not keep `margin` [m], or None."""
     return _walk(checker, positions, margin)[1]
 
 
-def last_free(checker: Checker, start: Array, goal: Array) -> Array:
-    """The last posture (n,) on the straight line from `start` to `goal` before anything comes nearer than allowed."""
+def last_free(checker: DistanceChecker, start: Array, goal: Array) -> Array:
+    """The last configuration (n,) on the straight line from `start` to `goal` before anything comes nearer than
+    allowed."""
     return _walk(checker, np.vstack((start, goal)), CLEARANCE + ROUNDING)[0]
 
 
-def _walk(checker: Checker, positions: Array, margin: float) -> tuple[Array, Array | None]:
-    """The last posture that keeps the margin, and the first one after it that does not.
+def _walk(checker: DistanceChecker, positions: Array, margin: float) -> tuple[Array, Array | None]:
+    """The last configuration that keeps the margin, and the first one after it that does not.
 
     Between two looks no point of the arm moves farther than the clearance just seen, or than half the margin where
     there is none to spare, so that nothing is skipped (conservative advancement).
@@ -52,27 +53,27 @@ def _walk(checker: Checker, positions: Array, margin: float) -> tuple[Array, Arr
     least = max(0.5 * margin, end / MOST_LOOKS)
     along, last = 0.0, positions[0]
     while True:
-        posture = _posture_at(along, moved, positions)
-        clearance = checker.distance(posture) - margin
+        configuration = _configuration_at(along, moved, positions)
+        clearance = checker.distance(configuration) - margin
         if clearance <= 0.0:
-            return last, posture
+            return last, configuration
         if along >= end:
-            return posture, None
-        last = posture
+            return configuration, None
+        last = configuration
         along = min(end, along + max(clearance, least))
 
 
-def _movement(checker: Checker, positions: Array) -> Array:
+def _movement(checker: DistanceChecker, positions: Array) -> Array:
     """(m,) [m] that any point of the arm has moved at most since the first row."""
     return np.concatenate(([0.0], np.cumsum(np.abs(np.diff(positions, axis=0)) @ checker.reach)))
 
 
-def _posture_at(along: float, moved: Array, positions: Array) -> Array:
-    """The posture (n,) after so much movement [m], on the line between two rows."""
+def _configuration_at(along: float, moved: Array, positions: Array) -> Array:
+    """The configuration (n,) after so much movement [m], on the line between two rows."""
     row = min(max(int(np.searchsorted(moved, along, side="right")) - 1, 0), len(moved) - 2) if len(moved) > 1 else 0
     if len(moved) == 1:
         return np.asarray(positions[0])
     step = float(moved[row + 1] - moved[row])
     share = min(1.0, (along - float(moved[row])) / step) if step > 0.0 else 1.0
-    posture: Array = positions[row] + share * (positions[row + 1] - positions[row])
-    return posture
+    configuration: Array = positions[row] + share * (positions[row + 1] - positions[row])
+    return configuration

@@ -1,7 +1,7 @@
-"""A whole way against all that may touch: every pair of shapes is looked at only as often as it comes near.
+"""A whole path against all that may touch: every pair of shapes is looked at only as often as it comes near.
 
 Two shapes that are so far apart stay apart for as long as the joints between them do not carry them farther than that:
-a look answers for a stretch of the way on both sides, a long one for most pairs (conservative advancement, pair by
+a look answers for a stretch of the path on both sides, a long one for most pairs (conservative advancement, pair by
 pair; Mirtich 1996). Joints that carry both shapes of a pair do not count.
 """
 
@@ -25,25 +25,26 @@ FINEST = 0.25  # of the margin: so far at least does a look answer, whatever it 
 MOST_LOOKS = 50_000
 
 
-class Sweep:
-    """For one world; `look(posture, pairs)` says how far apart [m] these pairs are."""
+class ContinuousCheck:
+    """For one world; `look(configuration, pairs)` says how far apart [m] these pairs are."""
 
     def __init__(self, arm: Arm, kinematics: Kinematics, geometry: WorldGeometry, look: Look) -> None:
         self._look = look
         self.reach: Array = _pair_reach(arm, kinematics.model, geometry)
 
     def touching(self, positions: Array, margin: float) -> Array | None:
-        """Any posture along the rows of `positions` (m, n) at which a pair is nearer than `margin` [m], or None."""
+        """Any configuration along the rows of `positions` (m, n) at which a pair is nearer than `margin` [m], or
+        None."""
         moved = self._movement(positions)
         finest = max(FINEST * margin, float(moved[-1].max(initial=0.0)) / MOST_LOOKS)
         waiting = [(0.0, float(len(positions) - 1), np.arange(len(self.reach)), moved[0], moved[-1])]
         while waiting:
             low, high, pairs, left, right = waiting.pop()
             middle = 0.5 * (low + high)
-            posture = _at(middle, positions)
-            spare = self._look(posture, pairs.tolist()) - margin
+            configuration = _at(middle, positions)
+            spare = self._look(configuration, pairs.tolist()) - margin
             if spare.size and float(spare.min()) <= 0.0:
-                return posture
+                return configuration
             reached, known = _at(middle, moved)[pairs], np.maximum(spare, finest)
             before, after = reached - left > known, right - reached > known
             if before.any():

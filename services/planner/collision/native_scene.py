@@ -1,4 +1,4 @@
-"""A planning scene as the compiled core has it: obstacles in the base frame, and what the links carry."""
+"""A planning scene as the native planner has it: obstacles in the base frame, and what the links carry."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from pathlib import Path
 from schemas.scene import PlanningScene, SceneObject
 from services.arm.description import Arm
 from services.planner.collision.scene_shapes import allows, shape_of
-from services.planner.collision_geometry.shapes import Attachment, Shape
+from services.planner.collision_geometry.shapes import Attachment, CollisionShape
 
 
-def native_scene(arm: Arm, scene: PlanningScene, folders: Sequence[Path] = ()) -> tuple[list[Shape], list[Attachment]]:
+def native_scene(
+    arm: Arm, scene: PlanningScene, folders: Sequence[Path] = ()
+) -> tuple[list[CollisionShape], list[Attachment]]:
     """Obstacles and attachments with what they may touch; raises `SceneError`. What may touch is as in `World`."""
     links = [link.name for link in arm.model.links if link.collisions]
     carried = [_attachment(item, scene, links, folders) for item in scene.objects if item.attached]

@@ -12,7 +12,7 @@ from schemas.message import Vector
 from schemas.scene import AllowedPair, BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, SphereShape
 from services.arm.stl import BadMesh, read_stl
 from services.arm.transforms import Rigid, from_message
-from services.planner.collision_geometry.shapes import Mesh, Shape, ShapeKind
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 Folders = Sequence[Path]
 
@@ -24,12 +24,12 @@ class SceneError(ValueError):
     """A scene that cannot be; the text names the object, the value and the remedy."""
 
 
-def shape_of(item: SceneObject, folders: Folders = ()) -> Shape:
+def shape_of(item: SceneObject, folders: Folders = ()) -> CollisionShape:
     """The object as a solid, its pose in its own frame; mesh files are looked for in `folders`. Raises `SceneError`."""
     if not 0.0 <= item.padding <= LARGEST:
         raise SceneError(f'object "{item.name}": padding is {item.padding:g} m; give 0 m or more')
     kind, size, mesh = _form(item, folders)
-    return Shape(item.name, kind, size, pose_of(item), mesh, item.padding)
+    return CollisionShape(item.name, kind, size, pose_of(item), mesh, item.padding)
 
 
 def pose_of(item: SceneObject) -> Rigid:
@@ -44,7 +44,7 @@ def pose_of(item: SceneObject) -> Rigid:
 
 
 def allows(pairs: Iterable[AllowedPair], first: str, second: str) -> bool:
-    """Whether one of the pairs lets these two touch, in either order; "*" is any name."""
+    """True if one of the pairs lets these two touch, in either order; "*" is any name."""
     return any(
         (pair.first in (one, ANY) and pair.second in (other, ANY))
         for pair in pairs
@@ -52,7 +52,7 @@ def allows(pairs: Iterable[AllowedPair], first: str, second: str) -> bool:
     )
 
 
-def _form(item: SceneObject, folders: Folders) -> tuple[ShapeKind, tuple[float, ...], Mesh | None]:
+def _form(item: SceneObject, folders: Folders) -> tuple[ShapeKind, tuple[float, ...], TriangleMesh | None]:
     match item.shape:
         case BoxShape(size=edges):
             return ShapeKind.BOX, _sizes(item.name, "box", ("x", "y", "z"), edges), None
@@ -76,7 +76,7 @@ def _sizes(name: str, what: str, names: Sequence[str], values: Vector) -> Vector
     return values
 
 
-def _mesh(name: str, shape: MeshShape, folders: Folders) -> Mesh:
+def _mesh(name: str, shape: MeshShape, folders: Folders) -> TriangleMesh:
     if len(shape.scale) != 3 or not all(0.0 < abs(factor) <= LARGEST for factor in shape.scale):
         raise SceneError(f'object "{name}": scale of the mesh is {shape.scale}; give three numbers that are not 0')
     x, y, z = shape.scale
@@ -88,12 +88,12 @@ def _mesh(name: str, shape: MeshShape, folders: Folders) -> Mesh:
 
 
 @lru_cache(maxsize=64)
-def _triangles(content: bytes, scale: tuple[float, float, float]) -> Mesh:
+def _triangles(content: bytes, scale: tuple[float, float, float]) -> TriangleMesh:
     """Of equal content the same mesh, so that what is built of it is built once."""
     triangles = read_stl(content)
     inside_out = scale[0] * scale[1] * scale[2] < 0.0
     faces = triangles.faces[:, ::-1] if inside_out else triangles.faces
-    return Mesh(triangles.vertices * np.array(scale), np.ascontiguousarray(faces))
+    return TriangleMesh(triangles.vertices * np.array(scale), np.ascontiguousarray(faces))
 
 
 def _content(name: str, shape: MeshShape, folders: Folders) -> bytes:

@@ -1,4 +1,4 @@
-"""Whether the arm touches itself, what it carries, or what stands around it: coal on the exact shapes.
+"""True if the arm touches itself, what it carries, or what stands around it: coal on the exact shapes.
 
 The reference of every faster check, with the names that `SelfCollisions` has for the arm alone.
 """
@@ -18,7 +18,7 @@ from schemas.scene import Contact, PlanningScene
 from services.arm.collisions import LinkPair
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
-from services.planner.collision.continuous import Sweep
+from services.planner.collision.continuous import ContinuousCheck
 from services.planner.collision.world_geometry import LowerBounds, WorldGeometry
 from services.planner.collision_geometry.coal_shapes import is_inside
 
@@ -57,7 +57,7 @@ class World:
             self._placed.deactivateCollisionPair(index)
         self.reach: Array = self._geometry.reach
         self._sides: dict[tuple[int, int], Side] = {}  # the shapes' numbers, outer first
-        self._sweep = Sweep(arm, kinematics, self._geometry, self.distances)
+        self._sweep = ContinuousCheck(arm, kinematics, self._geometry, self.distances)
 
     @property
     def version(self) -> int:
@@ -120,7 +120,8 @@ class World:
         return self._sweep.reach
 
     def touching(self, positions: Array, margin: float) -> Array | None:
-        """Any posture along the rows of `positions` (m, n) at which something is nearer than `margin` [m], or None."""
+        """Any configuration along the rows of `positions` (m, n) at which something is nearer than `margin` [m], or
+        None."""
         return self._sweep.touching(positions, margin)
 
     def pairs_within(self, positions: Positions, margin: float = 0.0) -> list[LinkPair]:
@@ -138,7 +139,7 @@ class World:
         return list(found.values())
 
     def _place(self, positions: Positions) -> None:
-        """Moves the shapes, and computes the distances of the pairs that are looked at in every posture."""
+        """Moves the shapes, and computes the distances of the pairs that are looked at in every configuration."""
         q = self._kinematics.configuration.to_pinocchio(positions)
         pin.updateGeometryPlacements(self._kinematics.model, self._data, self._geometry.model, self._placed, q)
         pin.computeDistances(self._geometry.model, self._placed)
@@ -168,7 +169,7 @@ class World:
         return distance - self._geometry.padding[index]
 
     def _is_swallowed(self, index: int, distance: float) -> bool:
-        """Whether one shape is wholly inside the other, a mesh: coal sees only its surface, `distance` [m] away."""
+        """True if one shape is wholly inside the other, a mesh: coal sees only its surface, `distance` [m] away."""
         one, other = self._geometry.pairs[index]
         return self._holds(one, other, distance) or self._holds(other, one, distance)
 

@@ -16,7 +16,7 @@ from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.planner.collision.scene_shapes import SceneError, allows, shape_of
 from services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
-from services.planner.collision_geometry.shapes import Shape, matrix_of
+from services.planner.collision_geometry.shapes import CollisionShape, matrix_of
 
 Array = NDArray[np.float64]
 ENDLESS = 1e6  # [m]
@@ -48,7 +48,7 @@ class WorldGeometry:
         self.moving = [index for index, joint in enumerate(self._joints) if joint != 0]
         self.reach: Array = reach_of(arm, kinematics.model, self.model)
 
-    def _placed(self, item: SceneObject, shape: Shape) -> pin.GeometryObject:
+    def _placed(self, item: SceneObject, shape: CollisionShape) -> pin.GeometryObject:
         pose = matrix_of(shape.pose)
         inner = pin.SE3(pose[:3, :3], pose[:3, 3])
         if not item.attached:
@@ -71,7 +71,7 @@ class WorldGeometry:
     def _checked(self) -> tuple[list[tuple[int, int]], int]:
         """The pairs that a joint can move apart and that nothing allows to touch, known to the model as well.
 
-        The first of them, as many as the second result says, are worth looking at in every posture: links among
+        The first of them, as many as the second result says, are worth looking at in every configuration: links among
         themselves, and solids while there are few.
         """
         count = len(self.shape_names)

@@ -8,13 +8,13 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.collision_geometry.shapes import Mesh, Shape, ShapeKind
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 Array = NDArray[np.float64]
 WHOLE_TURN = 4.0 * np.pi  # the solid angle of everything
 
 
-def geometry_of(shape: Shape) -> coal.CollisionGeometry:
+def geometry_of(shape: CollisionShape) -> coal.CollisionGeometry:
     """The solid around its own origin, without its padding."""
     size = shape.size
     match shape.kind:
@@ -34,7 +34,7 @@ def geometry_of(shape: Shape) -> coal.CollisionGeometry:
 
 
 @lru_cache(maxsize=64)
-def tree_of(mesh: Mesh) -> coal.BVHModelOBBRSS:
+def tree_of(mesh: TriangleMesh) -> coal.BVHModelOBBRSS:
     """The mesh's surface as a tree of boxes: built once for as long as it is among the newest."""
     tree = coal.BVHModelOBBRSS()
     tree.beginModel(len(mesh.faces), len(mesh.vertices))
@@ -46,8 +46,8 @@ def tree_of(mesh: Mesh) -> coal.BVHModelOBBRSS:
     return tree
 
 
-def is_inside(mesh: Mesh, point: Array) -> bool:
-    """Whether the surface goes around `point` (3,) in the mesh's frame, holes or not.
+def is_inside(mesh: TriangleMesh, point: Array) -> bool:
+    """True if the surface goes around `point` (3,) in the mesh's frame, holes or not.
 
     By the generalised winding number (Jacobson et al. 2013) of the solid angles of its triangles (Van Oosterom and
     Strackee 1983); either orientation of the triangles counts.
@@ -62,10 +62,10 @@ def is_inside(mesh: Mesh, point: Array) -> bool:
     return bool(abs(2.0 * np.arctan2(volume, shape).sum()) > 0.5 * WHOLE_TURN)
 
 
-def mesh_of(geometry: coal.CollisionGeometry) -> Mesh | None:
+def mesh_of(geometry: coal.CollisionGeometry) -> TriangleMesh | None:
     """The triangles of a geometry that has any."""
     if not isinstance(geometry, coal.BVHModelBase):
         return None
     vertices = np.array([geometry.vertex(index) for index in range(geometry.num_vertices)]).reshape(-1, 3)
     triangles = map(geometry.tri_indices, range(geometry.num_tris))
-    return Mesh(vertices, np.array([[triangle[k] for k in range(3)] for triangle in triangles], dtype=np.int32))
+    return TriangleMesh(vertices, np.array([[triangle[k] for k in range(3)] for triangle in triangles], dtype=np.int32))

@@ -10,24 +10,24 @@ from numpy.typing import NDArray
 from services.arm.collisions import load_shapes
 from services.arm.description import Arm
 from services.arm.errors import DescriptionError
-from services.planner.collision_geometry.shapes import Mesh, Shape, ShapeKind
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from services.planner.collision_geometry.solids import Box, Capsule, Cylinder, Solid
 
 Array = NDArray[np.float64]
-Form = tuple[ShapeKind, tuple[float, ...], Mesh | None]
+Form = tuple[ShapeKind, tuple[float, ...], TriangleMesh | None]
 
 
-def link_shapes(arm: Arm) -> dict[str, tuple[Shape, ...]]:
+def link_shapes(arm: Arm) -> dict[str, tuple[CollisionShape, ...]]:
     """The collision shapes of every link that has any, in the link's frame; raises `DescriptionError` where one could
     not be loaded."""
     model = pin.buildModelFromUrdf(str(arm.urdf_path))
-    shapes: dict[str, tuple[Shape, ...]] = {}
+    shapes: dict[str, tuple[CollisionShape, ...]] = {}
     for item in load_shapes(arm, model).geometryObjects:
         frame = model.frames[item.parentFrame]
         placement = frame.placement.actInv(item.placement)
         x, y, z, w = pin.Quaternion(placement.rotation).coeffs().tolist()
         form, size, mesh = _form_of(item.geometry, frame.name)
-        shape = Shape(item.name, form, size, (tuple(placement.translation.tolist()), (x, y, z, w)), mesh)
+        shape = CollisionShape(item.name, form, size, (tuple(placement.translation.tolist()), (x, y, z, w)), mesh)
         shapes[frame.name] = (*shapes.get(frame.name, ()), shape)
     return shapes
 
@@ -47,13 +47,13 @@ def _form_of(geometry: coal.CollisionGeometry, link: str) -> Form:
             vertices = np.array([geometry.vertex(i) for i in range(geometry.num_vertices)]).reshape(-1, 3)
             triangles = map(geometry.tri_indices, range(geometry.num_tris))
             faces = np.array([[triangle[k] for k in range(3)] for triangle in triangles], dtype=np.int32)
-            return ShapeKind.MESH, (), Mesh(vertices, faces)
+            return ShapeKind.MESH, (), TriangleMesh(vertices, faces)
     raise DescriptionError(
         f'link "{link}": there are no spheres for a {type(geometry).__name__}; use box, cylinder, sphere or mesh'
     )
 
 
-def solid_of(shape: Shape) -> Solid:
+def solid_of(shape: CollisionShape) -> Solid:
     """Its solid about its own origin; raises ValueError for a mesh and for what has no end."""
     size = shape.size
     match shape.kind:

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 class ShapeKind(StrEnum):
-    """And what `Shape.size` means for each, in m."""
+    """And what `CollisionShape.size` means for each, in m."""
 
     BOX = "box"  # x, y, z: whole lengths of the edges
     SPHERE = "sphere"  # radius
@@ -29,7 +29,7 @@ SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "half_space": 0, "m
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class TriangleMesh:
     """Triangles: `vertices` (v, 3) [m], `faces` (f, 3) vertex numbers. Solid where the surface is closed."""
 
     vertices: Array
@@ -37,7 +37,7 @@ class Mesh:
 
     @property
     def arrays(self) -> tuple[Array, NDArray[np.int32]]:
-        """Vertices and faces as the compiled core wants them; raises ValueError for a vertex that is not finite."""
+        """Vertices and faces as the native planner wants them; raises ValueError for a vertex that is not finite."""
         vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
         if not np.isfinite(vertices).all():
             raise ValueError("a vertex of the mesh is not finite")
@@ -45,14 +45,14 @@ class Mesh:
 
 
 @dataclass(frozen=True)
-class Shape:
+class CollisionShape:
     """One solid; `pose` is in the arm's base, or in the link that it belongs to."""
 
     name: str
     kind: ShapeKind
     size: tuple[float, ...] = ()
     pose: Rigid = IDENTITY
-    mesh: Mesh | None = None
+    mesh: TriangleMesh | None = None
     padding: float = 0.0  # [m] added on all sides
     touching: frozenset[str] = frozenset()  # links and attached things that may touch it
 
@@ -99,5 +99,5 @@ class Attachment:
 
     name: str
     link: str
-    shapes: tuple[Shape, ...]
+    shapes: tuple[CollisionShape, ...]
     touching: frozenset[str] = frozenset()

@@ -1,7 +1,7 @@
 """How fast velocities of all joints may change together, and where the arm comes to rest from them.
 
 Braking is as gentle as the gateway's jerk limit: a joint slows by `speed / (d'(speed) + dt)` at most, where d is its
-jerk-limited way to rest. Then the place where it would come to rest never moves back from one period to the next.
+jerk-limited path to rest. Then the place where it would come to rest never moves back from one period to the next.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Braking:
         self._shares = np.arange(1, PIECES + 1)[:, None] / PIECES
 
     def towards(self, present: Array, wanted: Array) -> Array:
-        """The velocity after a period on the straight way from `present` to `wanted`.
+        """The velocity after a period on the straight path from `present` to `wanted`.
 
         All joints change in proportion, so that braking keeps the direction of the motion.
         """
@@ -46,18 +46,18 @@ class Braking:
     def together(self, velocity: Array) -> Array:
         """[rad] or [m] that braking with `towards` takes at most, all joints at rest at one time.
 
-        With v the share of the velocity that is left and t its time constant, dv/dt = -v/t: the way is the integral of
+        With v the share of the velocity that is left and t its time constant, dv/dt = -v/t: the path is the integral of
         t over v from 0 to 1, summed from above.
         """
         speeds = self._shares * np.abs(velocity)[..., None, :]
         constants = self._time_constants(speeds).max(axis=-1)
-        way: Array = constants.mean(axis=-1, keepdims=True) * velocity
-        return way
+        displacement: Array = constants.mean(axis=-1, keepdims=True) * velocity
+        return displacement
 
-    def way_to_rest(self, velocity: Array) -> Array:
+    def displacement_to_rest(self, velocity: Array) -> Array:
         """[rad] or [m] with the period that is about to come."""
-        way: Array = self.dt * velocity + self.together(velocity)
-        return way
+        displacement: Array = self.dt * velocity + self.together(velocity)
+        return displacement
 
     def alone(self, velocity: Array) -> Array:
         """(n,) [rad] or [m] until each joint has come to rest as fast as it can: never farther than `together`."""

@@ -20,7 +20,7 @@ from services.planner.collision.world import World
 from services.planner.jog.braking import Braking
 from services.planner.jog.jog_command import BadJog, JogInterpreter, JogRefused, Wanted, standing_position
 from services.planner.jog.jog_limits import no_command, singularity
-from services.planner.jog.velocity_limiter import Room
+from services.planner.jog.velocity_limiter import VelocityLimiter
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ class Jog:
         self._arm = arm
         self._interpreter = JogInterpreter(kinematics)
         self._braking = Braking(arm, PERIOD)
-        self._room = Room(arm, world, self._braking)
+        self._limiter = VelocityLimiter(arm, world, self._braking)
         self._command = JogCommand()
         self._heard = self._told = self._rested = self._on_way = NEVER
         self._is_heard = False
@@ -68,7 +68,7 @@ class Jog:
 
     @property
     def is_busy(self) -> bool:
-        """Whether there is anything to do for a step."""
+        """True if there is anything to do for a step."""
         return self._positions is not None or self._is_heard
 
     @property
@@ -78,7 +78,7 @@ class Jog:
 
     def set_world(self, world: World) -> None:
         """What counts from the next step on."""
-        self._room = Room(self._arm, world, self._braking)
+        self._limiter = VelocityLimiter(self._arm, world, self._braking)
 
     def on_command(self, command: JogCommand, now: float) -> None:
         """The newest one counts."""
@@ -94,26 +94,26 @@ class Jog:
         present: JointState | None,
         age: float,
         goal_is_active: bool,
-        hindrance: str = "",
+        not_ready: str = "",
     ) -> JogOutput:
-        """One period; `present` is `age` [s] old, `stamp` is [ns] UNIX, `hindrance` why the device does not move."""
+        """One period; `present` is `age` [s] old, `stamp` is [ns] UNIX, `not_ready` why the device does not move."""
         self._is_heard = now - self._heard <= DEAD_MAN
         if not self.is_busy:
             return JogOutput()
         try:
             if self._positions is None:
-                self._begin(present, age, goal_is_active, hindrance, now)
+                self._begin(present, age, goal_is_active, not_ready, now)
             said = self._lead(now)
-            self._require_followed(present, age, goal_is_active, hindrance, now)
+            self._require_followed(present, age, goal_is_active, not_ready, now)
         except JogRefused as refused:
             return self._end(str(refused), now, stamp)
         return self._output(now, stamp, present, said)
 
-    def _begin(self, present: JointState | None, age: float, goal_is_active: bool, hindrance: str, now: float) -> None:
+    def _begin(self, present: JointState | None, age: float, goal_is_active: bool, not_ready: str, now: float) -> None:
         if goal_is_active:
             raise JogRefused("a goal is being carried out: cancel it first")
-        if hindrance:
-            raise JogRefused(hindrance)
+        if not_ready:
+            raise JogRefused(not_ready)
         if self._interrupted_by:
             raise JogRefused(
                 f"jogging was interrupted ({self._interrupted_by}), and nothing resumes by itself: "
@@ -131,16 +131,16 @@ class Jog:
         there = self._positions + 0.5 * PERIOD * self._velocity  # halfway: the tool's line bends less
         wanted, said = self._wanted(there) if self._is_heard else (self._fading(there, now), "")
         singular = self._singularity_on if wanted.is_twist else None
-        allowed = self._room.allowed(self._positions, self._velocity, wanted.velocity, singular)
+        allowed = self._limiter.allowed(self._positions, self._velocity, wanted.velocity, singular)
         self._velocity = allowed.velocity
         self._positions = self._positions + PERIOD * allowed.velocity
         self._scale = wanted.scale * allowed.share
         self._limits = (*wanted.limits, *allowed.limits)
         return said
 
-    def _singularity_on(self, way: Array) -> JogLimit | None:
+    def _singularity_on(self, displacement: Array) -> JogLimit | None:
         assert self._positions is not None
-        regularity = self._interpreter.twists.singularity_on(self._positions, way)
+        regularity = self._interpreter.twists.singularity_on(self._positions, displacement)
         return None if regularity is None else singularity(regularity)
 
     def _wanted(self, positions: Array) -> tuple[Wanted, str]:
@@ -168,20 +168,20 @@ class Jog:
         return Wanted(min(1.0, share) * wanted.velocity, is_twist=True)
 
     def _require_followed(
-        self, present: JointState | None, age: float, goal_is_active: bool, hindrance: str, now: float
+        self, present: JointState | None, age: float, goal_is_active: bool, not_ready: str, now: float
     ) -> None:
         """Raises `JogRefused` where somebody else moves the arm, or nobody does."""
         if goal_is_active:
             raise JogRefused("a goal has taken over")
         if present is None or age > FOLLOW:
-            raise JogRefused(hindrance or "no fresh joint_states: is the stepper_gateway running?")
+            raise JogRefused(not_ready or "no fresh joint_states: is the stepper_gateway running?")
         self._remember(now)
         astray = self._astray(present)
-        if not (astray or hindrance):
+        if not (astray or not_ready):
             self._on_way = now
         elif now - self._on_way > GRACE:
             raise JogRefused(
-                hindrance or f"{astray} does not follow its targets: see what `gemelo state` says of the device"
+                not_ready or f"{astray} does not follow its targets: see what `gemelo state` says of the device"
             )
 
     def _remember(self, now: float) -> None:

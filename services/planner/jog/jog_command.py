@@ -14,7 +14,7 @@ from services.arm.errors import suggestion
 from services.arm.kinematics import Kinematics
 from services.planner.jog.jog_limits import no_command, singularity, speed_limit
 from services.planner.jog.twist import TwistSolver
-from services.planner.request.refusals import NoPlan
+from services.planner.request.refusals import PlanRefused
 from services.planner.request.start_state import resolve_start
 
 Array = NDArray[np.float64]
@@ -114,5 +114,5 @@ def standing_position(arm: Arm, present: JointState | None, age: float) -> tuple
     """[rad] or [m] in the arm's order, of an arm that stands; raises `JogRefused`."""
     try:
         return resolve_start(arm, None, present, age)
-    except NoPlan as no_plan:
-        raise JogRefused(f"{no_plan.refusal.message}; {no_plan.refusal.remedy}") from no_plan
+    except PlanRefused as refused:
+        raise JogRefused(f"{refused.refusal.message}; {refused.refusal.remedy}") from refused

@@ -43,39 +43,41 @@ class Obstacles:
         most = CONTACT_SPEED / max(CONTACT_SPEED, float(self._nearness.speeds(wanted, pairs).max()))
         return most, None if most == 1.0 else self._said(pairs, self._nearness.distances(pairs))
 
-    def on_the_way(self, velocity: Array) -> JogLimit | None:
+    def obstacle_ahead(self, velocity: Array) -> JogLimit | None:
         """What comes too near something on the way to rest.
 
         Conservative advancement, pair by pair; two that are nearer than they should be already may only come away.
         """
-        way = self._braking.way_to_rest(velocity)
+        displacement = self._braking.displacement_to_rest(velocity)
         floor = CLEARANCE + SLACK + self._straying(velocity)
-        pairs = self._nearness.pairs_within(floor, way)
+        pairs = self._nearness.pairs_within(floor, displacement)
         before = self._nearness.distances(pairs)
-        closing = self._hardly_known(way, pairs, before, floor)
+        closing = self._hardly_known(displacement, pairs, before, floor)
         if closing is None:
-            closing = self._closing(way, pairs, before, floor)
+            closing = self._closing(displacement, pairs, before, floor)
         if closing is None:
-            closing = self._closing_before(way, pairs, before, floor)
+            closing = self._closing_before(displacement, pairs, before, floor)
         return None if closing is None else self._said(closing, self._nearness.distances(closing))
 
-    def _hardly_known(self, way: Array, pairs: Pairs, before: Array, floor: float) -> Pairs | None:
+    def _hardly_known(self, displacement: Array, pairs: Pairs, before: Array, floor: float) -> Pairs | None:
         """The pairs that are clear now, dear to look at, and moved farther than one look on the way answers for."""
         free = np.maximum(before - floor, LEAST_LOOK)
-        unseen = self._nearness.are_dear(pairs) & (before >= floor) & (self._nearness.speeds(way, pairs) > free)
+        unseen = (
+            self._nearness.are_dear(pairs) & (before >= floor) & (self._nearness.speeds(displacement, pairs) > free)
+        )
         return pairs[unseen] if unseen.any() else None
 
-    def _closing(self, way: Array, pairs: Pairs, before: Array, floor: float) -> Pairs | None:
-        """The pairs that are too near at the end of the way, and not farther than before."""
+    def _closing(self, displacement: Array, pairs: Pairs, before: Array, floor: float) -> Pairs | None:
+        """The pairs that are too near at the end of the path, and not farther than before."""
         if not pairs.size:
             return None
-        after = self._nearness.distances_at(self._here + way, pairs)
+        after = self._nearness.distances_at(self._here + displacement, pairs)
         too_near = (after < floor) & ~comes_away(before, after)
         return pairs[too_near] if too_near.any() else None
 
-    def _closing_before(self, way: Array, pairs: Pairs, before: Array, floor: float) -> Pairs | None:
+    def _closing_before(self, displacement: Array, pairs: Pairs, before: Array, floor: float) -> Pairs | None:
         """The same of any place before the end; pairs that are clear of one another for the rest fall out."""
-        moved, along = self._nearness.speeds(way, pairs), 0.0
+        moved, along = self._nearness.speeds(displacement, pairs), 0.0
         for _ in range(MOST_LOOKS):
             free = np.maximum(before - floor, LEAST_LOOK)
             counts = (before < floor) | (free < (1.0 - along) * moved)
@@ -83,7 +85,7 @@ class Obstacles:
             if not pairs.size:
                 return None
             along = min(1.0, along + float(np.min(free / moved)))
-            after = self._nearness.distances_at(self._here + along * way, pairs)
+            after = self._nearness.distances_at(self._here + along * displacement, pairs)
             too_near = (after < floor) & ~comes_away(before, after)
             if too_near.any():
                 return pairs[too_near]
@@ -93,12 +95,12 @@ class Obstacles:
         return pairs
 
     def _straying(self, velocity: Array) -> float:
-        """[m] by which joints that stop each on its own, when the targets cease, leave the straight way at most."""
+        """[m] by which joints that stop each on its own, when the targets cease, leave the straight path at most."""
         together, alone = np.abs(self._braking.together(velocity)), np.abs(self._braking.alone(velocity))
         whole = float(together @ self._reach)
         if whole == 0.0:
             return 0.0
-        nearest = float(alone @ self._reach) / whole  # a place on the straight way that is near to where they stop
+        nearest = float(alone @ self._reach) / whole  # a place on the straight path that is near to where they stop
         return float(np.abs(alone - nearest * together) @ self._reach)
 
     def _said(self, pairs: Pairs, distances: Array) -> JogLimit:
@@ -107,6 +109,6 @@ class Obstacles:
 
 
 def comes_away(before: Array | float, after: Array | float) -> NDArray[np.bool_]:
-    """Whether two that were so near [m] are farther apart; from inside, a way along the surface leads out too."""
+    """True if two that were so near [m] are farther apart; from inside, a path along the surface leads out too."""
     slack = np.where(np.less(before, 0.0), LEVEL, 0.0)
     return np.greater(after, np.subtract(before, slack))

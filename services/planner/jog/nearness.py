@@ -18,7 +18,7 @@ STILL = 1e-9  # [m] that two shapes move against one another: they do not
 
 
 class Nearness:
-    """Of one world, at one posture (n,) [rad] or [m] after the other; pairs of shapes have numbers."""
+    """Of one world, at one configuration (n,) [rad] or [m] after the other; pairs of shapes have numbers."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -28,19 +28,20 @@ class Nearness:
         self._is_exact = np.zeros(len(self._reach), dtype=bool)
         self._here: Array | None = None
 
-    def move_to(self, posture: Array) -> None:
-        """From now on it is about this posture."""
+    def move_to(self, configuration: Array) -> None:
+        """From now on it is about this configuration."""
         if self._here is None:
-            self._least = self._world.least_distances(posture)
+            self._least = self._world.least_distances(configuration)
         else:
-            self._least -= self._moved(posture - self._here)
+            self._least -= self._moved(configuration - self._here)
         self._is_exact[:] = False
-        self._here = posture
+        self._here = configuration
 
-    def pairs_within(self, margin: float, way: Array | None = None) -> Pairs:
-        """Which may be nearer than `margin` [m] here, or somewhere on a `way` (n,) from here that moves them."""
-        moved = self._moved(way) if way is not None else np.zeros(len(self._reach))
-        counts = moved > STILL if way is not None else np.ones(len(self._reach), dtype=bool)
+    def pairs_within(self, margin: float, displacement: Array | None = None) -> Pairs:
+        """Which may be nearer than `margin` [m] here, or somewhere on a `displacement` (n,) from here that moves
+        them."""
+        moved = self._moved(displacement) if displacement is not None else np.zeros(len(self._reach))
+        counts = moved > STILL if displacement is not None else np.ones(len(self._reach), dtype=bool)
         self._look_at(np.flatnonzero(counts & ~self._is_exact & (self._least - moved < margin)))
         return np.flatnonzero(counts & (self._least - moved < margin))
 
@@ -52,9 +53,9 @@ class Nearness:
         """(k,) whether a look at them takes too long to be done often."""
         return self._is_dear[pairs]
 
-    def distances_at(self, posture: Array, pairs: Pairs) -> Array:
+    def distances_at(self, configuration: Array, pairs: Pairs) -> Array:
         """(k,) [m] somewhere else."""
-        return self._world.distances(posture, pairs.tolist())
+        return self._world.distances(configuration, pairs.tolist())
 
     def speeds(self, velocity: Array, pairs: Pairs) -> Array:
         """(k,) [m/s] at which the shapes move against one another at most."""
@@ -64,8 +65,8 @@ class Nearness:
     def names(self, pair: int) -> LinkPair:
         return self._world.pair_names[pair]
 
-    def _moved(self, way: Array) -> Array:
-        moved: Array = self._reach @ np.abs(way)
+    def _moved(self, displacement: Array) -> Array:
+        moved: Array = self._reach @ np.abs(displacement)
         return moved
 
     def _look_at(self, pairs: Pairs) -> None:

@@ -16,7 +16,7 @@ from services.arm.kinematics import Kinematics
 
 Array = NDArray[np.float64]
 
-SAMPLES = 64  # postures that tell what is much for this arm
+SAMPLES = 64  # configurations that tell what is much for this arm
 RANK = 1e-6  # [m/s] below which a direction is none
 NEAR = 0.1  # share of the largest manipulability below which a singularity is near
 DAMPING = 0.2  # at a singularity: share of the smallest singular value that the arm usually has
@@ -24,7 +24,7 @@ STRAIGHT, CROOKED = 0.99, 0.90  # cosines to the commanded twist: full speed, an
 LOOK_AHEAD = 0.02  # [s]
 NOISE = 1e-6  # of the near manipulability, which is no approach
 LEAST = 0.1  # of the near manipulability, at which the tool stops on its way to a singularity
-PLACES = np.linspace(0.25, 1.0, 4)[:, None]  # of a way to rest that are looked at
+PLACES = np.linspace(0.25, 1.0, 4)[:, None]  # of a path to rest that are looked at
 
 
 @dataclass(frozen=True)
@@ -48,18 +48,18 @@ class TwistSolver:
         self._speeds = np.array([joint.velocity for joint in joints])
         lower = np.array([max(joint.lower, -np.pi) for joint in joints])
         upper = np.array([min(joint.upper, np.pi + max(joint.lower, -np.pi)) for joint in joints])
-        postures = np.random.default_rng(1).uniform(lower, np.maximum(lower, upper), (SAMPLES, len(joints)))
-        self._length = self._tool_arm(postures)
+        configurations = np.random.default_rng(1).uniform(lower, np.maximum(lower, upper), (SAMPLES, len(joints)))
+        self._length = self._tool_arm(configurations)
         self._rows = 6
-        if len(joints) < 6 or self._values(postures)[:, -1].max() < RANK:
+        if len(joints) < 6 or self._values(configurations)[:, -1].max() < RANK:
             self._rows = 3
-        values = self._values(postures)
+        values = self._values(configurations)
         self._near = NEAR * max(float(values.prod(axis=1).max()), RANK**self._rows)
         self._damping = DAMPING * float(np.median(values[:, -1]))
 
     @property
     def turns(self) -> bool:
-        """Whether the angular part counts."""
+        """True if the angular part counts."""
         return self._rows == 6
 
     def manipulability(self, positions: Array) -> float:
@@ -85,21 +85,23 @@ class TwistSolver:
             scale *= share
         return ToolMotion(scale * velocity, scale, share)
 
-    def singularity_on(self, positions: Array, way: Array) -> float | None:
-        """The regularity where the arm is, if a way (n,) [rad] or [m] comes too near to a singularity, else None.
+    def singularity_on(self, positions: Array, displacement: Array) -> float | None:
+        """The regularity where the arm is, if a path (n,) [rad] or [m] comes too near to a singularity, else None.
 
         Going along one or away is allowed.
         """
-        shares = self._signed(np.vstack((positions, positions + PLACES * way))) / self._near
+        shares = self._signed(np.vstack((positions, positions + PLACES * displacement))) / self._near
         shares = np.abs(shares) if abs(shares[0]) <= NOISE else shares * np.sign(shares[0])
         return None if shares[1:].min() >= min(LEAST, shares[0] - NOISE) else abs(float(shares[0]))
 
-    def _signed(self, postures: Array) -> Array:
+    def _signed(self, configurations: Array) -> Array:
         """(m,) manipulabilities; of a square Jacobian with the sign, which is another beyond a singularity."""
         if len(self._speeds) == self._rows:
-            determinants: Array = np.linalg.det(np.array([self._scaled(posture) for posture in postures]))
+            determinants: Array = np.linalg.det(
+                np.array([self._scaled(configuration) for configuration in configurations])
+            )
             return determinants
-        volumes: Array = self._values(postures).prod(axis=1)
+        volumes: Array = self._values(configurations).prod(axis=1)
         return volumes
 
     def _weighed(self, twist: Array) -> Array:
@@ -112,14 +114,18 @@ class TwistSolver:
         jacobian[3:] *= self._length
         return jacobian
 
-    def _values(self, postures: Sequence[Array] | Array) -> Array:
+    def _values(self, configurations: Sequence[Array] | Array) -> Array:
         """(m, rows) singular values, the largest first."""
-        values: Array = np.linalg.svd(np.array([self._scaled(posture) for posture in postures]), compute_uv=False)
+        values: Array = np.linalg.svd(
+            np.array([self._scaled(configuration) for configuration in configurations]), compute_uv=False
+        )
         return values
 
-    def _tool_arm(self, postures: Array) -> float:
-        """[m] by which a turn weighs as much as a way: half of how far the tool gets from the base."""
-        return 0.5 * max(float(np.linalg.norm(self._kinematics.tool(posture).position)) for posture in postures)
+    def _tool_arm(self, configurations: Array) -> float:
+        """[m] by which a turn weighs as much as a path: half of how far the tool gets from the base."""
+        return 0.5 * max(
+            float(np.linalg.norm(self._kinematics.tool(configuration).position)) for configuration in configurations
+        )
 
 
 def _straightness(wanted: Array, gotten: Array) -> float:

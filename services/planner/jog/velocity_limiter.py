@@ -22,7 +22,7 @@ SINGULARITY_HALVINGS = 6
 FACTORS = (1.2, 0.9, 0.5)  # of the share of the tick before, where something is in the way
 LEAST_SHARE = 0.01
 
-# What is too near on a way (n,) [rad] or [m] from where the arm is; None where it may be gone.
+# What is too near on a path (n,) [rad] or [m] from where the arm is; None where it may be gone.
 Singular = Callable[[Array], JogLimit | None]
 
 
@@ -35,7 +35,7 @@ class Allowed:
     limits: tuple[JogLimit, ...] = ()
 
 
-class Room:
+class VelocityLimiter:
     """Finds the largest share of a velocity from which the arm can still stop.
 
     Braking at any tick stays on the way that was found free at the tick before, so it is always possible.
@@ -51,18 +51,18 @@ class Room:
         if not np.any(wanted):
             return Allowed(self._next(velocity, wanted, 0.0))
         share, limit = self._within_limits(positions, velocity, wanted)
-        if singular is not None and (found := singular(self._way(velocity, wanted, share))) is not None:
+        if singular is not None and (found := singular(self._displacement(velocity, wanted, share))) is not None:
             limit = found
             share = _largest(
-                lambda part: singular(self._way(velocity, wanted, part)) is None, share, SINGULARITY_HALVINGS
+                lambda part: singular(self._displacement(velocity, wanted, part)) is None, share, SINGULARITY_HALVINGS
             )
         return self._free(positions, velocity, wanted, share, limit)
 
     def _next(self, velocity: Array, wanted: Array, share: float) -> Array:
         return self._braking.towards(velocity, share * wanted)
 
-    def _way(self, velocity: Array, wanted: Array, share: float) -> Array:
-        return self._braking.way_to_rest(self._next(velocity, wanted, share))
+    def _displacement(self, velocity: Array, wanted: Array, share: float) -> Array:
+        return self._braking.displacement_to_rest(self._next(velocity, wanted, share))
 
     def _within_limits(self, positions: Array, velocity: Array, wanted: Array) -> tuple[float, JogLimit | None]:
         outside = self._beyond(positions, velocity, wanted)
@@ -80,7 +80,7 @@ class Room:
 
     def _beyond(self, positions: Array, velocity: Array, wanted: Array) -> Array:
         """[rad] or [m] by which each joint would come to rest outside its limits, a row for each of `wanted`."""
-        end = positions + self._braking.way_to_rest(self._braking.towards(velocity, wanted))
+        end = positions + self._braking.displacement_to_rest(self._braking.towards(velocity, wanted))
         lower, upper = np.minimum(self._braking.lower, positions), np.maximum(self._braking.upper, positions)
         outside: Array = np.maximum(lower - end, end - upper) - 1e-12
         return outside
@@ -90,7 +90,7 @@ class Room:
         out, contact = self._obstacles.most_out_of_contact(wanted)
         most = min(most, out)
         candidate = self._next(velocity, wanted, most)
-        obstacle = self._obstacles.on_the_way(candidate)
+        obstacle = self._obstacles.obstacle_ahead(candidate)
         self._share = most if obstacle is None else self._near_the_last(velocity, wanted, most)
         limits = tuple(found for found in (limit, obstacle or contact) if found is not None)
         if obstacle is None:
@@ -101,7 +101,7 @@ class Room:
         """A share that is free, not far from the one before: distances are dear."""
         for factor in FACTORS:
             share = min(factor * max(self._share, LEAST_SHARE), most)
-            if self._obstacles.on_the_way(self._next(velocity, wanted, share)) is None:
+            if self._obstacles.obstacle_ahead(self._next(velocity, wanted, share)) is None:
                 return share
         return 0.0
 

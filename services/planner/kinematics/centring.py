@@ -32,7 +32,7 @@ class Centring:
         self._weight = np.array([2.0 / (upper - lower) for lower, upper in spans])  # 0 without limits
 
     def is_redundant(self, target: Target, solution: Array) -> bool:
-        """Whether the joints can move there without the tool leaving its target."""
+        """True if the joints can move there without the tool leaving its target."""
         return len(self._free_motions(target, solution)) > 0
 
     def centred(self, target: Target, solution: Array) -> Array:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
-from services.planner.kinematics.joint_ranges import Turns
+from services.planner.kinematics.joint_ranges import FullTurns
 from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, Target, any_normal
 
 if TYPE_CHECKING:
@@ -23,21 +23,21 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 JOINTS = 6  # with fewer, EAIK answers positions or pairs of turns only
-SAMPLES = 8  # postures at which EAIK's forward kinematics is held against ours
+SAMPLES = 8  # configurations at which EAIK's forward kinematics is held against ours
 AGREEMENT = 1e-9  # [m], and per entry of the rotation
 
 log = logging.getLogger(__name__)
 
 
 class ClosedForm:
-    """All postures of one arm for a full tool pose; joint values are (n,) [rad] in the arm's order."""
+    """All configurations of one arm for a full tool pose; joint values are (n,) [rad] in the arm's order."""
 
     def __init__(self, arm: Arm, robot: Robot, order: list[int]) -> None:
         self._robot = robot
         self._order = order  # the arm's joints from the base to the tool
-        self.turns = Turns(arm)
+        self.turns = FullTurns(arm)
 
-    def postures(self, position: Array, rotation: Array, near: Array) -> tuple[list[Array], list[Array]]:
+    def configurations(self, position: Array, rotation: Array, near: Array) -> tuple[list[Array], list[Array]]:
         """The exact ones within the limits, with every full turn, in no order; and what EAIK calls least squares.
 
         Those are out of reach, or, where axes coincide, a solution that lacks one turn.
@@ -110,7 +110,7 @@ def chain_order(arm: Arm) -> list[int]:
 
 
 def _agrees(arm: Arm, kinematics: Kinematics, robot: Robot, order: list[int]) -> bool:
-    """Whether EAIK's forward kinematics is ours."""
+    """True if EAIK's forward kinematics is ours."""
     for values in np.random.default_rng(1).uniform(-math.pi, math.pi, (SAMPLES, JOINTS)):
         ours, theirs = kinematics.tool(values), robot.fwdkin(values[order])
         if max(np.abs(theirs[:3, 3] - ours.position).max(), np.abs(theirs[:3, :3] - ours.rotation).max()) > AGREEMENT:
@@ -121,7 +121,7 @@ def _agrees(arm: Arm, kinematics: Kinematics, robot: Robot, order: list[int]) ->
 def completed(target: Target, kinematics: Kinematics, guess: Array) -> list[Array]:
     """`guess` with the turn that is missing made by one joint or another; none where more than one turn is missing.
 
-    A posture that is out of reach has its orientation right and its position wrong, and is left soonest.
+    A configuration that is out of reach has its orientation right and its position wrong, and is left soonest.
     """
     far, away = target.misses(kinematics.tool(guess))
     if away < ROTATION_TOLERANCE:

@@ -15,7 +15,7 @@ from services.arm.kinematics import Kinematics
 from services.planner.kinematics.targets import Target
 
 Array = NDArray[np.float64]
-Residual = Callable[[Array], tuple[Array, Array]]  # what is missing at a posture, and how the joints change that
+Residual = Callable[[Array], tuple[Array, Array]]  # what is missing at a configuration, and how the joints change that
 Test = Callable[[Array], bool]
 
 ITERATIONS = 40
@@ -42,7 +42,7 @@ class Descent:
         self._identity = np.eye(len(arm.joints))
 
     def clip(self, positions: Array) -> Array:
-        """The nearest posture within the limits."""
+        """The nearest configuration within the limits."""
         clipped: Array = np.minimum(np.maximum(positions, self._lower), self._upper)
         return clipped
 

@@ -12,11 +12,11 @@ from schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, Way
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.arm.transforms import IDENTITY, Rigid, from_message
-from services.planner.collision.clearance import Checker
+from services.planner.collision.clearance import DistanceChecker
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.pose_goals import target_of
-from services.planner.kinematics.task_space import abilities
-from services.planner.kinematics.unreachable import Unreachable
+from services.planner.kinematics.task_space import task_space
+from services.planner.kinematics.unreachable import UnreachableRefusals
 from services.planner.request.deadline import Deadline
 from services.planner.request.refusals import beyond_limit, malformed, timed_out, unknown_name
 from services.planner.request.start_state import require_parallel, require_unwound
@@ -30,22 +30,24 @@ INVALID = PlanCode.INVALID_GOAL_CONSTRAINTS
 class Goals:
     """Joint values for every kind of goal, nearest to the start first."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, checker: Checker | None = None) -> None:
+    def __init__(self, arm: Arm, kinematics: Kinematics, checker: DistanceChecker | None = None) -> None:
         """`checker` says what touches; without one it is the arm alone."""
         self._arm = arm
         self._kinematics = kinematics
-        self.abilities = abilities(arm, kinematics)
+        self.task_space = task_space(arm, kinematics)
         self._ik = InverseKinematics(arm, kinematics)
-        self._unreachable = Unreachable(arm, kinematics, self._ik, self.abilities, checker or kinematics.collisions)
+        self._unreachable = UnreachableRefusals(
+            arm, kinematics, self._ik, self.task_space, checker or kinematics.collisions
+        )
 
     def travel(self, first: Start, second: Start) -> float:
-        """[s] that the slowest joint takes between two postures at full speed."""
+        """[s] that the slowest joint takes between two configurations at full speed."""
         return self._ik.travel(np.array(first), np.array(second))
 
     def candidates(
         self, goal: Goal, start: Start, deadline: Deadline, standing: Start | None = None
     ) -> Iterator[Start]:
-        """Postures that fulfil the goal, lazily; raises `NoPlan` where there is none.
+        """Configurations that fulfil the goal, lazily; raises `PlanRefused` where there is none.
 
         A link's frame is where the arm has it when it stands in `standing`: at the start, where that is absent.
         """
@@ -91,7 +93,7 @@ class Goals:
     def _poses(self, goal: PoseGoal, frame: Rigid, start: Start, deadline: Deadline) -> Iterator[Start]:
         target = target_of(goal, frame)
         near = np.array(start)
-        if not self.abilities.allows(target):
+        if not self.task_space.allows(target):
             raise self._unreachable.refusal(goal, target, frame, near, deadline)
         found = False
         for positions in self._ik.solutions(target, near, deadline):
@@ -112,6 +114,6 @@ class Goals:
             raise unknown_name(PlanCode.FRAME_TRANSFORM_FAILURE, "unknown frame", goal.frame, links, self._arm.name)
         return from_message(links[goal.frame])
 
-    def shown_point(self, goal: PoseGoal, start: Start, posture: Array, deadline: Deadline) -> Vector:
-        """Where the tool is in `posture`, in the goal's form; a mere point is reachable as printed."""
-        return self._unreachable.shown(goal, posture, self.frame(goal, start), deadline)
+    def shown_point(self, goal: PoseGoal, start: Start, configuration: Array, deadline: Deadline) -> Vector:
+        """Where the tool is in `configuration`, in the goal's form; a mere point is reachable as printed."""
+        return self._unreachable.shown(goal, configuration, self.frame(goal, start), deadline)

@@ -20,11 +20,14 @@ from services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 
-STARTS = 24  # beside the present posture
+STARTS = 24  # beside the present configuration
 FULL_POSE_JOINTS, MORE_STARTS = 6, 64  # that many where a full pose has to be searched for
 BATCH = 4  # starts that are tried together before their solutions are handed out
 FEW = 4  # starts where the closed form finds nothing, which it has never missed
-FINE_TURNS, MOST_AT_LIMITS = 120, 12  # the same, where none of those has a posture, and postures that are tried then
+FINE_TURNS, MOST_AT_LIMITS = (
+    120,
+    12,
+)  # the same, where none of those has a configuration, and configurations that are tried then
 TURNS = 16  # rotations about the axis of a tool that only has to point somewhere
 SAME = 1e-4  # [s] at full speed: solutions nearer than that are one
 SAME_REDUNDANT = 0.1  # [s] the same, where solutions lie in a continuum
@@ -41,13 +44,13 @@ class InverseKinematics:
         self._parallel: ParallelAxes | None = None if is_numeric else parallel_axes(arm, kinematics)
         self._lower, self._upper = one_turn(arm)
         self._speed = np.array([joint.velocity for joint in arm.joints])
-        # The first joint of the chain turns the whole arm as it is: its mirror image is no other posture.
+        # The first joint of the chain turns the whole arm as it is: its mirror image is no other configuration.
         self._mirrored = [index for index in chain_order(arm)[1:] if arm.joints[index].unit == "rad"]
         self._starts = spread(arm, self._start_count(arm))
 
     @property
     def is_closed_form(self) -> bool:
-        """Whether full poses are solved in closed form."""
+        """True if full poses are solved in closed form."""
         return self._closed is not None
 
     def solutions(self, target: Target, near: Array, deadline: Deadline) -> Iterator[Array]:
@@ -64,12 +67,12 @@ class InverseKinematics:
             yield from self._searched(target, near, deadline, starts)
 
     def nearest(self, target: Target, near: Array, deadline: Deadline) -> list[Array]:
-        """Postures that bring the tool as near to the target as their start allows, the best one first."""
+        """Configurations that bring the tool as near to the target as their start allows, the best one first."""
         attempts = [self.descend(target, near), *self._attempts(target, near, deadline)]
         return [attempt.positions for attempt in sorted(attempts, key=lambda attempt: attempt.error)]
 
     def travel(self, first: Array, second: Array) -> float:
-        """[s] that the slowest joint takes between two postures at full speed: the distance that counts."""
+        """[s] that the slowest joint takes between two configurations at full speed: the distance that counts."""
         return float(np.max(np.abs(first - second) / self._speed))
 
     def descend(self, target: Target, start: Array) -> Attempt:
@@ -77,39 +80,41 @@ class InverseKinematics:
         return self._descent.descend(target, start)
 
     def _closed_form_solutions(self, target: Target, near: Array) -> Iterator[Array]:
-        """The closed form's postures, each refined until it meets the target; lazily, the nearest first."""
-        postures = self._closed_form_postures(target, near)
-        for positions in sorted(postures, key=lambda positions: self.travel(near, positions)):
+        """The closed form's configurations, each refined until it meets the target; lazily, the nearest first."""
+        configurations = self._closed_form_configurations(target, near)
+        for positions in sorted(configurations, key=lambda positions: self.travel(near, positions)):
             attempt = self._descent.descend(target, positions)
             if attempt.is_solution:
                 yield attempt.positions
 
-    def _closed_form_postures(self, target: Target, near: Array) -> list[Array]:
+    def _closed_form_configurations(self, target: Target, near: Array) -> list[Array]:
         if self._parallel is not None:
-            return self._parallel.postures(target.position, near)
+            return self._parallel.configurations(target.position, near)
         if self._closed is None:
             return []
-        postures: list[Array] = []
+        configurations: list[Array] = []
         for rotation in self._rotations(target, near):
-            exact, guesses = self._closed.postures(target.position, rotation, near)
-            postures += exact
-            postures += [
-                posture for guess in guesses for posture in self._from_guess(self._closed, target, guess, near)
+            exact, guesses = self._closed.configurations(target.position, rotation, near)
+            configurations += exact
+            configurations += [
+                configuration
+                for guess in guesses
+                for configuration in self._from_guess(self._closed, target, guess, near)
             ]
-        return postures
+        return configurations
 
     def _at_limits(self, target: Target, near: Array, found: list[Array]) -> Iterator[Array]:
-        """Where nothing was found, for the free turn leaves hardly any posture within the limits: what those of a fine
-        turn lead to that miss the limits least."""
+        """Where nothing was found, for the free turn leaves hardly any configuration within the limits: what those of a
+        fine turn lead to that miss the limits least."""
         if found or self._closed is None or target.pointing is None:
             return
         closed, present = self._closed, self._kinematics.tool(near).rotation
         rotations = turns_about(target.pointing.direction, target.pointing.axis, present, FINE_TURNS)
         answers = [closed.branches(target.position, rotation) for rotation in rotations]
         exact = np.concatenate([branches[~is_guess] for branches, is_guess in answers])
-        postures, missed = closed.turns.nearly(exact[np.isfinite(exact).all(axis=1)])
+        configurations, missed = closed.turns.nearly(exact[np.isfinite(exact).all(axis=1)])
         for place in np.argsort(missed)[:MOST_AT_LIMITS].tolist():
-            attempt = self.descend(target, postures[place])
+            attempt = self.descend(target, configurations[place])
             if attempt.is_solution:
                 yield attempt.positions
 

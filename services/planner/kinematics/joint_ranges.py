@@ -17,7 +17,7 @@ MOST_TURNS = 64  # combinations of full turns of one branch
 ROUNDING = 1e-9  # [rad] or [m] by which a solution may be beyond a limit before it is put onto it
 
 
-class Turns:
+class FullTurns:
     """For one arm; joint values are (n,) [rad] or [m] in the arm's order."""
 
     def __init__(self, arm: Arm) -> None:
@@ -32,11 +32,11 @@ class Turns:
         upper = np.where(np.isinf(self._upper), near + 0.5 * self._period, self._upper)
         first = branches + self._period * np.ceil((lower - branches) / self._period)
         more = np.floor((upper - first) / self._period)
-        postures: list[Array] = []
+        configurations: list[Array] = []
         for values, turns in zip(first, more, strict=True):
             if turns.min() >= 0.0:  # false for what is not a number, too
-                postures.extend(_turned(values, turns) if turns.any() else [values])
-        return postures
+                configurations.extend(_turned(values, turns) if turns.any() else [values])
+        return configurations
 
     def nearly(self, branches: Array) -> tuple[Array, Array]:
         """The branches (m, n) with the full turns that bring them nearest to the limits, and by how much (m,) they

@@ -1,4 +1,5 @@
-"""The answers to `ik` and `fk`: postures for a pose, poses for a posture, each with the reason where there is none."""
+"""The answers to `ik` and `fk`: configurations for a pose, poses for a configuration, each with the reason where there
+is none."""
 
 from __future__ import annotations
 
@@ -10,15 +11,15 @@ from schemas.joints import JointState
 from schemas.planning import FkRequest, FkResponse, IkRequest, IkResponse, IkSolution, PlanCode
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
-from services.planner.collision.clearance import CLEARANCE, Checker
+from services.planner.collision.clearance import CLEARANCE, DistanceChecker
 from services.planner.kinematics.goals import INVALID, Goals, Start
 from services.planner.kinematics.pose_goals import FARTHEST
 from services.planner.request.deadline import NEVER, Deadline
-from services.planner.request.refusals import NoPlan, in_collision, malformed, unknown_name
+from services.planner.request.refusals import PlanRefused, in_collision, malformed, unknown_name
 from services.planner.request.start_state import require_parallel, resolve_start
 
 MOST_SOLUTIONS = 64
-LOOKED_THROUGH = 256  # postures, of which all may touch something
+LOOKED_THROUGH = 256  # configurations, of which all may touch something
 
 
 class KinematicRequests:
@@ -34,19 +35,23 @@ class KinematicRequests:
         request: IkRequest,
         present: JointState | None,
         age: float = 0.0,
-        checker: Checker | None = None,
+        checker: DistanceChecker | None = None,
         deadline: Deadline = NEVER,
     ) -> IkResponse:
-        """The postures for a pose, the nearest first, or why there is none; `checker` says what they must not touch."""
+        """The configurations for a pose, the nearest first, or why there is none; `checker` says what they must not
+        touch."""
         try:
             _require_count(request.solutions)
             near = self._standing(request.near, present, age)
-            postures = list(islice(self._goals.candidates(request.goal, near, deadline), LOOKED_THROUGH))
+            configurations = list(islice(self._goals.candidates(request.goal, near, deadline), LOOKED_THROUGH))
             if request.avoid_collisions:
-                postures = _free(postures, checker or self._kinematics.collisions)
-        except NoPlan as no_plan:
-            return IkResponse(code=no_plan.code, refusal=no_plan.refusal)
-        solutions = (IkSolution(position=posture, distance=self._goals.travel(near, posture)) for posture in postures)
+                configurations = _free(configurations, checker or self._kinematics.collisions)
+        except PlanRefused as refused:
+            return IkResponse(code=refused.code, refusal=refused.refusal)
+        solutions = (
+            IkSolution(position=configuration, distance=self._goals.travel(near, configuration))
+            for configuration in configurations
+        )
         nearest_first = sorted(solutions, key=lambda solution: solution.distance)[: request.solutions]
         return IkResponse(code=PlanCode.SUCCESS, name=self._arm.joint_names, solutions=tuple(nearest_first))
 
@@ -59,8 +64,8 @@ class KinematicRequests:
             for link in links:
                 if link not in poses:
                     raise unknown_name(PlanCode.FRAME_TRANSFORM_FAILURE, "unknown link", link, poses, self._arm.name)
-        except NoPlan as no_plan:
-            return FkResponse(code=no_plan.code, refusal=no_plan.refusal)
+        except PlanRefused as refused:
+            return FkResponse(code=refused.code, refusal=refused.refusal)
         return FkResponse(code=PlanCode.SUCCESS, links=links, poses=tuple(poses[link] for link in links))
 
     def _standing(self, given: JointState | None, present: JointState | None, age: float) -> Start:
@@ -87,14 +92,16 @@ class KinematicRequests:
         return tuple(given.get(name, value) for name, value in zip(self._arm.joint_names, standing, strict=True))
 
 
-def _free(postures: list[Start], checker: Checker) -> list[Start]:
-    """Those that touch nothing; raises `NoPlan` where all do."""
-    free = [posture for posture in postures if checker.distance(posture) > CLEARANCE]
+def _free(configurations: list[Start], checker: DistanceChecker) -> list[Start]:
+    """Those that touch nothing; raises `PlanRefused` where all do."""
+    free = [configuration for configuration in configurations if checker.distance(configuration) > CLEARANCE]
     if free:
         return free
-    where = "in every posture for this pose" if len(postures) > 1 else "in the only posture for this pose"
-    remedy = "ask for another pose, or for postures that touch as well (avoid_collisions false)"
-    pairs = checker.pairs_within(postures[0], CLEARANCE)
+    where = (
+        "in every configuration for this pose" if len(configurations) > 1 else "in the only configuration for this pose"
+    )
+    remedy = "ask for another pose, or for configurations that touch as well (avoid_collisions false)"
+    pairs = checker.pairs_within(configurations[0], CLEARANCE)
     raise in_collision(PlanCode.GOAL_IN_COLLISION, where, pairs, CLEARANCE, (), remedy)
 
 

@@ -14,24 +14,24 @@ from numpy.typing import NDArray
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics, Pose
 from services.planner.kinematics.closed_form import chain_order
-from services.planner.kinematics.joint_ranges import Turns, one_turn
+from services.planner.kinematics.joint_ranges import FullTurns, one_turn
 from services.planner.kinematics.targets import any_normal
 
 Array = NDArray[np.float64]
 
 JOINTS = 3
-SAMPLES = 8  # postures at which the answers are held against the kinematics
+SAMPLES = 8  # configurations at which the answers are held against the kinematics
 AGREEMENT = 1e-9  # [m]
 LEAST = 1e-6  # [m] a link that is shorter is none
 STRETCHED = 1e-9  # how far a cosine may be beyond 1 by rounding
 
 
 class ParallelAxes:
-    """All postures of one arm for a position of the tool; joint values are (3,) in the arm's order."""
+    """All configurations of one arm for a position of the tool; joint values are (3,) in the arm's order."""
 
     def __init__(self, arm: Arm, pose: Pose, jacobian: Array, order: tuple[int, int, int]) -> None:
         """The tool's pose and Jacobian (6, 3) at zero; `order` is of the shoulder, the elbow and the slide."""
-        self._turns = Turns(arm)
+        self._turns = FullTurns(arm)
         self._first, self._second, self._slide = order
         axis = jacobian[3:, self._first]
         across = any_normal(axis)
@@ -44,7 +44,7 @@ class ParallelAxes:
         self._shoulder, elbow = self._seen(on_axes[self._first]), self._seen(on_axes[self._second])
         self._upper, self._fore = elbow - self._shoulder, self._seen(pose.position) - elbow
 
-    def postures(self, position: Array, near: Array) -> list[Array]:
+    def configurations(self, position: Array, near: Array) -> list[Array]:
         """Those within the limits, with every full turn, in no order; the shoulder stays where it may turn freely."""
         out, upper, fore = self._seen(position) - self._shoulder, self._upper, self._fore
         if not math.hypot(out.real, out.imag) <= 2.0 * (abs(upper) + abs(fore)):  # whose square may be no number
@@ -56,12 +56,12 @@ class ParallelAxes:
         branches = []
         for elbow in (bend - straight, -bend - straight):
             reach = upper + fore * complex(math.cos(elbow), math.sin(elbow))
-            posture = near.copy()
+            configuration = near.copy()
             if min(abs(reach), abs(out)) > LEAST:
-                posture[self._first] = _angle(out) - _angle(reach)
-            posture[self._second] = self._sense * elbow
-            posture[self._slide] = float(position @ self._along) - self._height
-            branches.append(posture)
+                configuration[self._first] = _angle(out) - _angle(reach)
+            configuration[self._second] = self._sense * elbow
+            configuration[self._slide] = float(position @ self._along) - self._height
+            branches.append(configuration)
         return self._turns.within_limits(np.array(branches), near)
 
     @property
@@ -89,11 +89,11 @@ def parallel_axes(arm: Arm, kinematics: Kinematics) -> ParallelAxes | None:
 
 
 def _agrees(arm: Arm, kinematics: Kinematics, solver: ParallelAxes) -> bool:
-    """Whether random postures are among those of their own position."""
+    """True if random configurations are among those of their own position."""
     lower, upper = one_turn(arm)
-    for posture in np.random.default_rng(1).uniform(lower, upper, (SAMPLES, JOINTS)):
-        found = solver.postures(kinematics.tool(posture).position, posture)
-        if not found or min(float(np.abs(each - posture).max()) for each in found) > AGREEMENT:
+    for configuration in np.random.default_rng(1).uniform(lower, upper, (SAMPLES, JOINTS)):
+        found = solver.configurations(kinematics.tool(configuration).position, configuration)
+        if not found or min(float(np.abs(each - configuration).max()) for each in found) > AGREEMENT:
             return False
     return True
 

@@ -24,7 +24,7 @@ FARTHEST = 1e6  # [m] beyond which a position is a mistake, and squares lose the
 
 
 def target_of(goal: PoseGoal, frame: Rigid) -> Target:
-    """The target of `goal`, given in `frame` (its pose in the base); raises `NoPlan`."""
+    """The target of `goal`, given in `frame` (its pose in the base); raises `PlanRefused`."""
     _require_form(goal)
     x, y, z = goal.position
     position = np.array(compose(frame, ((x, y, z), IDENTITY[1]))[0])
@@ -66,7 +66,7 @@ def _least_turned(asked: Array, goal: PoseGoal, pose: Pose) -> Array:
 
 
 def _require_form(goal: PoseGoal) -> None:
-    """Raises `NoPlan` for what is no pose, or two at once."""
+    """Raises `PlanRefused` for what is no pose, or two at once."""
     if len(goal.position) != 3:
         raise malformed(
             INVALID, "position", f"a tool position has 3 numbers, not {len(goal.position)}", "give x y z in m"

@@ -40,12 +40,12 @@ class Target:
 
     @property
     def has_turn(self) -> bool:
-        """Whether it matters how the tool is turned."""
+        """True if it matters how the tool is turned."""
         return self.rotation is not None or self.pointing is not None
 
     @property
     def is_tolerant(self) -> bool:
-        """Whether less than exact will do."""
+        """True if less than exact will do."""
         return self.position_tolerance > POSITION_TOLERANCE or self.rotation_tolerance > ROTATION_TOLERANCE
 
     def error_and_jacobian(self, kinematics: Kinematics, positions: Array) -> tuple[Array, Array]:
@@ -83,16 +83,16 @@ class Target:
         return float(np.linalg.norm(self.position - pose.position)), float(np.linalg.norm(self.turn(pose.rotation)))
 
     def is_exact(self, error: Array) -> bool:
-        """Whether nothing is missing but rounding."""
+        """True if nothing is missing but rounding."""
         return self._is_within(error, POSITION_TOLERANCE, ROTATION_TOLERANCE)
 
     def is_at_edge(self, error: Array) -> bool:
-        """Whether nothing is missing to the edge of the tolerances, given `beyond_tolerances`."""
+        """True if nothing is missing to the edge of the tolerances, given `beyond_tolerances`."""
         position = max(POSITION_TOLERANCE, (1.0 - EDGE) * self.position_tolerance)
         return self._is_within(error, position, max(ROTATION_TOLERANCE, (1.0 - EDGE) * self.rotation_tolerance))
 
     def is_met(self, error: Array) -> bool:
-        """Whether what is missing is within the tolerances."""
+        """True if what is missing is within the tolerances."""
         position = max(POSITION_TOLERANCE, self.position_tolerance)
         return self._is_within(error, position, max(ROTATION_TOLERANCE, self.rotation_tolerance))
 

@@ -1,8 +1,7 @@
 """What an arm can do with its tool, known from its joints before any goal is asked for.
 
-The rotations of the tool over all postures are read from the Jacobian; where they are turns about one axis only, how
-far a goal is from them is plain geometry.
-"""
+The rotations of the tool over all configurations are read from the Jacobian; where they are turns about one axis only,
+how far a goal is from them is plain geometry."""
 
 from __future__ import annotations
 
@@ -24,11 +23,12 @@ UPRIGHT = 1.0 - 1e-6  # cosine to the vertical from which a turn is called yaw
 
 
 @dataclass(frozen=True)
-class Abilities:
-    """`axes` (r, 3): the directions in the base frame about which the tool can be turned at all, over all postures.
+class TaskSpace:
+    """`axes` (r, 3): the directions in the base frame about which the tool can be turned at all, over all
+    configurations.
 
-    `chosen`: how many of these turns can be chosen beside a position. `rotation` (3, 3): the tool's in some posture.
-    """
+    `chosen`: how many of these turns can be chosen beside a position. `rotation` (3, 3): the tool's in some
+    configuration."""
 
     arm: str
     joints: int
@@ -38,7 +38,7 @@ class Abilities:
 
     @property
     def is_full(self) -> bool:
-        """Whether every orientation can be asked for beside a position."""
+        """True if every orientation can be asked for beside a position."""
         return self.chosen == 3
 
     @property
@@ -75,11 +75,12 @@ class Abilities:
         return "tilt" if self._is_upright else "orientation"
 
     def allows(self, target: Target) -> bool:
-        """Whether any posture at all, wherever the tool then is, turns it like that."""
+        """True if any configuration at all, wherever the tool then is, turns it like that."""
         return self.missing_tilt(target) <= max(ROTATION_TOLERANCE, target.rotation_tolerance)
 
     def missing_tilt(self, target: Target) -> float:
-        """[rad] at least between the target and the nearest orientation of any posture; 0 where that is not known."""
+        """[rad] at least between the target and the nearest orientation of any configuration; 0 where that is not
+        known."""
         if not target.has_turn or len(self.axes) > 1:
             return 0.0
         if len(self.axes) == 0:
@@ -113,16 +114,17 @@ class Abilities:
         return "yaw" if self._is_upright else "the turn about that axis"
 
 
-def abilities(arm: Arm, kinematics: Kinematics) -> Abilities:
-    """Read from the Jacobians of some postures within the limits; those at a stretch do not hide what others can."""
+def task_space(arm: Arm, kinematics: Kinematics) -> TaskSpace:
+    """Read from the Jacobians of some configurations within the limits; those at a stretch do not hide what others
+    can."""
     lower = [max(joint.lower, -math.pi) for joint in arm.joints]
     upper = [min(joint.upper, math.pi) for joint in arm.joints]
-    postures = np.random.default_rng(1).uniform(lower, upper, (SAMPLES, len(arm.joints)))
-    jacobians = [kinematics.jacobian(posture) for posture in postures]
+    configurations = np.random.default_rng(1).uniform(lower, upper, (SAMPLES, len(arm.joints)))
+    jacobians = [kinematics.jacobian(configuration) for configuration in configurations]
     _, values, rows = np.linalg.svd(np.hstack([jacobian[3:] for jacobian in jacobians]).T)
     axes = rows[: int(np.sum(values > RANK))]
     chosen = max(_rank(jacobian) - _rank(jacobian[:3]) for jacobian in jacobians)
-    return Abilities(arm.name, len(arm.joints), axes, chosen, kinematics.tool(postures[0]).rotation)
+    return TaskSpace(arm.name, len(arm.joints), axes, chosen, kinematics.tool(configurations[0]).rotation)
 
 
 def angle_between(first: Array, second: Array) -> float:

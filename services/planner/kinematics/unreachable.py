@@ -1,4 +1,4 @@
-"""Why no posture meets a pose goal, and the nearest pose that one does."""
+"""Why no configuration meets a pose goal, and the nearest pose that one does."""
 
 from __future__ import annotations
 
@@ -14,97 +14,98 @@ from schemas.planning import PlanCode, PoseGoal, Refusal
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
 from services.arm.transforms import IDENTITY, Rigid, compose, inverse
-from services.planner.collision.clearance import CLEARANCE, Checker, last_free
+from services.planner.collision.clearance import CLEARANCE, DistanceChecker, last_free
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.pose_goals import as_goal
 from services.planner.kinematics.targets import POSITION_TOLERANCE, Target
-from services.planner.kinematics.task_space import Abilities
+from services.planner.kinematics.task_space import TaskSpace
 from services.planner.request.deadline import Deadline
-from services.planner.request.refusals import NoPlan, out_of_reach
+from services.planner.request.refusals import PlanRefused, out_of_reach
 
 Array = NDArray[np.float64]
 
 PRINTED = 1e-4  # [m] to which the nearest point is rounded that a person is told
-NEAREST_TRIED = 6  # postures
+NEAREST_TRIED = 6  # configurations
 LIGHT = 0.002  # [m/rad] a turn that must not cost position
 FORGIVABLE = math.radians(2.0)  # below which a tolerance is what a person may have wanted
 
 
-class Unreachable:
+class UnreachableRefusals:
     """Refusals of pose goals for one arm."""
 
     def __init__(
-        self, arm: Arm, kinematics: Kinematics, ik: InverseKinematics, able: Abilities, collisions: Checker
+        self, arm: Arm, kinematics: Kinematics, ik: InverseKinematics, able: TaskSpace, collisions: DistanceChecker
     ) -> None:
         self._arm, self._kinematics, self._ik = arm, kinematics, ik
-        self._abilities, self._collisions = able, collisions
+        self._task_space, self._collisions = able, collisions
 
-    def refusal(self, goal: PoseGoal, target: Target, frame: Rigid, near: Array, deadline: Deadline) -> NoPlan:
+    def refusal(self, goal: PoseGoal, target: Target, frame: Rigid, near: Array, deadline: Deadline) -> PlanRefused:
         """What is missing: the place, or there the orientation."""
         place = Target(target.position, position_tolerance=target.position_tolerance)
         best = self._nearest_free(place, near, deadline)
         pose = self._kinematics.tool(best)
-        if not self._abilities.allows(target):
+        if not self._task_space.allows(target):
             return self._tilt_refused(goal, target, frame, self._nearest_turned(target, place, best, near, deadline))
         if target.misses(pose)[0] <= max(POSITION_TOLERANCE, target.position_tolerance) and target.has_turn:
             return self._turn_refused(goal, target, frame, self._nearest_turned(target, place, best, near, deadline))
         shown = self.shown(goal, best, frame, deadline)
         return out_of_reach(self._arm, target.position.tolist(), pose.position.tolist(), shown, self._held(best))
 
-    def shown(self, goal: PoseGoal, posture: Array, frame: Rigid, deadline: Deadline) -> Vector:
-        """Where the tool is in `posture`, in the goal's form; a mere point is reachable as printed."""
-        pose = self._kinematics.tool(posture)
+    def shown(self, goal: PoseGoal, configuration: Array, frame: Rigid, deadline: Deadline) -> Vector:
+        """Where the tool is in `configuration`, in the goal's form; a mere point is reachable as printed."""
+        pose = self._kinematics.tool(configuration)
         if goal.orientation or goal.tool_axis:
             return as_goal(goal, pose, frame)
-        return self._printable(pose.position, posture, frame, deadline)
+        return self._printable(pose.position, configuration, frame, deadline)
 
     def _nearest_free(self, target: Target, near: Array, deadline: Deadline) -> Array:
-        """The best posture; one that touches is drawn back towards the start until it does not."""
-        postures = self._ik.nearest(target, near, deadline)[:NEAREST_TRIED]
-        free = [self._drawn_back(near, posture) for posture in postures]
+        """The best configuration; one that touches is drawn back towards the start until it does not."""
+        configurations = self._ik.nearest(target, near, deadline)[:NEAREST_TRIED]
+        free = [self._drawn_back(near, configuration) for configuration in configurations]
         return min(free, key=lambda q: target.misses(self._kinematics.tool(q))[0])
 
-    def _drawn_back(self, near: Array, posture: Array) -> Array:
-        if self._collisions.distance(posture) > CLEARANCE:
-            return posture
-        return last_free(self._collisions, near, posture)
+    def _drawn_back(self, near: Array, configuration: Array) -> Array:
+        if self._collisions.distance(configuration) > CLEARANCE:
+            return configuration
+        return last_free(self._collisions, near, configuration)
 
     def _nearest_turned(self, target: Target, place: Target, fallback: Array, near: Array, deadline: Deadline) -> Array:
-        """At the place, the posture that turns the tool as nearly as it can be, and touches nothing."""
+        """At the place, the configuration that turns the tool as nearly as it can be, and touches nothing."""
         light = replace(target, metres_per_radian=LIGHT, rotation_tolerance=0.0)
         turned: list[Array] = []
-        for posture in self._ik.nearest(place, near, deadline)[:NEAREST_TRIED]:
-            attempt = self._ik.descend(place, self._ik.descend(light, posture).positions)
+        for configuration in self._ik.nearest(place, near, deadline)[:NEAREST_TRIED]:
+            attempt = self._ik.descend(place, self._ik.descend(light, configuration).positions)
             if attempt.is_solution and self._collisions.distance(attempt.positions) > CLEARANCE:
                 turned.append(attempt.positions)
         return min(turned, key=lambda q: target.misses(self._kinematics.tool(q))[1], default=fallback)
 
-    def _tilt_refused(self, goal: PoseGoal, target: Target, frame: Rigid, best: Array) -> NoPlan:
-        missing = self._abilities.missing_tilt(target)
-        return NoPlan(
+    def _tilt_refused(self, goal: PoseGoal, target: Target, frame: Rigid, best: Array) -> PlanRefused:
+        missing = self._task_space.missing_tilt(target)
+        return PlanRefused(
             PlanCode.INVALID_GOAL_CONSTRAINTS,
             Refusal(
                 check="orientation",
-                subject=self._abilities.turning,
+                subject=self._task_space.turning,
                 value=missing,
                 limit=target.rotation_tolerance,
                 nearest=as_goal(goal, self._kinematics.tool(best), frame),
-                message=f"{self._abilities.sentence}: the goal is {math.degrees(missing):.4g} deg from all that it can",
-                remedy=self._abilities.remedy,
+                message=f"{self._task_space.sentence}: the goal is {math.degrees(missing):.4g} deg from all that it"
+                " can",
+                remedy=self._task_space.remedy,
             ),
         )
 
-    def _turn_refused(self, goal: PoseGoal, target: Target, frame: Rigid, best: Array) -> NoPlan:
+    def _turn_refused(self, goal: PoseGoal, target: Target, frame: Rigid, best: Array) -> PlanRefused:
         pose = self._kinematics.tool(best)
         missing = target.misses(pose)[1]
         nearest = as_goal(goal, pose, frame)
         what, shown = ("direction" if goal.tool_axis else "orientation"), " ".join(f"{v:.6f}" for v in nearest[3:])
         remedies = [f"the nearest {what} there is {shown}"]
-        if not self._abilities.is_full:
-            remedies.append(self._abilities.remedy)
+        if not self._task_space.is_full:
+            remedies.append(self._task_space.remedy)
         if missing < FORGIVABLE:
             remedies.append(f"allow an orientation_tolerance of {math.ceil(missing * 1e4) / 1e4:g} rad")
-        return NoPlan(
+        return PlanRefused(
             PlanCode.NO_IK_SOLUTION,
             Refusal(
                 check="orientation",
@@ -118,14 +119,14 @@ class Unreachable:
             ),
         )
 
-    def _why(self, posture: Array) -> str:
+    def _why(self, configuration: Array) -> str:
         """What keeps the tool from turning further."""
-        held = self._held(posture)
+        held = self._held(configuration)
         if held:
             return f", held by {', '.join(held)}"
-        return "" if self._abilities.is_full else f"; {self._abilities.sentence}"
+        return "" if self._task_space.is_full else f"; {self._task_space.sentence}"
 
-    def _printable(self, point: Array, posture: Array, frame: Rigid, deadline: Deadline) -> Vector:
+    def _printable(self, point: Array, configuration: Array, frame: Rigid, deadline: Deadline) -> Vector:
         """The nearest point to `point` that has few decimals in the goal's frame and can be reached like that."""
         a, b, c = point.tolist()
         local = np.array(compose(inverse(frame), ((a, b, c), IDENTITY[1]))[0])
@@ -133,17 +134,17 @@ class Unreachable:
         for corner in sorted(corners, key=lambda corner: float(np.linalg.norm(corner * PRINTED - local))):
             x, y, z = (round(value, 4) for value in (corner * PRINTED).tolist())
             back = np.array(compose(frame, ((x, y, z), IDENTITY[1]))[0])
-            attempt = self._ik.descend(Target(back), posture)
+            attempt = self._ik.descend(Target(back), configuration)
             if deadline.has_passed() or (
                 attempt.is_solution and self._collisions.distance(attempt.positions) > CLEARANCE
             ):
                 return (x, y, z)
         return tuple(local.tolist())
 
-    def _held(self, posture: Array) -> list[str]:
+    def _held(self, configuration: Array) -> list[str]:
         """The joints that stand at a limit, in words."""
         held = []
-        for joint, value in zip(self._arm.joints, posture.tolist(), strict=True):
+        for joint, value in zip(self._arm.joints, configuration.tolist(), strict=True):
             for side, limit in (("lower", joint.lower), ("upper", joint.upper)):
                 if abs(value - limit) < 1e-9:
                     held.append(f"{joint.name} at its {side} limit of {limit:g} {joint.unit}")

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from services.arm.description import Arm
 from services.planner.collision_geometry.link_shapes import link_shapes
-from services.planner.collision_geometry.shapes import Attachment, Mesh, Shape, ShapeKind
+from services.planner.collision_geometry.shapes import Attachment, CollisionShape, ShapeKind, TriangleMesh
 from services.planner.native.binding import motion
 from services.planner.native.chain import frames_of, transform_row
-from services.planner.native.sphere_cover import BULGE, Cover, cover_shapes
+from services.planner.native.sphere_cover import BULGE, SphereCover, cover_shapes
 
 Array = NDArray[np.float64]
 
@@ -28,17 +28,17 @@ class Held:
     """An attachment and its compiled part."""
 
     attachment: Attachment
-    cover: Cover
+    cover: SphereCover
     part: motion.Part
 
 
 @dataclass(frozen=True)
-class Setting:
+class CompiledScene:
     """One state of the surroundings, and the names that belong to it; never changed."""
 
     world: motion.World
     names: tuple[str, ...]  # of the parts: links, then what is attached
-    shapes: tuple[Shape, ...]
+    shapes: tuple[CollisionShape, ...]
     held: Mapping[str, Held]
     bulge: float  # [m] that spheres may be nearer at most than what they cover
     least: float  # [m] the smallest sphere's radius
@@ -68,7 +68,7 @@ class Assembly:
         cover = cover_shapes(attachment.shapes, _bulge(attachment.shapes))
         return Held(attachment, cover, self._part(attachment.link, attachment.shapes, cover))
 
-    def setting(self, shapes: Sequence[Shape], held: Mapping[str, Held]) -> Setting:
+    def compiled_scene(self, shapes: Sequence[CollisionShape], held: Mapping[str, Held]) -> CompiledScene:
         """Links, then what is attached; raises ValueError for two obstacles of one name or an unknown name."""
         _require_distinct(shapes)
         parts = [(link, link, part) for link, part in self._links.items()]
@@ -86,9 +86,9 @@ class Assembly:
         covers = [*self.covers.values(), *(one.cover for one in held.values())]
         bulge = max(cover.bulge for cover in covers) + 2.0 * self._rounding()
         least = min(float(cover.spheres[:, 3].min()) for cover in covers)
-        return Setting(world, names, tuple(shapes), dict(held), bulge, least)
+        return CompiledScene(world, names, tuple(shapes), dict(held), bulge, least)
 
-    def _part(self, link: str, shapes: Sequence[Shape], cover: Cover) -> motion.Part:
+    def _part(self, link: str, shapes: Sequence[CollisionShape], cover: SphereCover) -> motion.Part:
         """A link's solids and their spheres in its frame, larger by what floats lose on an arm of this reach."""
         frame, pose = self._frames.places[link]
         spheres = cover.spheres.copy()
@@ -115,14 +115,14 @@ class Assembly:
         return not self.arm.collisions_are_disabled(link, second_link)
 
 
-def _require_distinct(shapes: Sequence[Shape]) -> None:
+def _require_distinct(shapes: Sequence[CollisionShape]) -> None:
     names = [shape.name for shape in shapes]
     for name in names:
         if names.count(name) > 1:
             raise ValueError(f'the scene has "{name}" twice')
 
 
-def _bits(shape: Shape, names: Sequence[str]) -> int:
+def _bits(shape: CollisionShape, names: Sequence[str]) -> int:
     """A bit for each part that may touch the shape."""
     for name in shape.touching:
         if name not in names:
@@ -130,14 +130,14 @@ def _bits(shape: Shape, names: Sequence[str]) -> int:
     return sum(1 << names.index(name) for name in shape.touching)
 
 
-def _bulge(shapes: Sequence[Shape]) -> float:
+def _bulge(shapes: Sequence[CollisionShape]) -> float:
     """[m]: more for what is large."""
     longest = [max(shape.size, default=0.0) for shape in shapes]
     longest += [float(np.ptp(shape.mesh.vertices, axis=0).max()) for shape in shapes if shape.mesh is not None]
     return max(BULGE, ATTACHED_SHARE * max(longest, default=0.0))
 
 
-def obstacle_of(shape: Shape, pose: Array, padding: float = 0.0, touching: int = 0) -> motion.Obstacle:
+def obstacle_of(shape: CollisionShape, pose: Array, padding: float = 0.0, touching: int = 0) -> motion.Obstacle:
     """The shape at `pose` (4, 4), larger by `padding` [m]; `touching` has a bit for every part that may touch it."""
     number, size, radius = _form(shape)
     compiled = None if shape.mesh is None else _compiled(shape.mesh)
@@ -146,12 +146,12 @@ def obstacle_of(shape: Shape, pose: Array, padding: float = 0.0, touching: int =
 
 
 @lru_cache(maxsize=64)
-def _compiled(mesh: Mesh) -> motion.Mesh:
+def _compiled(mesh: TriangleMesh) -> motion.TriangleMesh:
     """Built once for as long as it is among the newest: the costly part of a mesh."""
     return motion.mesh(*mesh.arrays)
 
 
-def _form(shape: Shape) -> tuple[int, tuple[float, float, float], float]:
+def _form(shape: CollisionShape) -> tuple[int, tuple[float, float, float], float]:
     """Number, size and radius as views.h has them: what is round is a point, a line or a box with a radius."""
     size = shape.size
     match shape.kind:

@@ -11,7 +11,7 @@ try:
     from services.planner.native import _motion as motion
 except ImportError as error:
     raise NativeMissing(
-        f"the motion core cannot be loaded ({error}): run `make setup`; where it says that Python.h is missing, "
+        f"the native planner cannot be loaded ({error}): run `make setup`; where it says that Python.h is missing, "
         "`sudo apt-get install python3-dev` first"
     ) from error
 

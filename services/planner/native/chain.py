@@ -1,4 +1,4 @@
-"""An arm's joints as the motion core wants them: a frame for each moving joint with the joint's axis as its z."""
+"""An arm's joints as the native planner wants them: a frame for each moving joint with the joint's axis as its z."""
 
 from __future__ import annotations
 

@@ -10,23 +10,23 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from services.arm.description import Arm
-from services.planner.collision_geometry.shapes import Attachment, Shape
+from services.planner.collision_geometry.shapes import Attachment, CollisionShape
 from services.planner.native.assembly import Assembly
 from services.planner.native.binding import CancelFlag as NativeCancelFlag
 from services.planner.native.binding import motion
-from services.planner.native.paths import Effort, FreePath, NoPath, Why
-from services.planner.native.sphere_cover import BULGE, Cover
+from services.planner.native.paths import Effort, FailureReason, FreePath, NoPath
+from services.planner.native.sphere_cover import BULGE, SphereCover
 from services.planner.request.deadline import CancelFlag
 
 Array = NDArray[np.float64]
 
 MARGIN = 0.001  # [m]
 FINEST = 0.0002  # [m] how much nearer than the margin a way may seem before it is refused
-FREE, TOUCHING = 0, 1  # rake.h
+FREE, TOUCHING = 0, 1  # motion_validator.h
 FOUND = 0  # plan.h
 
 
-class Contact(NamedTuple):
+class ContactPair(NamedTuple):
     """The names of two links, attached things or obstacles."""
 
     first: str
@@ -45,7 +45,7 @@ class NativePlanner:
         self.margin = margin
         self._kernel = motion.kernel(kernel)
         self._assembly = Assembly(arm, bulge)
-        self._setting = self._assembly.setting((), {})
+        self._scene = self._assembly.compiled_scene((), {})
 
     @property
     def kernel(self) -> str:
@@ -53,7 +53,7 @@ class NativePlanner:
         return self._kernel.name
 
     @property
-    def covers(self) -> Mapping[str, Cover]:
+    def covers(self) -> Mapping[str, SphereCover]:
         """Each link's spheres, in its own frame, and how far they bulge."""
         return self._assembly.covers
 
@@ -62,75 +62,80 @@ class NativePlanner:
         """Of all links; never zero."""
         return sum(len(cover.spheres) for cover in self.covers.values())
 
-    def set_scene(self, shapes: Sequence[Shape]) -> None:
+    def set_scene(self, shapes: Sequence[CollisionShape]) -> None:
         """Replaces all obstacles; raises ValueError, and changes nothing, where a name is unknown or there twice."""
-        self._setting = self._assembly.setting(shapes, self._setting.held)
+        self._scene = self._assembly.compiled_scene(shapes, self._scene.held)
 
     def attach(self, attachment: Attachment) -> None:
         """From now on these shapes move with their link; replaces what had the same name."""
-        held = {**self._setting.held, attachment.name: self._assembly.hold(attachment)}
-        self._setting = self._assembly.setting(self._setting.shapes, held)
+        held = {**self._scene.held, attachment.name: self._assembly.hold(attachment)}
+        self._scene = self._assembly.compiled_scene(self._scene.shapes, held)
 
     def detach(self, name: str) -> None:
         """Lets go of it; raises ValueError where there is nothing of that name, or an obstacle still names it."""
-        held = dict(self._setting.held)
+        held = dict(self._scene.held)
         if name not in held:
             raise ValueError(f'nothing called "{name}" is attached, only {", ".join(held) or "nothing"}')
         del held[name]
-        self._setting = self._assembly.setting(self._setting.shapes, held)
+        self._scene = self._assembly.compiled_scene(self._scene.shapes, held)
 
     @property
     def attached(self) -> tuple[str, ...]:
         """The names of what is attached."""
-        return tuple(self._setting.held)
+        return tuple(self._scene.held)
 
     def free(self, positions: ArrayLike) -> NDArray[np.bool_]:
         """(rows,) whether each row of `positions` (rows, n) keeps the margin to itself and everything else."""
-        return motion.are_free(self._setting.world, self._kernel, self._rows(positions), self.margin)
+        return motion.are_free(self._scene.world, self._kernel, self._rows(positions), self.margin)
 
     def edge_free(self, start: ArrayLike, goal: ArrayLike) -> bool:
-        """Whether the whole straight line of the joints keeps the margin, between samples too."""
+        """True if the whole straight line of the joints keeps the margin, between samples too."""
         return self.path_free(np.vstack((self._row(start), self._row(goal))))
 
     def path_free(self, rows: ArrayLike) -> bool:
-        """Whether the polyline through `rows` (m, n) keeps the margin everywhere."""
+        """True if the polyline through `rows` (m, n) keeps the margin everywhere."""
         return self._look(self._rows(rows), 1)
 
     def spline_free(self, control: ArrayLike) -> bool:
-        """Whether the uniform cubic B-spline of the control points (k, n) keeps the margin everywhere."""
+        """True if the uniform cubic B-spline of the control points (k, n) keeps the margin everywhere."""
         return self._look(self._rows(control), 3)
 
     def unresolved_intervals(self, rows: ArrayLike) -> Array:
         """(k, 2) from where to where, in rows, the polyline through `rows` (m, n) is not known to keep the margin."""
-        return motion.doubts(self._setting.world, self._kernel, self._rows(rows), self.margin, FINEST)
+        return motion.unresolved_intervals(self._scene.world, self._kernel, self._rows(rows), self.margin, FINEST)
 
     def touching(self, rows: ArrayLike) -> Array | None:
-        """A posture (n,) on the polyline through `rows` (m, n) that does not keep the margin, however much bulges.
+        """A configuration (n,) on the polyline through `rows` (m, n) that does not keep the margin, however much
+        bulges.
 
         None where there is none, or where only the true shapes can tell.
         """
-        setting = self._setting
-        margin = self.margin - setting.bulge  # [m] below 0: by how much spheres are in one another
-        if margin + setting.least <= 0.0:
+        compiled_scene = self._scene
+        margin = self.margin - compiled_scene.bulge  # [m] below 0: by how much spheres are in one another
+        if margin + compiled_scene.least <= 0.0:
             return None
-        verdict, posture = motion.look(setting.world, self._kernel, self._rows(rows), 1, margin, FINEST, math.inf, None)
-        return posture if verdict == TOUCHING else None
+        verdict, configuration = motion.look(
+            compiled_scene.world, self._kernel, self._rows(rows), 1, margin, FINEST, math.inf, None
+        )
+        return configuration if verdict == TOUCHING else None
 
     def distance(self, positions: ArrayLike, most: float = 1.0) -> float:
         """[m] that the arm keeps at least to itself and everything else; 0 where spheres touch, at most `most`."""
-        return motion.clearance(self._setting.world, self._kernel, self._row(positions), most)[0]
+        return motion.clearance(self._scene.world, self._kernel, self._row(positions), most)[0]
 
-    def nearest(self, positions: ArrayLike, most: float = 1.0) -> Contact | None:
+    def nearest(self, positions: ArrayLike, most: float = 1.0) -> ContactPair | None:
         """The two that are nearest to one another, None where all are farther than `most` [m]."""
-        setting = self._setting
-        _, first, second = motion.clearance(setting.world, self._kernel, self._row(positions), most)
-        return None if first < 0 else Contact(setting.name_of(first), setting.name_of(second))
+        compiled_scene = self._scene
+        _, first, second = motion.clearance(compiled_scene.world, self._kernel, self._row(positions), most)
+        return None if first < 0 else ContactPair(compiled_scene.name_of(first), compiled_scene.name_of(second))
 
-    def first_contact(self, positions: ArrayLike) -> Contact | None:
-        """Two that do not keep the margin, None where the posture is free."""
-        setting = self._setting
-        touches, first, second = motion.first_contact(setting.world, self._kernel, self._row(positions), self.margin)
-        return Contact(setting.name_of(first), setting.name_of(second)) if touches else None
+    def first_contact(self, positions: ArrayLike) -> ContactPair | None:
+        """Two that do not keep the margin, None where the configuration is free."""
+        compiled_scene = self._scene
+        touches, first, second = motion.first_contact(
+            compiled_scene.world, self._kernel, self._row(positions), self.margin
+        )
+        return ContactPair(compiled_scene.name_of(first), compiled_scene.name_of(second)) if touches else None
 
     def plan(
         self,
@@ -140,7 +145,7 @@ class NativePlanner:
         time_limit: float = math.inf,
         cancel: CancelFlag | None = None,
     ) -> FreePath | NoPath:
-        """A way from `start` (n,) to one of `goals` (n,) or (m, n), by RRT-Connect, shortened and smoothed.
+        """A path from `start` (n,) to one of `goals` (n,) or (m, n), by RRT-Connect, shortened and smoothed.
 
         The same seed gives the same path, unless `time_limit` [s] cuts the shortening off. Distances are counted in
         time at full speed. The interpreter's lock is released; `cancel` may be set from another thread.
@@ -149,15 +154,15 @@ class NativePlanner:
         at = self._row(start)
         bounds = np.array([*self._span(np.vstack((at, rows))), [1.0 / joint.velocity for joint in self.arm.joints]])
         flag = cancel if isinstance(cancel, NativeCancelFlag) else None  # another kind is only seen by the caller
-        done = motion.plan(self._setting.world, self._kernel, bounds, at, rows, seed, self.margin, time_limit, flag)
+        done = motion.plan(self._scene.world, self._kernel, bounds, at, rows, seed, self.margin, time_limit, flag)
         effort = Effort(done.search_s, done.shorten_s, done.smooth_s, done.iterations, done.checks)
         if done.outcome != FOUND:
-            return NoPath(Why(done.outcome), effort)
-        return FreePath(done.way(len(self.arm.joints)), done.control(len(self.arm.joints)), effort)
+            return NoPath(FailureReason(done.outcome), effort)
+        return FreePath(done.path(len(self.arm.joints)), done.control(len(self.arm.joints)), effort)
 
     def sphere_centres(self, positions: ArrayLike) -> NDArray[np.float32]:
         """(rows, spheres, 3) [m] in the base, in the order of the trees: for tests and pictures."""
-        return motion.centres(self._setting.world, self._kernel, self._rows(positions))
+        return motion.centres(self._scene.world, self._kernel, self._rows(positions))
 
     def _span(self, ends: Array) -> tuple[Array, Array]:
         """Where is searched: within the limits, and half a turn around `ends` (m, n) where a joint has none."""
@@ -178,5 +183,5 @@ class NativePlanner:
         return row
 
     def _look(self, rows: Array, degree: int) -> bool:
-        world, margin = self._setting.world, self.margin
+        world, margin = self._scene.world, self.margin
         return motion.look(world, self._kernel, rows, degree, margin, FINEST, math.inf, None)[0] == FREE

@@ -1,4 +1,4 @@
-"""What a plan of the motion core ends with."""
+"""What a plan of the native planner ends with."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-class Why(IntEnum):
+class FailureReason(IntEnum):
     """Why there is no path; as plan.h numbers it."""
 
     START_TOUCHES = 1
@@ -35,13 +35,13 @@ class Effort:
 class NoPath:
     """None was found."""
 
-    why: Why
+    reason: FailureReason
     effort: Effort
 
 
 @dataclass(frozen=True)
 class FreePath:
-    """A free way: `corners` (m, n) of the polyline, and `control` (k, n) points of the curve in its place.
+    """A free path: `corners` (m, n) of the polyline, and `control` (k, n) points of the curve in its place.
 
     The curve is the uniform cubic B-spline of the control points, twice continuously differentiable in its parameter,
     from 0 to k - 3; both of its ends are control points three times, so that it begins and ends exactly there.

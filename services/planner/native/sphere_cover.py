@@ -1,9 +1,8 @@
 """Spheres that cover a solid: every point of it is in one of them, and none bulges out by more than is allowed.
 
 The solid is cut into cells, small ones at its surface, and each cell is in a ball. A sphere at depth d in a solid may
-have the radius d + bulge. Greedily (native/src/cover.h), the sphere that holds the most cells not yet held is taken, and
-shrunk to what it is needed for. The same solid gives the same spheres.
-"""
+have the radius d + bulge. Greedily (native/src/cover.h), the sphere that holds the most cells not yet held is taken,
+and shrunk to what it is needed for. The same solid gives the same spheres."""
 
 from __future__ import annotations
 
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.planner.collision_geometry.link_shapes import solid_of
-from services.planner.collision_geometry.shapes import Shape
+from services.planner.collision_geometry.shapes import CollisionShape
 from services.planner.collision_geometry.solids import Capsule, Solid
 from services.planner.native.binding import motion
 
@@ -32,40 +31,40 @@ MEDIAL = 0.9  # the slope of the depth below which a point has several nearest o
 
 
 @dataclass(frozen=True)
-class Cover:
+class SphereCover:
     """`spheres` (n, 4): centres and radii [m]; `bulge` [m]: how far the farthest one reaches beyond the solid."""
 
     spheres: Array
     bulge: float
 
 
-def cover_shapes(shapes: Sequence[Shape], bulge: float) -> Cover:
+def cover_shapes(shapes: Sequence[CollisionShape], bulge: float) -> SphereCover:
     """The spheres of several shapes in the frame that their poses are in; raises ValueError for one without an end."""
     covers = [_placed(shape, bulge) for shape in shapes]
-    return Cover(np.vstack([cover.spheres for cover in covers]), max(cover.bulge for cover in covers))
+    return SphereCover(np.vstack([cover.spheres for cover in covers]), max(cover.bulge for cover in covers))
 
 
-def _placed(shape: Shape, bulge: float) -> Cover:
+def _placed(shape: CollisionShape, bulge: float) -> SphereCover:
     cover = mesh_cover(*shape.mesh.arrays, bulge) if shape.mesh else cover_of(solid_of(shape), bulge)
     spheres = cover.spheres.copy()
     spheres[:, :3] = spheres[:, :3] @ shape.rotation.T + shape.pose[0]
     spheres[:, 3] += shape.padding
-    return Cover(spheres, cover.bulge)
+    return SphereCover(spheres, cover.bulge)
 
 
 @lru_cache(maxsize=256)
-def cover_of(solid: Solid, bulge: float = BULGE) -> Cover:
+def cover_of(solid: Solid, bulge: float = BULGE) -> SphereCover:
     """The spheres of a convex solid in its own frame."""
     if isinstance(solid, Capsule) and solid.half_length == 0.0:
-        return Cover(np.array([[0.0, 0.0, 0.0, solid.radius]]), 0.0)
+        return SphereCover(np.array([[0.0, 0.0, 0.0, solid.radius]]), 0.0)
     cells = cells_of(solid, FINENESS * bulge)
     centres = medial(solid, FINENESS * bulge)
     candidates = with_radii(centres, np.maximum(solid.depth(centres), 0.0) + bulge)
     spheres = _chosen(cells, candidates, bulge)
-    return Cover(spheres, float((spheres[:, 3] - solid.depth(spheres[:, :3])).max()))
+    return SphereCover(spheres, float((spheres[:, 3] - solid.depth(spheres[:, :3])).max()))
 
 
-def mesh_cover(vertices: Array, faces: NDArray[np.int32], bulge: float = BULGE) -> Cover:
+def mesh_cover(vertices: Array, faces: NDArray[np.int32], bulge: float = BULGE) -> SphereCover:
     """The spheres of a mesh: of what its surface encloses and of the surface.
 
     The bulge is a bound here: of a cell at the surface only the cell is known.
@@ -78,7 +77,7 @@ def mesh_cover(vertices: Array, faces: NDArray[np.int32], bulge: float = BULGE) 
     promised = rows[:, 3]  # for any point of a cell; half a diagonal more for its centre
     depths = np.where(promised > 0.0, promised + radius, np.where(promised < 0.0, -radius, 0.0))
     cells = with_radii(rows[:, :3], np.full(len(rows), radius * (1.0 + 1e-9)))
-    return Cover(_chosen(cells, with_radii(rows[:, :3], depths + bulge), bulge - radius), bulge)
+    return SphereCover(_chosen(cells, with_radii(rows[:, :3], depths + bulge), bulge - radius), bulge)
 
 
 def _chosen(cells: Array, candidates: Array, least: float) -> Array:

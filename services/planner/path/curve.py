@@ -1,7 +1,7 @@
-"""A way without corners, by its length: a uniform cubic B-spline as cubic pieces, with derivatives by arc length.
+"""A path without corners, by its length: a uniform cubic B-spline as cubic pieces, with derivatives by arc length.
 
 Lengths are times at full speed: joint values are divided by the joints' speed limits, and what is left is measured as
-in space, so that the length of a way is smooth and a unit of it takes about a second at least.
+in space, so that the length of a path is smooth and a unit of it takes about a second at least.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ Indices = NDArray[np.int64]
 
 PARTS = 8  # of a piece, within which its length is integrated and looked up
 NEWTON = 3  # steps from the look-up to the parameter
-SMALLEST = 1e-12  # of a way's whole length: a piece that is shorter is none
-CORNER = 1e-6  # between two unit tangents: beyond it the way has a corner
+SMALLEST = 1e-12  # of a path's whole length: a piece that is shorter is none
+CORNER = 1e-6  # between two unit tangents: beyond it the path has a corner
 SLOWEST = 1e-3  # of the mean speed in the parameter: below it a piece turns on the spot
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 NODES, WEIGHTS = 0.5 * (NODES + 1.0), 0.5 * WEIGHTS
@@ -38,7 +38,8 @@ class Derivatives(NamedTuple):
 
 
 def spline_rows(control: Array, rows: int) -> Array:
-    """(m, n) postures along the uniform cubic B-spline of `control` (k, n), `rows` in each span, ends included."""
+    """(m, n) configurations along the uniform cubic B-spline of `control` (k, n), `rows` in each span, ends
+    included."""
     powers = _powers(control)
     u = np.linspace(0.0, 1.0, rows, endpoint=False)
     values = np.stack((np.ones_like(u), u, u * u, u**3), axis=1)

@@ -1,4 +1,4 @@
-"""The compiled core as a search, and as the check that the other searches ask; absent where it is not built."""
+"""The native planner as a search, and as the check that the other searches ask; absent where it is not built."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from services.arm.description import Arm
 from services.planner.native.paths import FreePath, NoPath
-from services.planner.path.path import NoWay, Way
+from services.planner.path.path import Path, PathNotFound
 from services.planner.request.deadline import Deadline
 from services.planner.request.refusals import SearchFailure
 
@@ -24,28 +24,29 @@ STRIDE = 1_000_003  # from seed to seed: the next request's is another one
 REASONS = {"START_TOUCHES": SearchFailure.START_TOUCHES, "GOAL_TOUCHES": SearchFailure.GOAL_TOUCHES}
 
 
-def native_way(core: NativePlanner, start: Array, goals: Array, seed: int, deadline: Deadline) -> Way:
-    """From `start` (n,) to one of `goals` (m, n): the shortest of as many as `ENOUGH` checks find; raises `NoWay`.
+def native_path(core: NativePlanner, start: Array, goals: Array, seed: int, deadline: Deadline) -> Path:
+    """From `start` (n,) to one of `goals` (m, n): the shortest of as many as `ENOUGH` checks find; raises
+    `PathNotFound`.
 
-    Searched, shortened and smoothed by the core. The same seed gives the same way where the time does not end it.
-    """
+    Searched, shortened and smoothed by the native planner. The same seed gives the same path where the time does not
+    end it."""
     best = _path(core, start, goals, seed, deadline)
     spent = best.effort.checks
     while spent < ENOUGH and not deadline.has_passed():
         seed = (seed + STRIDE) % 2**32
         try:
             path = _path(core, start, goals, seed, deadline)
-        except NoWay:
+        except PathNotFound:
             break
         spent += path.effort.checks
         best = min(best, path, key=lambda path: _length(core.arm, path.corners))
-    return Way(best.corners, best.control, NATIVE)
+    return Path(best.corners, best.control, NATIVE)
 
 
 def _path(core: NativePlanner, start: Array, goals: Array, seed: int, deadline: Deadline) -> FreePath:
     path = core.plan(start, goals, seed=seed, time_limit=deadline.left, cancel=deadline.cancel)
     if isinstance(path, NoPath):
-        raise NoWay(REASONS.get(path.why.name, SearchFailure.TIMED_OUT))
+        raise PathNotFound(REASONS.get(path.reason.name, SearchFailure.TIMED_OUT))
     return path
 
 

@@ -1,4 +1,4 @@
-"""From where only the exact shapes let the arm be, a short straight way to where the compiled core lets it be too."""
+"""From where only the exact shapes let the arm be, a short straight path to where the native planner lets it be too."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.description import Arm
-from services.planner.path.validity import Validity
+from services.planner.path.validity import ValidityChecker
 from services.planner.request.deadline import Deadline
 
 if TYPE_CHECKING:
@@ -17,40 +17,41 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-NEAREST, FARTHEST = 0.02, 1.3  # [s] at full speed: how far from the posture is looked first and last
-SAMPLES = 64  # postures at each distance, which doubles
-SPARE = 0.0003  # [m] beyond the margin: with none the core finds no line free that begins there
-TRIED = 3  # of them, the nearest, to which the straight way is looked at
+NEAREST, FARTHEST = 0.02, 1.3  # [s] at full speed: how far from the configuration is looked first and last
+SAMPLES = 64  # configurations at each distance, which doubles
+SPARE = 0.0003  # [m] beyond the margin: with none the native planner finds no line free that begins there
+TRIED = 3  # of them, the nearest, to which the straight path is looked at
 
 
-def with_room(
-    arm: Arm, core: NativePlanner, posture: Array, validity: Validity, seed: int, deadline: Deadline
+def nearby_free(
+    arm: Arm, core: NativePlanner, configuration: Array, validity: ValidityChecker, seed: int, deadline: Deadline
 ) -> Array | None:
-    """`posture` (n,) itself where the core lets it move, else a near one where it does, None where none was found."""
-    if _can_move(core, posture):
-        return posture
-    for rows in _around(arm, posture, seed):
+    """`configuration` (n,) itself where the native planner lets it move, else a near one where it does, None where none
+    was found."""
+    if _can_move(core, configuration):
+        return configuration
+    for rows in _around(arm, configuration, seed):
         for row in rows[core.free(rows)][:TRIED]:
-            if _can_move(core, row) and validity.is_line_free(posture, row):
+            if _can_move(core, row) and validity.is_line_free(configuration, row):
                 return np.asarray(row)
         if deadline.has_passed():
             break
     return None
 
 
-def _can_move(core: NativePlanner, posture: Array) -> bool:
+def _can_move(core: NativePlanner, configuration: Array) -> bool:
     most = core.margin + SPARE
-    return core.distance(posture, most) >= most
+    return core.distance(configuration, most) >= most
 
 
-def _around(arm: Arm, posture: Array, seed: int) -> Iterator[Array]:
-    """(m, n) postures within the limits, nearest first, from farther and farther away."""
+def _around(arm: Arm, configuration: Array, seed: int) -> Iterator[Array]:
+    """(m, n) configurations within the limits, nearest first, from farther and farther away."""
     random = np.random.default_rng(seed)
     speed = np.array([joint.velocity for joint in arm.joints])
     lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
     distance = NEAREST
     while distance < FARTHEST:
         steps = distance * random.uniform(-1.0, 1.0, (SAMPLES, len(speed)))
-        rows = np.clip(posture + speed * steps, lower, upper)
+        rows = np.clip(configuration + speed * steps, lower, upper)
         yield rows[np.argsort(np.abs(steps).max(axis=1), kind="stable")]
         distance *= 2.0

@@ -1,7 +1,7 @@
-"""The sampling planners of OMPL 2.0: one thread, seeded, asked for a way in the time that is left.
+"""The sampling planners of OMPL 2.0: one thread, seeded, asked for a path in the time that is left.
 
 Distances are counted in time at full speed. What improves for as long as it may is stopped by the count of its own
-questions, not by the clock, so that the same seed gives the same way.
+questions, not by the clock, so that the same seed gives the same path.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.description import Arm
-from services.planner.path.path import NoWay
-from services.planner.path.roadmap import shortest_way
-from services.planner.path.validity import Validity
+from services.planner.path.path import PathNotFound
+from services.planner.path.roadmap import shortest_path
+from services.planner.path.validity import ValidityChecker
 from services.planner.request.deadline import Deadline
 from services.planner.request.refusals import SearchFailure
 
@@ -32,9 +32,10 @@ AROUND = math.pi  # [rad] about start and goals that a joint without limits is s
 
 
 def ompl_corners(
-    arm: Arm, planner_id: str, start: Array, goals: Array, validity: Validity, seed: int, deadline: Deadline
+    arm: Arm, planner_id: str, start: Array, goals: Array, validity: ValidityChecker, seed: int, deadline: Deadline
 ) -> Array:
-    """Corners (m, n) of a polyline from `start` (n,) to one of `goals` (k, n), exact at both ends; raises `NoWay`."""
+    """Corners (m, n) of a polyline from `start` (n,) to one of `goals` (k, n), exact at both ends; raises
+    `PathNotFound`."""
     problem = _Problem(arm, validity, np.vstack((start, goals)))
     problem.set_ends(start, goals, seed)
     corners = problem.roadmap(deadline) if planner_id == "PRM" else problem.tree(planner_id, deadline)
@@ -53,7 +54,7 @@ def load_ompl() -> None:
 class _Problem:
     """One question in OMPL's terms; states are joint values divided by the speed limits."""
 
-    def __init__(self, arm: Arm, validity: Validity, ends: Array) -> None:
+    def __init__(self, arm: Arm, validity: ValidityChecker, ends: Array) -> None:
         from ompl import base
 
         self._scale = np.array([joint.velocity for joint in arm.joints])
@@ -87,7 +88,7 @@ class _Problem:
         self._definition.setOptimizationObjective(self._base.PathLengthOptimizationObjective(self.information))
 
     def tree(self, planner_id: str, deadline: Deadline) -> Array:
-        """The way of a planner that grows trees or batches."""
+        """The path of a planner that grows trees or batches."""
         from ompl import geometric
 
         planner = getattr(geometric, planner_id)(self.information)
@@ -99,11 +100,13 @@ class _Problem:
         is_over = _bettered(planner, BETTERING[planner_id], is_late) if planner_id in BETTERING else is_late
         planner.solve(self._base.PlannerTerminationCondition(is_over))
         if not self._definition.hasExactSolution():
-            raise NoWay(SearchFailure.TIMED_OUT)
-        return np.array([_posture(state, self._scale) for state in self._definition.getSolutionPath().getStates()])
+            raise PathNotFound(SearchFailure.TIMED_OUT)
+        return np.array(
+            [_configuration(state, self._scale) for state in self._definition.getSolutionPath().getStates()]
+        )
 
     def roadmap(self, deadline: Deadline) -> Array:
-        """The way on a roadmap. OMPL grows it; its own `solve` waits for a thread that waits for Python, for ever."""
+        """The path on a roadmap. OMPL grows it; its own `solve` waits for a thread that waits for Python, for ever."""
         from ompl import geometric
 
         planner = geometric.PRM(self.information)
@@ -114,23 +117,25 @@ class _Problem:
             planner.growRoadmapPtc(self._base.PlannerTerminationCondition(_after(BATCH, is_late)))
             data = self._base.PlannerData(self.information)
             planner.getPlannerData(data)
-            postures = [_posture(data.getVertex(row).getState(), self._scale) for row in range(data.numVertices())]
-            edges = [(row, int(other)) for row in range(len(postures)) for other in data.getEdges(row)]
-            found = shortest_way(
-                self.start, self.goals, np.array(postures), edges, self._scale, self._validity.is_line_free
+            configurations = [
+                _configuration(data.getVertex(row).getState(), self._scale) for row in range(data.numVertices())
+            ]
+            edges = [(row, int(other)) for row in range(len(configurations)) for other in data.getEdges(row)]
+            found = shortest_path(
+                self.start, self.goals, np.array(configurations), edges, self._scale, self._validity.is_line_free
             )
             if found is not None:
                 return found
-        raise NoWay(SearchFailure.TIMED_OUT)
+        raise PathNotFound(SearchFailure.TIMED_OUT)
 
     def _late(self, deadline: Deadline) -> Callable[[], bool]:
         """By the clock on the wall too, where the deadline's own stands."""
         is_over = self._base.timedPlannerTerminationCondition(deadline.left).eval
         return lambda: bool(is_over()) or deadline.has_passed()
 
-    def _state(self, posture: Array) -> Any:
+    def _state(self, configuration: Array) -> Any:
         state = self.information.allocState()
-        for index, value in enumerate((posture / self._scale).tolist()):
+        for index, value in enumerate((configuration / self._scale).tolist()):
             state[index] = value
         return state
 
@@ -148,21 +153,23 @@ def _bettered(planner: Any, questions: int, is_late: Callable[[], bool]) -> Call
     return is_over
 
 
-def _posture(state: Any, scale: Array) -> Array:
+def _configuration(state: Any, scale: Array) -> Array:
     """Joint values (n,) of a state."""
     values: Array = np.array([state[index] for index in range(len(scale))]) * scale
     return values
 
 
-def _states(validity: Validity, scale: Array) -> Callable[[Any], bool]:
+def _states(validity: ValidityChecker, scale: Array) -> Callable[[Any], bool]:
     """OMPL's question about states. It does not know the problem: a ring through OMPL and Python is never freed."""
-    return lambda state: validity.is_free(_posture(state, scale))
+    return lambda state: validity.is_free(_configuration(state, scale))
 
 
-def _motions(information: Any, validity: Validity, scale: Array) -> Any:
+def _motions(information: Any, validity: ValidityChecker, scale: Array) -> Any:
     """OMPL's question about motions, answered between the samples too."""
     motions = _motions_class()(information)
-    motions.is_line_free = lambda one, other: validity.is_line_free(_posture(one, scale), _posture(other, scale))
+    motions.is_line_free = lambda one, other: validity.is_line_free(
+        _configuration(one, scale), _configuration(other, scale)
+    )
     return motions
 
 

@@ -15,17 +15,17 @@ Start = tuple[float, ...]
 STRAIGHT = "straight"  # the planner_id of joint lines, which no search is needed for
 
 
-class NoWay(Exception):
+class PathNotFound(Exception):
     """None was found."""
 
-    def __init__(self, why: SearchFailure) -> None:
-        super().__init__(why.value)
-        self.why = why
+    def __init__(self, reason: SearchFailure) -> None:
+        super().__init__(reason.value)
+        self.reason = reason
 
 
 @dataclass(frozen=True)
-class Way:
-    """A free way: the polyline of `corners` (m, n), and the uniform cubic B-spline of `control` (k, n) in its place.
+class Path:
+    """A free path: the polyline of `corners` (m, n), and the uniform cubic B-spline of `control` (k, n) in its place.
 
     Both ends of the curve are there three times, so that it begins and ends exactly there.
     """

@@ -1,4 +1,4 @@
-"""Joint values by the length of a way, with their derivatives: a cubic spline, or lines with rounded corners."""
+"""Joint values by the length of a path, with their derivatives: a cubic spline, or lines with rounded corners."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from services.planner.path.curve import Derivatives
 
 Array = NDArray[np.float64]
 
-NO_WAY = 1e-7  # [m] a leg that is shorter is none
+NO_LENGTH = 1e-7  # [m] a leg that is shorter is none
 
 
 class PathCurve(Protocol):
@@ -64,13 +64,14 @@ class CubicSpline:
 
 
 class RoundedLines:
-    """Straight from row to row of `postures` (m, n), corners cut at `radii` (m - 2,) of the length before and after."""
+    """Straight from row to row of `configurations` (m, n), corners cut at `radii` (m - 2,) of the length before and
+    after."""
 
-    def __init__(self, postures: Array, lengths: Array, radii: Array) -> None:
-        self.start, self.end = postures[0], postures[-1]
+    def __init__(self, configurations: Array, lengths: Array, radii: Array) -> None:
+        self.start, self.end = configurations[0], configurations[-1]
         self._corners = np.concatenate(([0.0], np.cumsum(lengths)))
-        self._postures = postures
-        self._directions = np.diff(postures, axis=0) / lengths[:, None]
+        self._configurations = configurations
+        self._directions = np.diff(configurations, axis=0) / lengths[:, None]
         self._radii = radii
         inner = self._corners[1:-1]
         self.marks = np.unique(np.concatenate((inner - radii, inner + radii, self._corners[[0, -1]])))
@@ -80,40 +81,41 @@ class RoundedLines:
         """At lengths (m,) within the knots."""
         leg = np.clip(np.searchsorted(self._corners, along, side="right") - 1, 0, len(self._directions) - 1)
         first = self._directions[leg].copy()
-        value = self._postures[leg] + (along - self._corners[leg])[:, None] * first
+        value = self._configurations[leg] + (along - self._corners[leg])[:, None] * first
         second, third = np.zeros_like(first), np.zeros_like(first)
         for index, radius in enumerate(self._radii.tolist()):
             near = np.abs(along - self._corners[index + 1]) < radius
             coming, leaving = self._directions[index : index + 2]
-            way, change = 2.0 * radius, (leaving - coming)[None, :]
+            width, change = 2.0 * radius, (leaving - coming)[None, :]
             offset = (along[near] - self._corners[index + 1])[:, None]
-            u = (offset + radius) / way
-            value[near] = self._postures[index + 1] + offset * coming + way * blending(u) * change
+            u = (offset + radius) / width
+            value[near] = self._configurations[index + 1] + offset * coming + width * blending(u) * change
             first[near] = coming + u * u * (3.0 - 2.0 * u) * change
-            second[near] = 6.0 * u * (1.0 - u) / way * change
-            third[near] = (6.0 - 12.0 * u) / way**2 * change
+            second[near] = 6.0 * u * (1.0 - u) / width * change
+            third[near] = (6.0 - 12.0 * u) / width**2 * change
         return Derivatives(value, first, second, third)
 
 
-def rounded_runs(postures: Array, scale: Array, reach: Array, blend: float) -> list[RoundedLines]:
-    """The polyline of `postures` (m, n) as runs from rest to rest; its length is in `scale` (n,) units of the joints.
+def rounded_runs(configurations: Array, scale: Array, reach: Array, blend: float) -> list[RoundedLines]:
+    """The polyline of `configurations` (m, n) as runs from rest to rest; its length is in `scale` (n,) units of the
+    joints.
 
     A corner is cut only as far as no point of the arm leaves it by more than `blend` [m], by how far it can move at
     most per unit of each joint, `reach` (n,).
     """
-    lengths = np.linalg.norm(np.diff(postures, axis=0) / scale, axis=1)
-    keep = lengths > NO_WAY
-    postures, lengths = np.vstack((postures[:1], postures[1:][keep])), lengths[keep]
+    lengths = np.linalg.norm(np.diff(configurations, axis=0) / scale, axis=1)
+    keep = lengths > NO_LENGTH
+    configurations, lengths = np.vstack((configurations[:1], configurations[1:][keep])), lengths[keep]
     if not len(lengths):
         return []
-    movement = np.abs(np.diff(postures, axis=0)) @ reach / lengths  # [m] per unit of length
+    movement = np.abs(np.diff(configurations, axis=0)) @ reach / lengths  # [m] per unit of length
     radii = [
-        cut(float(lengths[i]), float(lengths[j]), blend / max(float(movement[i]), float(movement[j]), NO_WAY))
+        cut(float(lengths[i]), float(lengths[j]), blend / max(float(movement[i]), float(movement[j]), NO_LENGTH))
         for i, j in pairwise(range(len(lengths)))
     ]
     stops = [0, *(index + 1 for index, radius in enumerate(radii) if radius == 0.0), len(lengths)]
     return [
-        RoundedLines(postures[low : high + 1], lengths[low:high], np.array(radii[low : high - 1]))
+        RoundedLines(configurations[low : high + 1], lengths[low:high], np.array(radii[low : high - 1]))
         for low, high in pairwise(stops)
     ]
 
@@ -126,9 +128,9 @@ def _end_slope(knots: Array, values: Array) -> Array:
 
 
 def cut(before: float, after: float, blend: float) -> float:
-    """How far from a corner between two legs the way may leave them; 0 where it has to stop there."""
+    """How far from a corner between two legs the path may leave them; 0 where it has to stop there."""
     radius = min(blend, 0.5 * before, 0.5 * after)
-    return radius if radius > NO_WAY else 0.0
+    return radius if radius > NO_LENGTH else 0.0
 
 
 def blending(u: float | Array) -> float | Array:

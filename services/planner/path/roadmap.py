@@ -1,4 +1,4 @@
-"""The shortest way over a roadmap, and from the start and to a goal by its nearest places (Dijkstra 1959)."""
+"""The shortest path over a roadmap, and from the start and to a goal by its nearest places (Dijkstra 1959)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Neighbours = dict[int, list[tuple[int, float]]]
 TRIED = 10  # nearest places to which an end is joined
 
 
-def shortest_way(
+def shortest_path(
     start: Array,
     goals: Array,
     places: Array,
@@ -61,7 +61,7 @@ def _dijkstra(neighbours: Neighbours, start: int, goals: set[int]) -> list[int] 
 
 
 def _traced(came_from: dict[int, int], place: int, start: int) -> list[int]:
-    way = [place]
-    while way[-1] != start:
-        way.append(came_from[way[-1]])
-    return way[::-1]
+    path = [place]
+    while path[-1] != start:
+        path.append(came_from[path[-1]])
+    return path[::-1]

@@ -1,4 +1,4 @@
-"""A polyline made shorter by straight cuts, and its corners round: what the compiled core does for its own ways."""
+"""A polyline made shorter by straight cuts, and its corners round: what the native planner does for its own ways."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.path.validity import Validity
+from services.planner.path.validity import ValidityChecker
 from services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
@@ -19,7 +19,7 @@ LEAST = 1.0 / 64.0
 SHARED = 2  # control points from one corner to the next, where these share the one between them
 
 
-def shorten(corners: Array, validity: Validity, seed: int, deadline: Deadline) -> Array:
+def shorten(corners: Array, validity: ValidityChecker, seed: int, deadline: Deadline) -> Array:
     """The polyline (m, n) with straight cuts between random places on it, for as long as there is time.
 
     At last it loses the corners that it can do without: two that nearly coincide let the arm creep around them.
@@ -36,7 +36,7 @@ def shorten(corners: Array, validity: Validity, seed: int, deadline: Deadline) -
     return _needed(corners, validity, deadline)
 
 
-def smooth(corners: Array, validity: Validity, deadline: Deadline) -> Array:
+def smooth(corners: Array, validity: ValidityChecker, deadline: Deadline) -> Array:
     """Control points (k, n) of a uniform cubic B-spline along the polyline, free as a whole.
 
     Every corner keeps its own control point, with one before and one after it on its edges; where the curve touches,
@@ -56,7 +56,7 @@ def smooth(corners: Array, validity: Validity, deadline: Deadline) -> Array:
     return stopping(corners) if waiting else control
 
 
-def continued(corners: Array, end: Array, validity: Validity) -> Array:
+def continued(corners: Array, end: Array, validity: ValidityChecker) -> Array:
     """The polyline from `end` (n,) straight to its first corner, or past it to the second where that is free."""
     is_needless = len(corners) > 1 and validity.is_line_free(end, corners[1])
     return np.vstack((end, corners[1:] if is_needless else corners))
@@ -67,7 +67,7 @@ def stopping(corners: Array) -> Array:
     return np.repeat(corners, 3, axis=0)
 
 
-def _needed(corners: Array, validity: Validity, deadline: Deadline) -> Array:
+def _needed(corners: Array, validity: ValidityChecker, deadline: Deadline) -> Array:
     """The polyline without each corner that a straight line may pass by."""
     kept = [corners[0]]
     for corner, after in pairwise(corners[1:]):
@@ -76,7 +76,7 @@ def _needed(corners: Array, validity: Validity, deadline: Deadline) -> Array:
     return np.array([*kept, corners[-1]])
 
 
-def _cut(corners: Array, low: float, high: float, validity: Validity) -> Array | None:
+def _cut(corners: Array, low: float, high: float, validity: ValidityChecker) -> Array | None:
     """The polyline that goes straight from one place on it to another; None where it is not free or no shorter."""
     first, last = int(low), int(high)
     if first == last:

@@ -1,4 +1,4 @@
-"""Whether postures, joint lines and curves keep a margin, for the searches."""
+"""True if configurations, joint lines and curves keep a margin, for the searches."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from services.planner.path.curve import spline_rows
 
 Array = NDArray[np.float64]
 
-ROWS = 24  # postures in a span of a curve, between which it is looked at as straight
+ROWS = 24  # configurations in a span of a curve, between which it is looked at as straight
 
 
-class Checker(Protocol):
-    """Coal, as a `World`, or the compiled core where it can tell and coal in doubt, as `CollisionChecker`."""
+class TouchingCheck(Protocol):
+    """Coal, as a `World`, or the native planner where it can tell and coal in doubt, as `CollisionChecker`."""
 
     def touching(self, positions: Array, margin: float) -> Array | None: ...
 
 
-class Validity:
+class ValidityChecker:
     """Answers hold between samples too; joint values (n,), control points of a uniform cubic B-spline (k, n)."""
 
-    def __init__(self, checker: Checker, margin: float) -> None:
+    def __init__(self, checker: TouchingCheck, margin: float) -> None:
         self._checker, self._margin = checker, margin
 
-    def is_free(self, posture: Array) -> bool:
-        return self.is_line_free(posture, posture)
+    def is_free(self, configuration: Array) -> bool:
+        return self.is_line_free(configuration, configuration)
 
     def is_line_free(self, start: Array, goal: Array) -> bool:
         return self._checker.touching(np.array((start, goal)), self._margin) is None

@@ -13,25 +13,28 @@ from services.planner.collision.checker import CollisionChecker
 from services.planner.collision.clearance import CLEARANCE, ROUNDING, first_collision, last_free
 from services.planner.kinematics.goals import Goals
 from services.planner.path.path import Start
-from services.planner.pipeline.nearest_free import jog_words, way_out
+from services.planner.pipeline.nearest_free import jog_words, nearest_free
 from services.planner.request.deadline import Deadline
-from services.planner.request.refusals import NoPlan, in_collision
+from services.planner.request.refusals import PlanRefused, in_collision
 
 Array = NDArray[np.float64]
 
 
-class Blockade:
+class CollisionRefusals:
     """Says of one arm, in the world of the plan at hand, what is in the way."""
 
-    def __init__(self, arm: Arm, goals: Goals, surroundings: CollisionChecker) -> None:
-        self._arm, self._goals, self._surroundings = arm, goals, surroundings
+    def __init__(self, arm: Arm, goals: Goals, checker: CollisionChecker) -> None:
+        self._arm, self._goals, self._checker = arm, goals, checker
 
-    def goal(self, asked: Goal, goal: Start, start: Start, deadline: Deadline, standing: Start | None = None) -> NoPlan:
-        """The refusal of a goal at which links touch, with the last free posture on the way, in the goal's own form.
+    def goal(
+        self, asked: Goal, goal: Start, start: Start, deadline: Deadline, standing: Start | None = None
+    ) -> PlanRefused:
+        """The refusal of a goal at which links touch, with the last free configuration on the way, in the goal's own
+        form.
 
         `standing` as in `Goals.candidates`.
         """
-        last = last_free(self._surroundings, np.array(start), np.array(goal))
+        last = last_free(self._checker, np.array(start), np.array(goal))
         values = dict(zip(self._arm.joint_names, (round(value, 4) for value in last.tolist()), strict=True))
         match asked:
             case PoseGoal():
@@ -43,53 +46,52 @@ class Blockade:
         remedy = f"the farthest it can go on the straight way there: {self._named(tuple(values.values()))}"
         return self.refusal(PlanCode.GOAL_IN_COLLISION, "at the goal", np.array(goal), CLEARANCE, nearest, remedy)
 
-    def start(self, start: Start, deadline: Deadline) -> NoPlan:
-        """The refusal of a start in which something touches, with the nearest posture that touches nothing."""
-        remedy, nearest = self._remedy(start), way_out(self._arm, self._surroundings, start, deadline)
+    def start(self, start: Start, deadline: Deadline) -> PlanRefused:
+        """The refusal of a start in which something touches, with the nearest configuration that touches nothing."""
+        remedy, nearest = self._remedy(start), nearest_free(self._arm, self._checker, start, deadline)
         if nearest is not None and nearest.can_be_jogged:
-            remedy = (
-                f"`{jog_words(self._arm, self._surroundings.reach, start, nearest.posture)}` leads out; or {remedy}"
-            )
+            words = jog_words(self._arm, self._checker.reach, start, nearest.configuration)
+            remedy = f"`{words}` leads out; or {remedy}"
         elif nearest is not None:
-            remedy = f"nothing touches at {self._named(nearest.posture)}; {remedy}"
-        where, shown = "where the arm stands", () if nearest is None else nearest.posture
-        no_plan = self.refusal(PlanCode.START_STATE_IN_COLLISION, where, np.array(start), 0.0, (), remedy)
-        return NoPlan(no_plan.code, msgspec.structs.replace(no_plan.refusal, way_out=shown))
+            remedy = f"nothing touches at {self._named(nearest.configuration)}; {remedy}"
+        where, shown = "where the arm stands", () if nearest is None else nearest.configuration
+        refused = self.refusal(PlanCode.START_STATE_IN_COLLISION, where, np.array(start), 0.0, (), remedy)
+        return PlanRefused(refused.code, msgspec.structs.replace(refused.refusal, nearest_free=shown))
 
-    def line(self, start: Start, goal: Start, margin: float) -> NoPlan:
+    def line(self, start: Start, goal: Start, margin: float) -> PlanRefused:
         """The refusal of a straight line on which something touches, where it does so first."""
-        found = first_collision(self._surroundings, np.array((start, goal)), margin)
+        found = first_collision(self._checker, np.array((start, goal)), margin)
         touching = np.array(goal) if found is None else found
         named = ", ".join(self._arm.state_names)
-        remedy = f"go by way of another posture, for example a named one ({named})"
+        remedy = f"go by way of another configuration, for example a named one ({named})"
         return self.refusal(PlanCode.PLANNING_FAILED, "on the straight way to the goal", touching, margin, (), remedy)
 
-    def way(self, touching: Array, margin: float) -> NoPlan:
-        """The refusal of the ways that were found and came too near to something once they had their time."""
+    def path(self, touching: Array, margin: float) -> PlanRefused:
+        """The refusal of the paths that were found and came too near to something once they had their time."""
         remedy = "ask with another seed or planner_id; if it stays, report this as a defect"
         return self.refusal(PlanCode.PLANNING_FAILED, "on the way that was found", touching, margin, (), remedy)
 
-    def by(self, touching: Array, margin: float) -> NoPlan:
+    def waypoints(self, touching: Array, margin: float) -> PlanRefused:
         """The refusal of the straight lines from waypoint to waypoint."""
         remedy = "give waypoints that lead around it, or ask for a free motion"
         return self.refusal(PlanCode.PLANNING_FAILED, "on the way by the waypoints", touching, margin, (), remedy)
 
     def refusal(
-        self, code: PlanCode, where: str, posture: Array, margin: float, nearest: Vector, remedy: str
-    ) -> NoPlan:
-        """The refusal of a posture in which the plan's world touches the arm, with the names of both."""
-        world = self._surroundings.world
-        pairs = world.pairs_within(posture, margin + ROUNDING) or [("?", "?")]
-        standing = tuple(posture.tolist())
+        self, code: PlanCode, where: str, configuration: Array, margin: float, nearest: Vector, remedy: str
+    ) -> PlanRefused:
+        """The refusal of a configuration in which the plan's world touches the arm, with the names of both."""
+        world = self._checker.world
+        pairs = world.pairs_within(configuration, margin + ROUNDING) or [("?", "?")]
+        standing = tuple(configuration.tolist())
         return in_collision(code, where, pairs, margin, nearest, remedy, standing, world.objects)
 
-    def _named(self, posture: Start) -> str:
-        pairs = zip(self._arm.joints, posture, strict=True)
+    def _named(self, configuration: Start) -> str:
+        pairs = zip(self._arm.joints, configuration, strict=True)
         return ", ".join(f"{joint.name} {value:g} {joint.unit}" for joint, value in pairs)
 
     def _remedy(self, start: Start) -> str:
         """What a person can do for an arm that touches something, besides moving it."""
-        world = self._surroundings.world
+        world = self._checker.world
         touched = [name for pair in world.pairs_within(start) for name in pair if name in world.objects]
         carried = [shown.name for shown in world.scene.objects if shown.attached and shown.name in touched]
         if carried:

@@ -1,4 +1,4 @@
-"""For an arm that touches something by little: the nearest posture that touches nothing, and how to jog there."""
+"""For an arm that touches something by little: the nearest configuration that touches nothing, and how to jog there."""
 
 from __future__ import annotations
 
@@ -22,37 +22,37 @@ FREE = CLEARANCE + 0.001  # [m] that is clear of everything there, so that a pla
 NEAREST, FARTHEST, GROWTH = 0.003, 0.15, 1.25  # [m] that any point of the arm moves at most on the ways that are tried
 DIRECTIONS = 24  # of all joints together, at each distance, besides those of one joint
 LEAST_REACH = 0.02  # [m/rad] of a joint that moves hardly anything
-LOOKS = 8  # at what touches, along a way
+LOOKS = 8  # at what touches, along a path
 LEAST_SECONDS, SHARE = 0.5, 0.7  # and of a joint's velocity limit at most
-DECIMALS, TINY = 4, 1e-4  # of [rad] or [m], in which a posture is told; what moves less does not move
+DECIMALS, TINY = 4, 1e-4  # of [rad] or [m], in which a configuration is told; what moves less does not move
 
 
 @dataclass(frozen=True)
-class WayOut:
-    """A posture (n,) [rad] or [m], and whether what touches only comes away on the straight way there, as jogging
-    demands."""
+class FreeConfiguration:
+    """A configuration (n,) [rad] or [m], and whether what touches only comes away on the straight path there, as
+    jogging demands."""
 
-    posture: Start
+    configuration: Start
     can_be_jogged: bool
 
 
-def way_out(arm: Arm, surroundings: CollisionChecker, start: Start, deadline: Deadline) -> WayOut | None:
+def nearest_free(arm: Arm, checker: CollisionChecker, start: Start, deadline: Deadline) -> FreeConfiguration | None:
     """The nearest that can be jogged to, or else the nearest; None where there is none near."""
-    nearest: WayOut | None = None
-    for row in _around(arm, surroundings.reach, np.array(start)):
+    nearest: FreeConfiguration | None = None
+    for row in _around(arm, checker.reach, np.array(start)):
         if deadline.has_passed():
             break
-        if surroundings.keeps(row, FREE):
-            found = WayOut(tuple(row.tolist()), _comes_away(surroundings, np.array(start), row))
+        if checker.keeps(row, FREE):
+            found = FreeConfiguration(tuple(row.tolist()), _comes_away(checker, np.array(start), row))
             if found.can_be_jogged:
                 return found
             nearest = nearest or found
     return nearest
 
 
-def jog_words(arm: Arm, reach: Array, start: Start, posture: Start) -> str:
-    """The command that moves from `start` to `posture`; `reach` as a world's."""
-    moves = [after - before for before, after in zip(start, posture, strict=True)]
+def jog_words(arm: Arm, reach: Array, start: Start, configuration: Start) -> str:
+    """The command that moves from `start` to `configuration`; `reach` as a world's."""
+    moves = [after - before for before, after in zip(start, configuration, strict=True)]
     fastest = max(abs(move) / joint.velocity for joint, move in zip(arm.joints, moves, strict=True))
     needed = max(LEAST_SECONDS, float(np.abs(moves) @ reach) / CONTACT_SPEED, fastest / SHARE)
     seconds = math.ceil(10.0 * needed) / 10.0
@@ -67,7 +67,7 @@ def _speed(joint: Joint, velocity: float) -> str:
 
 
 def _around(arm: Arm, reach: Array, start: Array) -> Iterator[Array]:
-    """Postures within the limits, the near ones first: of one joint moved, then of all; the same every time."""
+    """Configurations within the limits, the near ones first: of one joint moved, then of all; the same every time."""
     lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
     random, size = np.random.default_rng(0), len(start)
     away = NEAREST
@@ -81,11 +81,11 @@ def _around(arm: Arm, reach: Array, start: Array) -> Iterator[Array]:
         away *= GROWTH
 
 
-def _comes_away(surroundings: CollisionChecker, start: Array, end: Array) -> bool:
-    """Whether nothing that is nearer than the clearance comes nearer on the straight way."""
+def _comes_away(checker: CollisionChecker, start: Array, end: Array) -> bool:
+    """True if nothing that is nearer than the clearance comes nearer on the straight path."""
     before: dict[tuple[str, str], float] | None = None
     for share in np.linspace(0.0, 1.0, LOOKS + 1).tolist():
-        near = surroundings.contacts(start + share * (end - start), CLEARANCE)
+        near = checker.contacts(start + share * (end - start), CLEARANCE)
         now = {(each.first, each.second): each.distance for each in near}
         if before is not None and any(
             not comes_away(before.get(pair, math.inf), distance) for pair, distance in now.items()

@@ -6,19 +6,19 @@ from dataclasses import dataclass
 
 from schemas.planning import PlanRequest
 from services.planner.path.path import Start
-from services.planner.pipeline.trajectory_builder import Finisher
+from services.planner.pipeline.trajectory_builder import TrajectoryBuilder
 from services.planner.request.deadline import Deadline, Stopwatch
 from services.planner.timing.profile import JointLimits
 
 
 @dataclass(frozen=True)
-class Errand:
+class PlanningContext:
     """From `start`, within `limits`, `margin` [m] away from everything."""
 
     request: PlanRequest
     start: Start
     limits: JointLimits
     margin: float
-    finisher: Finisher
+    builder: TrajectoryBuilder
     deadline: Deadline
     watch: Stopwatch

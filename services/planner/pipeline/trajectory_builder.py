@@ -1,4 +1,4 @@
-"""From a way to a trajectory that may be executed: timed, within what the steppers can do, and looked at densely."""
+"""From a path to a trajectory that may be executed: timed, within what the steppers can do, and looked at densely."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import numpy as np
 from schemas.motion import JointTrajectory
 from schemas.planning import PlanRequest, StepMargin, StepPolicy, Timing
 from services.arm.description import Arm
-from services.planner.collision.clearance import Sweeper
+from services.planner.collision.clearance import PathChecker
 from services.planner.path.curve import TurnsOnTheSpot
-from services.planner.path.path import Array, Start, Way
+from services.planner.path.path import Array, Path, Start
 from services.planner.path.smoothing import stopping
 from services.planner.request.deadline import Stopwatch
-from services.planner.request.refusals import NoPlan, not_verified
+from services.planner.request.refusals import PlanRefused, not_verified
 from services.planner.timing.profile import JointLimits, NoProfile, stop_and_go
-from services.planner.timing.time_optimal import time_optimal_way
-from services.planner.timing.timing import timed_way
+from services.planner.timing.time_optimal import time_optimal_path
+from services.planner.timing.timing import timed_path
 from services.planner.verification.feasibility import feasible_scale, require_feasible, slowed
 from services.planner.verification.verify import (
     BadTrajectory,
@@ -30,16 +30,16 @@ from services.planner.verification.verify import (
 )
 
 
-class Touching(Exception):
-    """The finished trajectory comes too near to something, in `posture` (n,)."""
+class TrajectoryTouches(Exception):
+    """The finished trajectory comes too near to something, in `configuration` (n,)."""
 
-    def __init__(self, posture: Array) -> None:
+    def __init__(self, configuration: Array) -> None:
         super().__init__("the trajectory touches")
-        self.posture = posture
+        self.configuration = configuration
 
 
 @dataclass(frozen=True)
-class Finished:
+class VerifiedTrajectory:
     """What may be executed."""
 
     trajectory: JointTrajectory
@@ -47,52 +47,54 @@ class Finished:
     slowed: float  # 1: not at all
 
 
-class Finisher:
+class TrajectoryBuilder:
     """For one request: its limits, its policy, and what must be kept clear of."""
 
     def __init__(
-        self, arm: Arm, checker: Sweeper, request: PlanRequest, limits: JointLimits, margin: float, watch: Stopwatch
+        self, arm: Arm, checker: PathChecker, request: PlanRequest, limits: JointLimits, margin: float, watch: Stopwatch
     ) -> None:
         self._arm, self._checker, self._request = arm, checker, request
         self._limits, self._margin, self._watch = limits, margin, watch
 
-    def line(self, start: Start, goal: Start) -> Finished:
-        """The straight line of the joints; raises `Touching` or `NoPlan`."""
-        return self.finish(self._stopping(np.array((start, goal))), start, goal)
+    def line(self, start: Start, goal: Start) -> VerifiedTrajectory:
+        """The straight line of the joints; raises `TrajectoryTouches` or `PlanRefused`."""
+        return self.verified(self._stopping(np.array((start, goal))), start, goal)
 
-    def way(self, way: Way) -> Finished:
-        """Around its corners or with a stop at each, whichever is faster and free; raises `Touching` or `NoPlan`.
+    def path(self, path: Path) -> VerifiedTrajectory:
+        """Around its corners or with a stop at each, whichever is faster and free; raises `TrajectoryTouches` or
+        `PlanRefused`.
 
         A joint that must turn back at a corner has to stop there in any case, and so do tight corners cost less time.
         """
-        trajectories = [self._stopping(way.corners)]
+        trajectories = [self._stopping(path.corners)]
         with suppress(TurnsOnTheSpot):
-            trajectories.append(self._along(way.control))
+            trajectories.append(self._along(path.control))
         faster, *slower = sorted(trajectories, key=_duration)
         try:
-            return self.finish(faster, way.start, way.goal)
-        except Touching:
+            return self.verified(faster, path.start, path.goal)
+        except TrajectoryTouches:
             if not slower:
                 raise
-        return self.finish(slower[0], way.start, way.goal)
+        return self.verified(slower[0], path.start, path.goal)
 
     def _stopping(self, corners: Array) -> JointTrajectory:
-        """Straight from corner to corner (m, n), with a stop at each, timed as asked; raises `NoPlan`."""
+        """Straight from corner to corner (m, n), with a stop at each, timed as asked; raises `PlanRefused`."""
         if self._request.timing is Timing.TIME_OPTIMAL:
             return self._along(stopping(corners))
         with self._watch.phase("timing"):
             return _timed(lambda: stop_and_go(self._arm.joint_names, corners.tolist(), self._limits))
 
     def _along(self, control: Array) -> JointTrajectory:
-        """On the uniform cubic B-spline of `control`, timed as asked; raises `TurnsOnTheSpot` or `NoPlan`."""
+        """On the uniform cubic B-spline of `control`, timed as asked; raises `TurnsOnTheSpot` or `PlanRefused`."""
         names = self._arm.joint_names
         with self._watch.phase("timing"):
             if self._request.timing is Timing.TIME_OPTIMAL:
-                return _timed(lambda: time_optimal_way(names, control, self._limits))
-            return _timed(lambda: timed_way(names, control, self._limits))
+                return _timed(lambda: time_optimal_path(names, control, self._limits))
+            return _timed(lambda: timed_path(names, control, self._limits))
 
-    def finish(self, trajectory: JointTrajectory, start: Start, goal: Start) -> Finished:
-        """Slower where the steppers cannot, then verified as it will be played; raises `Touching` or `NoPlan`."""
+    def verified(self, trajectory: JointTrajectory, start: Start, goal: Start) -> VerifiedTrajectory:
+        """Slower where the steppers cannot, then verified as it will be played; raises `TrajectoryTouches` or
+        `PlanRefused`."""
         with self._watch.phase("verification"):
             samples = sample(trajectory)
             self._require_free(samples.positions)
@@ -107,17 +109,17 @@ class Finisher:
                     require_jerk(self._arm, samples, self._limits)
             except BadTrajectory as error:
                 raise not_verified(str(error)) from error
-        return Finished(trajectory, margins, scale)
+        return VerifiedTrajectory(trajectory, margins, scale)
 
     def _require_free(self, rows: Array) -> None:
         touching = self._checker.touching(rows, self._margin)
         if touching is not None:
-            raise Touching(touching)
+            raise TrajectoryTouches(touching)
 
     def _feasible(self, trajectory: JointTrajectory) -> tuple[JointTrajectory, tuple[StepMargin, ...], float]:
         try:
             return trajectory, require_feasible(self._arm, trajectory), 1.0
-        except NoPlan:
+        except PlanRefused:
             if self._request.step_policy is StepPolicy.REFUSE:
                 raise
         scale = feasible_scale(self._arm, trajectory)

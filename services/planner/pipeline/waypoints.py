@@ -1,4 +1,5 @@
-"""By way of several goals in the space of the joints: lines from posture to posture, corners cut within the blend."""
+"""By way of several goals in the space of the joints: lines from configuration to configuration, corners cut within the
+blend."""
 
 from __future__ import annotations
 
@@ -16,14 +17,14 @@ from services.planner.cartesian.tool_motions import points_of
 from services.planner.collision.checker import CollisionChecker
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.kinematics.goals import Goals
-from services.planner.path.path import STRAIGHT, NoWay, Start
+from services.planner.path.path import STRAIGHT, PathNotFound, Start
 from services.planner.path.path_curve import RoundedLines, rounded_runs
 from services.planner.path.search import Search
-from services.planner.pipeline.collision_refusals import Blockade
-from services.planner.pipeline.planning_context import Errand
-from services.planner.pipeline.trajectory_builder import Finished, Touching
+from services.planner.pipeline.collision_refusals import CollisionRefusals
+from services.planner.pipeline.planning_context import PlanningContext
+from services.planner.pipeline.trajectory_builder import TrajectoryTouches, VerifiedTrajectory
 from services.planner.request.deadline import Deadline
-from services.planner.request.refusals import NoPlan, no_way_around, not_verified, timed_out
+from services.planner.request.refusals import PlanRefused, no_path_around, not_verified, timed_out
 from services.planner.timing.path_timing import law_along
 from services.planner.timing.profile import NoProfile, straight_line
 from services.planner.timing.timing import at_limits, trajectory_of
@@ -33,87 +34,89 @@ Array = NDArray[np.float64]
 BLENDS = 4  # times that the blend is halved where a cut corner touches, before the arm stops at every one
 
 
-class Via:
-    """Ways by waypoints for one arm."""
+class WaypointPlanner:
+    """Paths by waypoints for one arm."""
 
     def __init__(
-        self, arm: Arm, goals: Goals, surroundings: CollisionChecker, blockade: Blockade, search: Search
+        self, arm: Arm, goals: Goals, checker: CollisionChecker, collision_refusals: CollisionRefusals, search: Search
     ) -> None:
-        self._arm, self._goals, self._surroundings = arm, goals, surroundings
-        self._blockade, self._search = blockade, search
+        self._arm, self._goals, self._checker = arm, goals, checker
+        self._collision_refusals, self._search = collision_refusals, search
 
-    def plan(self, goal: WaypointGoal, errand: Errand) -> tuple[Finished, str]:
+    def plan(self, goal: WaypointGoal, context: PlanningContext) -> tuple[VerifiedTrajectory, str]:
         """Straight, or around what is in the way from one to the next, with as much blend as is free."""
-        with errand.watch.phase("ik"):
-            postures = self._postures(goal, errand.start, errand.deadline)
-        corners, planner_id = np.array(postures), STRAIGHT
-        if isinstance(errand.request.motion, FreeMotion):
-            corners, planner_id = self._corners(errand.request.motion, postures, errand)
-        refusal: NoPlan | None = None
-        for trajectory in self._trajectories(corners, goal.blend, errand):
+        with context.watch.phase("ik"):
+            configurations = self._configurations(goal, context.start, context.deadline)
+        corners, planner_id = np.array(configurations), STRAIGHT
+        if isinstance(context.request.motion, FreeMotion):
+            corners, planner_id = self._corners(context.request.motion, configurations, context)
+        refusal: PlanRefused | None = None
+        for trajectory in self._trajectories(corners, goal.blend, context):
             try:
-                return errand.finisher.finish(trajectory, errand.start, postures[-1]), planner_id
-            except Touching as touching:
-                refusal = self._blockade.by(touching.posture, errand.margin)
-            if errand.deadline.has_passed():
+                return context.builder.verified(trajectory, context.start, configurations[-1]), planner_id
+            except TrajectoryTouches as touching:
+                refusal = self._collision_refusals.waypoints(touching.configuration, context.margin)
+            if context.deadline.has_passed():
                 break
         raise refusal or timed_out()
 
-    def _postures(self, goal: WaypointGoal, start: Start, deadline: Deadline) -> list[Start]:
-        """The start, and for each waypoint the free posture nearest to the one before."""
+    def _configurations(self, goal: WaypointGoal, start: Start, deadline: Deadline) -> list[Start]:
+        """The start, and for each waypoint the free configuration nearest to the one before."""
         chosen = [start]
         for point in points_of(goal):
             touching: Start | None = None
-            for posture in self._goals.candidates(point, chosen[-1], deadline, start):
-                if self._surroundings.keeps(posture, CLEARANCE):
-                    chosen.append(posture)
+            for configuration in self._goals.candidates(point, chosen[-1], deadline, start):
+                if self._checker.keeps(configuration, CLEARANCE):
+                    chosen.append(configuration)
                     break
-                touching = touching or posture
+                touching = touching or configuration
             else:
                 if touching is None:
                     raise timed_out()
-                raise self._blockade.goal(point, touching, chosen[-1], deadline, start)
+                raise self._collision_refusals.goal(point, touching, chosen[-1], deadline, start)
         return chosen
 
-    def _corners(self, motion: FreeMotion, postures: list[Start], errand: Errand) -> tuple[Array, str]:
-        """The polyline by `postures`, with the corners of a way around wherever a leg is not free."""
-        rows, planner_id = [np.array(postures[:1])], STRAIGHT
-        for begin, end in pairwise(postures):
+    def _corners(self, motion: FreeMotion, configurations: list[Start], context: PlanningContext) -> tuple[Array, str]:
+        """The polyline by `configurations`, with the corners of a path around wherever a leg is not free."""
+        rows, planner_id = [np.array(configurations[:1])], STRAIGHT
+        for begin, end in pairwise(configurations):
             leg = np.array((begin, end))
-            if self._surroundings.touching(leg, errand.margin) is None:
+            if self._checker.touching(leg, context.margin) is None:
                 rows.append(leg[1:])
                 continue
             try:
-                with errand.watch.phase("search"):
-                    way = self._search.find(
-                        leg[0], leg[1:], errand.margin, motion.planner_id, motion.seed, errand.deadline, errand.watch
+                with context.watch.phase("search"):
+                    path = self._search.find(
+                        leg[0], leg[1:], context.margin, motion.planner_id, motion.seed, context.deadline, context.watch
                     )
-            except NoWay as no_way:
-                raise no_way_around(no_way.why, self._blockade.line(begin, end, errand.margin)) from no_way
-            rows.append(way.corners[1:])
-            planner_id = way.planner_id
+            except PathNotFound as not_found:
+                raise no_path_around(
+                    not_found.reason, self._collision_refusals.line(begin, end, context.margin)
+                ) from not_found
+            rows.append(path.corners[1:])
+            planner_id = path.planner_id
         return np.vstack(rows), planner_id
 
-    def _trajectories(self, corners: Array, blend: float, errand: Errand) -> Iterator[JointTrajectory]:
+    def _trajectories(self, corners: Array, blend: float, context: PlanningContext) -> Iterator[JointTrajectory]:
         """With the blend [m], with less and less of it, at last with a stop at each corner."""
         radii = [blend * 0.5**index for index in range(BLENDS)] if blend > 0.0 else []
         for radius in [*radii, 0.0]:
-            with errand.watch.phase("timing"):
-                trajectory = self._trajectory(corners, errand, radius)
+            with context.watch.phase("timing"):
+                trajectory = self._trajectory(corners, context, radius)
             yield trajectory
 
-    def _trajectory(self, corners: Array, errand: Errand, blend: float) -> JointTrajectory:
-        names, limits = self._arm.joint_names, errand.limits
-        lines = rounded_runs(corners, limits.velocity, self._surroundings.reach, blend)
+    def _trajectory(self, corners: Array, context: PlanningContext, blend: float) -> JointTrajectory:
+        names, limits = self._arm.joint_names, context.limits
+        lines = rounded_runs(corners, limits.velocity, self._checker.reach, blend)
         try:
             if not lines:
                 return straight_line(names, corners[0].tolist(), corners[-1].tolist(), limits)
-            states = states_of_runs([_run(line, errand) for line in lines], errand.deadline)
-            return trajectory_of(names, at_limits(states, limits, errand.request.timing is Timing.JERK_LIMITED))
+            states = states_of_runs([_run(line, context) for line in lines], context.deadline)
+            return trajectory_of(names, at_limits(states, limits, context.request.timing is Timing.JERK_LIMITED))
         except NoProfile as error:
             raise not_verified(str(error)) from error
 
 
-def _run(line: RoundedLines, errand: Errand) -> Run:
-    law = law_along(line, errand.limits, (0.0, 0.0), line.marks, errand.request.timing, errand.deadline)
+def _run(line: RoundedLines, context: PlanningContext) -> Run:
+    law = law_along(line, context.limits, (0.0, 0.0), line.marks, context.request.timing, context.deadline)
     return Run(line, law, line.start, line.end, line.marks[1:-1])

@@ -16,8 +16,8 @@ LEAST_SCALING = 1e-300  # with less, a time is no longer a number
 LONGEST_NAME = 64  # characters of a name that is not known, which a person is shown
 
 
-class NoPlan(Exception):
-    """A refusal on its way out of the planner; `fraction` of a Cartesian way could have been gone."""
+class PlanRefused(Exception):
+    """A refusal on its way out of the planner; `fraction` of a Cartesian path could have been gone."""
 
     def __init__(self, code: PlanCode, refusal: Refusal, fraction: float = 0.0) -> None:
         super().__init__(refusal.message)
@@ -34,7 +34,7 @@ class SearchFailure(StrEnum):
     GOAL_TOUCHES = "goal touches"
 
 
-def timed_out() -> NoPlan:
+def timed_out() -> PlanRefused:
     """The refusal (TIMED_OUT) of a plan that used up the time it was allowed."""
     return malformed(
         PlanCode.TIMED_OUT,
@@ -45,10 +45,10 @@ def timed_out() -> NoPlan:
     )
 
 
-def scaling_refused(which: str, value: float) -> NoPlan:
+def scaling_refused(which: str, value: float) -> PlanRefused:
     """0 is not 1: it is refused."""
     must = f"below {LEAST_SCALING:g} no way ends" if 0.0 < value < 1.0 else "it must be above 0 and at most 1"
-    return NoPlan(
+    return PlanRefused(
         PlanCode.INVALID_GOAL_CONSTRAINTS,
         Refusal(
             check="scaling",
@@ -62,13 +62,13 @@ def scaling_refused(which: str, value: float) -> NoPlan:
     )
 
 
-def unknown_name(code: PlanCode, check: str, name: str, known: Iterable[str], where: str) -> NoPlan:
+def unknown_name(code: PlanCode, check: str, name: str, known: Iterable[str], where: str) -> PlanRefused:
     """A joint, state or frame that is not there."""
     names = sorted(known)
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     near = nearest_name(name, names)
     meant = suggestion(name, names) if near else ""  # else the remedy names them all
-    return NoPlan(
+    return PlanRefused(
         code,
         Refusal(
             check=check,
@@ -79,17 +79,17 @@ def unknown_name(code: PlanCode, check: str, name: str, known: Iterable[str], wh
     )
 
 
-def malformed(code: PlanCode, subject: str, message: str, remedy: str, check: str = "request") -> NoPlan:
+def malformed(code: PlanCode, subject: str, message: str, remedy: str, check: str = "request") -> PlanRefused:
     """A request that says too little, too much or two things at once."""
-    return NoPlan(code, Refusal(check=check, subject=subject, message=message, remedy=remedy))
+    return PlanRefused(code, Refusal(check=check, subject=subject, message=message, remedy=remedy))
 
 
-def beyond_limit(arm: Arm, joint: Joint, value: float, nearest: Vector) -> NoPlan:
+def beyond_limit(arm: Arm, joint: Joint, value: float, nearest: Vector) -> PlanRefused:
     """A goal beyond a joint's limit."""
     limit = joint.clamp(value)
     side = "above its upper" if value > joint.upper else "below its lower"
     off = f"{abs(value - limit):.4g} {joint.unit}"  # value and limit may look alike in few digits
-    return NoPlan(
+    return PlanRefused(
         PlanCode.INVALID_GOAL_CONSTRAINTS,
         Refusal(
             check="joint limit",
@@ -104,10 +104,10 @@ def beyond_limit(arm: Arm, joint: Joint, value: float, nearest: Vector) -> NoPla
     )
 
 
-def start_beyond_limit(joint: Joint, value: float) -> NoPlan:
+def start_beyond_limit(joint: Joint, value: float) -> PlanRefused:
     """The arm stands, or is said to stand, where it must not be."""
     limit = joint.clamp(value)
-    return NoPlan(
+    return PlanRefused(
         PlanCode.INVALID_ROBOT_STATE,
         Refusal(
             check="start state",
@@ -121,9 +121,9 @@ def start_beyond_limit(joint: Joint, value: float) -> NoPlan:
     )
 
 
-def moving_start(joint: Joint, velocity: float, limit: float) -> NoPlan:
+def moving_start(joint: Joint, velocity: float, limit: float) -> PlanRefused:
     """Plans begin at rest."""
-    return NoPlan(
+    return PlanRefused(
         PlanCode.INVALID_ROBOT_STATE,
         Refusal(
             check="moving start",
@@ -137,10 +137,10 @@ def moving_start(joint: Joint, velocity: float, limit: float) -> NoPlan:
     )
 
 
-def stale_state(age: float | None, limit: float) -> NoPlan:
+def stale_state(age: float | None, limit: float) -> PlanRefused:
     """Nobody knows where the arm is now."""
     told = "no joint state has come yet" if age is None else f"the newest joint state is {age:.3f} s old"
-    return NoPlan(
+    return PlanRefused(
         PlanCode.ROBOT_STATE_STALE,
         Refusal(
             check="joint state",
@@ -160,59 +160,63 @@ def in_collision(
     margin: float,
     nearest: Vector,
     remedy: str,
-    posture: Vector = (),
+    configuration: Vector = (),
     objects: Mapping[str, str] | None = None,
-) -> NoPlan:
-    """Two links, or a link and one of the scene's `objects` (their kinds by name), would touch in `posture`."""
+) -> PlanRefused:
+    """Two links, or a link and one of the scene's `objects` (their kinds by name), would touch in `configuration`."""
     known = objects or {}
     shown = [[f"{known[name]} {name}" if name in known else name for name in pair] for pair in pairs]
     named = " and ".join(f"{first} with {second}" for first, second in shown)
     is_own = not any(name in known for pair in pairs for name in pair)
     near = f"would be nearer than {1000 * margin:.2g} mm" if margin > 0.0 else "touch"
-    return NoPlan(
+    return PlanRefused(
         code,
         Refusal(
             check="self-collision" if is_own else "collision",
             subject=" / ".join(pairs[0]),
             limit=margin,
             nearest=nearest,
-            posture=posture,
+            configuration=configuration,
             message=f"{where}, {named} {near}",
             remedy=remedy,
         ),
     )
 
 
-def no_way_around(why: SearchFailure, blocked: NoPlan) -> NoPlan:
-    """No search has found a way around what is on the straight one."""
-    told, subject, posture = f"{blocked.refusal.message}; and", blocked.refusal.subject, blocked.refusal.posture
+def no_path_around(why: SearchFailure, blocked: PlanRefused) -> PlanRefused:
+    """No search has found a path around what is on the straight one."""
+    told, subject, configuration = (
+        f"{blocked.refusal.message}; and",
+        blocked.refusal.subject,
+        blocked.refusal.configuration,
+    )
     if why is SearchFailure.TIMED_OUT:
-        return NoPlan(
+        return PlanRefused(
             PlanCode.TIMED_OUT,
             Refusal(
                 check="allowed time",
                 subject=subject,
-                posture=posture,
+                configuration=configuration,
                 message=f"{told} no way around it was found within the time allowed",
-                remedy="allow more time, go by way of another posture, or make room",
+                remedy="allow more time, go by way of another configuration, or make room",
             ),
         )
-    where = "the start" if why is SearchFailure.START_TOUCHES else "every posture of the goal"
-    return NoPlan(
+    where = "the start" if why is SearchFailure.START_TOUCHES else "every configuration of the goal"
+    return PlanRefused(
         PlanCode.PLANNING_FAILED,
         Refusal(
             check="clearance",
             subject=subject,
-            posture=posture,
-            message=f"{told} {where} is too near to something for the compiled core, which is cautious",
+            configuration=configuration,
+            message=f"{told} {where} is too near to something for the native planner, which is cautious",
             remedy='ask for planner_id "RRTConnect", which looks at the exact shapes',
         ),
     )
 
 
-def not_verified(why: str) -> NoPlan:
+def not_verified(why: str) -> PlanRefused:
     """A trajectory was made, and may not be executed."""
-    return NoPlan(
+    return PlanRefused(
         PlanCode.PLANNING_FAILED,
         Refusal(
             check="verification",
@@ -222,14 +226,14 @@ def not_verified(why: str) -> NoPlan:
     )
 
 
-def out_of_reach(arm: Arm, goal: Point, nearest: Point, shown: Vector, held: Sequence[str]) -> NoPlan:
-    """No posture brings the tool there; `shown` is the nearest point in the goal's own frame."""
+def out_of_reach(arm: Arm, goal: Point, nearest: Point, shown: Vector, held: Sequence[str]) -> PlanRefused:
+    """No configuration brings the tool there; `shown` is the nearest point in the goal's own frame."""
     missing = [a - b for a, b in zip(goal, nearest, strict=True)]
     distance = sum(value * value for value in missing) ** 0.5
     axis = max(range(3), key=lambda index: abs(missing[index]))
     is_one_axis = abs(missing[axis]) > 0.98 * distance
     limits = f", held by {', '.join(held)}" if held else ""
-    return NoPlan(
+    return PlanRefused(
         PlanCode.NO_IK_SOLUTION,
         Refusal(
             check="reach",

@@ -12,12 +12,12 @@ from services.planner.request.refusals import malformed, moving_start, stale_sta
 
 STALE_AFTER = 0.5  # [s] without a joint state: as long as the device waits for a heartbeat
 REST = 0.01  # share of a joint's velocity limit below which it stands
-MOST_TURNED = 90.0  # [rad] of a joint without limits: the compiled core takes 100, and a search goes half a turn more
+MOST_TURNED = 90.0  # [rad] of a joint without limits: the native planner takes 100, and a search goes half a turn more
 ROUNDING = 0.51  # [steps] executed positions are whole steps, so they may be this far beyond a limit
 
 
 def resolve_start(arm: Arm, given: JointState | None, present: JointState | None, age: float) -> tuple[float, ...]:
-    """Joint values [rad] or [m] in the arm's order, within the limits; raises `NoPlan`."""
+    """Joint values [rad] or [m] in the arm's order, within the limits; raises `PlanRefused`."""
     values = {} if given is None else _values(arm, given)
     if len(values) < len(arm.joints):
         values = {**_present(arm, present, age), **values}
@@ -61,7 +61,7 @@ def _values(arm: Arm, state: JointState) -> dict[str, float]:
 
 
 def require_unwound(code: PlanCode, joint: Joint, value: float) -> None:
-    """Raises `NoPlan` for a joint without limits that has turned, or is to turn, too often."""
+    """Raises `PlanRefused` for a joint without limits that has turned, or is to turn, too often."""
     if math.isinf(joint.upper) and abs(value) > MOST_TURNED:
         raise malformed(
             code,
@@ -73,7 +73,7 @@ def require_unwound(code: PlanCode, joint: Joint, value: float) -> None:
 
 
 def require_parallel(names: Sequence[str], positions: Sequence[float], where: str) -> None:
-    """As many positions as names, and no name twice; raises `NoPlan`."""
+    """As many positions as names, and no name twice; raises `PlanRefused`."""
     if len(names) != len(positions):
         raise malformed(
             PlanCode.INVALID_GOAL_CONSTRAINTS,

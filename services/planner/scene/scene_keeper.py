@@ -50,12 +50,12 @@ class SceneKeeper:
     def heed(self, response: PlanResponse) -> None:
         """Shows what touches where a plan was refused, until one succeeds."""
         refusal = response.refusal
-        if refusal is not None and refusal.posture:
+        if refusal is not None and refusal.configuration:
             margin = CLEARANCE if refusal.limit is None else refusal.limit
-            touching = tuple(self.world.contacts(refusal.posture, margin + ROUNDING))
+            touching = tuple(self.world.contacts(refusal.configuration, margin + ROUNDING))
             names = self._arm.joint_names
             self._contacts.put(
-                Contacts(stamp=self._node.now(), name=names, position=refusal.posture, contacts=touching)
+                Contacts(stamp=self._node.now(), name=names, position=refusal.configuration, contacts=touching)
             )
             self._is_touching = True
         elif response.code is PlanCode.SUCCESS and self._is_touching:
@@ -79,11 +79,11 @@ class SceneKeeper:
 
     def _tell_what_touches_here(self) -> None:
         """After an edit: what touches where the arm stands; what a refused plan has shown was of another scene."""
-        posture = self._posture()
-        touching = () if posture is None else tuple(self.world.contacts(posture))
-        if posture is not None and touching:
+        configuration = self._configuration()
+        touching = () if configuration is None else tuple(self.world.contacts(configuration))
+        if configuration is not None and touching:
             self._contacts.put(
-                Contacts(stamp=self._node.now(), name=self._arm.joint_names, position=posture, contacts=touching)
+                Contacts(stamp=self._node.now(), name=self._arm.joint_names, position=configuration, contacts=touching)
             )
         elif self._is_touching:
             self._contacts.put(Contacts(stamp=self._node.now()))
@@ -99,10 +99,10 @@ class SceneKeeper:
 
     def _links(self) -> Mapping[str, Transform] | None:
         """Where the links are, or None where that is not known."""
-        posture = self._posture()
-        return None if posture is None else self._kinematics.link_poses(posture)
+        configuration = self._configuration()
+        return None if configuration is None else self._kinematics.link_poses(configuration)
 
-    def _posture(self) -> Vector | None:
+    def _configuration(self) -> Vector | None:
         """Where the arm stands, or None without a fresh joint state of all joints."""
         state = self._states.message
         if state is None or self._states.age() > STALE_AFTER:

@@ -26,7 +26,7 @@ class SceneStore:
         require_scene(arm, self.scene, folders)
 
     def edit(self, request: SceneRequest, links: LinkPoses, stamp: int) -> SceneResponse:
-        """Whether the scene is changed, or why not; `links` says where the links are now, `stamp` is [ns] UNIX."""
+        """True if the scene is changed, or why not; `links` says where the links are now, `stamp` is [ns] UNIX."""
         try:
             changed = edited(self._arm, self.scene, request, links)
             if changed != self.scene:

@@ -1,6 +1,6 @@
-"""Time along a given way: jerk-limited by stretches, each with the speed, acceleration and jerk that all limits allow.
+"""Time along a given path: jerk-limited by stretches, each with the speed, acceleration and jerk that all limits allow.
 
-With q(s) the way and s(t) its time law: q' = q_s s', q'' = q_ss s'^2 + q_s s'', q''' = q_sss s'^3 + 3 q_ss s' s'' +
+With q(s) the path and s(t) its time law: q' = q_s s', q'' = q_ss s'^2 + q_s s'', q''' = q_sss s'^3 + 3 q_ss s' s'' +
 q_s s''' (Biagiotti and Melchiorri 2008, section 9.1). Between stretches the speed is carried on, at no acceleration.
 """
 
@@ -27,19 +27,19 @@ from services.planner.timing.timing import stretches_through
 Array = NDArray[np.float64]
 
 NEAR = 1e-4  # share of the length: marks that are nearer to one another are one
-ASIDE = 1e-6  # share of the length from a mark at which the way is that of one side
+ASIDE = 1e-6  # share of the length from a mark at which the path is that of one side
 ROWS = 128  # of length at which limits are looked at, besides the knots and the marks
 COUNTS = (1, 4, 16)  # of even stretches that are tried; they divide ROWS
 PARTS = 4  # of a stretch of one kind
-SHARES = (1.0, 0.7, 0.45)  # of the speed that the way allows: slower leaves more for acceleration
+SHARES = (1.0, 0.7, 0.45)  # of the speed that the path allows: slower leaves more for acceleration
 CENTRIPETAL = 0.8  # share of the acceleration that curvature may take
 JERK_OF_SPEED, JERK_OF_BOTH = 0.5, 0.25  # shares of the jerk: of q_sss s'^3, and of 3 q_ss s' s''
 MARGIN = 0.98  # share of the limits that is used: the quintics between points swing a little
-FASTEST = 1e3  # [lengths of the way per second], where nothing else limits
+FASTEST = 1e3  # [lengths of the path per second], where nothing else limits
 
 
 class Law(Protocol):
-    """The way's length by time, from rest to rest."""
+    """The path's length by time, from rest to rest."""
 
     @property
     def duration(self) -> float: ...
@@ -58,7 +58,7 @@ class Demand:
     velocity: Array
     acceleration: Array
     jerk: Array
-    marks: Array  # lengths from 0 to the end between which the way is of one kind
+    marks: Array  # lengths from 0 to the end between which the path is of one kind
 
     @cached_property
     def speeds(self) -> Array:
@@ -84,8 +84,8 @@ def law_along(
 ) -> Law:
     """Of the kind that was asked for; `tool` is its speed [m/s] and acceleration [m/s^2], 0 for no limit.
 
-    Its position is in the columns behind the joints; raises `NoProfile`, and `NoPlan` once the deadline has passed.
-    """
+    Its position is in the columns behind the joints; raises `NoProfile`, and `PlanRefused` once the deadline has
+    passed."""
     if timing is Timing.JERK_LIMITED:
         return time_law(demand_of(curve, limits, tool, marks), deadline)
     deadline.check()
@@ -145,7 +145,7 @@ def _apart(marks: Array, least: float) -> Array:
 
 
 def _divisions(demand: Demand) -> list[Array]:
-    """Edges of stretches: of even ones, and where the way is of different kinds also of parts of these."""
+    """Edges of stretches: of even ones, and where the path is of different kinds also of parts of these."""
     end, marks = float(demand.along[-1]), demand.marks
     even = [np.linspace(0.0, end, count + 1) for count in COUNTS]
     if len(marks) == 2:

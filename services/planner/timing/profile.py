@@ -1,6 +1,6 @@
-"""Time along a straight line of the joints: jerk-limited, every joint at the same share of its way at every moment.
+"""Time along a straight line of the joints: jerk-limited, every joint at the same share of its path at every moment.
 
-ruckig times one variable, the way along the line; the joints follow in proportion. That is phase synchronisation
+ruckig times one variable, the path along the line; the joints follow in proportion. That is phase synchronisation
 without its exception: ruckig's own falls back to curved lines where another joint's limit would be exceeded.
 """
 
@@ -24,7 +24,7 @@ MOST_POINTS = 400
 SHORTEST = 1e-4  # [s] two points nearer than that are one: below it the quintic's coefficients lose their digits
 MARGIN = 0.997  # share of the limits that is used, for what SHORTEST leaves out
 LONGEST = 86_400.0  # [s] a plan may take: beyond a day the scaling is a mistake
-STANDSTILL = 1e-9  # [s] at full speed: a way so short is no way
+STANDSTILL = 1e-9  # [s] at full speed: a path so short is no way
 NEGLIGIBLE = 1e-12  # share of its full speed below which a joint limits nothing
 HOLD = 0.1  # [s] that a plan to where the arm already is takes
 
@@ -71,25 +71,25 @@ def stop_and_go(names: Sequence[str], corners: Sequence[Sequence[float]], limits
 
 def _leg(start: Sequence[float], goal: Sequence[float], limits: JointLimits, began: float) -> list[TrajectoryPoint]:
     """The points after the one at `start`, where the leg begins at the time `began` [s]."""
-    way = np.subtract(goal, start)
-    length = float(np.max(np.abs(way) / limits.velocity))  # [s] at full speed
+    displacement = np.subtract(goal, start)
+    length = float(np.max(np.abs(displacement) / limits.velocity))  # [s] at full speed
     if length < STANDSTILL:
         return [_rest(goal, began + HOLD)]
-    require_short(max(length, float(np.max(np.abs(way) / limits.acceleration)) ** 0.5))
-    direction = way / length
-    profile, changes = _time_way(length, direction, limits)
+    require_short(max(length, float(np.max(np.abs(displacement) / limits.acceleration)) ** 0.5))
+    direction = displacement / length
+    profile, changes = _time_line(length, direction, limits)
     inner = _inner_points(start, direction, profile, _times(changes, profile.duration), began)
     return [*inner, _rest(goal, began + profile.duration)]
 
 
 def require_short(lasts: float) -> None:
-    """Raises `NoProfile` for a way that takes at least so long [s]."""
+    """Raises `NoProfile` for a path that takes at least so long [s]."""
     if not lasts <= LONGEST:
         raise NoProfile(f"it would take more than {lasts:.3g} s, {LONGEST:g} s is the most")
 
 
-def _time_way(length: float, direction: Array, limits: JointLimits) -> tuple[Trajectory, list[float]]:
-    """The profile of the way [s at full speed], and the times [s] at which its jerk changes."""
+def _time_line(length: float, direction: Array, limits: JointLimits) -> tuple[Trajectory, list[float]]:
+    """The profile of the path [s at full speed], and the times [s] at which its jerk changes."""
     share = np.abs(direction)
     moving = share > NEGLIGIBLE * limits.velocity
     demand = InputParameter(1)
@@ -108,7 +108,7 @@ def solved(demand: InputParameter, what: str) -> Trajectory:
         result = Ruckig(1).calculate(demand, profile)
     except RuckigError as error:
         raise NoProfile(f"no jerk-limited profile for {what}") from error
-    if result not in (Result.Working, Result.Finished):
+    if result not in (Result.Working, Result.VerifiedTrajectory):
         raise NoProfile(f"no jerk-limited profile for {what}: {result.name}")
     return profile
 
@@ -131,11 +131,11 @@ def _inner_points(
     start: Sequence[float], direction: Array, profile: Trajectory, times: list[float], began: float
 ) -> list[TrajectoryPoint]:
     """The profile at `times` [s], spread over the joints; as points they are later by `began`."""
-    ways = np.array([profile.at_time(t) for t in times]).reshape(len(times), 3, 1) * direction  # (m, 3, n)
-    ways[:, 0] += start
+    rows = np.array([profile.at_time(t) for t in times]).reshape(len(times), 3, 1) * direction  # (m, 3, n)
+    rows[:, 0] += start
     return [
         TrajectoryPoint(positions=tuple(p), velocities=tuple(v), accelerations=tuple(a), time_from_start=began + t)
-        for t, (p, v, a) in zip(times, ways.tolist(), strict=True)
+        for t, (p, v, a) in zip(times, rows.tolist(), strict=True)
     ]
 
 

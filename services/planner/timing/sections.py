@@ -1,6 +1,6 @@
-"""A smooth way in sections, in each of which the movement along it has bounds under which no joint exceeds its own.
+"""A smooth path in sections, in each of which the movement along it has bounds under which no joint exceeds its own.
 
-With y the joints by the way's length, divided by their speed limits, and a dash for a derivative by it:
+With y the joints by the path's length, divided by their speed limits, and a dash for a derivative by it:
 q' = y' v, q'' = y'' v^2 + y' a, q''' = y''' v^3 + 3 y'' v a + y' j.
 """
 
@@ -31,7 +31,7 @@ NEARLY = 1.0 - 1e-9  # of a change of speed, lest rounding leaves no profile for
 
 @dataclass(frozen=True)
 class Section:
-    """A stretch of the way with bounds of the movement along it."""
+    """A stretch of the path with bounds of the movement along it."""
 
     length: float  # [s at full speed]
     speed: float
@@ -42,8 +42,8 @@ class Section:
 
 def sections_of(run: Curve, limits: JointLimits) -> list[Section]:
     """Some for each piece of the curve, with the bounds of all their samples; those that are alike are one."""
-    lengths, way = run.cut(CUTS, SHARES)
-    y1, y2, y3 = (np.abs(part) + TINY for part in way[1:])
+    lengths, derivatives = run.cut(CUTS, SHARES)
+    y1, y2, y3 = (np.abs(part) + TINY for part in derivatives[1:])
     most_a, most_j = limits.acceleration / limits.velocity, limits.jerk / limits.velocity
     speeds = np.minimum(1.0 / y1, np.minimum((BENDING * most_a / y2) ** 0.5, (TWISTING * most_j / y3) ** (1.0 / 3.0)))
     v = _least(speeds)

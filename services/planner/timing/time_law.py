@@ -1,4 +1,4 @@
-"""The movement along a way, as stretches of steady jerk one after the other, and the times at which it is told."""
+"""The movement along a path, as stretches of steady jerk one after the other, and the times at which it is told."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FEWEST = 1e-3  # [s] times nearer than that are one
 
 
 class TimeLaw:
-    """The way's length by time, from rest to rest."""
+    """The path's length by time, from rest to rest."""
 
     def __init__(self, stretches: Iterable[Stretch]) -> None:
         self._durations, *states = np.array(list(stretches)).T
@@ -32,7 +32,7 @@ class TimeLaw:
         return s + t * (v + t * (a / 2.0 + t * j / 6.0)), v + t * (a + t * j / 2.0), a + t * j
 
     def reached(self, lengths: Array) -> Array:
-        """(m,) [s] when the way between its ends is so long (m,), by Newton from where the speed is highest."""
+        """(m,) [s] when the path between its ends is so long (m,), by Newton from where the speed is highest."""
         row = np.searchsorted(self._states[0], lengths, side="right") - 1
         s, v, a, j = self._states[:, row]
         most = self._durations[row]
@@ -44,7 +44,7 @@ class TimeLaw:
         return times
 
     def times(self, lengths: Array, spacing: float) -> Array:
-        """Times [s] from 0 to the end: where the jerk changes, where the way is so long, and evenly between them."""
+        """Times [s] from 0 to the end: where the jerk changes, where the path is so long, and evenly between them."""
         marks = np.sort(np.concatenate((self._stamps, self.reached(lengths), [self.duration])))
         marks = marks[np.concatenate(([True], np.diff(marks) > FEWEST))]
         marks[-1] = self.duration

@@ -26,8 +26,8 @@ FEWEST = 40  # points of a run
 MOST = 4000
 
 
-def time_optimal_way(names: Sequence[str], control: Array, limits: JointLimits) -> JointTrajectory:
-    """As `timing.timed_way`, as fast as velocities and accelerations allow; raises `NoProfile`."""
+def time_optimal_path(names: Sequence[str], control: Array, limits: JointLimits) -> JointTrajectory:
+    """As `timing.timed_path`, as fast as velocities and accelerations allow; raises `NoProfile`."""
     return along_runs(names, control, limits, _run_states, with_jerk=False)
 
 
@@ -73,7 +73,7 @@ class BlurredLaw:
         return length, speed, bend
 
     def times(self, lengths: Array, spacing: float) -> Array:
-        """Even ones [s] from 0 to the end, so near as what is blurred asks for, wherever the way is so long."""
+        """Even ones [s] from 0 to the end, so near as what is blurred asks for, wherever the path is so long."""
         spacing = min(spacing, self._blur * SPACING / BLUR)
         count = int(np.clip(round(self.duration / spacing), FEWEST, MOST))
         return np.linspace(0.0, self.duration, count + 1)

@@ -1,6 +1,6 @@
-"""Jerk-limited time along a smooth way: fast where it is straight, slow enough where it bends.
+"""Jerk-limited time along a smooth path: fast where it is straight, slow enough where it bends.
 
-The way is cut into sections. ruckig goes through each of them within its bounds, from the speed at its beginning to
+The path is cut into sections. ruckig goes through each of them within its bounds, from the speed at its beginning to
 that at its end, where the speed is steady. At last all is sped up or slowed down evenly until one joint is at one of
 its limits.
 """
@@ -42,15 +42,15 @@ class States(NamedTuple):
 
 
 def states_along(run: Curve, limits: JointLimits, times: Array, lengths: Array, speeds: Array, bends: Array) -> States:
-    """Of the joints, where the way's length, speed and acceleration (m,) are these."""
-    way = run.at(lengths)
-    first, second, scale = way.first, way.second, limits.velocity
+    """Of the joints, where the path's length, speed and acceleration (m,) are these."""
+    derivatives = run.at(lengths)
+    first, second, scale = derivatives.first, derivatives.second, limits.velocity
     velocities = first * speeds[:, None]
     accelerations = second * (speeds * speeds)[:, None] + first * bends[:, None]
-    return States(times, way.value * scale, velocities * scale, accelerations * scale)
+    return States(times, derivatives.value * scale, velocities * scale, accelerations * scale)
 
 
-def timed_way(names: Sequence[str], control: Array, limits: JointLimits) -> JointTrajectory:
+def timed_path(names: Sequence[str], control: Array, limits: JointLimits) -> JointTrajectory:
     """From rest to rest along the uniform cubic B-spline of `control` (k, n), both ends exact; raises `NoProfile`.
 
     At corners it stops. Raises `TurnsOnTheSpot` where the curve does so without a corner.
@@ -84,14 +84,14 @@ def along_runs(
 
 
 def at_limits(states: States, limits: JointLimits, with_jerk: bool) -> States:
-    """The same way in the time in which the joint that is asked most of is just within its limits."""
+    """The same path in the time in which the joint that is asked most of is just within its limits."""
     velocity, acceleration, jerk = peak_shares(*states, limits)
     most = max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0) if with_jerk else 0.0)
     return states if most == 0.0 else at_speed(states, MARGIN / most)
 
 
 def at_speed(states: States, scale: float) -> States:
-    """The same way at `scale` times the speed."""
+    """The same path at `scale` times the speed."""
     times, positions, velocities, accelerations = states
     return States(times / scale, positions, velocities * scale, accelerations * scale * scale)
 

@@ -1,7 +1,7 @@
-"""The highest speeds along a way, by toppra.
+"""The highest speeds along a path, by toppra.
 
 It reaches its limits between its grid points too, so it gets smaller ones. Its figures are kept near 1, however slow
-the arm is to be: the way is as long as 1, and a unit of time is about what the way takes.
+the arm is to be: the path is as long as 1, and a unit of time is about what the path takes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SIDES = 16  # of the polygon in half a circle: what the tool's acceleration alon
 
 
 def optimal_speeds(grid: Array, first: Array, second: Array, limits: JointLimits, tool: tuple[float, float]) -> Array:
-    """(m,) [1/s] at `grid` (m,) of a way of length 1, by its derivatives (m, k) there; raises `NoProfile`.
+    """(m,) [1/s] at `grid` (m,) of a path of length 1, by its derivatives (m, k) there; raises `NoProfile`.
 
     `tool` is its speed [m/s] and acceleration [m/s^2], 0 for no limit; its position is in the columns behind the
     joints.
@@ -131,16 +131,16 @@ def _classes() -> _Classes:
 
     class Tool(LinearConstraint):  # type: ignore[misc]
         """|p'| s' <= speed, and |p' s'' + p'' s'^2| <= most: in a polygon within the circle of what is along and
-        across the way."""
+        across the path."""
 
         def __init__(self, first: Array, second: Array, speed: float, most: float) -> None:
             super().__init__()
             self.set_discretization_type(DiscretizationType.Interpolation)
             self.identical = True
             self._rate = np.linalg.norm(first, axis=1)
-            way = first / np.maximum(self._rate, 1e-12)[:, None]
-            self._along = (second * way).sum(axis=1)
-            self._across = np.linalg.norm(second - self._along[:, None] * way, axis=1)
+            direction = first / np.maximum(self._rate, 1e-12)[:, None]
+            self._along = (second * direction).sum(axis=1)
+            self._across = np.linalg.norm(second - self._along[:, None] * direction, axis=1)
             self._speed, self._most = speed, most
 
         def compute_constraint_params(self, path: Any, grid: Array) -> Any:

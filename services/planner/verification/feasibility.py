@@ -1,4 +1,4 @@
-"""Whether the steppers can do a trajectory: its exact step stream against rates, pulses, torque and the device's queue.
+"""True if the steppers can do a trajectory: its exact step stream against rates, pulses, torque and the device's queue.
 
 The stream is the gateway's and the device's own: knots every 20 ms in 1/256 steps, cubic Hermite between them, and
 floor(p + 0.5) steps made by the end of every millisecond (firmware/PROTOCOL.md, "The path").
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.planning import PlanCode, Refusal, StepMargin
 from services.arm.description import Arm, Joint
-from services.planner.request.refusals import NoPlan
+from services.planner.request.refusals import PlanRefused
 from services.planner.timing.profile import LONGEST
 from services.planner.verification.verify import at_times
 
@@ -102,7 +102,7 @@ def sentence(margin: StepMargin) -> str:
 
 
 def require_feasible(arm: Arm, trajectory: JointTrajectory) -> tuple[StepMargin, ...]:
-    """The margins; raises `NoPlan` with the joint that cannot, and the scaling that would do."""
+    """The margins; raises `PlanRefused` with the joint that cannot, and the scaling that would do."""
     found = _margins(arm, trajectory)
     worst = max(found, key=lambda margin: margin.share)
     filled = queue_share(arm, trajectory)
@@ -111,7 +111,7 @@ def require_feasible(arm: Arm, trajectory: JointTrajectory) -> tuple[StepMargin,
     scale = feasible_scale(arm, trajectory)
     remedy = f"slow down to {scale:.2f} of this speed, or let step_policy do so" if scale else "see robot.toml"
     if worst.share > FULL:
-        raise NoPlan(
+        raise PlanRefused(
             PlanCode.PLANNING_FAILED,
             Refusal(
                 check=worst.limited_by,
@@ -122,7 +122,7 @@ def require_feasible(arm: Arm, trajectory: JointTrajectory) -> tuple[StepMargin,
                 remedy=remedy,
             ),
         )
-    raise NoPlan(
+    raise PlanRefused(
         PlanCode.PLANNING_FAILED,
         Refusal(
             check="device queue",

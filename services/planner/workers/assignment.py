@@ -10,7 +10,7 @@ from schemas.planning import PlanCode, PlanPhase, PlanProgress, PlanRequest, Pla
 
 WORDS = {
     PlanPhase.WAITING: "waiting",
-    PlanPhase.IK: "looking for postures of the goal",
+    PlanPhase.IK: "looking for configurations of the goal",
     PlanPhase.SEARCH: "searching",
     PlanPhase.SMOOTHING: "smoothing",
     PlanPhase.TIMING: "timing",

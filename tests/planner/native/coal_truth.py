@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from services.arm.configuration import Configuration
 from services.arm.description import Arm
-from services.planner.collision_geometry.shapes import Shape, ShapeKind
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 class Truth:
     """Distances of an arm to itself and to `shapes`, whose poses are in the arm's base."""
 
-    def __init__(self, arm: Arm, shapes: Sequence[Shape] = ()) -> None:
+    def __init__(self, arm: Arm, shapes: Sequence[CollisionShape] = ()) -> None:
         self._model = pin.buildModelFromUrdf(str(arm.urdf_path))
         self._data = self._model.createData()
         self._configuration = Configuration(arm, self._model)
@@ -48,7 +48,7 @@ class Truth:
         return float(min(result.min_distance for result in self._geometry_data.distanceResults))
 
 
-def solid_of(shape: Shape) -> coal.CollisionGeometry:
+def solid_of(shape: CollisionShape) -> coal.CollisionGeometry:
     size = shape.size
     match shape.kind:
         case ShapeKind.BOX:

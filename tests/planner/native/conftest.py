@@ -33,8 +33,8 @@ def core(arm: Arm) -> NativePlanner:
 
 
 @pytest.fixture
-def postures(arm: Arm) -> Callable[[int, int], NDArray[np.float64]]:
-    """(count, seed) -> random postures (count, n) within the limits."""
+def configurations(arm: Arm) -> Callable[[int, int], NDArray[np.float64]]:
+    """(count, seed) -> random configurations (count, n) within the limits."""
     lower = np.array([max(joint.lower, -np.pi) for joint in arm.joints])
     upper = np.array([min(joint.upper, np.pi) for joint in arm.joints])
     return lambda count, seed: np.random.default_rng(seed).uniform(lower, upper, (count, len(lower)))

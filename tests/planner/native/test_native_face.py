@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from services.planner.collision_geometry.shapes import Shape, ShapeKind
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 from services.planner.native.binding import motion
 from services.planner.native.native_planner import NativePlanner
 from tests.planner.native.conftest import load
@@ -34,7 +34,7 @@ def test_the_module_has_all_that_its_stub_promises_and_nothing_else():
 
 def test_without_the_compiled_module_the_remedy_is_said():
     said = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, text=True, timeout=60, check=True)
-    assert said.stdout.startswith("NativeMissing the motion core cannot be loaded")
+    assert said.stdout.startswith("NativeMissing the native planner cannot be loaded")
     assert "make setup" in said.stdout
     assert "sudo apt-get install python3-dev" in said.stdout
 
@@ -46,7 +46,7 @@ def test_two_hundred_obstacles_are_no_more_than_the_same_asked_one_by_one():
     places = np.column_stack((radii * np.cos(angles), radii * np.sin(angles), heights)).tolist()
     upright = (0.0, 0.0, 0.0, 1.0)
     size = (0.02, 0.01, 0.03)
-    shapes = [Shape(f"{i}", ShapeKind.BOX, size, ((x, y, z), upright)) for i, (x, y, z) in enumerate(places)]
+    shapes = [CollisionShape(f"{i}", ShapeKind.BOX, size, ((x, y, z), upright)) for i, (x, y, z) in enumerate(places)]
     rows = rng.uniform([-2, -2.4, 1.9, -1.8, -1.5, 0], [2, -0.1, 5.0, 1.8, 1.5, 6], (500, 6))
     core.set_scene(shapes)
     together = core.free(rows)

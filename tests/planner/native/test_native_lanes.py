@@ -19,9 +19,9 @@ from tests.planner.native.scenes import random_shape
 SLACK = 1e-5  # [m]: half of what the radii have in excess for the floats
 
 
-def test_the_spheres_are_where_pinocchio_puts_them(arm, core, postures):
+def test_the_spheres_are_where_pinocchio_puts_them(arm, core, configurations):
     kinematics = Kinematics(arm)
-    for row in postures(8, 1):
+    for row in configurations(8, 1):
         poses = kinematics.link_poses(row)
         expected = []
         for link, cover in core.covers.items():
@@ -43,9 +43,9 @@ def test_angles_of_many_turns_lose_little(arm, core):
 
 
 @pytest.mark.parametrize("name", [name for name in motion.kernel_names() if name != "plain"])
-def test_every_build_gives_the_same_bits_as_the_plain_one(name, arm, postures):
+def test_every_build_gives_the_same_bits_as_the_plain_one(name, arm, configurations):
     fast, plain = NativePlanner(arm, kernel=name), NativePlanner(arm, kernel="plain")
-    rows = postures(4003, 2)  # the last lanes are not all used
+    rows = configurations(4003, 2)  # the last lanes are not all used
     assert np.array_equal(fast.sphere_centres(rows[:200]), plain.sphere_centres(rows[:200]))
     rng = np.random.default_rng(3)
     scene = [random_shape(rng, kind, f"{kind} {i}") for i in range(2) for kind in ShapeKind]
@@ -58,8 +58,8 @@ def test_every_build_gives_the_same_bits_as_the_plain_one(name, arm, postures):
     assert [fast.distance(row) for row in rows[:100]] == [plain.distance(row) for row in rows[:100]]
 
 
-def test_the_order_of_the_rows_changes_no_verdict(core, postures):
-    rows = postures(1000, 4)
+def test_the_order_of_the_rows_changes_no_verdict(core, configurations):
+    rows = configurations(1000, 4)
     order = np.random.default_rng(5).permutation(len(rows))
     assert np.array_equal(core.free(rows)[order], core.free(rows[order]))
 

@@ -9,10 +9,10 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from services.planner.collision_geometry.shapes import Shape, ShapeKind
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 from services.planner.native.binding import CancelFlag
 from services.planner.native.native_planner import NativePlanner
-from services.planner.native.paths import FreePath, NoPath, Why
+from services.planner.native.paths import FailureReason, FreePath, NoPath
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.conftest import load
 
@@ -20,8 +20,8 @@ UNSURE = 1e-5  # [m] of coal's own distances
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
-def crate(name: str, size: tuple[float, float, float], place: tuple[float, float, float]) -> Shape:
-    return Shape(name, ShapeKind.BOX, size, (place, UPRIGHT))
+def crate(name: str, size: tuple[float, float, float], place: tuple[float, float, float]) -> CollisionShape:
+    return CollisionShape(name, ShapeKind.BOX, size, (place, UPRIGHT))
 
 
 SHELF = [
@@ -32,21 +32,21 @@ SHELF = [
     crate("right", (0.2, 0.02, 0.5), (0.36, -0.25, 0.3)),
 ]
 POSTS = [
-    Shape(f"post {i}", ShapeKind.CYLINDER, (0.01, 0.6), ((0.38 * np.cos(a), 0.38 * np.sin(a), 0.3), UPRIGHT))
+    CollisionShape(f"post {i}", ShapeKind.CYLINDER, (0.01, 0.6), ((0.38 * np.cos(a), 0.38 * np.sin(a), 0.3), UPRIGHT))
     for i, a in enumerate(np.linspace(0.3, 2.0 * np.pi + 0.3, 8, endpoint=False))
 ]
 
 
 @pytest.mark.parametrize("scene", [[], SHELF, POSTS], ids=["empty", "shelf", "posts"])
-def test_a_path_is_free_all_along_exact_at_its_ends_and_within_the_limits(scene, arm, core, postures):
+def test_a_path_is_free_all_along_exact_at_its_ends_and_within_the_limits(scene, arm, core, configurations):
     core.set_scene(scene)
-    rows, truth = postures(200, 1), Truth(arm, scene)
+    rows, truth = configurations(200, 1), Truth(arm, scene)
     rows = rows[core.free(rows)]
     found = 0
     for seed, (start, goal) in enumerate(zip(rows[0:16:2], rows[1:17:2], strict=True)):
         path = core.plan(start, goal, seed=seed, time_limit=5.0)
         if isinstance(path, NoPath):
-            assert path.why is Why.TIMED_OUT
+            assert path.reason is FailureReason.TIMED_OUT
             continue
         found += 1
         curve, slope, _ = path.at(np.linspace(0.0, path.spans, 400))
@@ -60,9 +60,9 @@ def test_a_path_is_free_all_along_exact_at_its_ends_and_within_the_limits(scene,
     assert found >= 6
 
 
-def test_the_curve_is_twice_continuously_differentiable(arm, core, postures):
+def test_the_curve_is_twice_continuously_differentiable(arm, core, configurations):
     core.set_scene(SHELF)
-    start, goal = _bent(core, postures(400, 3))
+    start, goal = _bent(core, configurations(400, 3))
     path = core.plan(start, goal, seed=7, time_limit=10.0)
     assert isinstance(path, FreePath)
     knots = np.arange(1.0, path.spans)
@@ -76,9 +76,9 @@ def test_the_curve_is_twice_continuously_differentiable(arm, core, postures):
     assert position.shape == (300, len(arm.joints))
 
 
-def test_the_same_seed_gives_the_same_path_and_another_seed_another(core, postures):
+def test_the_same_seed_gives_the_same_path_and_another_seed_another(core, configurations):
     core.set_scene(SHELF)
-    start, goal = _bent(core, postures(400, 3))
+    start, goal = _bent(core, configurations(400, 3))
     once, again, other = (core.plan(start, goal, seed=seed) for seed in (7, 7, 8))
     assert all(isinstance(path, FreePath) for path in (once, again, other))
     assert np.array_equal(once.corners, again.corners)
@@ -96,12 +96,12 @@ def _bent(core: NativePlanner, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray
     raise AssertionError("there is no such pair")
 
 
-def test_every_build_of_the_check_finds_the_same_path(arm, postures):
+def test_every_build_of_the_check_finds_the_same_path(arm, configurations):
     paths = []
     for kernel in ("plain", "vector", ""):
         core = NativePlanner(arm, kernel=kernel)
         core.set_scene(SHELF)
-        rows = postures(60, 4)
+        rows = configurations(60, 4)
         rows = rows[core.free(rows)]
         paths.append(
             [core.plan(a, b, seed=2, time_limit=20.0) for a, b in zip(rows[0:12:2], rows[1:13:2], strict=True)]
@@ -125,8 +125,8 @@ def test_a_start_and_a_goal_that_touch_are_told_apart():
     core = NativePlanner(load("rm1"))
     core.set_scene([crate("crate", (0.1, 0.1, 0.3), (0.4, 0.0, 0.15))])
     inside, outside = [0.0, 0.0, 0.1], [1.0, 0.5, 0.1]
-    assert core.plan(inside, outside).why is Why.START_TOUCHES
-    assert core.plan(outside, inside).why is Why.GOAL_TOUCHES
+    assert core.plan(inside, outside).reason is FailureReason.START_TOUCHES
+    assert core.plan(outside, inside).reason is FailureReason.GOAL_TOUCHES
 
 
 def walled() -> tuple[NativePlanner, list[float], list[float]]:
@@ -142,7 +142,7 @@ def test_the_time_limit_ends_a_search():
     began = time.monotonic()
     ended = core.plan(start, goal, time_limit=0.05)
     assert isinstance(ended, NoPath)
-    assert ended.why is Why.TIMED_OUT
+    assert ended.reason is FailureReason.TIMED_OUT
     assert time.monotonic() - began < 2.0
 
 
@@ -159,12 +159,12 @@ def test_another_thread_can_end_a_search_and_do_other_things_meanwhile():
     cancel.set()
     searching.join(timeout=5.0)
     assert not searching.is_alive()
-    assert ended[0].why is Why.CANCELLED
+    assert ended[0].reason is FailureReason.CANCELLED
     assert core.edge_free(start, goal)
 
 
 def test_a_search_that_finds_nothing_had_nothing_to_find():
-    """Against a flood over a grid of postures, which may squeeze through where the search may not."""
+    """Against a flood over a grid of configurations, which may squeeze through where the search may not."""
     core = NativePlanner(load("rm1"))
     rng = np.random.default_rng(5)
     counts = (41, 41, 5)
@@ -214,7 +214,10 @@ def test_a_plan_of_nonsense_is_refused():
 def test_an_arm_that_stands_close_to_something_gets_away_from_it():
     core = NativePlanner(load("rm1"))
     start, goal = [0.3, 0.2, 0.05], [-1.5, 0.4, 0.15]
-    tables = (Shape("table", ShapeKind.HALF_SPACE, (), ((0.0, 0.0, z), UPRIGHT)) for z in np.arange(0.0, 0.06, 0.0002))
+    tables = (
+        CollisionShape("table", ShapeKind.HALF_SPACE, (), ((0.0, 0.0, z), UPRIGHT))
+        for z in np.arange(0.0, 0.06, 0.0002)
+    )
     for table in tables:
         core.set_scene([table])
         if core.distance(start) < core.margin + 0.0006:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from services.planner.collision_geometry.link_shapes import link_shapes
-from services.planner.collision_geometry.shapes import Shape, ShapeKind
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 from services.planner.collision_geometry.solids import Box, Capsule, Cylinder, Solid
 from services.planner.native.sphere_cover import cover_of, cover_shapes, mesh_cover
 from tests.planner.native.conftest import load
@@ -104,4 +104,4 @@ def test_a_mesh_is_covered_inside_too():
 
 def test_what_has_no_end_cannot_be_covered():
     with pytest.raises(ValueError, match=r'"floor": a half_space has no end'):
-        cover_shapes([Shape("floor", ShapeKind.HALF_SPACE)], 0.005)
+        cover_shapes([CollisionShape("floor", ShapeKind.HALF_SPACE)], 0.005)

@@ -13,9 +13,9 @@ namespace gemelo {
 // `cells` have to be held; `candidates` are centres with the largest radius that each may have. The chosen ones are
 // shrunk to what they were chosen for. A cell that no candidate holds gets a sphere around its own centre, for which
 // `least` [m] must do.
-class Coverer {
+class GreedyCover {
   public:
-    Coverer(const std::vector<Ball>& cells, std::vector<Ball> candidates, double least)
+    GreedyCover(const std::vector<Sphere>& cells, std::vector<Sphere> candidates, double least)
         : cells_(cells), candidates_(std::move(candidates)), holders_(cells.size()) {
         for (size_t k = 0; k < candidates_.size(); ++k) list(k);
         for (size_t i = 0; i < cells_.size(); ++i) {
@@ -26,8 +26,8 @@ class Coverer {
         }
     }
 
-    std::vector<Ball> choose() {
-        std::vector<Ball> chosen;
+    std::vector<Sphere> choose() {
+        std::vector<Sphere> chosen;
         std::vector<bool> left(cells_.size(), true);
         for (size_t count = cells_.size(); count > 0;) {
             const auto most = std::max_element(held_.begin(), held_.end(),
@@ -51,19 +51,19 @@ class Coverer {
         int64_t gain;  // how many of them are left
     };
 
-    static double away(const Ball& from, const Ball& to) {
+    static double away(const Sphere& from, const Sphere& to) {
         return std::sqrt(square(from.x - to.x) + square(from.y - to.y) + square(from.z - to.z)) + to.radius;
     }
 
     static double square(double value) { return value * value; }
 
     void list(size_t candidate) {
-        const Ball& ball = candidates_[candidate];
+        const Sphere& sphere = candidates_[candidate];
         Held held{{}, 0};
         for (size_t i = 0; i < cells_.size(); ++i) {
-            const double room = ball.radius - cells_[i].radius;
+            const double room = sphere.radius - cells_[i].radius;
             const double apart =
-                square(ball.x - cells_[i].x) + square(ball.y - cells_[i].y) + square(ball.z - cells_[i].z);
+                square(sphere.x - cells_[i].x) + square(sphere.y - cells_[i].y) + square(sphere.z - cells_[i].z);
             if (room < 0.0 || apart > room * room) continue;
             held.cells.push_back(static_cast<uint32_t>(i));
             holders_[i].push_back(static_cast<uint32_t>(candidate));
@@ -72,8 +72,8 @@ class Coverer {
         held_.push_back(std::move(held));
     }
 
-    const std::vector<Ball>& cells_;
-    std::vector<Ball> candidates_;
+    const std::vector<Sphere>& cells_;
+    std::vector<Sphere> candidates_;
     std::vector<std::vector<uint32_t>> holders_;  // of each cell
     std::vector<Held> held_;                      // by each candidate
 };

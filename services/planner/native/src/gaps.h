@@ -104,11 +104,11 @@ inline Lanes mesh_gap(const MeshView& mesh, const Point& p, const Lanes& limit) 
 inline Lanes squared_gap(const ObstacleView& obstacle, const Point& centre, const Lanes& limit) {
     const Point p = placed(obstacle.pose, centre);
     switch (obstacle.shape) {
-        case Shape::kCylinder:
+        case ShapeKind::kCylinder:
             return cylinder_gap(p, obstacle.size);
-        case Shape::kHalfSpace:
+        case ShapeKind::kHalfSpace:
             return half_space_gap(p);
-        case Shape::kMesh:
+        case ShapeKind::kMesh:
             return mesh_gap(*obstacle.mesh, p, limit);
         default:
             return box_gap(p, obstacle.size);

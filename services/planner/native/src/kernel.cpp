@@ -1,7 +1,7 @@
 // Whether an arm touches itself or anything else, in eight configurations at once. Compiled once for each processor.
 //
 // Spheres in trees: what is far from the sphere around a whole link is far from the link. `near` asks the same question
-// with the way added that a part may move within the stretch that a lane stands for: a lane that is not near is free
+// with the path added that a part may move within the stretch that a lane stands for: a lane that is not near is free
 // on its whole stretch.
 #include "gaps.h"
 
@@ -10,12 +10,13 @@ namespace {
 
 constexpr int kBatch = 32;  // obstacles that go down a tree together
 
-class Checker {
+class CollisionCheck {
   public:
-    Checker(const WorldView& world, const Question& ask, Answer& answer) : world_(world), ask_(ask), answer_(answer) {
-        answer_ = {0, 0, -1, -1};
-        half_ = load(ask.half);
-        place_frames(world_, ask.joints, frames_);
+    CollisionCheck(const WorldView& world, const CheckQuery& query, CheckResult& result)
+        : world_(world), query_(query), result_(result) {
+        result_ = {0, 0, -1, -1};
+        half_ = load(query.half);
+        place_frames(world_, query.joints, frames_);
     }
 
     void run() {
@@ -25,44 +26,44 @@ class Checker {
             if (view.frame != 0) against_obstacles(part);  // what stands fixed cannot come nearer to anything
         }
         for (int32_t pair = 0; pair < world_.pair_count && !is_over(); ++pair) against_itself(pair);
-        answer_.hits &= ask_.lanes;
-        answer_.near &= ask_.lanes;
+        result_.hits &= query_.lanes;
+        result_.near &= query_.lanes;
     }
 
   private:
     bool is_over() const {
-        const uint32_t hits = answer_.hits & ask_.lanes;
-        return hits == ask_.lanes || (ask_.first_hit_is_all && hits != 0);
+        const uint32_t hits = result_.hits & query_.lanes;
+        return hits == query_.lanes || (query_.first_hit_is_all && hits != 0);
     }
 
     // The lanes that could still learn something from a squared distance of which `limit` is the least that is free.
     uint32_t within(const Lanes& gap, float limit) const {
         const Lanes wide = open_ + limit;
-        return not_beyond(gap, wide * wide) & ask_.lanes & ~answer_.hits;
+        return not_beyond(gap, wide * wide) & query_.lanes & ~result_.hits;
     }
 
     void note(const Lanes& gap, float limit, uint32_t near, int32_t first, int32_t second) {
         const Lanes narrow(limit * limit);
         const uint32_t hits = not_beyond(gap, narrow) & near;
-        answer_.hits |= hits;
-        if ((near & ~answer_.near) != 0 || hits != 0) {
-            answer_.first = first;
-            answer_.second = second;
+        result_.hits |= hits;
+        if ((near & ~result_.near) != 0 || hits != 0) {
+            result_.first = first;
+            result_.second = second;
         }
-        answer_.near |= near;
+        result_.near |= near;
         close();
     }
 
     // Lanes that are already known to be near only want to know of hits.
-    void close() { open_ = select(spread(answer_.near), 0.0f, way_); }
+    void close() { open_ = select(spread(result_.near), 0.0f, motion_); }
 
     void begin(float motion) {
-        way_ = half_ * motion;
+        motion_ = half_ * motion;
         close();
     }
 
     void against_obstacles(int32_t part) {
-        begin(ask_.part_motion[part]);
+        begin(query_.part_motion[part]);
         const Descent down{world_.parts[part].nodes, &frames_[world_.parts[part].frame], world_.obstacles, part, -1};
         const NodeView& root = down.nodes[0];
         int32_t batch[kBatch];
@@ -78,7 +79,7 @@ class Checker {
         for (int32_t i = 0; i < world_.tree_count && !is_over();) {
             const NodeView& node = world_.tree[i];
             const Lanes gap = squared(roots_[part] - Point{node.x, node.y, node.z});
-            const bool is_near = within(gap, root.radius + node.radius + ask_.margin) != 0;
+            const bool is_near = within(gap, root.radius + node.radius + query_.margin) != 0;
             if (is_near && node.skip == i + 1) push(node.item);
             i = is_near ? i + 1 : node.skip;
         }
@@ -88,8 +89,8 @@ class Checker {
     void against_itself(int32_t pair) {
         const PairView& both = world_.pairs[pair];
         const PartView &first = world_.parts[both.first], &second = world_.parts[both.second];
-        begin(ask_.pair_motion[pair]);
-        const float limit = first.nodes[0].radius + second.nodes[0].radius + ask_.margin;
+        begin(query_.pair_motion[pair]);
+        const float limit = first.nodes[0].radius + second.nodes[0].radius + query_.margin;
         if (within(squared(roots_[both.first] - roots_[both.second]), limit) == 0) return;
         const Placement seen = relative(frames_[second.frame], frames_[first.frame]);
         const Descent down{first.nodes, &seen, second.solids, both.first, both.second};
@@ -120,7 +121,7 @@ class Checker {
         int keep = 0;
         for (int i = 0; i < count; ++i) {
             const ObstacleView& obstacle = down.obstacles[obstacles[i]];
-            const float limit = node.radius + ask_.margin + obstacle.round;
+            const float limit = node.radius + query_.margin + obstacle.rounding;
             const Lanes gap = squared_gap(obstacle, centre, open_ + limit);
             const uint32_t near = within(gap, limit);
             if (near == 0) continue;
@@ -134,16 +135,18 @@ class Checker {
     }
 
     const WorldView& world_;
-    const Question& ask_;
-    Answer& answer_;
+    const CheckQuery& query_;
+    CheckResult& result_;
     Lanes half_;
-    Lanes way_;   // [m] the present part or pair may move within a lane's stretch
-    Lanes open_;  // the same, and 0 in lanes that are known to be near
+    Lanes motion_;  // [m] the present part or pair may move within a lane's stretch
+    Lanes open_;    // the same, and 0 in lanes that are known to be near
     Placement frames_[kMaxFrames];
     Point roots_[kMaxParts];
 };
 
-void check(const WorldView& world, const Question& ask, Answer& answer) { Checker(world, ask, answer).run(); }
+void check(const WorldView& world, const CheckQuery& query, CheckResult& result) {
+    CollisionCheck(world, query, result).run();
+}
 
 void place(const WorldView& world, const float* joints, float* centres) {
     Placement frames[kMaxFrames];

@@ -13,10 +13,10 @@
 
 namespace gemelo {
 
-class Mesh {
+class TriangleMesh {
   public:
     // Triangles' corners (n, 3, 3) [m].
-    explicit Mesh(std::vector<Triangle> triangles) : triangles_(std::move(triangles)) {
+    explicit TriangleMesh(std::vector<Triangle> triangles) : triangles_(std::move(triangles)) {
         if (triangles_.empty()) throw BadModel("a mesh needs at least one triangle");
         std::vector<size_t> order(triangles_.size());
         std::iota(order.begin(), order.end(), 0);
@@ -36,8 +36,8 @@ class Mesh {
         view_.cell = static_cast<float>(grid_.cell);
         view_.per_cell = static_cast<float>(1.0 / grid_.cell);
     }
-    Mesh(const Mesh&) = delete;
-    Mesh& operator=(const Mesh&) = delete;
+    TriangleMesh(const TriangleMesh&) = delete;
+    TriangleMesh& operator=(const TriangleMesh&) = delete;
 
     const MeshView& view() const { return view_; }
     double radius() const { return radius_; }  // around the mesh's own origin
@@ -51,7 +51,7 @@ class Mesh {
         if (end - begin <= kLeaf) {
             boxes_[self].first = static_cast<int32_t>(views_.size());
             boxes_[self].count = static_cast<int32_t>(end - begin);
-            for (size_t i = begin; i < end; ++i) views_.push_back(seen(triangles_[order[i]]));
+            for (size_t i = begin; i < end; ++i) views_.push_back(view_of(triangles_[order[i]]));
         } else {
             const size_t middle = begin + (end - begin) / 2;
             const size_t axis = longest(boxes_[self]);
@@ -90,7 +90,7 @@ class Mesh {
         return axis;
     }
 
-    static TriangleView seen(const Triangle& triangle) {
+    static TriangleView view_of(const Triangle& triangle) {
         TriangleView view{};
         const Vector normal = cross(minus(triangle[1], triangle[0]), minus(triangle[2], triangle[0]));
         const double twice_area = length(normal);

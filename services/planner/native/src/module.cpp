@@ -70,22 +70,22 @@ std::shared_ptr<const Chain> make_chain(const Integers& links, const Rows& numbe
     return chain;
 }
 
-std::vector<Ball> balls_of(const Rows& rows) {
+std::vector<Sphere> spheres_of(const Rows& rows) {
     require_columns(rows.shape(1), 4, "spheres (x, y, z, radius)");
-    std::vector<Ball> balls;
-    for (size_t i = 0; i < rows.shape(0); ++i) balls.push_back({rows(i, 0), rows(i, 1), rows(i, 2), rows(i, 3)});
-    return balls;
+    std::vector<Sphere> spheres;
+    for (size_t i = 0; i < rows.shape(0); ++i) spheres.push_back({rows(i, 0), rows(i, 1), rows(i, 2), rows(i, 3)});
+    return spheres;
 }
 
-std::shared_ptr<const Part> make_part(int frame, const Rows& balls, std::vector<Obstacle> solids) {
-    return std::make_shared<Part>(frame, balls_of(balls), std::move(solids));
+std::shared_ptr<const Part> make_part(int frame, const Rows& spheres, std::vector<Obstacle> solids) {
+    return std::make_shared<Part>(frame, spheres_of(spheres), std::move(solids));
 }
 
 nb::ndarray<nb::numpy, double> cover(const Rows& cells, const Rows& candidates, double least) {
-    const std::vector<Ball> held = balls_of(cells);
+    const std::vector<Sphere> held = spheres_of(cells);
     std::vector<double> rows;
-    for (const Ball& ball : Coverer(held, balls_of(candidates), least).choose()) {
-        rows.insert(rows.end(), {ball.x, ball.y, ball.z, ball.radius});
+    for (const Sphere& sphere : GreedyCover(held, spheres_of(candidates), least).choose()) {
+        rows.insert(rows.end(), {sphere.x, sphere.y, sphere.z, sphere.radius});
     }
     const size_t count = rows.size() / 4;
     return array_of(std::move(rows), {count, size_t{4}});
@@ -105,10 +105,10 @@ std::vector<Triangle> triangles_of(const Rows& vertices, const Integers& faces) 
     return triangles;
 }
 
-std::shared_ptr<const Mesh> make_mesh(const Rows& vertices, const Integers& faces) {
+std::shared_ptr<const TriangleMesh> make_mesh(const Rows& vertices, const Integers& faces) {
     auto triangles = triangles_of(vertices, faces);
     nb::gil_scoped_release release;
-    return std::make_shared<const Mesh>(std::move(triangles));
+    return std::make_shared<const TriangleMesh>(std::move(triangles));
 }
 
 // The cells that hold any of the solid, for the fit of spheres: centres [m] and at least how deep, -1 at the surface.
@@ -128,13 +128,13 @@ nb::ndarray<nb::numpy, double> solid_cells(const Rows& vertices, const Integers&
     return array_of(std::move(rows), {count, size_t{4}});
 }
 
-Obstacle make_obstacle(int shape, const Row& pose, const Row& size, double round, uint64_t touching,
-                       std::shared_ptr<const Mesh> mesh) {
+Obstacle make_obstacle(int shape, const Row& pose, const Row& size, double rounding, uint64_t touching,
+                       std::shared_ptr<const TriangleMesh> mesh) {
     require(shape >= 0 && shape <= 3, "a shape is 0 to 3");
     require_columns(pose.size(), 12, "a pose");
     require_columns(size.size(), 3, "a size");
     require((shape == 3) == (mesh != nullptr), "a mesh, and only a mesh, comes with its triangles");
-    Obstacle obstacle{static_cast<Shape>(shape), {}, {}, round, touching, std::move(mesh)};
+    Obstacle obstacle{static_cast<ShapeKind>(shape), {}, {}, rounding, touching, std::move(mesh)};
     std::copy(pose.data(), pose.data() + 12, obstacle.pose);
     std::copy(size.data(), size.data() + 3, obstacle.size);
     return obstacle;
@@ -166,12 +166,12 @@ nb::ndarray<nb::numpy, bool> are_free(const World& world, const Kernel& kernel, 
                 const double* row = rows.data() + (first + std::min(lane, lanes - 1)) * dof;
                 for (size_t i = 0; i < dof; ++i) joints[i * kLanes + lane] = static_cast<float>(row[i]);
             }
-            Answer answer;
+            CheckResult checked;
             kernel.check(
                 world.view(),
                 {joints, half, still.data(), still.data(), static_cast<float>(margin), (1u << lanes) - 1, false},
-                answer);
-            for (size_t lane = 0; lane < lanes; ++lane) verdicts[first + lane] = !(answer.hits >> lane & 1u);
+                checked);
+            for (size_t lane = 0; lane < lanes; ++lane) verdicts[first + lane] = !(checked.hits >> lane & 1u);
         }
     }
     return nb::ndarray<nb::numpy, bool>(verdicts, {count}, owner);
@@ -184,16 +184,16 @@ nb::tuple clearance(const World& world, const Kernel& kernel, const Row& row, do
     float joints[kMaxDof * kLanes], half[kLanes];
     for (size_t i = 0; i < at.size(); ++i) std::fill_n(joints + i * kLanes, kLanes, static_cast<float>(at[i]));
     double low = 0.0, high = most;
-    Answer answer{}, nearest{0, 0, -1, -1};
+    CheckResult checked{}, nearest{0, 0, -1, -1};
     while (high - low > 1e-6) {
         for (int lane = 0; lane < kLanes; ++lane)
             half[lane] = static_cast<float>(low + (high - low) * (lane + 1) / kLanes);
-        kernel.check(world.view(), {joints, half, unit.data(), unit.data(), 0.0f, kAllLanes, true}, answer);
-        if (answer.hits != 0) return nb::make_tuple(0.0, answer.first, answer.second);
-        if (answer.near == 0 && low == 0.0 && high == most) return nb::make_tuple(most, -1, -1);
+        kernel.check(world.view(), {joints, half, unit.data(), unit.data(), 0.0f, kAllLanes, true}, checked);
+        if (checked.hits != 0) return nb::make_tuple(0.0, checked.first, checked.second);
+        if (checked.near == 0 && low == 0.0 && high == most) return nb::make_tuple(most, -1, -1);
         int free = 0;
-        while (free < kLanes && !(answer.near >> free & 1u)) ++free;
-        if (answer.near != 0) nearest = answer;
+        while (free < kLanes && !(checked.near >> free & 1u)) ++free;
+        if (checked.near != 0) nearest = checked;
         const double step = (high - low) / kLanes;
         high = free == kLanes ? high : low + step * (free + 1);
         low = low + step * free;
@@ -204,9 +204,9 @@ nb::tuple clearance(const World& world, const Kernel& kernel, const Row& row, do
 
 nb::tuple first_contact(const World& world, const Kernel& kernel, const Row& row, double margin) {
     const Joints at = joints_of(row, world);
-    Rake rake(world, kernel, {margin, 0.0, 0.0});
-    const bool is_free = rake.is_free(at.data());
-    return nb::make_tuple(!is_free, rake.answer().first, rake.answer().second);
+    MotionValidator validator(world, kernel, {margin, 0.0, 0.0});
+    const bool is_free = validator.is_free(at.data());
+    return nb::make_tuple(!is_free, validator.result().first, validator.result().second);
 }
 
 // Verdict of a polyline (degree 1) or of a B-spline by its control points (degree 3), and where on it, if it touches.
@@ -220,27 +220,29 @@ nb::tuple look(const World& world, const Kernel& kernel, const Rows& rows, int d
     Tolerances tolerances;
     tolerances.margin = margin;
     tolerances.finest = finest;
-    Rake rake(world, kernel, tolerances);
-    const Stop stop(seconds, cancel);
-    const Verdict verdict = degree == 1 ? rake.look(Polyline(rows.data(), rows.shape(0), rows.shape(1)), stop)
-                                        : rake.look(Spline(rows.data(), rows.shape(0), rows.shape(1)), stop);
+    MotionValidator validator(world, kernel, tolerances);
+    const StopCondition stop(seconds, cancel);
+    const Verdict verdict = degree == 1 ? validator.look(Polyline(rows.data(), rows.shape(0), rows.shape(1)), stop)
+                                        : validator.look(Spline(rows.data(), rows.shape(0), rows.shape(1)), stop);
     nb::gil_scoped_acquire acquire;
-    return nb::make_tuple(static_cast<int>(verdict), array_of(Joints(rake.touching()), {rake.touching().size()}));
+    return nb::make_tuple(static_cast<int>(verdict),
+                          array_of(Joints(validator.touching()), {validator.touching().size()}));
 }
 
 // The ranges (k, 2) of a polyline, in rows, that are not known to be free.
-nb::ndarray<nb::numpy, double> doubts(const World& world, const Kernel& kernel, const Rows& rows, double margin,
-                                      double finest) {
+nb::ndarray<nb::numpy, double> unresolved_intervals(const World& world, const Kernel& kernel, const Rows& rows,
+                                                    double margin, double finest) {
     require_columns(rows.shape(1), static_cast<size_t>(world.dof()), "joint values");
     require_usable(rows.data(), rows.size());
     require(rows.shape(0) > 1, "a polyline needs two rows");
     Tolerances tolerances;
     tolerances.margin = margin;
     tolerances.finest = finest;
-    Rake rake(world, kernel, tolerances);
-    const Polyline course(rows.data(), rows.shape(0), rows.shape(1));
+    MotionValidator validator(world, kernel, tolerances);
+    const Polyline path(rows.data(), rows.shape(0), rows.shape(1));
     std::vector<double> ranges;
-    for (const auto& range : rake.doubts(course, Stop(std::numeric_limits<double>::infinity(), nullptr))) {
+    for (const auto& range :
+         validator.unresolved_intervals(path, StopCondition(std::numeric_limits<double>::infinity(), nullptr))) {
         ranges.insert(ranges.end(), range.begin(), range.end());
     }
     const size_t count = ranges.size() / 2;
@@ -260,32 +262,32 @@ Plan find(const World& world, const Kernel& kernel, const Rows& bounds, const Ro
     const auto limits = each_row(bounds, world, "bounds (lower, upper, weights)");
     require(limits.size() == 3, "bounds are three rows: lower, upper, weights");
     const Space space{limits[0], limits[1], limits[2]};
-    Wish wish{joints_of(start, world), each_row(goals, world, "goals"), seed};
-    require(!wish.goals.empty(), "a plan needs at least one goal");
+    PlanQuery query{joints_of(start, world), each_row(goals, world, "goals"), seed};
+    require(!query.goals.empty(), "a plan needs at least one goal");
     nb::gil_scoped_release release;
     Tolerances tolerances;
     tolerances.margin = margin;
-    return plan(world, kernel, space, tolerances, wish, Stop(seconds, cancel));
+    return plan(world, kernel, space, tolerances, query, StopCondition(seconds, cancel));
 }
 
-nb::ndarray<nb::numpy, double> way_of(const Plan& plan, size_t dof) {
+nb::ndarray<nb::numpy, double> path_of(const Plan& plan, size_t dof) {
     std::vector<double> rows;
-    for (const Joints& joints : plan.way) rows.insert(rows.end(), joints.begin(), joints.end());
-    return array_of(std::move(rows), {plan.way.size(), dof});
+    for (const Joints& joints : plan.path) rows.insert(rows.end(), joints.begin(), joints.end());
+    return array_of(std::move(rows), {plan.path.size(), dof});
 }
 
 // The leaves' centres (n, leaves, 3), for the tests of the kinematics.
 nb::ndarray<nb::numpy, float> centres(const World& world, const Kernel& kernel, const Rows& rows) {
     require_columns(rows.shape(1), static_cast<size_t>(world.dof()), "joint values");
     require_usable(rows.data(), rows.size());
-    const size_t dof = rows.shape(1), balls = world.ball_count();
-    std::vector<float> result(rows.shape(0) * balls * 3), joints(dof * kLanes), placed(balls * 3 * kLanes);
+    const size_t dof = rows.shape(1), spheres = world.sphere_count();
+    std::vector<float> result(rows.shape(0) * spheres * 3), joints(dof * kLanes), placed(spheres * 3 * kLanes);
     for (size_t row = 0; row < rows.shape(0); ++row) {
         for (size_t i = 0; i < dof * kLanes; ++i) joints[i] = static_cast<float>(rows(row, i / kLanes));
         kernel.place(world.view(), joints.data(), placed.data());
-        for (size_t i = 0; i < balls * 3; ++i) result[row * balls * 3 + i] = placed[i * kLanes + row % kLanes];
+        for (size_t i = 0; i < spheres * 3; ++i) result[row * spheres * 3 + i] = placed[i * kLanes + row % kLanes];
     }
-    return array_of(std::move(result), {rows.shape(0), balls, size_t{3}});
+    return array_of(std::move(result), {rows.shape(0), spheres, size_t{3}});
 }
 
 }  // namespace
@@ -297,7 +299,7 @@ NB_MODULE(_motion, module) {
     using namespace nb::literals;
     nb::class_<Chain>(module, "Chain");
     nb::class_<Part>(module, "Part");
-    nb::class_<Mesh>(module, "Mesh");
+    nb::class_<TriangleMesh>(module, "TriangleMesh");
     nb::class_<Obstacle>(module, "Obstacle");
     nb::class_<World>(module, "World");
     nb::class_<Kernel>(module, "Kernel").def_ro("name", &Kernel::name);
@@ -307,7 +309,7 @@ NB_MODULE(_motion, module) {
         .def("is_set", [](const CancelFlag& flag) { return flag.is_set.load(); });
     nb::class_<Plan>(module, "Plan")
         .def_prop_ro("outcome", [](const Plan& plan) { return static_cast<int>(plan.outcome); })
-        .def("way", &way_of, "dof"_a)
+        .def("path", &path_of, "dof"_a)
         .def(
             "control",
             [](const Plan& plan, size_t dof) {
@@ -327,18 +329,18 @@ NB_MODULE(_motion, module) {
     module.def(
         "kernel", [](const std::string& name) { return &kernel_named(name); }, "name"_a, nb::rv_policy::reference);
     module.def("chain", &make_chain, "links"_a, "numbers"_a, "dof"_a);
-    module.def("part", &make_part, "frame"_a, "balls"_a, "solids"_a);
+    module.def("part", &make_part, "frame"_a, "spheres"_a, "solids"_a);
     module.def("cover", &cover, "cells"_a, "candidates"_a, "least"_a);
     module.def("mesh", &make_mesh, "vertices"_a, "faces"_a);
     module.def("solid_cells", &solid_cells, "vertices"_a, "faces"_a, "cell"_a);
-    module.def("obstacle", &make_obstacle, "shape"_a, "pose"_a, "size"_a, "round"_a, "touching"_a, "mesh"_a.none());
+    module.def("obstacle", &make_obstacle, "shape"_a, "pose"_a, "size"_a, "rounding"_a, "touching"_a, "mesh"_a.none());
     module.def("world", &make_world, "chain"_a, "parts"_a, "pairs"_a, "obstacles"_a);
     module.def("are_free", &are_free, "world"_a, "kernel"_a, "rows"_a, "margin"_a);
     module.def("clearance", &clearance, "world"_a, "kernel"_a, "row"_a, "most"_a);
     module.def("first_contact", &first_contact, "world"_a, "kernel"_a, "row"_a, "margin"_a);
     module.def("look", &look, "world"_a, "kernel"_a, "rows"_a, "degree"_a, "margin"_a, "finest"_a, "seconds"_a,
                "cancel"_a.none());
-    module.def("doubts", &doubts, "world"_a, "kernel"_a, "rows"_a, "margin"_a, "finest"_a);
+    module.def("unresolved_intervals", &unresolved_intervals, "world"_a, "kernel"_a, "rows"_a, "margin"_a, "finest"_a);
     module.def("plan", &find, "world"_a, "kernel"_a, "bounds"_a, "start"_a, "goals"_a, "seed"_a, "margin"_a,
                "seconds"_a, "cancel"_a.none());
     module.def("centres", &centres, "world"_a, "kernel"_a, "rows"_a);

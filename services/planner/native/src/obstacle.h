@@ -9,23 +9,23 @@
 namespace gemelo {
 
 struct Obstacle {
-    Shape shape;
+    ShapeKind shape;
     double pose[12];  // of the obstacle in the base, or of the solid in its part's frame
     double size[3];   // as in ObstacleView
-    double round;
+    double rounding;
     uint64_t touching;
-    std::shared_ptr<const Mesh> mesh;
+    std::shared_ptr<const TriangleMesh> mesh;
 };
 
 // With its pose inverted, and larger by what floats lose on something so big or so far away.
-inline ObstacleView seen(const Obstacle& obstacle) {
+inline ObstacleView view_of(const Obstacle& obstacle) {
     ObstacleView view{};
     const double* pose = obstacle.pose;
     double far =
         std::hypot(pose[9], pose[10], pose[11]) + std::hypot(obstacle.size[0], obstacle.size[1], obstacle.size[2]);
     if (obstacle.mesh) far += obstacle.mesh->radius();
     view.shape = obstacle.shape;
-    view.round = rounded_up(obstacle.round + 1e-6 * far);
+    view.rounding = rounded_up(obstacle.rounding + 1e-6 * far);
     view.touching = obstacle.touching;
     view.mesh = obstacle.mesh ? &obstacle.mesh->view() : nullptr;
     for (int row = 0; row < 3; ++row) {
@@ -40,12 +40,12 @@ inline ObstacleView seen(const Obstacle& obstacle) {
     return view;
 }
 
-inline Ball around(const Obstacle& obstacle, double round) {
+inline Sphere around(const Obstacle& obstacle, double rounding) {
     const double* size = obstacle.size;
     double radius = std::hypot(size[0], size[1], size[2]);
-    if (obstacle.shape == Shape::kCylinder) radius = std::hypot(size[0], size[2]);
+    if (obstacle.shape == ShapeKind::kCylinder) radius = std::hypot(size[0], size[2]);
     if (obstacle.mesh) radius = obstacle.mesh->radius();
-    return {obstacle.pose[9], obstacle.pose[10], obstacle.pose[11], radius + round};
+    return {obstacle.pose[9], obstacle.pose[10], obstacle.pose[11], radius + rounding};
 }
 
 }  // namespace gemelo

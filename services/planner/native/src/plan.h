@@ -10,13 +10,13 @@ enum class Outcome { kFound, kStartTouches, kGoalTouches, kTimedOut, kCancelled 
 
 struct Plan {
     Outcome outcome = Outcome::kTimedOut;
-    std::vector<Joints> way;      // corners of the polyline, start and goal included
+    std::vector<Joints> path;     // corners of the polyline, start and goal included
     std::vector<double> control;  // of the B-spline, by rows
     double search_s = 0.0, shorten_s = 0.0, smooth_s = 0.0;
     uint64_t iterations = 0, checks = 0;
 };
 
-struct Wish {
+struct PlanQuery {
     Joints start;
     std::vector<Joints> goals;  // any of them will do
     uint64_t seed = 0;
@@ -26,28 +26,28 @@ struct Wish {
 // How finely lines are told apart while searching: a line that comes so near to something is no loss, unless the start
 // or a goal is as near itself.
 inline Tolerances while_searching(const World& world, const Kernel& kernel, const Tolerances& tolerances,
-                                  const Wish& wish) {
+                                  const PlanQuery& query) {
     Tolerances hasty = tolerances;
     hasty.finest = std::max(tolerances.finest, 1e-3);
     Tolerances wide = tolerances;
     wide.margin += 2.0 * hasty.finest;
-    Rake rake(world, kernel, wide);
-    bool has_room = rake.is_free(wish.start.data());
-    for (const Joints& goal : wish.goals) has_room = has_room && rake.is_free(goal.data());
+    MotionValidator validator(world, kernel, wide);
+    bool has_room = validator.is_free(query.start.data());
+    for (const Joints& goal : query.goals) has_room = has_room && validator.is_free(goal.data());
     return has_room ? hasty : tolerances;
 }
 
 inline Plan plan(const World& world, const Kernel& kernel, const Space& space, const Tolerances& tolerances,
-                 const Wish& wish, const Stop& stop) {
+                 const PlanQuery& query, const StopCondition& stop) {
     Plan result;
-    Rake rake(world, kernel, while_searching(world, kernel, tolerances, wish));
-    Rake last(world, kernel, tolerances);
-    Random random(wish.seed);
+    MotionValidator validator(world, kernel, while_searching(world, kernel, tolerances, query));
+    MotionValidator last(world, kernel, tolerances);
+    Random random(query.seed);
     std::vector<Joints> goals;
-    for (const Joints& goal : wish.goals) {
-        if (rake.is_free(goal.data())) goals.push_back(goal);
+    for (const Joints& goal : query.goals) {
+        if (validator.is_free(goal.data())) goals.push_back(goal);
     }
-    if (!rake.is_free(wish.start.data())) {
+    if (!validator.is_free(query.start.data())) {
         result.outcome = Outcome::kStartTouches;
         return result;
     }
@@ -55,20 +55,20 @@ inline Plan plan(const World& world, const Kernel& kernel, const Space& space, c
         result.outcome = Outcome::kGoalTouches;
         return result;
     }
-    Search search(space, rake, random, stop);
-    result.way = search.find(wish.start, goals);
+    Search search(space, validator, random, stop);
+    result.path = search.find(query.start, goals);
     result.search_s = stop.elapsed();
     result.iterations = search.iterations();
-    if (result.way.empty()) {
+    if (result.path.empty()) {
         result.outcome = stop.is_cancelled() ? Outcome::kCancelled : Outcome::kTimedOut;
-        result.checks = rake.checks();
+        result.checks = validator.checks();
         return result;
     }
-    result.way = Shortener(space, rake, random, stop).shorten(std::move(result.way), wish.patience);
+    result.path = Shortener(space, validator, random, stop).shorten(std::move(result.path), query.patience);
     result.shorten_s = stop.elapsed() - result.search_s;
-    result.control = Smoother(last, stop).smooth(result.way);
+    result.control = Smoother(last, stop).smooth(result.path);
     result.smooth_s = stop.elapsed() - result.search_s - result.shorten_s;
-    result.checks = rake.checks() + last.checks();
+    result.checks = validator.checks() + last.checks();
     result.outcome = stop.is_cancelled() ? Outcome::kCancelled : Outcome::kFound;
     return result;
 }

@@ -32,28 +32,28 @@ struct Chain {
 // A link or an attached object.
 struct Part {
     int32_t frame;
-    std::vector<Ball> balls;       // in the frame
+    std::vector<Sphere> spheres;   // in the frame
     std::vector<Obstacle> solids;  // that the balls cover
     std::vector<NodeView> nodes;
     std::vector<ObstacleView> solid_views;
 
-    Part(int32_t of, std::vector<Ball> cover, std::vector<Obstacle> covered)
-        : frame(of), balls(std::move(cover)), solids(std::move(covered)), nodes(SphereTree(balls).take()) {
-        if (balls.empty() || solids.empty()) throw BadModel("a part needs at least one sphere and one solid");
-        for (const Obstacle& solid : solids) solid_views.push_back(seen(solid));
+    Part(int32_t of, std::vector<Sphere> cover, std::vector<Obstacle> covered)
+        : frame(of), spheres(std::move(cover)), solids(std::move(covered)), nodes(SphereTree(spheres).take()) {
+        if (spheres.empty() || solids.empty()) throw BadModel("a part needs at least one sphere and one solid");
+        for (const Obstacle& solid : solids) solid_views.push_back(view_of(solid));
     }
 };
 
 // How far at most [m] a part moves for each unit of each frame's joint: [m/rad] or [m/m]; 0 where it does not move it.
 //
-// For a turning joint that is the longest way from its axis to a point of the part, over all positions of the joints
-// between. Where the next axis is parallel, the way along the axis does not count (an arm of the SCARA kind).
+// For a turning joint that is the longest path from its axis to a point of the part, over all positions of the joints
+// between. Where the next axis is parallel, the path along the axis does not count (an arm of the SCARA kind).
 inline std::vector<double> reaches(const Chain& chain, const Part& part) {
     std::vector<double> reach(chain.frames.size(), 0.0);
     double from_axis = 0.0, from_origin = 0.0;
-    for (const Ball& ball : part.balls) {
-        from_axis = std::max(from_axis, std::hypot(ball.x, ball.y) + ball.radius);
-        from_origin = std::max(from_origin, std::hypot(ball.x, ball.y, ball.z) + ball.radius);
+    for (const Sphere& sphere : part.spheres) {
+        from_axis = std::max(from_axis, std::hypot(sphere.x, sphere.y) + sphere.radius);
+        from_origin = std::max(from_origin, std::hypot(sphere.x, sphere.y, sphere.z) + sphere.radius);
     }
     for (int32_t i = part.frame; i > 0; i = chain.frame(i).parent) {
         const FrameView& frame = chain.frame(i);

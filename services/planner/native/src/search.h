@@ -1,7 +1,7 @@
 // RRT-Connect (Kuffner and LaValle 2000): two trees that grow towards one another, from the start and from the goals.
 #pragma once
 
-#include "rake.h"
+#include "motion_validator.h"
 #include "random.h"
 
 namespace gemelo {
@@ -13,8 +13,8 @@ struct Space {
     double distance(const double* a, const double* b) const {
         double sum = 0.0;
         for (size_t i = 0; i < weights.size(); ++i) {
-            const double way = weights[i] * (a[i] - b[i]);
-            sum += way * way;
+            const double path = weights[i] * (a[i] - b[i]);
+            sum += path * path;
         }
         return std::sqrt(sum);
     }
@@ -41,8 +41,8 @@ class SearchTree {
         for (size_t index = 0; index < size(); ++index) {
             double sum = 0.0;
             for (size_t i = 0; i < dof_; ++i) {
-                const double way = space_.weights[i] * (joints[i] - rows_[index * dof_ + i]);
-                sum += way * way;
+                const double path = space_.weights[i] * (joints[i] - rows_[index * dof_ + i]);
+                sum += path * path;
             }
             if (sum < least) {
                 least = sum;
@@ -53,11 +53,11 @@ class SearchTree {
     }
 
     // From `index` to its root.
-    std::vector<Joints> way_up(size_t index) const {
-        std::vector<Joints> way;
+    std::vector<Joints> path_to_root(size_t index) const {
+        std::vector<Joints> path;
         for (;; index = parents_[index]) {
-            way.emplace_back(row(index), row(index) + dof_);
-            if (parents_[index] == index) return way;
+            path.emplace_back(row(index), row(index) + dof_);
+            if (parents_[index] == index) return path;
         }
     }
 
@@ -70,17 +70,17 @@ class SearchTree {
 
 class Search {
   public:
-    Search(const Space& space, Rake& rake, Random& random, const Stop& stop)
-        : space_(space), rake_(rake), random_(random), stop_(stop) {
+    Search(const Space& space, MotionValidator& validator, Random& random, const StopCondition& stop)
+        : space_(space), validator_(validator), random_(random), stop_(stop) {
         range_ = 0.25 * space_.distance(space_.lower.data(), space_.upper.data());
     }
 
     size_t iterations() const { return iterations_; }
 
-    // A way from `start` to one of `goals`, all of which must be free; none when it was stopped.
+    // A path from `start` to one of `goals`, all of which must be free; none when it was stopped.
     std::vector<Joints> find(const Joints& start, const std::vector<Joints>& goals) {
         for (const Joints& goal : goals) {
-            if (rake_.is_free_line(start.data(), goal.data(), stop_)) return {start, goal};
+            if (validator_.is_free_line(start.data(), goal.data(), stop_)) return {start, goal};
         }
         SearchTree from_start(space_), from_goals(space_);
         from_start.add(start.data(), 0);
@@ -111,7 +111,7 @@ class Search {
         for (size_t i = 0; i < next.size(); ++i) {
             next[i] = share < 1.0 ? next[i] + share * (target[i] - next[i]) : target[i];
         }
-        if (!rake_.is_free_line(tree.row(from), next.data(), stop_)) return false;
+        if (!validator_.is_free_line(tree.row(from), next.data(), stop_)) return false;
         tree.add(next.data(), from);
         return share >= 1.0;
     }
@@ -130,17 +130,17 @@ class Search {
 
     // The newest nodes of both are the same configuration.
     std::vector<Joints> joined(const SearchTree& from_start, const SearchTree& from_goals) const {
-        std::vector<Joints> way = from_start.way_up(from_start.size() - 1);
-        std::reverse(way.begin(), way.end());
-        const std::vector<Joints> rest = from_goals.way_up(from_goals.size() - 1);
-        way.insert(way.end(), rest.begin() + 1, rest.end());
-        return way;
+        std::vector<Joints> path = from_start.path_to_root(from_start.size() - 1);
+        std::reverse(path.begin(), path.end());
+        const std::vector<Joints> rest = from_goals.path_to_root(from_goals.size() - 1);
+        path.insert(path.end(), rest.begin() + 1, rest.end());
+        return path;
     }
 
     const Space& space_;
-    Rake& rake_;
+    MotionValidator& validator_;
     Random& random_;
-    const Stop& stop_;
+    const StopCondition& stop_;
     double range_;
     size_t iterations_ = 0;
 };

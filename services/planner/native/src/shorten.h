@@ -1,4 +1,4 @@
-// A shorter way through the same free space: straight cuts between two places of it, at random and from corner to
+// A shorter path through the same free space: straight cuts between two places of it, at random and from corner to
 // corner.
 #pragma once
 
@@ -8,54 +8,55 @@ namespace gemelo {
 
 class Shortener {
   public:
-    Shortener(const Space& space, Rake& rake, Random& random, const Stop& stop)
-        : space_(space), rake_(rake), random_(random), stop_(stop) {}
+    Shortener(const Space& space, MotionValidator& validator, Random& random, const StopCondition& stop)
+        : space_(space), validator_(validator), random_(random), stop_(stop) {}
 
     // `patience`: cuts in a row that may fail before it is enough.
-    std::vector<Joints> shorten(std::vector<Joints> way, int patience) {
-        drop_corners(way);
-        for (int failures = 0; way.size() > 2 && failures < patience && !stop_();) {
-            failures = cut(way) ? 0 : failures + 1;
+    std::vector<Joints> shorten(std::vector<Joints> path, int patience) {
+        drop_corners(path);
+        for (int failures = 0; path.size() > 2 && failures < patience && !stop_();) {
+            failures = cut(path) ? 0 : failures + 1;
         }
-        drop_corners(way);
-        return way;
+        drop_corners(path);
+        return path;
     }
 
-    double length(const std::vector<Joints>& way) const {
+    double length(const std::vector<Joints>& path) const {
         double sum = 0.0;
-        for (size_t i = 1; i < way.size(); ++i) sum += space_.distance(way[i - 1].data(), way[i].data());
+        for (size_t i = 1; i < path.size(); ++i) sum += space_.distance(path[i - 1].data(), path[i].data());
         return sum;
     }
 
   private:
     // From every corner straight to the farthest one that can be seen.
-    void drop_corners(std::vector<Joints>& way) {
-        for (size_t from = 0; from + 2 < way.size(); ++from) {
-            for (size_t to = way.size() - 1; to > from + 1; --to) {
+    void drop_corners(std::vector<Joints>& path) {
+        for (size_t from = 0; from + 2 < path.size(); ++from) {
+            for (size_t to = path.size() - 1; to > from + 1; --to) {
                 if (stop_()) return;
-                if (!rake_.is_free_line(way[from].data(), way[to].data(), stop_)) continue;
-                way.erase(way.begin() + static_cast<long>(from) + 1, way.begin() + static_cast<long>(to));
+                if (!validator_.is_free_line(path[from].data(), path[to].data(), stop_)) continue;
+                path.erase(path.begin() + static_cast<long>(from) + 1, path.begin() + static_cast<long>(to));
                 break;
             }
         }
     }
 
-    bool cut(std::vector<Joints>& way) {
-        const size_t edges = way.size() - 1;
+    bool cut(std::vector<Joints>& path) {
+        const size_t edges = path.size() - 1;
         size_t first = random_.below(edges), second = random_.below(edges);
         const double here = random_.share(), there = random_.share();
         if (first == second) return false;
         if (first > second) std::swap(first, second);
-        const Joints a = between(way[first], way[first + 1], here), b = between(way[second], way[second + 1], there);
-        double old = space_.distance(a.data(), way[first + 1].data()) + space_.distance(way[second].data(), b.data());
-        for (size_t i = first + 1; i < second; ++i) old += space_.distance(way[i].data(), way[i + 1].data());
+        const Joints a = between(path[first], path[first + 1], here),
+                     b = between(path[second], path[second + 1], there);
+        double old = space_.distance(a.data(), path[first + 1].data()) + space_.distance(path[second].data(), b.data());
+        for (size_t i = first + 1; i < second; ++i) old += space_.distance(path[i].data(), path[i + 1].data());
         if (space_.distance(a.data(), b.data()) > 0.999 * old) return false;
-        if (!rake_.is_free_line(a.data(), b.data(), stop_)) return false;
-        std::vector<Joints> cut_way(way.begin(), way.begin() + static_cast<long>(first) + 1);
+        if (!validator_.is_free_line(a.data(), b.data(), stop_)) return false;
+        std::vector<Joints> cut_way(path.begin(), path.begin() + static_cast<long>(first) + 1);
         cut_way.push_back(a);
         cut_way.push_back(b);
-        cut_way.insert(cut_way.end(), way.begin() + static_cast<long>(second) + 1, way.end());
-        way = std::move(cut_way);
+        cut_way.insert(cut_way.end(), path.begin() + static_cast<long>(second) + 1, path.end());
+        path = std::move(cut_way);
         return true;
     }
 
@@ -66,9 +67,9 @@ class Shortener {
     }
 
     const Space& space_;
-    Rake& rake_;
+    MotionValidator& validator_;
     Random& random_;
-    const Stop& stop_;
+    const StopCondition& stop_;
 };
 
 }  // namespace gemelo

@@ -5,22 +5,22 @@
 // equal control points, at which the curve comes to rest in its parameter.
 #pragma once
 
-#include "rake.h"
+#include "motion_validator.h"
 
 namespace gemelo {
 
 class Smoother {
   public:
-    Smoother(Rake& rake, const Stop& stop) : rake_(rake), stop_(stop) {}
+    Smoother(MotionValidator& validator, const StopCondition& stop) : validator_(validator), stop_(stop) {}
 
     // Control points by rows; both ends are there three times. The whole curve is free where the polyline is.
-    std::vector<double> smooth(const std::vector<Joints>& way) {
-        shares_.assign(way.size(), 0.5);
-        std::vector<bool> open(way.size(), true);
+    std::vector<double> smooth(const std::vector<Joints>& path) {
+        shares_.assign(path.size(), 0.5);
+        std::vector<bool> open(path.size(), true);
         for (bool is_done = false; !is_done && !stop_();) {
             is_done = true;
-            lay(way);
-            for (size_t corner = 1; corner + 1 < way.size(); ++corner) {
+            lay(path);
+            for (size_t corner = 1; corner + 1 < path.size(); ++corner) {
                 if (!open[corner] || is_free(corner)) {
                     open[corner] = false;
                     continue;
@@ -31,8 +31,8 @@ class Smoother {
             }
         }
         if (stop_()) {
-            shares_.assign(way.size(), 0.0);
-            lay(way);
+            shares_.assign(path.size(), 0.0);
+            lay(path);
         }
         return points_;
     }
@@ -43,24 +43,24 @@ class Smoother {
 
     size_t count() const { return points_.size() / dof_; }
 
-    void lay(const std::vector<Joints>& way) {
-        dof_ = way[0].size();
+    void lay(const std::vector<Joints>& path) {
+        dof_ = path[0].size();
         points_.clear();
-        places_.assign(way.size(), 0);
-        for (int i = 0; i < 3; ++i) push(way.front(), way.front(), 0.0);
-        for (size_t corner = 1; corner + 1 < way.size(); ++corner) {
+        places_.assign(path.size(), 0);
+        for (int i = 0; i < 3; ++i) push(path.front(), path.front(), 0.0);
+        for (size_t corner = 1; corner + 1 < path.size(); ++corner) {
             const double share = shares_[corner];
             const bool is_sharp = share == 0.0;
             const bool is_shared = corner > 1 && share == 0.5 && shares_[corner - 1] == 0.5;
-            if (is_sharp) push(way[corner], way[corner], 0.0);
-            if (!is_sharp && !is_shared) push(way[corner], way[corner - 1], share);
+            if (is_sharp) push(path[corner], path[corner], 0.0);
+            if (!is_sharp && !is_shared) push(path[corner], path[corner - 1], share);
             places_[corner] = count();
-            push(way[corner], way[corner], 0.0);
-            if (is_sharp) push(way[corner], way[corner], 0.0);
-            if (!is_sharp) push(way[corner], way[corner + 1], share);
+            push(path[corner], path[corner], 0.0);
+            if (is_sharp) push(path[corner], path[corner], 0.0);
+            if (!is_sharp) push(path[corner], path[corner + 1], share);
         }
         places_.back() = count();
-        for (int i = 0; i < 3; ++i) push(way.back(), way.back(), 0.0);
+        for (int i = 0; i < 3; ++i) push(path.back(), path.back(), 0.0);
     }
 
     void push(const Joints& from, const Joints& to, double share) {
@@ -74,11 +74,11 @@ class Smoother {
         const bool shares_before = here - places_[corner - 1] == kShared;
         const bool shares_after = places_[corner + 1] - here == kShared && corner + 2 < places_.size();
         const size_t first = here - (shares_before ? 3 : 2), last = here + (shares_after ? 3 : 2);
-        return rake_.look(Spline(points_.data() + first * dof_, last - first + 1, dof_), stop_) == Verdict::kFree;
+        return validator_.look(Spline(points_.data() + first * dof_, last - first + 1, dof_), stop_) == Verdict::kFree;
     }
 
-    Rake& rake_;
-    const Stop& stop_;
+    MotionValidator& validator_;
+    const StopCondition& stop_;
     size_t dof_ = 1;
     std::vector<double> shares_;
     std::vector<double> points_;

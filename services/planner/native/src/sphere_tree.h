@@ -11,7 +11,7 @@
 
 namespace gemelo {
 
-struct Ball {
+struct Sphere {
     double x, y, z, radius;
 };
 
@@ -22,10 +22,10 @@ inline float rounded_up(double value) {
 
 class SphereTree {
   public:
-    explicit SphereTree(const std::vector<Ball>& balls) : balls_(balls), order_(balls.size()) {
+    explicit SphereTree(const std::vector<Sphere>& spheres) : spheres_(spheres), order_(spheres.size()) {
         std::iota(order_.begin(), order_.end(), 0);
-        nodes_.reserve(2 * balls.size());
-        if (!balls.empty()) add(0, balls.size());
+        nodes_.reserve(2 * spheres.size());
+        if (!spheres.empty()) add(0, spheres.size());
     }
 
     std::vector<NodeView> take() { return std::move(nodes_); }
@@ -34,9 +34,9 @@ class SphereTree {
     void add(size_t begin, size_t end) {
         const size_t self = nodes_.size();
         const bool is_leaf = end - begin == 1;
-        const Ball ball = is_leaf ? balls_[static_cast<size_t>(order_[begin])] : around(begin, end);
-        nodes_.push_back({static_cast<float>(ball.x), static_cast<float>(ball.y), static_cast<float>(ball.z),
-                          rounded_up(ball.radius), 0, is_leaf ? order_[begin] : -1});
+        const Sphere sphere = is_leaf ? spheres_[static_cast<size_t>(order_[begin])] : around(begin, end);
+        nodes_.push_back({static_cast<float>(sphere.x), static_cast<float>(sphere.y), static_cast<float>(sphere.z),
+                          rounded_up(sphere.radius), 0, is_leaf ? order_[begin] : -1});
         if (!is_leaf) {
             const size_t middle = split(begin, end);
             add(begin, middle);
@@ -46,41 +46,41 @@ class SphereTree {
     }
 
     // Badoiu and Clarkson (2003): towards the farthest one by ever smaller steps; then what that centre needs.
-    Ball around(size_t begin, size_t end) const {
-        Ball best = balls_[static_cast<size_t>(order_[begin])];
+    Sphere around(size_t begin, size_t end) const {
+        Sphere best = spheres_[static_cast<size_t>(order_[begin])];
         for (int step = 1; step <= 64; ++step) {
-            const Ball& far = balls_[static_cast<size_t>(farthest(best, begin, end))];
+            const Sphere& far = spheres_[static_cast<size_t>(farthest(best, begin, end))];
             const double share = 1.0 / (step + 1);
             best.x += share * (far.x - best.x);
             best.y += share * (far.y - best.y);
             best.z += share * (far.z - best.z);
         }
-        best.radius = reach(best, balls_[static_cast<size_t>(farthest(best, begin, end))]) + 1e-6;
+        best.radius = reach(best, spheres_[static_cast<size_t>(farthest(best, begin, end))]) + 1e-6;
         return best;
     }
 
-    int32_t farthest(const Ball& from, size_t begin, size_t end) const {
+    int32_t farthest(const Sphere& from, size_t begin, size_t end) const {
         return *std::max_element(order_.begin() + static_cast<long>(begin), order_.begin() + static_cast<long>(end),
                                  [&](int32_t a, int32_t b) {
-                                     return reach(from, balls_[static_cast<size_t>(a)]) <
-                                            reach(from, balls_[static_cast<size_t>(b)]);
+                                     return reach(from, spheres_[static_cast<size_t>(a)]) <
+                                            reach(from, spheres_[static_cast<size_t>(b)]);
                                  });
     }
 
-    static double reach(const Ball& from, const Ball& to) {
+    static double reach(const Sphere& from, const Sphere& to) {
         return std::hypot(to.x - from.x, to.y - from.y, to.z - from.z) + to.radius;
     }
 
     // At the median along the axis in which the centres are spread the most.
     size_t split(size_t begin, size_t end) {
-        static constexpr double Ball::* kAxes[] = {&Ball::x, &Ball::y, &Ball::z};
+        static constexpr double Sphere::* kAxes[] = {&Sphere::x, &Sphere::y, &Sphere::z};
         double widest = -1.0;
-        double Ball::* axis = &Ball::x;
-        for (double Ball::* each : kAxes) {
+        double Sphere::* axis = &Sphere::x;
+        for (double Sphere::* each : kAxes) {
             double low = std::numeric_limits<double>::infinity(), high = -low;
             for (size_t i = begin; i < end; ++i) {
-                low = std::min(low, balls_[static_cast<size_t>(order_[i])].*each);
-                high = std::max(high, balls_[static_cast<size_t>(order_[i])].*each);
+                low = std::min(low, spheres_[static_cast<size_t>(order_[i])].*each);
+                high = std::max(high, spheres_[static_cast<size_t>(order_[i])].*each);
             }
             if (high - low > widest) {
                 widest = high - low;
@@ -89,12 +89,12 @@ class SphereTree {
         }
         std::stable_sort(order_.begin() + static_cast<long>(begin), order_.begin() + static_cast<long>(end),
                          [&](int32_t a, int32_t b) {
-                             return balls_[static_cast<size_t>(a)].*axis < balls_[static_cast<size_t>(b)].*axis;
+                             return spheres_[static_cast<size_t>(a)].*axis < spheres_[static_cast<size_t>(b)].*axis;
                          });
         return begin + (end - begin) / 2;
     }
 
-    const std::vector<Ball>& balls_;
+    const std::vector<Sphere>& spheres_;
     std::vector<int32_t> order_;
     std::vector<NodeView> nodes_;
 };

@@ -31,7 +31,7 @@ struct NodeView {
     int32_t item;  // of a leaf: which of the things that the tree was built of
 };
 
-enum class Shape : int32_t {
+enum class ShapeKind : int32_t {
     kRoundedBox,  // half sizes and a radius: sphere, capsule along z, box
     kCylinder,    // along z: size = {radius, -, half length}
     kHalfSpace,   // solid where z <= 0
@@ -60,10 +60,10 @@ struct MeshView {
 };
 
 struct ObstacleView {
-    Shape shape;
+    ShapeKind shape;
     float pose[12];  // from the base into the obstacle's own frame
     float size[3];
-    float round;        // [m] radius and padding, added to the shape on all sides
+    float rounding;     // [m] radius and padding, added to the shape on all sides
     uint64_t touching;  // bit for every part that may touch it
     const MeshView* mesh;
 };
@@ -91,7 +91,7 @@ struct WorldView {
     int32_t frame_count, part_count, pair_count, tree_count, unbounded_count;
 };
 
-struct Question {
+struct CheckQuery {
     const float* joints;       // [dof][kLanes]
     const float* half;         // [kLanes] of the curve's parameter that each lane stands for, on both sides
     const float* part_motion;  // [parts], [pairs]: how far at most they move per unit of the parameter [m]
@@ -101,13 +101,13 @@ struct Question {
     bool first_hit_is_all;  // whether one lane's hit ends the question
 };
 
-struct Answer {
+struct CheckResult {
     uint32_t hits;          // lanes that are nearer than the margin
     uint32_t near;          // lanes that are nearer than the margin and the motion within `half`
     int32_t first, second;  // the parts of the newest contact; an obstacle is kMaxParts + its index
 };
 
-using Check = void (*)(const WorldView&, const Question&, Answer&);
+using Check = void (*)(const WorldView&, const CheckQuery&, CheckResult&);
 using Place = void (*)(const WorldView&, const float* joints, float* centres);
 
 // One build of the check.

@@ -30,9 +30,9 @@ class World {
 
     const WorldView& view() const { return view_; }
     int32_t dof() const { return chain_->dof; }
-    size_t ball_count() const {
+    size_t sphere_count() const {
         size_t sum = 0;
-        for (const auto& part : parts_) sum += part->balls.size();
+        for (const auto& part : parts_) sum += part->spheres.size();
         return sum;
     }
 
@@ -72,7 +72,8 @@ class World {
 
     // Of the spheres of one part against the solids of another.
     size_t cost(int32_t spheres, int32_t solids) const {
-        return parts_[static_cast<size_t>(spheres)]->balls.size() * parts_[static_cast<size_t>(solids)]->solids.size();
+        return parts_[static_cast<size_t>(spheres)]->spheres.size() *
+               parts_[static_cast<size_t>(solids)]->solids.size();
     }
 
     double motion(const std::vector<double>& reach, const double* speed) const {
@@ -91,19 +92,19 @@ class World {
     }
 
     void add_obstacles() {
-        std::vector<Ball> balls;
+        std::vector<Sphere> spheres;
         std::vector<int32_t> items;
         for (const Obstacle& obstacle : owned_) {
             const int32_t item = count(obstacles_);
-            obstacles_.push_back(seen(obstacle));
-            if (obstacle.shape == Shape::kHalfSpace) {
+            obstacles_.push_back(view_of(obstacle));
+            if (obstacle.shape == ShapeKind::kHalfSpace) {
                 unbounded_.push_back(item);
             } else {
-                balls.push_back(around(obstacle, obstacles_.back().round));
+                spheres.push_back(around(obstacle, obstacles_.back().rounding));
                 items.push_back(item);
             }
         }
-        tree_ = SphereTree(balls).take();
+        tree_ = SphereTree(spheres).take();
         for (NodeView& node : tree_) node.item = node.item < 0 ? -1 : items[static_cast<size_t>(node.item)];
     }
 

@@ -1,4 +1,4 @@
-// A way through the joints' space, in spans of the parameter 0 to 1: straight lines, or the cubics of a B-spline.
+// A path through the joints' space, in spans of the parameter 0 to 1: straight lines, or the cubics of a B-spline.
 #pragma once
 
 #include <algorithm>
@@ -12,17 +12,17 @@ namespace gemelo {
 
 using Joints = std::vector<double>;  // (dof,) [rad] or [m]
 
-class Course {
+class JointPath {
   public:
-    virtual ~Course() = default;
+    virtual ~JointPath() = default;
     virtual size_t span_count() const = 0;
-    // Where the way is at `share` of a span, into `joints` (dof,).
+    // Where the path is at `share` of a span, into `joints` (dof,).
     virtual void at(size_t span, double share, double* joints) const = 0;
     // The most that each joint value changes per unit of the span's parameter.
     virtual void speed(size_t span, double* speeds) const = 0;
 };
 
-class Polyline : public Course {
+class Polyline : public JointPath {
   public:
     Polyline(const double* rows, size_t count, size_t dof) : rows_(rows), count_(count), dof_(dof) {}
 
@@ -46,7 +46,7 @@ class Polyline : public Course {
 // The uniform cubic B-spline of control points (n, dof); span i is that of the points i to i + 3.
 //
 // With both end points given thrice it begins and ends on them, at rest in its parameter.
-class Spline : public Course {
+class Spline : public JointPath {
   public:
     Spline(const double* points, size_t count, size_t dof) : points_(points), count_(count), dof_(dof) {}
 

@@ -23,7 +23,8 @@ from services.planner.collision.native_scene import native_scene
 from services.planner.collision.world import World
 from services.planner.core import Planner
 from services.planner.path.curve import spline_rows
-from services.planner.path.path import NoWay, Way
+from services.planner.path.path import Path as JointPath
+from services.planner.path.path import PathNotFound
 from services.planner.path.search import KNOWN, Search
 from services.planner.request.deadline import Deadline, Stopwatch
 from services.planner.timing.profile import joint_limits
@@ -88,7 +89,7 @@ def require_sound(planner: Planner, request: PlanRequest, response: PlanResponse
     assert isinstance(request.goal, JointGoal)
     assert request.start is not None
     require_ends(response.trajectory, request.start.position, request.goal.position)
-    truth = Truth(planner.arm, native_scene(planner.arm, planner.surroundings.world.scene)[0])
+    truth = Truth(planner.arm, native_scene(planner.arm, planner.checker.world.scene)[0])
     rows = samples.positions[:: max(1, len(samples.positions) // looks)]
     assert min(truth.distance(row) for row in rows) > 0.0
 
@@ -134,11 +135,11 @@ def test_any_seed_will_do(planner_id: str, seed: int):
 
 
 def random_requests(planner: Planner, count: int, seed: int, **options: object) -> list[PlanRequest]:
-    """Between random free postures in the present scene."""
-    random, world = np.random.default_rng(seed), planner.surroundings.newest
+    """Between random free configurations in the present scene."""
+    random, world = np.random.default_rng(seed), planner.checker.newest
     lower, upper = np.array([(joint.lower, joint.upper) for joint in planner.arm.joints]).T
-    postures = (random.uniform(lower, upper) for _ in itertools.count())
-    free = (posture for posture in postures if world.distance(posture) > 0.006)
+    configurations = (random.uniform(lower, upper) for _ in itertools.count())
+    free = (configuration for configuration in configurations if world.distance(configuration) > 0.006)
     return [asked(planner, next(free), next(free), **{"allowed_time": 2.0, **options}) for _ in range(count)]
 
 
@@ -157,11 +158,11 @@ def test_whatever_is_returned_is_within_all_limits_and_touches_nothing(planner: 
     assert found >= 4
 
 
-def narrow_postures(planner: Planner) -> Iterator[np.ndarray]:
-    """Those that keep the clearance, though the spheres of the compiled core do not."""
-    random, world = np.random.default_rng(5), planner.surroundings.begin()
+def narrow_configurations(planner: Planner) -> Iterator[np.ndarray]:
+    """Those that keep the clearance, though the spheres of the native planner do not."""
+    random, world = np.random.default_rng(5), planner.checker.begin()
     lower, upper = np.array([(joint.lower, joint.upper) for joint in planner.arm.joints]).T
-    core = planner.surroundings.native(CLEARANCE)
+    core = planner.checker.native(CLEARANCE)
     assert core is not None
     while True:
         rows = random.uniform(lower, upper, (500, len(lower)))
@@ -173,9 +174,11 @@ def test_a_way_from_where_only_coal_lets_the_arm_be_to_such_a_place_is_found_twi
     planner: Planner, planner_id: str
 ):
     show(planner, SCENES["cage"])
-    postures = narrow_postures(planner)
+    configurations = narrow_configurations(planner)
     for _ in range(3):
-        request = asked(planner, next(postures), next(postures), motion=FreeMotion(planner_id=planner_id, seed=4))
+        request = asked(
+            planner, next(configurations), next(configurations), motion=FreeMotion(planner_id=planner_id, seed=4)
+        )
         first, second = planner.plan(request, None), planner.plan(request, None)
         require_sound(planner, request, first)
         assert first.planner_id in {planner_id or "native", "straight"}
@@ -183,10 +186,10 @@ def test_a_way_from_where_only_coal_lets_the_arm_be_to_such_a_place_is_found_twi
 
 
 def test_an_arm_that_stands_at_the_very_margin_is_led_away_at_once(planner: Planner):
-    """So near, by the spheres, that none of the compiled core's lines may begin there."""
+    """So near, by the spheres, that none of the native planner's lines may begin there."""
     show(planner, SCENES["cage"])
-    planner.surroundings.begin()
-    core = planner.surroundings.native(CLEARANCE)
+    planner.checker.begin()
+    core = planner.checker.native(CLEARANCE)
     assert core is not None
     random = np.random.default_rng(2)
     lower, upper = np.array([(joint.lower, joint.upper) for joint in planner.arm.joints]).T
@@ -206,33 +209,34 @@ def test_an_arm_that_stands_at_the_very_margin_is_led_away_at_once(planner: Plan
 
 
 def test_a_gap_too_narrow_for_the_spheres_is_found_by_another_search():
-    """A plate 7.5 mm above the forearm's motor: the core lets it pass nowhere, though it keeps the clearance."""
+    """A plate 7.5 mm above the forearm's motor: the native planner lets it pass nowhere, though it keeps the
+    clearance."""
     planner, angle = planner_of("rm1"), 0.65
     place = (0.2 * float(np.cos(angle)), 0.2 * float(np.sin(angle)), 0.2764)
     show(planner, PlanningScene(version=1, objects=(turned(box("plate", (0.3, 0.08, 0.02), place), angle),)))
-    planner.surroundings.begin()
+    planner.checker.begin()
     search, start, goals = (
-        Search(planner.arm, planner.surroundings),
+        Search(planner.arm, planner.checker),
         np.array((0, 0.1, 0.05)),
         np.array([(1.2, 0.1, 0.05)]),
     )
 
-    def found(planner_id: str) -> Way:
+    def found(planner_id: str) -> JointPath:
         deadline = Deadline(time.monotonic, 1.0, time.monotonic())
         return search.find(start, goals, CLEARANCE, planner_id, 1, deadline, Stopwatch(time.monotonic))
 
-    with pytest.raises(NoWay):
+    with pytest.raises(PathNotFound):
         found("native")
     way = found("")
     assert way.planner_id == "RRTConnect"
-    assert planner.surroundings.world.touching(spline_rows(way.control, 50), CLEARANCE) is None
+    assert planner.checker.world.touching(spline_rows(way.control, 50), CLEARANCE) is None
 
 
 def test_two_hundred_obstacles_are_gone_between(planner: Planner):
     """Strewn anywhere but on one way that is known to be free."""
     request, random = between(planner), np.random.default_rng(7)
     known = sample(planner.plan(request, None).trajectory).positions[::25]
-    stones = list(planner.surroundings.newest.scene.objects)
+    stones = list(planner.checker.newest.scene.objects)
     while len(stones) < 200:
         angle, out, up = random.uniform((-np.pi, 0.15, 0.0), (np.pi, 0.6, 0.6))
         stone = box(f"stone {len(stones)}", (0.02,) * 3, (out * float(np.cos(angle)), out * float(np.sin(angle)), up))
@@ -245,7 +249,7 @@ def test_two_hundred_obstacles_are_gone_between(planner: Planner):
 
 def test_a_mesh_of_a_hundred_thousand_triangles_is_gone_around(planner: Planner):
     request = between(planner)
-    (post,) = planner.surroundings.newest.scene.objects
+    (post,) = planner.checker.newest.scene.objects
     mesh = star_mesh(np.random.default_rng(1), rings=224, sectors=224)
     rock = msgspec.structs.replace(post, name="rock", shape=MeshShape(data=stl_of(mesh), scale=(0.4, 0.4, 0.4)))
     show(planner, PlanningScene(version=10, objects=(rock,)))
@@ -336,7 +340,7 @@ def test_an_unknown_planner_is_refused_with_the_known_ones(planner: Planner):
 
 def test_an_arm_at_rest_stays_where_it_is_whatever_it_is_asked_with(planner: Planner):
     show(planner, SCENES["empty"])
-    posture = START[planner.arm.name]
+    configuration = START[planner.arm.name]
     for timing in Timing:
-        request = asked(planner, posture, posture, timing=timing)
+        request = asked(planner, configuration, configuration, timing=timing)
         require_sound(planner, request, planner.plan(request, None))

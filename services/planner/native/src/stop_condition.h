@@ -12,10 +12,10 @@ struct CancelFlag {
     std::atomic<bool> is_set{false};
 };
 
-class Stop {
+class StopCondition {
   public:
     // `seconds` from now; infinity is for ever.
-    Stop(double seconds, std::shared_ptr<const CancelFlag> cancel)
+    StopCondition(double seconds, std::shared_ptr<const CancelFlag> cancel)
         : cancel_(std::move(cancel)), began_(Clock::now()), seconds_(seconds) {}
 
     bool is_cancelled() const { return cancel_ && cancel_->is_set.load(std::memory_order_relaxed); }

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from services.planner.collision_geometry.shapes import Shape, ShapeKind
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 from services.planner.native.native_planner import NativePlanner
 from services.planner.native.paths import Effort, FreePath
 from tests.planner.native.coal_truth import Truth
@@ -18,13 +18,13 @@ UNSURE = 1e-5  # [m] of coal's own distances
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
-def test_no_line_is_free_that_touches_anything_between_its_ends(arm, core, postures):
+def test_no_line_is_free_that_touches_anything_between_its_ends(arm, core, configurations):
     rng = np.random.default_rng(21)
     refused = passed = 0
     for round_ in range(4):
         scene = [random_shape(rng, kind, kind) for kind in ShapeKind if kind is not ShapeKind.MESH]
         core.set_scene(scene)
-        truth, rows = Truth(arm, scene), postures(60, round_)
+        truth, rows = Truth(arm, scene), configurations(60, round_)
         rows = rows[core.free(rows)]
         for start, goal in pairwise(rows):
             ways = start + np.linspace(0.0, 1.0, 40)[:, None] * (goal - start)
@@ -37,8 +37,8 @@ def test_no_line_is_free_that_touches_anything_between_its_ends(arm, core, postu
     assert passed > 5
 
 
-def test_a_refused_line_comes_within_the_margin_and_the_bulge(arm, core, postures):
-    rows = postures(60, 5)
+def test_a_refused_line_comes_within_the_margin_and_the_bulge(arm, core, configurations):
+    rows = configurations(60, 5)
     rows = rows[core.free(rows)]
     for start, goal in pairwise(rows):
         if not core.edge_free(start, goal):
@@ -46,7 +46,7 @@ def test_a_refused_line_comes_within_the_margin_and_the_bulge(arm, core, posture
             assert not core.free(ways).all() or min(core.distance(row) for row in ways) < core.margin + 0.001
 
 
-def test_what_surely_touches_is_within_the_margin_by_coal_too(arm, core, postures):
+def test_what_surely_touches_is_within_the_margin_by_coal_too(arm, core, configurations):
     rng = np.random.default_rng(8)
     core.margin = 0.004
     sure = unsure = 0
@@ -54,7 +54,7 @@ def test_what_surely_touches_is_within_the_margin_by_coal_too(arm, core, posture
         scene = [random_shape(rng, kind, kind) for kind in ShapeKind if kind is not ShapeKind.MESH]
         core.set_scene(scene)
         truth = Truth(arm, scene)
-        for start, goal in pairwise(postures(60, 40 + round_)):
+        for start, goal in pairwise(configurations(60, 40 + round_)):
             touching = core.touching([start, goal])
             if touching is not None:
                 sure += 1
@@ -65,12 +65,12 @@ def test_what_surely_touches_is_within_the_margin_by_coal_too(arm, core, posture
     assert sure > 10 * unsure
 
 
-def test_what_is_not_in_doubt_is_free_by_coal_too(arm, core, postures):
+def test_what_is_not_in_doubt_is_free_by_coal_too(arm, core, configurations):
     rng = np.random.default_rng(14)
     scene = [random_shape(rng, kind, kind) for kind in ShapeKind if kind is not ShapeKind.MESH]
     core.set_scene(scene)
     truth, wholly = Truth(arm, scene), 0
-    for corners in postures(90, 50).reshape(30, 3, -1):
+    for corners in configurations(90, 50).reshape(30, 3, -1):
         rows = corners[0] + 0.3 * (corners - corners[0])
         doubts = core.unresolved_intervals(rows)
         assert (len(doubts) == 0) == core.path_free(rows)
@@ -80,15 +80,15 @@ def test_what_is_not_in_doubt_is_free_by_coal_too(arm, core, postures):
         for place in np.linspace(0.0, 2.0, 80):
             if not ((doubts[:, 0] - 1e-9 <= place) & (place <= doubts[:, 1] + 1e-9)).any():
                 first = min(int(place), 1)
-                posture = rows[first] + (place - first) * (rows[first + 1] - rows[first])
-                assert truth.distance(posture) > core.margin - UNSURE
+                configuration = rows[first] + (place - first) * (rows[first + 1] - rows[first])
+                assert truth.distance(configuration) > core.margin - UNSURE
     assert 0 < wholly < 30
 
 
 @pytest.mark.parametrize("thickness", [0.02, 0.002, 0.0002, 0.00002])
 def test_the_thinnest_sheet_is_not_tunnelled_through(thickness):
     core = NativePlanner(load("rm1"))
-    sheet = Shape("sheet", ShapeKind.BOX, (0.5, thickness, 0.5), ((0.35, 0.0, 0.25), UPRIGHT))
+    sheet = CollisionShape("sheet", ShapeKind.BOX, (0.5, thickness, 0.5), ((0.35, 0.0, 0.25), UPRIGHT))
     core.set_scene([sheet])
     left, right = [1.0, 0.0, 0.1], [-1.0, 0.0, 0.1]
     assert core.free([left, right]).all()
@@ -100,7 +100,7 @@ def test_a_thin_wire_is_not_tunnelled_through_from_any_side():
     rng = np.random.default_rng(3)
     for _ in range(20):
         place = rng.uniform([0.15, -0.3, 0.1], [0.35, 0.3, 0.4]).tolist()
-        core.set_scene([Shape("bead", ShapeKind.SPHERE, (1e-4,), ((place[0], place[1], place[2]), UPRIGHT))])
+        core.set_scene([CollisionShape("bead", ShapeKind.SPHERE, (1e-4,), ((place[0], place[1], place[2]), UPRIGHT))])
         rows = rng.uniform([-2, -2.4, 1.9, -1.8, -1.5, 0], [2, -0.1, 5.0, 1.8, 1.5, 6], (20, 6))
         rows = rows[core.free(rows)]
         for start, goal in pairwise(rows):
@@ -108,19 +108,19 @@ def test_a_thin_wire_is_not_tunnelled_through_from_any_side():
                 assert core.free(start + np.linspace(0.0, 1.0, 2000)[:, None] * (goal - start)).all()
 
 
-def test_a_line_to_itself_is_as_free_as_its_posture(core, postures):
-    rows = postures(100, 8)
+def test_a_line_to_itself_is_as_free_as_its_configuration(core, configurations):
+    rows = configurations(100, 8)
     assert [core.edge_free(row, row) for row in rows] == core.free(rows).tolist()
 
 
-def test_a_line_is_as_free_backwards(core, postures):
-    rows = postures(80, 9)
+def test_a_line_is_as_free_backwards(core, configurations):
+    rows = configurations(80, 9)
     for start, goal in pairwise(rows):
         assert core.edge_free(start, goal) == core.edge_free(goal, start)
 
 
-def test_a_polyline_is_free_where_all_its_lines_are(core, postures):
-    rows = postures(90, 10)
+def test_a_polyline_is_free_where_all_its_lines_are(core, configurations):
+    rows = configurations(90, 10)
     rows = rows[core.free(rows)]
     for start in range(0, len(rows) - 3, 3):
         some = rows[start : start + 3]
@@ -130,7 +130,7 @@ def test_a_polyline_is_free_where_all_its_lines_are(core, postures):
 
 def test_a_curve_is_looked_at_where_it_goes():
     core = NativePlanner(load("rm1"))
-    post = Shape("post", ShapeKind.CYLINDER, (0.01, 0.5), ((0.4, 0.0, 0.25), UPRIGHT))
+    post = CollisionShape("post", ShapeKind.CYLINDER, (0.01, 0.5), ((0.4, 0.0, 0.25), UPRIGHT))
     core.set_scene([post])
     left, right, folded = [1.0, 0.0, 0.1], [-1.0, 0.0, 0.1], [0.0, 2.6, 0.1]
     assert not core.spline_free([left] * 3 + [right] * 3)

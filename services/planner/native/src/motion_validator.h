@@ -1,13 +1,13 @@
-// Whether a whole course is free, nothing left out between the samples.
+// Whether a whole path is free, nothing left out between the samples.
 //
-// A sample stands for the stretch around it. Eight stretches, taken from all over the course, make one question to the
+// A sample stands for the stretch around it. Eight stretches, taken from all over the path, make one question to the
 // check. No part moves farther within a stretch than its bound, so a lane without anything that near is free on all of
 // its stretch; one that touches ends everything; any other is cut in two. What cannot be told apart at `finest` is
 // called not free.
 #pragma once
 
-#include "course.h"
-#include "stop.h"
+#include "joint_path.h"
+#include "stop_condition.h"
 #include "world.h"
 
 namespace gemelo {
@@ -20,15 +20,15 @@ struct Tolerances {
 
 enum class Verdict { kFree, kTouching, kTooNear, kStopped };
 
-class Rake {
+class MotionValidator {
   public:
-    Rake(const World& world, const Kernel& kernel, const Tolerances& tolerances)
+    MotionValidator(const World& world, const Kernel& kernel, const Tolerances& tolerances)
         : world_(world), kernel_(kernel), tolerances_(tolerances), touching_(dof()) {}
 
     // How many configurations have been looked at.
     uint64_t checks() const { return checks_; }
-    const Answer& answer() const { return answer_; }  // the last contact, where the verdict is not kFree
-    // Where on the course it was, where the verdict is kTouching.
+    const CheckResult& result() const { return result_; }  // the last contact, where the verdict is not kFree
+    // Where on the path it was, where the verdict is kTouching.
     const Joints& touching() const { return touching_; }
 
     bool is_free(const double* joints) {
@@ -38,43 +38,43 @@ class Rake {
         const Polyline point(ends_.data(), 2, dof());
         const Joints still(dof(), 0.0);
         world_.bound_motion(still.data(), part_motion_, pair_motion_);
-        return ask(point, 0, 1) == 0 && answer_.near == 0;
+        return check(point, 0, 1) == 0 && result_.near == 0;
     }
 
-    bool is_free_line(const double* from, const double* to, const Stop& stop) {
+    bool is_free_line(const double* from, const double* to, const StopCondition& stop) {
         ends_.assign(from, from + dof());
         ends_.insert(ends_.end(), to, to + dof());
         return look(Polyline(ends_.data(), 2, dof()), stop) == Verdict::kFree;
     }
 
-    Verdict look(const Course& course, const Stop& stop) {
-        begin(course);
+    Verdict look(const JointPath& path, const StopCondition& stop) {
+        begin(path);
         for (size_t next = 0; next < stretches_.size();) {
             if (stop()) return Verdict::kStopped;
             const size_t count = std::min<size_t>(kLanes, stretches_.size() - next);
-            if (ask(course, next, count) != 0) {
-                const Stretch& stretch = stretches_[next + first_lane(answer_.hits)];
-                course.at(stretch.span, stretch.middle, touching_.data());
+            if (check(path, next, count) != 0) {
+                const Stretch& stretch = stretches_[next + first_lane(result_.hits)];
+                path.at(stretch.span, stretch.middle, touching_.data());
                 return Verdict::kTouching;
             }
             for (size_t lane = 0; lane < count; ++lane) {
-                if ((answer_.near >> lane & 1u) != 0 && !cut(stretches_[next + lane])) return Verdict::kTooNear;
+                if ((result_.near >> lane & 1u) != 0 && !cut(stretches_[next + lane])) return Verdict::kTooNear;
             }
             next += count;
         }
         return Verdict::kFree;
     }
 
-    // From where to where, in spans, the course is not known to be free; empty where all of it is.
-    std::vector<std::array<double, 2>> doubts(const Course& course, const Stop& stop) {
-        begin(course);
+    // From where to where, in spans, the path is not known to be free; empty where all of it is.
+    std::vector<std::array<double, 2>> unresolved_intervals(const JointPath& path, const StopCondition& stop) {
+        begin(path);
         std::vector<std::array<double, 2>> found;
         for (size_t next = 0, count = 0; next < stretches_.size(); next += count) {
             count = std::min<size_t>(kLanes, stretches_.size() - next);
-            const uint32_t hits = ask(course, next, count, false);
+            const uint32_t hits = check(path, next, count, false);
             for (size_t lane = 0; lane < count; ++lane) {
                 const Stretch stretch = stretches_[next + lane];
-                if (((hits | answer_.near) >> lane & 1u) == 0 || (!stop() && cut(stretch))) continue;
+                if (((hits | result_.near) >> lane & 1u) == 0 || (!stop() && cut(stretch))) continue;
                 const double middle = static_cast<double>(stretch.span) + stretch.middle;
                 found.push_back({middle - stretch.half, middle + stretch.half});
             }
@@ -108,11 +108,11 @@ class Rake {
     size_t dof() const { return static_cast<size_t>(world_.dof()); }
 
     // The bounds for the fastest span, how much of them each span needs, and the first stretches.
-    void begin(const Course& course) {
-        const size_t spans = course.span_count();
+    void begin(const JointPath& path) {
+        const size_t spans = path.span_count();
         Joints fastest(dof(), 0.0), speed(dof());
         for (size_t span = 0; span < spans; ++span) {
-            course.speed(span, speed.data());
+            path.speed(span, speed.data());
             for (size_t i = 0; i < dof(); ++i) fastest[i] = std::max(fastest[i], speed[i]);
         }
         world_.bound_motion(fastest.data(), part_motion_, pair_motion_);
@@ -120,7 +120,7 @@ class Rake {
         for (float pair : pair_motion_) motion_ = std::max(motion_, static_cast<double>(pair));
         slowness_.assign(spans, 0.0);
         for (size_t span = 0; span < spans; ++span) {
-            course.speed(span, speed.data());
+            path.speed(span, speed.data());
             for (size_t i = 0; i < dof(); ++i) {
                 if (fastest[i] > 0.0) slowness_[span] = std::max(slowness_[span], speed[i] / fastest[i]);
             }
@@ -128,14 +128,14 @@ class Rake {
         first_stretches(spans);
     }
 
-    // As many in every span, in an order that jumps about the course, so that a contact is found early.
+    // As many in every span, in an order that jumps about the path, so that a contact is found early.
     void first_stretches(size_t spans) {
         const double wanted = std::max(motion_ / tolerances_.coarsest, 1.0 * kLanes / static_cast<double>(spans));
         const size_t each = static_cast<size_t>(std::ceil(std::min(wanted, 1e4)));
-        const size_t total = each * spans, rakes = (total + kLanes - 1) / kLanes;
+        const size_t total = each * spans, strides = (total + kLanes - 1) / kLanes;
         stretches_.clear();
-        for (size_t rake = 0; rake < rakes; ++rake) {
-            for (size_t i = rake; i < total; i += rakes) {
+        for (size_t stride = 0; stride < strides; ++stride) {
+            for (size_t i = stride; i < total; i += strides) {
                 const double width = 1.0 / static_cast<double>(each);
                 stretches_.push_back({i / each, (static_cast<double>(i % each) + 0.5) * width, 0.5 * width});
             }
@@ -143,21 +143,21 @@ class Rake {
     }
 
     // The lanes that touch; the others are not looked at where one does and `is_one_enough`.
-    uint32_t ask(const Course& course, size_t next, size_t count, bool is_one_enough = true) {
+    uint32_t check(const JointPath& path, size_t next, size_t count, bool is_one_enough = true) {
         float joints[kMaxDof * kLanes], half[kLanes];
         double row[kMaxDof];
         for (size_t lane = 0; lane < kLanes; ++lane) {
             const Stretch& stretch = stretches_[next + std::min(lane, count - 1)];
-            course.at(stretch.span, stretch.middle, row);
+            path.at(stretch.span, stretch.middle, row);
             for (size_t i = 0; i < dof(); ++i) joints[i * kLanes + lane] = static_cast<float>(row[i]);
             half[lane] = rounded_up(stretch.half * (slowness_.empty() ? 0.0 : slowness_[stretch.span]));
         }
         const uint32_t lanes = (1u << count) - 1;
         const float margin = static_cast<float>(tolerances_.margin);
         kernel_.check(world_.view(),
-                      {joints, half, part_motion_.data(), pair_motion_.data(), margin, lanes, is_one_enough}, answer_);
+                      {joints, half, part_motion_.data(), pair_motion_.data(), margin, lanes, is_one_enough}, result_);
         checks_ += count;
-        return answer_.hits;
+        return result_.hits;
     }
 
     // Two halves at the end of the queue; false where that would be too fine.
@@ -173,7 +173,7 @@ class Rake {
     const Kernel& kernel_;
     Tolerances tolerances_;
     Joints touching_;
-    Answer answer_{};
+    CheckResult result_{};
     uint64_t checks_ = 0;
     double motion_ = 0.0;
     Joints ends_;

@@ -41,7 +41,7 @@ def scene_of(kind: str, name: str) -> PlanningScene:
 
 
 def standing(world: World, kind: str, distance: float) -> Array:
-    """A posture at which the nearest two, of this kind, are so far [m] apart; below 0 inside one another."""
+    """A configuration at which the nearest two, of this kind, are so far [m] apart; below 0 inside one another."""
     random, joints = np.random.default_rng(5), world.arm.joints
     lower, upper = np.array([(joint.lower, joint.upper) for joint in joints]).T
     free = np.array(world.arm.named_states["ready"])
@@ -65,9 +65,9 @@ def standing(world: World, kind: str, distance: float) -> Array:
 @pytest.mark.parametrize("name", ARMS)
 def test_who_stands_nearer_than_the_clearance_may_plan_away(name: str, kind: str):
     planner = planner_in(name, kind)
-    posture = standing(planner.surroundings.newest, kind, 0.0015)
-    assert planner.surroundings.newest.distance(posture) < CLEARANCE
-    response = planner.plan(home_from(planner, posture), None)
+    configuration = standing(planner.checker.newest, kind, 0.0015)
+    assert planner.checker.newest.distance(configuration) < CLEARANCE
+    response = planner.plan(home_from(planner, configuration), None)
     assert response.code is PlanCode.SUCCESS, response.refusal
 
 
@@ -75,16 +75,16 @@ def test_who_stands_nearer_than_the_clearance_may_plan_away(name: str, kind: str
 @pytest.mark.parametrize("name", ARMS)
 def test_who_touches_is_told_how_to_jog_out_and_that_leads_out(name: str, kind: str):
     planner = planner_in(name, kind)
-    world = planner.surroundings.newest
-    posture = standing(world, kind, -0.002)
-    refused = planner.plan(home_from(planner, posture), None)
+    world = planner.checker.newest
+    configuration = standing(world, kind, -0.002)
+    refused = planner.plan(home_from(planner, configuration), None)
     assert refused.code is PlanCode.START_STATE_IN_COLLISION
     assert refused.refusal is not None
-    assert world.distance(refused.refusal.way_out) > CLEARANCE
-    left = jogged_as_told(name, world, posture, refused.refusal.remedy)
+    assert world.distance(refused.refusal.nearest_free) > CLEARANCE
+    left = jogged_as_told(name, world, configuration, refused.refusal.remedy)
     assert world.distance(left) > 0.0
     assert planner.plan(home_from(planner, left), None).code is PlanCode.SUCCESS
-    assert planner.plan(home_from(planner, posture), None) == refused
+    assert planner.plan(home_from(planner, configuration), None) == refused
 
 
 def test_who_is_buried_is_told_of_no_way():
@@ -94,7 +94,7 @@ def test_who_is_buried_is_told_of_no_way():
     refused = planner.plan(home_from(planner, np.zeros(3)), None)
     assert refused.code is PlanCode.START_STATE_IN_COLLISION
     assert refused.refusal is not None
-    assert refused.refusal.way_out == ()
+    assert refused.refusal.nearest_free == ()
     assert "gemelo jog" not in refused.refusal.remedy
     assert "gemelo scene remove room" in refused.refusal.remedy
 
@@ -105,17 +105,17 @@ def planner_in(name: str, kind: str) -> Planner:
     return planner
 
 
-def home_from(planner: Planner, posture: Array) -> PlanRequest:
-    start = JointState(name=planner.arm.joint_names, position=tuple(posture.tolist()))
+def home_from(planner: Planner, configuration: Array) -> PlanRequest:
+    start = JointState(name=planner.arm.joint_names, position=tuple(configuration.tolist()))
     return PlanRequest(start=start, goal=NamedGoal(name="ready"), allowed_time=20.0)
 
 
-def jogged_as_told(name: str, world: World, posture: Array, remedy: str) -> Array:
+def jogged_as_told(name: str, world: World, configuration: Array, remedy: str) -> Array:
     """Where the arm comes to rest, by the jog and the tracker that run on a real one."""
     told = re.match(r"`gemelo jog --joint (.*) --for (\S+)` leads out; or ", remedy)
     assert told, remedy
     jogged = Jogged(name, crowded=False)
-    jogged.tracker = Tracker(Limits.of(jogged.arm.joints), PERIOD, Knot.at_rest(tuple(posture.tolist())))
+    jogged.tracker = Tracker(Limits.of(jogged.arm.joints), PERIOD, Knot.at_rest(tuple(configuration.tolist())))
     jogged.world = world
     jogged.jog.set_world(world)
     command = command_of(arm_of(name), shlex.split(told[1]), (), (), False)

@@ -14,15 +14,15 @@ from services.arm.description import Arm, load_arm
 from services.arm.kinematics import Kinematics
 from services.planner.kinematics.goals import Goals
 from services.planner.kinematics.targets import Pointing, Target
-from services.planner.kinematics.task_space import Abilities, abilities
+from services.planner.kinematics.task_space import TaskSpace, task_space
 from services.planner.request.deadline import NEVER
-from services.planner.request.refusals import NoPlan
+from services.planner.request.refusals import PlanRefused
 
 ROOT = Path(__file__).parents[2] / "urdf"
 
 
-def of(arm: Arm) -> Abilities:
-    return abilities(arm, Kinematics(arm))
+def of(arm: Arm) -> TaskSpace:
+    return task_space(arm, Kinematics(arm))
 
 
 def without(joints: list[str], folder: Path) -> Arm:
@@ -77,8 +77,8 @@ def test_an_arm_of_five_joints_points_its_tool_and_says_what_it_cannot_do(tmp_pa
     kinematics = Kinematics(arm)
     goals = Goals(arm, kinematics)
     start = tuple(0.5 * (joint.lower + joint.upper) for joint in arm.joints)
-    for posture in np.random.default_rng(2).uniform(-0.3, 0.3, (10, 5)) + start:
-        pose = kinematics.tool(posture)
+    for configuration in np.random.default_rng(2).uniform(-0.3, 0.3, (10, 5)) + start:
+        pose = kinematics.tool(configuration)
         x, y, z = pose.position.tolist()
         direction = (pose.rotation @ [0.0, 0.0, 1.0]).tolist()
         goal = PoseGoal(position=(x, y, z), tool_axis=(0.0, 0.0, 1.0), direction=tuple(direction))
@@ -87,7 +87,7 @@ def test_an_arm_of_five_joints_points_its_tool_and_says_what_it_cannot_do(tmp_pa
         assert np.allclose(got.rotation[:, 2], direction, atol=1e-5)
     turn = pin.Quaternion(pin.exp3(pose.rotation @ [0.0, 0.0, 0.5]) @ pose.rotation)
     goal = PoseGoal(position=(x, y, z), orientation=(turn.x, turn.y, turn.z, turn.w))
-    with pytest.raises(NoPlan) as caught:
+    with pytest.raises(PlanRefused) as caught:
         next(goals.candidates(goal, start, NEVER))
     assert "has 5 joints: beside a position it can choose 2 of 3 turns" in caught.value.refusal.message
     assert "the direction of one tool axis" in caught.value.refusal.remedy
