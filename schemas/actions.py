@@ -32,8 +32,9 @@ class GoalRequest(Message, frozen=True, kw_only=True):
     """A goal with the id its client chose; `goal` is the action's own goal message."""
 
     goal_id: str = ""
-    client: str = ""
+    client: str = ""  # key of its liveliness token
     goal: msgspec.Raw = NOTHING
+    attached: bool = False  # cancel the goal when the client's token vanishes
 
 
 class GoalResponse(Message, frozen=True, kw_only=True):

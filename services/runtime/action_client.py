@@ -46,14 +46,24 @@ class ActionClient(Generic[G, F, R]):
         subscribe(keys.feedback_topic(action), self._on_feedback)
         subscribe(keys.status_topic(action), self._on_status)
 
-    def send(self, goal: G, on_feedback: Callable[[F], object] | None = None, timeout: float = 2.0) -> GoalHandle[F, R]:
-        """Blocks for the decision; raises `GoalRefused`, `Refused` (not a goal at all) or `NoAnswer`."""
+    def send(
+        self,
+        goal: G,
+        on_feedback: Callable[[F], object] | None = None,
+        timeout: float = 2.0,
+        attached: bool = False,
+    ) -> GoalHandle[F, R]:
+        """Blocks for the decision; raises `GoalRefused`, `Refused` (not a goal at all) or `NoAnswer`.
+
+        An `attached` goal is cancelled by the server when this node disappears, by its end or by the network's.
+        """
         goal_id = uuid.uuid4().hex
         handle: GoalHandle[F, R] = GoalHandle(self.action, goal_id, self._bus, self._loop, on_feedback)
         self._handles[goal_id] = handle
         try:
-            response = self._ask(GoalRequest(goal_id=goal_id, client=self._client, goal=_raw(goal)), timeout)
-        except NoAnswer:
+            request = GoalRequest(goal_id=goal_id, client=self._client, goal=_raw(goal), attached=attached)
+            response = self._ask(request, timeout)
+        except (NoAnswer, KeyboardInterrupt):
             handle.cancel()  # it may have been accepted all the same
             del self._handles[goal_id]
             raise

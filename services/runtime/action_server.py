@@ -21,10 +21,11 @@ from schemas.actions import (
 from schemas.message import BadMessage, Message, decode, encode
 from schemas.topics import Action
 from services.runtime import action_keys as keys
+from services.runtime.client_watch import ClientWatch
 from services.runtime.errors import Refused
 from services.runtime.goal_book import Goal, GoalBook
 from services.runtime.request_server import Pending, RequestServer
-from services.runtime.topics import Publisher
+from services.runtime.topics import Complain, Publisher
 
 G = TypeVar("G", bound=Message)
 F = TypeVar("F", bound=Message)
@@ -67,10 +68,12 @@ class ActionServer(Generic[G, F, R]):
         on_cancel: OnCancel,
         serve: Callable[[Any, Callable[[Any, Pending[Any]], None]], RequestServer[Any, Any]],
         publisher: Callable[[Any], Publisher[Any]],
+        clients: ClientWatch,
+        complain: Complain,
     ) -> None:
         self.action = action
         self._on_goal, self._on_cancel = on_goal, on_cancel
-        self._goals = GoalBook()
+        self._goals, self._clients, self._complain = GoalBook(), clients, complain
         self._cancelled_early: dict[str, float] = {}  # by goal that has not come yet: [s] monotonic
         self._feedback: Publisher[GoalFeedback] = publisher(keys.feedback_topic(action))
         self._status: Publisher[GoalStatuses] = publisher(keys.status_topic(action))
@@ -95,6 +98,7 @@ class ActionServer(Generic[G, F, R]):
         if goal.status.is_terminal:
             raise ValueError(f"goal {goal_id} has ended already, as {goal.status.name}")
         goal.end(status, msgspec.Raw(encode(result)))
+        self._clients.forget(goal_id)
         self._publish_status()
 
     def refuse_waiting(self, reason: str) -> None:
@@ -107,8 +111,10 @@ class ActionServer(Generic[G, F, R]):
         return self._goals.active
 
     def beat(self) -> None:
-        """The server's sign of life; forgets what was kept long enough."""
+        """The server's sign of life; forgets what was kept long enough, and cancels goals whose client is gone."""
         self._goals.tidy()
+        for goal_id, client in self._clients.take_lost(time.monotonic()):
+            self._cancel_lost(goal_id, client)
         self._publish_status()
 
     def _answer_goal(self, request: GoalRequest, pending: Pending[GoalResponse]) -> None:
@@ -135,6 +141,8 @@ class ActionServer(Generic[G, F, R]):
             if not decision.accepted:
                 self._goals.remove(request.goal_id)
         if decision.accepted:
+            if request.attached and not goal.status.is_terminal:
+                self._clients.add(request.goal_id, request.client, time.monotonic())
             return goal.response
         return GoalResponse(accepted=False, code=decision.code, reason=decision.reason, stamp=time.time_ns())
 
@@ -147,13 +155,11 @@ class ActionServer(Generic[G, F, R]):
         wanted = (request.goal_id,) if request.goal_id else self.active
         canceling, reasons = [], [] if wanted else ["no goal is active"]
         for goal_id in wanted:
-            reason = self._on_cancel(goal_id)
+            reason = self._cancel(goal_id)
             if reason:
                 reasons.append(reason)
-                continue
-            canceling.append(goal_id)
-            if not self._goals[goal_id].status.is_terminal:
-                self._set(self._goals[goal_id], GoalStatusCode.CANCELING)
+            else:
+                canceling.append(goal_id)
         pending.reply(CancelResponse(canceling=tuple(canceling), reason="; ".join(reasons)))
 
     def _cancel_absent(self, goal_id: str) -> str:
@@ -166,6 +172,18 @@ class ActionServer(Generic[G, F, R]):
         if len(self._cancelled_early) < MOST_OVERTAKEN:
             self._cancelled_early[goal_id] = now
         return "no such goal is known here; one of that name that comes within 2 s is refused"
+
+    def _cancel(self, goal_id: str) -> str:
+        """Empty if the goal is being cancelled, else why not."""
+        reason = self._on_cancel(goal_id)
+        if not reason and not self._goals[goal_id].status.is_terminal:
+            self._set(self._goals[goal_id], GoalStatusCode.CANCELING)
+        return reason
+
+    def _cancel_lost(self, goal_id: str, client: str) -> None:
+        """Nobody watches an attached goal any more."""
+        reason = self._cancel(goal_id)
+        self._complain(f"goal {goal_id}: its client {client} is gone, so it is {reason or 'cancelled'}")
 
     def _set(self, goal: Goal, status: GoalStatusCode) -> None:
         if not goal.status.is_terminal and goal.status is not status:

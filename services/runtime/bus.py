@@ -119,6 +119,10 @@ class Bus(Protocol):
         """A token that vanishes when this process does."""
         ...
 
+    def watch_alive(self, key: str, on_change: Callable[[bool], None]) -> Declaration:
+        """`on_change(True)` when the token `key` is there or comes, `on_change(False)` when it vanishes."""
+        ...
+
     def alive(self, pattern: str) -> set[str]:
         """The keys of the living tokens; a `*` in `pattern` stands for one chunk."""
         ...

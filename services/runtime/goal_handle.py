@@ -53,7 +53,7 @@ class GoalHandle(Generic[F, R]):
         self.outcome: ActionOutcome[R] | None = None
         self.bad_feedback = 0
         self._bus, self._loop, self._on_feedback = bus, loop, on_feedback
-        self._lost: ServerLost | None = None
+        self.lost: ServerLost | None = None  # why there will be no outcome
         self._accepted = 0  # [ns] UNIX of the server
         self._heard = time.monotonic()
         self._away: float | None = None  # [s] monotonic since when there is no router
@@ -61,11 +61,12 @@ class GoalHandle(Generic[F, R]):
         self._wants_cancel = False
         self._is_canceling = False  # the request is under way
         self.cancel_refused = ""  # why the server goes on
+        self.on_end: Task | None = None  # called in the thread of logic when it is over
 
     @property
     def is_over(self) -> bool:
         """Whether the result is here, or the server is lost."""
-        return self.outcome is not None or self._lost is not None
+        return self.outcome is not None or self.lost is not None
 
     @property
     def accepted(self) -> int:
@@ -82,8 +83,8 @@ class GoalHandle(Generic[F, R]):
         is_over = self._loop.wait_for(lambda: self.is_over, timeout, on_tick)
         if self.outcome is not None:
             return self.outcome
-        if self._lost is not None:
-            raise self._lost
+        if self.lost is not None:
+            raise self.lost
         if not is_over and self._loop.stop.is_set:
             raise SystemExit(0)
         raise NoAnswer(f"goal {self.goal_id} of {self.action.key} has not ended within {timeout:g} s")
@@ -171,9 +172,15 @@ class GoalHandle(Generic[F, R]):
             if response.status.is_terminal:
                 self.status = response.status
                 self.outcome = ActionOutcome(response.status, decode(self.action.result, bytes(response.result)))
+                self._tell_end()
         except BadMessage as error:
             self._lose(f"the result of {self.action.server} cannot be read: {error}")
 
     def _lose(self, why: str) -> None:
         if not self.is_over:
-            self._lost = ServerLost(f"goal {self.goal_id} of {self.action.key}: {why}; what became of it is not known")
+            self.lost = ServerLost(f"goal {self.goal_id} of {self.action.key}: {why}; what became of it is not known")
+            self._tell_end()
+
+    def _tell_end(self) -> None:
+        if self.on_end is not None:
+            self.on_end()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from schemas.topics import Delivery
-from services.runtime.bus import Answer, Arrival, Query
+from services.runtime.bus import Answer, Arrival, Declaration, Query
 from services.runtime.memory_network import (
     MemoryNetwork,
     MemoryPublication,
@@ -13,6 +13,7 @@ from services.runtime.memory_network import (
     MemoryService,
     MemorySubscription,
     MemoryToken,
+    MemoryWatch,
 )
 
 __all__ = ["MemoryBus", "MemoryNetwork"]
@@ -23,7 +24,7 @@ class MemoryBus:
 
     def __init__(self, network: MemoryNetwork) -> None:
         self.network = network
-        self._declared: list[MemorySubscription | MemoryPublication | MemoryService | MemoryToken] = []
+        self._declared: list[Declaration] = []
 
     @property
     def is_connected(self) -> bool:
@@ -86,10 +87,19 @@ class MemoryBus:
 
     def declare_alive(self, key: str) -> MemoryToken:
         with self.network.lock:
-            self.network.tokens[key] += 1
+            self.network.count_token(key, 1)
         token = MemoryToken(self, key)
         self._declared.append(token)
         return token
+
+    def watch_alive(self, key: str, on_change: Callable[[bool], None]) -> MemoryWatch:
+        watch = MemoryWatch(self, key, on_change)
+        with self.network.lock:
+            self.network.watches.add(watch)
+            if self.network.tokens[key] > 0:
+                on_change(True)
+        self._declared.append(watch)
+        return watch
 
     def alive(self, pattern: str) -> set[str]:
         with self.network.lock:

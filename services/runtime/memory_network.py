@@ -93,8 +93,22 @@ class MemoryToken:
 
     def close(self) -> None:
         with self.bus.network.lock:
-            self.bus.network.tokens[self.key] -= self.is_open
-            self.is_open = False
+            if self.is_open:
+                self.is_open = False
+                self.bus.network.count_token(self.key, -1)
+
+
+@dataclass(eq=False)
+class MemoryWatch:
+    """Who wants to know whether a token is there."""
+
+    bus: MemoryBus
+    key: str
+    on_change: Callable[[bool], None]
+
+    def close(self) -> None:
+        with self.bus.network.lock:
+            self.bus.network.watches.discard(self)
 
 
 class MemoryQuery:
@@ -135,7 +149,15 @@ class MemoryNetwork:
         self.publications: set[MemoryPublication] = set()
         self.services: dict[str, MemoryService] = {}
         self.tokens: Counter[str] = Counter()
+        self.watches: set[MemoryWatch] = set()
         self._is_connected = True
+
+    def count_token(self, key: str, change: int) -> None:
+        """One more (1) or one less (-1) of the tokens `key`; tells who watches it. Call with the lock."""
+        was, self.tokens[key] = self.tokens[key] > 0, self.tokens[key] + change
+        if was != (self.tokens[key] > 0):
+            for watch in [each for each in self.watches if each.key == key]:
+                watch.on_change(not was)
 
     @property
     def is_connected(self) -> bool:

@@ -19,7 +19,8 @@ from schemas.topics import LOG, STATISTICS, Action, Request, Topic
 from services.runtime import identity, requests
 from services.runtime.action_client import ActionClient
 from services.runtime.action_server import ActionServer, OnCancel, OnGoal
-from services.runtime.bus import Bus
+from services.runtime.bus import Bus, Declaration
+from services.runtime.client_watch import ClientWatch
 from services.runtime.connection import connect
 from services.runtime.declared import Declared
 from services.runtime.deployment import load_deployment, project_root, robot_name
@@ -144,7 +145,8 @@ class Node:
 
     def serve_action(self, action: Action[G, F, R], on_goal: OnGoal[G], on_cancel: OnCancel) -> ActionServer[G, F, R]:
         """Serves an action: `on_goal(goal_id, goal)` accepts or refuses, `on_cancel(goal_id)` says "" or why not."""
-        server = ActionServer(action, on_goal, on_cancel, self._serve, self.publisher)
+        clients = ClientWatch(self._watch_alive, lambda: self._bus.is_connected)
+        server = ActionServer(action, on_goal, on_cancel, self._serve, self.publisher, clients, self.log.warning)
         self._loop.every(ActionServer.HEARTBEAT, server.beat)
         self._declared.actions.append(server)
         return server
@@ -262,6 +264,10 @@ class Node:
             server = RequestServer(self._bus, put, request, handler, self.log.warning)
         self._declared.servers.append(server)
         return server
+
+    def _watch_alive(self, key: str, on_change: Callable[[bool], None]) -> Declaration:
+        """`on_change(is_there)` runs in the thread of logic."""
+        return self._bus.watch_alive(key, lambda is_there: self.post(lambda: on_change(is_there)))
 
     def _serve_about_itself(self) -> None:
         about = Request(f"@node/{self.name}/info", Empty, NodeInfo, self.name, "who this node is")

@@ -173,6 +173,12 @@ class ZenohBus:
         self._tokens.append(token)  # one that nobody holds would be undeclared
         return token
 
+    def watch_alive(self, key: str, on_change: Callable[[bool], None]) -> ZenohDeclaration:
+        def on_sample(sample: zenoh.Sample) -> None:
+            on_change(sample.kind == zenoh.SampleKind.PUT)
+
+        return ZenohDeclaration(self._session.liveliness().declare_subscriber(key, on_sample, history=True))
+
     def alive(self, pattern: str) -> set[str]:
         replies = self._session.liveliness().get(pattern, timeout=1.0)
         return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}

@@ -21,7 +21,7 @@ from services.runtime import action_keys as keys
 from services.runtime.actions import ActionServer, GoalDecision, accept, refuse
 from services.runtime.errors import GoalRefused, NoAnswer, Refused, ServerLost
 from services.runtime.node import Node
-from tests.runtime.support import Buses, spinning, until
+from tests.runtime.support import Buses, hear, spinning, until
 
 Result = FollowJointTrajectoryResult
 Server = ActionServer[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
@@ -143,6 +143,25 @@ def test_a_client_that_vanishes_does_not_stop_the_motion(buses: Buses) -> None:
         client.action(FOLLOW).send(goal_of(30))
         client.close()
         assert until(lambda: arm.moved == 31 and not arm.left, 2.0)
+
+
+def test_an_attached_goal_is_cancelled_when_its_client_vanishes(buses: Buses) -> None:
+    with moving(buses) as arm:
+        client, other = buses.node("client"), buses.node("other")
+        handle = client.action(FOLLOW).send(goal_of(10_000), attached=True)
+        status = other.latest(keys.status_topic(FOLLOW))
+        assert hear(other, lambda: status.message is not None and status.message.goals[0].status == 2)
+        client.close()
+        assert hear(other, lambda: status.message.goals[0].status is GoalStatusCode.CANCELED, 2.0)
+        assert not arm.left
+        assert status.message.goals[0].goal_id == handle.goal_id
+
+
+def test_an_attached_goal_runs_to_its_end_while_its_client_lives(buses: Buses) -> None:
+    with moving(buses):
+        client = buses.node("client").action(FOLLOW)
+        for steps in (250, 3):  # of 10 ms: the first is longer than a client without a token would be given
+            assert client.send(goal_of(steps), attached=True).wait(10.0).status is GoalStatusCode.SUCCEEDED
 
 
 def test_a_result_is_kept_for_who_asks_later(buses: Buses) -> None:

@@ -158,3 +158,21 @@ def test_tokens_live_as_long_as_their_bus(buses: Buses) -> None:
     assert until(lambda: observer.alive("@alive/*") == {"@alive/planner"}, 1.0)
     planner.close()
     assert until(lambda: observer.alive("@alive/*") == set(), 1.0)
+
+
+def test_a_watch_hears_of_a_token_that_is_there_and_of_its_end(buses: Buses) -> None:
+    client, server = buses.open(), buses.open()
+    before, after, other = [], [], []
+    client.declare_alive("@id/script/1")
+    server.watch_alive("@id/script/1", before.append)
+    server.watch_alive("@id/script/2", after.append)
+    closed = server.watch_alive("@id/script/2", other.append)
+    assert until(lambda: before == [True], 2.0)
+    token = client.declare_alive("@id/script/2")
+    assert until(lambda: after == [True] and other == [True], 2.0)
+    closed.close()
+    token.close()
+    assert until(lambda: after == [True, False], 2.0)
+    client.close()
+    assert until(lambda: before == [True, False], 2.0)
+    assert other == [True]

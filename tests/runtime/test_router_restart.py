@@ -16,6 +16,7 @@ from schemas.joints import JointState
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
 from schemas.system import LogRecord
 from schemas.topics import DESCRIPTION, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES, LOG, PLAN
+from services.runtime.client_watch import RETURN
 from services.runtime.errors import BusError, NoAnswer, ServerLost
 from services.runtime.node import Node
 from tests.runtime.support import RouterProcess, hear, spinning, until
@@ -157,3 +158,20 @@ def test_a_node_that_does_not_find_back_ends_so_that_it_is_started_anew(
     monkeypatch.setattr("services.runtime.zenoh_bus.ZenohBus.is_connected", False)
     with open_node(own_router, "astray") as node, pytest.raises(BusError, match="did not take this session back"):
         node.spin()
+
+
+def test_an_attached_goal_outlives_a_router_that_comes_back_and_not_its_client(own_router: RouterProcess) -> None:
+    with open_node(own_router, "stepper_gateway") as gateway, open_node(own_router, "client") as client:
+        arm = Arm(gateway)
+        with spinning(gateway, arm.step, rate=100.0):
+            handle = client.action(FOLLOW_JOINT_TRAJECTORY).send(goal_of(9_000), attached=True)
+            with spinning(client):
+                own_router.kill()
+                assert until(lambda: not gateway.is_connected and not client.is_connected, 2.0)
+                own_router.start()
+                assert until(lambda: gateway.is_connected and client.is_connected, RECOVERY)
+                seen = time.monotonic()
+                assert not until(lambda: not arm.left, RETURN + 1.0), f"ended after {time.monotonic() - seen:.2f} s"
+                assert handle.status is GoalStatusCode.EXECUTING
+            client.close()
+            assert until(lambda: not arm.left, 2.0)

@@ -1,0 +1,77 @@
+"""Which goals have lost their client: an attached goal ends when the liveliness token of its client vanishes.
+
+A router that goes away takes all tokens with it, so nothing is concluded while it is away, nor until the clients
+have had the time to come back to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from services.runtime.bus import Declaration
+
+Watch = Callable[[str, Callable[[bool], None]], Declaration]
+
+SETTLE = 0.2  # [s] from a token's end to a conclusion; a router that ends takes longer to be missed than its tokens
+FIRST_SIGHT = 2.0  # [s] in which the token of a client that has just sent a goal must have been seen
+RETURN = 5.0  # [s] that clients have to come back to a router: retry 0.5 s, open 1 s (zenoh_config), and as much again
+
+
+@dataclass
+class Attached:
+    """One goal and its client's token."""
+
+    client: str  # key of the token
+    missing_since: float | None  # [s] monotonic; None while the token is there
+    patience: float  # [s] that it may be missing
+    declarations: list[Declaration] = field(default_factory=list)
+
+
+class ClientWatch:
+    """Everything here runs in the thread of logic; `watch` calls back there, True when a token comes."""
+
+    def __init__(self, watch: Watch, is_connected: Callable[[], bool]) -> None:
+        self._watch, self._is_connected = watch, is_connected
+        self._goals: dict[str, Attached] = {}
+        self._was_away = False
+        self._back_at = float("-inf")  # [s] monotonic, when the router came back last
+        self._now = 0.0  # [s] monotonic, of the last call
+
+    def add(self, goal_id: str, client: str, now: float) -> None:
+        """Watches `client`'s token [key] for the goal from `now` [s monotonic] on."""
+        goal = self._goals[goal_id] = Attached(client, now, FIRST_SIGHT)
+
+        def on_token(is_there: bool) -> None:
+            if is_there:
+                goal.missing_since = None
+            elif goal.missing_since is None:
+                goal.missing_since, goal.patience = self._now, SETTLE
+
+        self._now = now
+        goal.declarations.append(self._watch(client, on_token))
+
+    def forget(self, goal_id: str) -> None:
+        """The goal has ended."""
+        goal = self._goals.pop(goal_id, None)
+        for declaration in goal.declarations if goal else ():
+            declaration.close()
+
+    def take_lost(self, now: float) -> list[tuple[str, str]]:
+        """Goals whose client is gone at `now` [s monotonic], with its token; each is named once."""
+        self._now = now
+        if not self._is_connected():
+            self._was_away = True
+            return []
+        if self._was_away:
+            self._was_away, self._back_at = False, now
+        if now - self._back_at < RETURN:
+            return []
+        lost = [(goal_id, goal.client) for goal_id, goal in self._goals.items() if _is_lost(goal, now)]
+        for goal_id, _ in lost:
+            self.forget(goal_id)
+        return lost
+
+
+def _is_lost(goal: Attached, now: float) -> bool:
+    return goal.missing_since is not None and now - goal.missing_since > goal.patience

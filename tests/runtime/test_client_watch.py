@@ -1,0 +1,77 @@
+"""When a goal counts as having lost its client; time is given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from services.runtime.client_watch import FIRST_SIGHT, RETURN, SETTLE, ClientWatch
+
+
+class Tokens:
+    """A bus whose tokens and router are switched by hand."""
+
+    def __init__(self) -> None:
+        self.is_connected = True
+        self.watchers: dict[str, Callable[[bool], None]] = {}
+        self.closed = 0
+
+    def watch(self, key: str, on_change: Callable[[bool], None]) -> Tokens:
+        self.watchers[key] = on_change
+        return self
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+def watch() -> tuple[Tokens, ClientWatch]:
+    tokens = Tokens()
+    return tokens, ClientWatch(tokens.watch, lambda: tokens.is_connected)
+
+
+def test_a_goal_is_lost_once_soon_after_its_token_vanishes() -> None:
+    tokens, clients = watch()
+    clients.add("goal", "@id/a", 100.0)
+    tokens.watchers["@id/a"](True)
+    assert clients.take_lost(160.0) == []
+    tokens.watchers["@id/a"](False)
+    assert clients.take_lost(160.0 + SETTLE / 2) == []
+    assert clients.take_lost(160.0 + 1.1 * SETTLE) == [("goal", "@id/a")]
+    assert clients.take_lost(170.0) == []
+    assert tokens.closed == 1
+
+
+def test_a_client_that_was_never_seen_is_given_a_little_longer() -> None:
+    _, clients = watch()
+    clients.add("goal", "@id/a", 100.0)
+    assert clients.take_lost(100.0 + 0.9 * FIRST_SIGHT) == []
+    assert clients.take_lost(100.0 + 1.1 * FIRST_SIGHT) == [("goal", "@id/a")]
+
+
+def test_a_token_that_comes_back_in_time_keeps_the_goal() -> None:
+    tokens, clients = watch()
+    clients.add("goal", "@id/a", 100.0)
+    for is_there in (True, False, True):
+        tokens.watchers["@id/a"](is_there)
+    assert clients.take_lost(200.0) == []
+
+
+def test_nothing_is_concluded_while_the_router_is_away_nor_right_after_it() -> None:
+    tokens, clients = watch()
+    clients.add("goal", "@id/a", 100.0)
+    tokens.watchers["@id/a"](True)
+    tokens.is_connected = False
+    tokens.watchers["@id/a"](False)
+    assert clients.take_lost(130.0) == []
+    tokens.is_connected = True
+    assert clients.take_lost(131.0) == []
+    assert clients.take_lost(131.0 + 0.9 * RETURN) == []
+    assert clients.take_lost(131.0 + 1.1 * RETURN) == [("goal", "@id/a")]
+
+
+def test_a_goal_that_has_ended_is_forgotten() -> None:
+    tokens, clients = watch()
+    clients.add("goal", "@id/a", 100.0)
+    clients.forget("goal")
+    clients.forget("goal")
+    assert clients.take_lost(200.0) == []
+    assert tokens.closed == 1
