@@ -32,7 +32,7 @@ check: setup ## ruff, mypy, import-linter, clang-format
 checks := check-types check-walls check-lint check-format check-cpp
 .PHONY: $(checks)
 check-types:
-	@$(bin)/mypy --no-error-summary schemas services firmware
+	@$(bin)/mypy --no-error-summary gemelo schemas services firmware
 check-walls:
 	@$(bin)/lint-imports --no-logo >/dev/null || $(bin)/lint-imports --no-logo
 check-lint:

@@ -1,0 +1,494 @@
+"""One arm, as a script has it: ask it where it is, tell it where to go, and what stands around it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import TracebackType
+from typing import Self, Unpack
+
+from gemelo.device import Device, reference_request
+from gemelo.errors import BadArgument
+from gemelo.frames import Frames
+from gemelo.homing import HomingReport, home
+from gemelo.jog import Jogging, Streaming, jog_command
+from gemelo.motion import Motion, Motions
+from gemelo.planning import OnPlanProgress, Plan, find_configurations, find_poses, make_plan
+from gemelo.scene import Scene
+from gemelo.session import Session
+from gemelo.targets import Joints, Target, ToolGoal, Vector, Waypoint, as_target
+from gemelo.units import Pose
+from schemas.device import DeviceCommandKind, DeviceCommandRequest
+from schemas.planning import JogStatus
+from schemas.topics import JOINT_STATES, SENSORS, STEP_ERRORS
+from services.arm.description import Arm as Description
+from services.arm.errors import suggestion
+from services.runtime.node import Node
+
+OnProgress = Callable[[Motion], object]
+
+
+class Arm:
+    """One arm; made by `gemelo.connect`. Values are SI: metres, radians, seconds. Several arms may be in one script.
+
+    Every method may be called from any thread but those that handle messages.
+
+    >>> arm
+    <Arm rm1: brazo_joint, antebrazo_joint, efector_joint>
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._frames, self._motions = Frames(session), Motions(session)
+        self._jogging, self._streaming = Jogging(session), Streaming(session)
+        self._scene, self._device = Scene(session), Device(session)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<Arm {self.name}: {', '.join(self.joint_names)}>"
+
+    def close(self) -> None:
+        """Ends the connection. A motion that is under way decelerates first, unless it was started detached.
+
+        >>> second = gemelo.connect()
+        >>> second.close()
+        """
+        try:
+            self._motions.cancel_attached()
+        finally:
+            self._session.close()
+
+    # Who it is
+
+    @property
+    def name(self) -> str:
+        """The robot's name.
+
+        >>> arm.name
+        'rm1'
+        """
+        return self.description.name
+
+    @property
+    def description(self) -> Description:
+        """URDF, SRDF and robot.toml as one: joints with their limits, links, named states, inputs, outputs, sensors.
+
+        >>> arm.description.joint("brazo_joint").unit
+        'rad'
+        """
+        return self._session.description
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """In the order of robot.toml, which is their order everywhere.
+
+        >>> arm.joint_names
+        ('brazo_joint', 'antebrazo_joint', 'efector_joint')
+        """
+        return self.description.joint_names
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The named states of the SRDF, for `move(named=...)`.
+
+        >>> "ready" in arm.states
+        True
+        """
+        return self.description.state_names
+
+    @property
+    def base_frame(self) -> str:
+        """The link in which poses are given if not said otherwise.
+
+        >>> arm.base_frame
+        'base_link'
+        """
+        return self.description.base_frame
+
+    @property
+    def tool_frame(self) -> str:
+        """The link that goals are for.
+
+        >>> arm.tool_frame
+        'efector_link'
+        """
+        return self.description.tool_frame
+
+    @property
+    def node(self) -> Node:
+        """The node on the bus, to subscribe and publish on any topic; handlers run in its own thread.
+
+        >>> arm.node.latest(gemelo.topics.JOINT_STATES).topic.key
+        'joint_states'
+        """
+        return self._session.node
+
+    # How it is
+
+    @property
+    def joints(self) -> dict[str, float]:
+        """[rad] or [m] by joint: what the device has executed, at most 0.1 s old.
+
+        >>> arm.move(joints={"brazo_joint": 0.3}) and round(arm.joints["brazo_joint"], 2)
+        0.3
+        """
+        state = self._session.newest(JOINT_STATES)
+        return dict(zip(state.name, state.position, strict=True))
+
+    @property
+    def velocities(self) -> dict[str, float]:
+        """[rad/s] or [m/s] by joint.
+
+        >>> max(abs(speed) for speed in arm.velocities.values()) < 0.001
+        True
+        """
+        state = self._session.newest(JOINT_STATES)
+        return dict(zip(state.name, state.velocity, strict=True))
+
+    def pose(self, link: str = "", frame: str = "") -> Pose:
+        """Where the tool (or another `link`) is in the base frame (or another `frame`).
+
+        >>> x, y, z = arm.pose().position
+        >>> arm.pose().orientation
+        (..., ..., ..., ...)
+        """
+        return self._frames.look_up(frame or self.base_frame, link or self.tool_frame)
+
+    def frame(self, target: str, source: str, stamp: int = 0) -> Pose:
+        """The pose of the frame `source` in the frame `target`, now or at `stamp` [ns UNIX] of the last 10 s.
+
+        >>> arm.frame("base_link", "efector_link") == arm.pose()
+        True
+        """
+        return self._frames.look_up(target, source, stamp)
+
+    @property
+    def step_errors(self) -> dict[str, float]:
+        """[steps] by joint: what the path asks for minus what the device has emitted, at the same instant.
+
+        >>> all(abs(error) <= 0.5 for error in arm.step_errors.values())
+        True
+        """
+        errors = self._session.newest(STEP_ERRORS)
+        return dict(zip(errors.name, errors.error, strict=True))
+
+    @property
+    def sensors(self) -> dict[str, float]:
+        """The readings of robot.toml's sensors, by name, in their units.
+
+        >>> arm.device.inject("sensor", "ultra", 0.25)
+        >>> "ultra" in arm.sensors
+        True
+        """
+        if not self.description.sensors:
+            return {}
+        readings = self._session.newest(SENSORS)
+        return dict(zip(readings.name, readings.value, strict=True))
+
+    @property
+    def outputs(self) -> dict[str, bool]:
+        """The outputs of robot.toml, and whether they are on.
+
+        >>> arm.output("avanzar", True)
+        >>> arm.outputs["avanzar"]
+        True
+        >>> arm.output("avanzar", False)
+        """
+        on = self.device.state.outputs
+        return {output.name: output.name in on for output in self.description.outputs}
+
+    @property
+    def inputs(self) -> dict[str, bool]:
+        """The switches of robot.toml, and whether they are active.
+
+        >>> arm.inputs["estop"]
+        False
+        """
+        active = self.device.state.inputs
+        return {each.name: each.name in active for each in self.description.inputs}
+
+    @property
+    def device(self) -> Device:
+        """The controller board.
+
+        >>> arm.device.mode.name
+        'IDLE'
+        """
+        return self._device
+
+    @property
+    def scene(self) -> Scene:
+        """What stands around the arm, and what it carries.
+
+        >>> arm.scene.objects
+        {}
+        """
+        return self._scene
+
+    # Where it goes
+
+    def move(
+        self, *, detached: bool = False, on_progress: OnProgress | None = None, **target: Unpack[Target]
+    ) -> Motion:
+        """Plans and goes there, and returns when the arm has arrived; the arguments are those of `gemelo.Target`.
+
+        Raises `Refused` (nothing has moved), `Aborted`, `Lost` or `BadArgument`. At Ctrl-C the arm decelerates on its
+        path, and `Interrupted` is raised when it rests. `detached`: it goes on when this script dies.
+
+        >>> arm.move(named="ready")
+        <Motion rm1: named='ready', succeeded in ... s, ...>
+        >>> arm.move(position=(0.25, 0.15, 0.10), speed=0.5)
+        <Motion rm1: position=(0.25, 0.15, 0.1), speed=0.5, succeeded in ... s, ...>
+        >>> arm.move(joints={"brazo_joint": gemelo.deg(30)}).status.name
+        'SUCCEEDED'
+        """
+        plan = self.plan(**target)
+        return self._motions.start(plan, detached).wait(on_progress=on_progress)
+
+    def line(self, *, speed: float | None = None, detached: bool = False, **goal: Unpack[ToolGoal]) -> Motion:
+        """The tool on a straight line, at `speed` [m/s] at most; as `move` otherwise.
+
+        >>> arm.move(named="ready").status.name
+        'SUCCEEDED'
+        >>> arm.line(offset=(0.0, 0.0, -0.02), speed=0.05).status.name
+        'SUCCEEDED'
+        """
+        target = as_target(goal)
+        target["line"] = True
+        return self.move(**_with_speed(target, speed), detached=detached)
+
+    def arc(
+        self,
+        *,
+        through: Vector | None = None,
+        center: Vector | None = None,
+        to: Vector | Pose | None = None,
+        speed: float | None = None,
+        detached: bool = False,
+        **goal: Unpack[ToolGoal],
+    ) -> Motion:
+        """The tool on an arc through (or about) a point (3,) [m] to `to`, at `speed` [m/s] at most.
+
+        >>> arm.move(position=(0.20, 0.30, 0.12)).status.name
+        'SUCCEEDED'
+        >>> arm.arc(through=(0.15, 0.34, 0.12), to=(0.10, 0.35, 0.12)).status.name
+        'SUCCEEDED'
+        """
+        if (through is None) == (center is None):
+            raise BadArgument("an arc goes by one of through= and center=")
+        target = as_target(goal)
+        if isinstance(to, Pose):
+            target["pose"] = to
+        elif to is not None:
+            target["position"] = to
+        if through is not None:
+            target["through"] = through
+        if center is not None:
+            target["center"] = center
+        return self.move(**_with_speed(target, speed), detached=detached)
+
+    def path(self, waypoints: Sequence[Waypoint], *, detached: bool = False, **target: Unpack[Target]) -> Motion:
+        """Through the points in order: positions (3,) [m], poses, named states, joints by name; it stops at the last.
+
+        Corners may be cut within `blend=` [m] of a point. With `line=True` the tool goes straight between them.
+
+        >>> arm.path([(0.25, 0.05, 0.15), (0.25, 0.10, 0.15), (0.25, 0.15, 0.10)], blend=0.01).status.name
+        'SUCCEEDED'
+        """
+        if not waypoints:
+            raise BadArgument("a path needs at least one point")
+        target.update(_goal_of(waypoints[-1]))
+        if len(waypoints) > 1:
+            target["via"] = tuple(waypoints[:-1])
+        return self.move(**target, detached=detached)
+
+    def plan(self, *, on_progress: OnPlanProgress | None = None, **target: Unpack[Target]) -> Plan:
+        """A verified trajectory, for `execute` or `start`; nothing moves. The arguments are those of `move`.
+
+        >>> plan = arm.plan(named="left")
+        >>> arm.execute(plan).status.name
+        'SUCCEEDED'
+        """
+        return make_plan(self._session, target, self._frames.look_up, on_progress)
+
+    def execute(self, plan: Plan, *, detached: bool = False, on_progress: OnProgress | None = None) -> Motion:
+        """Goes along the plan, and returns when the arm has arrived. It must begin where the arm is.
+
+        >>> arm.execute(arm.plan(named="lifted")).status.name
+        'SUCCEEDED'
+        """
+        return self.start(plan, detached=detached).wait(on_progress=on_progress)
+
+    def start(self, plan: Plan | None = None, *, detached: bool = False, **target: Unpack[Target]) -> Motion:
+        """As `execute` and `move`, but returns as soon as the arm goes; a motion that still runs is taken over.
+
+        >>> motion = arm.start(named="left")
+        >>> motion.is_over
+        False
+        >>> motion.wait().status.name
+        'SUCCEEDED'
+        """
+        if (plan is None) == (not target):
+            raise BadArgument("start a plan, or say where to: not both, not none")
+        return self._motions.start(plan if plan is not None else self.plan(**target), detached)
+
+    def home(self, *joints: str, on_progress: Callable[[dict[str, str]], object] | None = None) -> HomingReport:
+        """The joints find their switches, all that have one if none is named; returns when they are home.
+
+        `on_progress` gets what each joint does, by name. At Ctrl-C the joints decelerate. Homing is the device's own
+        motion: it goes on to its end when this script dies.
+
+        >>> arm.home("efector_joint").homed
+        ('efector_joint',)
+        """
+        return home(self._session, joints, self.device.command, on_progress)
+
+    def reference(self, joints: Joints | None = None) -> None:
+        """Declares where the joints stand, [rad] or [m] by name; the others are at robot.toml's reference position.
+
+        >>> where = arm.joints
+        >>> arm.reference(where)
+        """
+        self.device.command(reference_request(self._session, joints))
+
+    def jog(
+        self,
+        *,
+        joints: Joints | None = None,
+        twist: Vector | None = None,
+        frame: str = "",
+        duration: float | None = None,
+        on_progress: Callable[[JogStatus], object] | None = None,
+    ) -> JogStatus | None:
+        """Moves by hand: the joints at speeds [rad/s] or [m/s] by name, or the tool with a twist.
+
+        `twist`: (vx, vy, vz) [m/s], or with (wx, wy, wz) [rad/s] after it, along the axes of `frame`, the base's or the
+        tool's. A command holds for 0.1 s: without `duration` [s] say it again and again, at 50 Hz; silence stops the
+        arm. The answer is the planner's newest word, None before the first: how much of the speed is left, and what
+        limits it.
+
+        >>> arm.jog(joints={"brazo_joint": 0.2}, duration=0.3).active
+        False
+        >>> arm.jog(twist=(0.0, 0.0, 0.02), duration=0.3).active
+        False
+        """
+        command = jog_command(self.description, joints, twist, frame)
+        if duration is None:
+            return self._jogging.say(command)
+        return self._jogging.hold(command, duration, on_progress)
+
+    def stream(self, joints: Joints) -> None:
+        """A target [rad] or [m] that the arm follows within its limits, now; the newest wins. No path is planned.
+
+        Say one at least every 0.5 s: silence brakes to rest. A target that the gateway has refused raises `Refused` at
+        the next call.
+
+        >>> for step in range(20):
+        ...     arm.stream({"brazo_joint": arm.joints["brazo_joint"] + 0.002})
+        """
+        self._streaming.say(joints)
+
+    # What is switched
+
+    def stop(self) -> None:
+        """Decelerates on the path and forgets the rest of it.
+
+        >>> arm.stop()
+        """
+        self._command(DeviceCommandKind.STOP)
+
+    def hold(self) -> None:
+        """Decelerates on the path and stands there; `resume` goes on.
+
+        >>> motion = arm.start(named="left", speed=0.5)
+        >>> arm.hold()
+        >>> arm.resume()
+        >>> motion.wait().status.name
+        'SUCCEEDED'
+        """
+        self._command(DeviceCommandKind.HOLD)
+
+    def resume(self) -> None:
+        """Goes on along the path after `hold`; `Refused` where nothing is held.
+
+        >>> motion = arm.start(named="right")
+        >>> arm.hold()
+        >>> arm.resume()
+        >>> motion.wait().status.name
+        'SUCCEEDED'
+        """
+        self._command(DeviceCommandKind.RESUME)
+
+    def speed(self, share: float) -> None:
+        """Plays every path at `share` (0 to 1) of its planned speed from now on, also what is under way.
+
+        >>> arm.speed(0.5)
+        >>> arm.speed(1.0)
+        """
+        if not 0.0 <= share <= 1.0:
+            hint = f": {share:g} per cent is {share / 100.0:g}" if 1.0 < share <= 100.0 else ""
+            raise BadArgument(f"speed({share:g}) is not in [0, 1], a share of the planned speed{hint}")
+        self.device.command(DeviceCommandRequest(command=DeviceCommandKind.SPEED, value=float(share)), "speed")
+
+    def output(self, name: str, on: bool) -> None:
+        """Switches an output of robot.toml.
+
+        >>> arm.output("avanzar", True)
+        >>> arm.output("avanzar", False)
+        """
+        known = [output.name for output in self.description.outputs]
+        if name not in known:
+            raise BadArgument(f'{self.name} has no output "{name}"{suggestion(name, known)}')
+        request = DeviceCommandRequest(command=DeviceCommandKind.OUTPUT, output=name, value=float(on))
+        self.device.command(request, f"output {name}")
+
+    # What could be
+
+    def ik(
+        self, *, near: Joints | None = None, solutions: int = 1, touching: bool = False, **goal: Unpack[ToolGoal]
+    ) -> list[dict[str, float]]:
+        """Joint values [rad] or [m] that bring the tool there, at most so many, nearest first; nothing moves.
+
+        Near to `near`, or to where the arm is; `touching`: also those at which links touch. Raises `Refused`.
+
+        >>> arm.ik(position=(0.25, 0.15, 0.10))
+        [{'brazo_joint': ..., 'antebrazo_joint': ..., 'efector_joint': ...}]
+        """
+        return find_configurations(self._session, goal, self._frames.look_up, near, solutions, touching)
+
+    def fk(self, joints: Joints | None = None) -> Pose:
+        """Where the tool is for joint values [rad] or [m]; joints that are not named stand as they do now.
+
+        >>> arm.fk({"brazo_joint": 0.0, "antebrazo_joint": 0.0, "efector_joint": 0.0}).position
+        (..., ..., ...)
+        """
+        return find_poses(self._session, joints, ())[self.tool_frame]
+
+    def link_poses(self, joints: Joints | None = None, links: Sequence[str] = ()) -> dict[str, Pose]:
+        """As `fk`, for `links`, or for all.
+
+        >>> sorted(arm.link_poses(links=["base_link"]))
+        ['base_link']
+        """
+        return find_poses(self._session, joints, tuple(links) or self.description.model.link_names)
+
+    def _command(self, kind: DeviceCommandKind) -> None:
+        self.device.command(DeviceCommandRequest(command=kind))
+
+
+def _with_speed(target: Target, speed: float | None) -> Target:
+    if speed is not None:
+        target["tool_speed"] = speed
+    return target
+
+
+def _goal_of(waypoint: Waypoint) -> Target:
+    if isinstance(waypoint, str):
+        return Target(named=waypoint)
+    if isinstance(waypoint, Mapping):
+        return Target(joints=waypoint)
+    return Target(pose=waypoint) if isinstance(waypoint, Pose) else Target(position=waypoint)

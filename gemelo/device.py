@@ -1,0 +1,215 @@
+"""The controller board: how it is, what it is told, and what a hand could do to a virtual one."""
+
+from __future__ import annotations
+
+from gemelo.errors import BadArgument, Lost, Refused
+from gemelo.homing import joint_name
+from gemelo.session import PATIENCE, Session
+from gemelo.targets import Joints, joint_state, number
+from schemas.device import (
+    ConfigureRequest,
+    DeviceCommandKind,
+    DeviceCommandRequest,
+    DeviceConfiguration,
+    DeviceFault,
+    DeviceMode,
+    DeviceState,
+    DeviceStatus,
+    PressKind,
+    PressRequest,
+)
+from schemas.device_faults import fault_text
+from schemas.topics import (
+    DEVICE_COMMAND,
+    DEVICE_CONFIGURATION,
+    DEVICE_CONFIGURE,
+    DEVICE_PRESS,
+    DEVICE_STATE,
+    DEVICE_STATUS,
+)
+from services.arm.errors import suggestion
+
+TO_ANSWER = 3.0  # [s] for a command
+TO_CONFIGURE = 10.0  # [s]: a board may write it to its flash first
+MOVING = (DeviceMode.RUN, DeviceMode.HOLD, DeviceMode.HOMING)
+
+
+class Device:
+    """The board that moves the motors, or its virtual twin.
+
+    >>> arm.device.mode.name, arm.device.fault
+    ('IDLE', '')
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    @property
+    def status(self) -> DeviceStatus:
+        """Who it is, and whether it is online.
+
+        >>> arm.device.status.online, arm.device.status.virtual
+        (True, True)
+        """
+        return self._session.newest(DEVICE_STATUS)
+
+    @property
+    def state(self) -> DeviceState:
+        """Mode, fault, switches, outputs, executed steps; raises `Lost` with the reason where it is offline.
+
+        >>> arm.device.state.armed, all(arm.device.state.referenced)
+        (True, True)
+        """
+        status = self._session.latest(DEVICE_STATUS)
+        try:
+            return self._session.newest(DEVICE_STATE)
+        except Lost:
+            if status.message is not None and not status.message.online:
+                raise Lost(f"the device is offline: {status.message.reason or 'no reason is known'}") from None
+            raise
+
+    @property
+    def mode(self) -> DeviceMode:
+        """BOOT, UNREFERENCED, HOMING, IDLE, RUN, HOLD, FAULT or ESTOP.
+
+        >>> arm.device.mode is gemelo.DeviceMode.IDLE
+        True
+        """
+        return self.state.mode
+
+    @property
+    def fault(self) -> str:
+        """The fault, what it means, and what to do; empty if there is none.
+
+        >>> arm.device.fault
+        ''
+        """
+        state = self.state
+        if state.fault == DeviceFault.NONE:
+            return ""
+        return fault_text(state.fault, joint_name(self._session.description, state.fault_joint))
+
+    @property
+    def configuration(self) -> DeviceConfiguration:
+        """What robot.toml asks of the device, and whether it works with it.
+
+        >>> arm.device.configuration.accepted
+        True
+        """
+        return self._session.newest(DEVICE_CONFIGURATION)
+
+    def arm(self) -> None:
+        """Energises the motors, and waits until they hold.
+
+        >>> arm.device.arm()
+        """
+        self.command(DeviceCommandRequest(command=DeviceCommandKind.ARM))
+        lead = max(joint.driver.enable_lead_ms for joint in self._session.description.joints) * 1e-3
+        self._session.wait_for(lambda: False, lead)
+
+    def disarm(self) -> None:
+        """Takes the current from the motors; every joint is unreferenced then, and an arm may sink.
+
+        >>> where = arm.joints
+        >>> arm.device.disarm()
+        >>> arm.device.mode.name
+        'UNREFERENCED'
+        >>> arm.device.arm()
+        >>> arm.reference(where)
+        """
+        self.command(DeviceCommandRequest(command=DeviceCommandKind.DISARM))
+
+    def reset(self) -> None:
+        """Leaves a fault or an emergency stop, once its cause is gone.
+
+        >>> where = arm.joints
+        >>> arm.device.inject("estop")
+        >>> arm.device.mode.name
+        'ESTOP'
+        >>> arm.device.inject("estop", value=0)
+        >>> arm.device.reset()
+        >>> arm.device.arm()
+        >>> arm.reference(where)
+        """
+        self.command(DeviceCommandRequest(command=DeviceCommandKind.RESET))
+
+    def configure(self) -> None:
+        """Gives the device what robot.toml says of it, if it has anything else: it disarms, and is referenced no more.
+
+        >>> arm.device.configure()
+        """
+        if self.configuration.accepted:
+            return
+        state = self.state
+        if state.mode in MOVING:
+            raise Refused(f"refused: the device is in {state.mode.name}: wait, or arm.stop()", check="device")
+        if state.armed:
+            self.disarm()
+            self._session.wait_for(lambda: not self.state.armed, PATIENCE)
+        answer = self._session.call(DEVICE_CONFIGURE, ConfigureRequest(), TO_CONFIGURE)
+        if not answer.accepted:
+            again = "; the drivers are off now: arm.device.arm()" if state.armed else ""
+            raise Refused(f"the device refused the configuration: {answer.reason}{again}", check="configuration")
+        if state.armed:
+            self.arm()
+
+    def inject(self, what: str, target: str = "", value: float = 1.0) -> None:
+        """Does to a virtual device what a hand or an accident could do; a real one refuses.
+
+        "estop" (`value` 0 releases it), "switch" (`target`: an input; 1 held, 0 open, -1 left to the arm), "block" (a
+        joint; 0 lets go), "slip" (a joint; steps), "sensor" (a sensor; its reading), "reboot", "offline" ([s]),
+        "freeze" ([s]), "drift" ([ppm]).
+
+        >>> arm.device.inject("sensor", "ultra", 0.25)
+        """
+        kinds = [kind.value for kind in PressKind]
+        if what not in kinds:
+            raise BadArgument(f'there is no "{what}" to inject{suggestion(what, kinds)}')
+        self._require_target(PressKind(what), target)
+        if self.status.online and not self.status.virtual:
+            raise Refused(f"{self.status.device} is a real device: only a virtual one takes this", check="device")
+        request = PressRequest(press=PressKind(what), target=target, value=number("value", value))
+        answer = self._session.call(DEVICE_PRESS, request, TO_ANSWER)
+        self._session.changed()
+        if not answer.accepted:
+            raise Refused(f"refused: {answer.reason}", check="device")
+
+    def command(self, request: DeviceCommandRequest, what: str = "") -> DeviceMode:
+        """Sends a command; the mode that the device answered with. Raises `Refused` with its reason.
+
+        >>> from schemas.device import DeviceCommandKind, DeviceCommandRequest
+        >>> arm.device.command(DeviceCommandRequest(command=DeviceCommandKind.STOP)).name
+        'IDLE'
+        """
+        answer = self._session.call(DEVICE_COMMAND, request, TO_ANSWER)
+        self._session.changed()
+        if not answer.accepted:
+            mode = f" (device mode {answer.mode.name})" if f"mode {answer.mode.name}" not in answer.reason else ""
+            what = what or request.command.name.lower()
+            raise Refused(f"{what} refused: {answer.reason}{mode}", check="device", subject=what)
+        return answer.mode
+
+    def _require_target(self, kind: PressKind, target: str) -> None:
+        arm = self._session.description
+        known = {
+            PressKind.SWITCH: [each.name for each in arm.inputs],
+            PressKind.BLOCK: list(arm.joint_names),
+            PressKind.SLIP: list(arm.joint_names),
+            PressKind.SENSOR: [each.name for each in arm.sensors],
+        }.get(kind)
+        if known is None and target:
+            raise BadArgument(f'"{kind}" is done to the whole device, not to "{target}"')
+        if known is not None and target not in known:
+            raise BadArgument(f'"{kind}" needs a target; there is no "{target}"{suggestion(target, known)}')
+
+
+def reference_request(session: Session, joints: Joints | None) -> DeviceCommandRequest:
+    """Every joint named: those of `joints` [rad] or [m], the others at the reference position of robot.toml."""
+    arm = session.description
+    values = dict(zip(arm.joint_names, arm.reference_position, strict=True))
+    if joints is not None:
+        given = joint_state(arm, joints, "joints")
+        values.update(zip(given.name, given.position, strict=True))
+    return DeviceCommandRequest(
+        command=DeviceCommandKind.REFERENCE, name=tuple(values), position=tuple(values.values())
+    )

@@ -1,0 +1,122 @@
+"""What can go wrong: each error is one sentence for a person, and fields for a program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from schemas.actions import GoalStatusCode
+
+if TYPE_CHECKING:
+    from gemelo.targets import Target
+
+
+class Error(Exception):
+    """Every error of this package but Ctrl-C.
+
+    >>> try:
+    ...     arm.move(named="nowhere")
+    ... except gemelo.Error as error:
+    ...     print(error)
+    no named state "nowhere"; known are folded, home, left, lifted, ready, right
+    """
+
+
+class BadArgument(Error, ValueError):
+    """An argument that cannot be meant: unknown, contradictory, not finite, or in another unit. Nothing was asked.
+
+    >>> try:
+    ...     arm.move(joints={"brazo_joint": 30})
+    ... except gemelo.BadArgument as error:
+    ...     print(error)
+    joint "brazo_joint": 30 rad is beyond its limits, ... rad: if it is in degrees, write gemelo.deg(30)
+    """
+
+
+class Refused(Error):
+    """What was asked cannot be done, and nothing has moved. The text says why, and what would do.
+
+    >>> try:
+    ...     arm.move(position=(0.6, 0.1, 0.1))
+    ... except gemelo.Refused as refused:
+    ...     print(refused.check, refused.nearest)
+    ...     motion = arm.move(**refused.nearest)
+    reach {'position': (0.4..., 0.06..., 0.1)}
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        check: str = "",
+        subject: str = "",
+        value: float | None = None,
+        limit: float | None = None,
+        nearest: Target | None = None,
+        remedy: str = "",
+        configuration: Mapping[str, float] | None = None,
+        way_out: Mapping[str, float] | None = None,
+        code: int = 0,
+    ) -> None:
+        super().__init__(message)
+        self.check = check  # what was checked, as "reach", "joint limit", "collision"; empty where the device refuses
+        self.subject = subject  # the joint, pair of links, or axis of the pose
+        self.value = value  # of the subject, in the unit of the check
+        self.limit = limit  # that the value is beyond
+        self.nearest: Target = nearest or {}  # the nearest goal that can, as arguments: `arm.move(**refused.nearest)`
+        self.remedy = remedy  # what a person can do
+        self.configuration = dict(configuration or {})  # [rad] or [m] by joint, where the arm would touch something
+        self.way_out = dict(way_out or {})  # [rad] or [m] by joint, the nearest that touches nothing, if it touches now
+        self.code = code  # PlanCode of the planner, FollowErrorCode of the gateway
+
+
+class Aborted(Error):
+    """A motion that ended before its goal: a fault, a tolerance, a newer goal, a device command.
+
+    >>> try:
+    ...     arm.execute(arm.plan(named="left"))
+    ... except gemelo.Aborted as aborted:
+    ...     print(aborted.status.name, aborted.stopped_at)
+    <Motion rm1: ...>
+    """
+
+    def __init__(
+        self,
+        message: str,
+        status: GoalStatusCode = GoalStatusCode.ABORTED,
+        code: int = 0,
+        stopped_at: Mapping[str, float] | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.status = status  # ABORTED, PREEMPTED or CANCELED
+        self.code = code  # FollowErrorCode
+        self.stopped_at = dict(stopped_at or {})  # [rad] or [m] by joint, from the steps that were read back
+
+
+class Canceled(Aborted):
+    """A motion that somebody else has cancelled: the arm decelerated on its path.
+
+    >>> issubclass(gemelo.Canceled, gemelo.Aborted)
+    True
+    """
+
+
+class Lost(Error):
+    """Nobody answers: the twin does not run, or a part of it fell silent. What became of a motion is not known.
+
+    >>> gemelo.connect("parol6")
+    Traceback (most recent call last):
+    gemelo.errors.Lost: no stepper_gateway of parol6 at the router ...
+    """
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C: the arm has come to rest on its path before this is raised; a second Ctrl-C does not wait for that.
+
+    >>> issubclass(gemelo.Interrupted, KeyboardInterrupt)
+    True
+    """
+
+    def __init__(self, message: str, stopped_at: Mapping[str, float] | None = None) -> None:
+        super().__init__(message)
+        self.stopped_at = dict(stopped_at or {})  # [rad] or [m] by joint; empty where it is not known

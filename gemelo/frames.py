@@ -1,0 +1,48 @@
+"""Where links are, from the frames of the last ten seconds."""
+
+from __future__ import annotations
+
+from gemelo.errors import BadArgument, Lost
+from gemelo.session import PATIENCE, Session
+from gemelo.units import Pose
+from schemas.frames import Transform
+from schemas.topics import FRAMES, STATIC_FRAMES
+from services.arm.errors import suggestion
+from services.arm.frames import FrameBuffer, FrameError
+from services.arm.transforms import from_message
+
+
+class Frames:
+    """Fills itself from the first look-up on."""
+
+    def __init__(self, session: Session) -> None:
+        self._session, self._buffer = session, FrameBuffer()
+
+    def look_up(self, target: str, source: str, stamp: int = 0) -> Pose:
+        """The pose of `source` in `target` at `stamp` [ns UNIX]; 0 is now. Raises `BadArgument` or `Lost`."""
+        session = self._session
+        session.latest(STATIC_FRAMES, lambda message: self._buffer.insert_all(message, is_static=True))
+        session.latest(FRAMES, self._buffer.insert_all)
+        if stamp == 0:
+            session.newest(FRAMES)
+        known = session.description.model.link_names
+        session.wait_for(lambda: self._is_there(target, source), PATIENCE)
+        try:
+            return pose_from(self._buffer.look_up(target, source, stamp))
+        except FrameError as error:
+            for name in (target, source):
+                if name not in (*known, *self._buffer.frames):
+                    raise BadArgument(f'there is no frame "{name}"{suggestion(name, known)}') from error
+            raise Lost(str(error)) from error
+
+    def _is_there(self, target: str, source: str) -> bool:
+        try:
+            self._buffer.look_up(target, source)
+        except FrameError:
+            return target not in self._session.description.model.link_names and bool(self._buffer.frames)
+        return True
+
+
+def pose_from(transform: Transform) -> Pose:
+    """The transform of a message."""
+    return Pose(*from_message(transform))

@@ -1,0 +1,213 @@
+"""How a homing goes, from what the device says of it."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from gemelo.errors import Aborted, BadArgument, Interrupted, Refused
+from gemelo.session import Session
+from schemas.actions import GoalStatusCode
+from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceEvent, DeviceMode, DeviceState
+from schemas.device_faults import fault_text
+from schemas.robot import HomingDirection
+from schemas.topics import DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
+from services.arm.description import Arm as Description
+from services.arm.description import Joint
+from services.arm.errors import suggestion
+
+WAITS, TO, OFF, HOME = "waits", "to its switch", "off its switch", "home"
+TO_BEGIN = 3.0  # [s] from the device's yes to its first word of homing
+LAST_WORDS = 0.5  # [s] for events that come after the state
+OFFLINE = 2.0  # [s] that the device may be away: a link that comes back, a clock that is synchronised anew
+BRAKING = 5.0  # [s] beyond the time-outs of robot.toml
+
+Command = Callable[[DeviceCommandRequest], object]
+
+
+@dataclass(frozen=True)
+class HomingReport:
+    """How a homing ended: which joints are home, and how many steps their counters had been off.
+
+    >>> report = arm.home("efector_joint")
+    >>> report.homed, abs(report.steps_off["efector_joint"]) <= 1
+    (('efector_joint',), True)
+    """
+
+    homed: tuple[str, ...]
+    steps_off: dict[str, int]  # of joints whose place had been known before
+    took: float  # [s]
+
+
+class Homing:
+    """The homing of some joints: takes events and states from the moment on at which the device has agreed. Pure."""
+
+    def __init__(self, arm: Description, joints: Sequence[Joint]) -> None:
+        self.joints = tuple(joints)
+        self.has_begun = False
+        self.reason = ""  # why it ended before its end
+        self.steps_off: dict[str, int] = {}
+        self.phases = {joint.name: WAITS for joint in joints}  # by joint: WAITS, TO, OFF or HOME
+        self._arm = arm
+        self._mode: DeviceMode | None = None
+
+    @property
+    def homed(self) -> tuple[str, ...]:
+        return tuple(name for name, phase in self.phases.items() if phase == HOME)
+
+    @property
+    def is_over(self) -> bool:
+        """True once the device has left Homing, or has said why it will."""
+        return self.has_begun and self._mode is not DeviceMode.HOMING
+
+    @property
+    def is_done(self) -> bool:
+        return len(self.homed) == len(self.phases)
+
+    @property
+    def longest(self) -> float:
+        """[s] that it may take: the groups one after another, each as long as its slowest joint."""
+        groups: dict[int, float] = {}
+        for joint in self.joints:
+            if joint.drive.homing is not None:
+                group = joint.drive.homing.group
+                groups[group] = max(groups.get(group, 0.0), joint.drive.homing.timeout)
+        return sum(groups.values()) + BRAKING
+
+    def on_event(self, event: DeviceEvent) -> None:
+        """What the device reports once."""
+        match event.event:
+            case "homed":
+                self._on_homed(event.detail)
+            case "homing_stopped":
+                self.reason = self.reason or _stopped_text(event.detail)
+
+    def on_state(self, state: DeviceState) -> None:
+        """How it is now; a state from before the homing, which may still be on its way, is passed over."""
+        self.has_begun = self.has_begun or state.mode is DeviceMode.HOMING or state.fault != 0
+        if not self.has_begun:
+            return
+        self._mode = state.mode
+        if state.fault:
+            self.reason = fault_text(state.fault, joint_name(self._arm, state.fault_joint))
+        velocity = dict(zip(state.name, state.velocity, strict=False))
+        for joint in self.joints:
+            if self.phases[joint.name] != HOME:
+                self.phases[joint.name] = _phase_of(joint, velocity.get(joint.name, 0.0)) or self.phases[joint.name]
+
+    def _on_homed(self, detail: str) -> None:
+        name, _, rest = detail.partition(":")
+        name = joint_name(self._arm, name.strip())
+        if name in self.phases:
+            self.phases[name] = HOME
+            off = re.search(r"-?\d+", rest)
+            if off is not None:
+                self.steps_off[name] = int(off[0])
+
+
+def home(
+    session: Session, names: Iterable[str], command: Command, on_progress: Callable[[dict[str, str]], object] | None
+) -> HomingReport:
+    """Homes the joints named, or all that can; raises `Refused`, `Aborted`, `Interrupted` or `Lost`."""
+    homing = Homing(session.description, homing_joints(session.description, names))
+    _require_ready(session.description, session.newest(DEVICE_STATE))
+    events = session.node.subscribe(DEVICE_EVENTS, homing.on_event)
+    try:
+        name = tuple(joint.name for joint in homing.joints)
+        command(DeviceCommandRequest(command=DeviceCommandKind.HOME, name=name))
+        states = session.node.subscribe(DEVICE_STATE, homing.on_state)
+        try:
+            return _follow(session, homing, on_progress)
+        except KeyboardInterrupt:
+            command(DeviceCommandRequest(command=DeviceCommandKind.STOP))
+            session.wait_for(lambda: homing.is_over, BRAKING)
+            raise Interrupted(f"homing stopped by Ctrl-C; home: {', '.join(homing.homed) or 'none'}") from None
+        finally:
+            states.close()
+    finally:
+        events.close()
+        session.changed()
+
+
+def homing_joints(arm: Description, names: Iterable[str]) -> list[Joint]:
+    """The joints to home: those named, or all that have a switch; raises `BadArgument` or `Refused`."""
+    asked = []
+    for name in names:
+        if name not in arm.joint_names:
+            raise BadArgument(f'{arm.name} has no joint "{name}"{suggestion(name, arm.joint_names)}')
+        asked.append(arm.joint(name))
+    without = [joint.name for joint in asked if joint.drive.homing is None]
+    found = asked or [joint for joint in arm.joints if joint.drive.homing is not None]
+    if without or not found:
+        what = f'joint "{without[0]}" has' if without else "no joint has a switch:"
+        raise Refused(
+            f"{what} no [joint.homing] in robot.toml, so it cannot home: declare where it stands, arm.reference(...)",
+            check="homing",
+        )
+    return found
+
+
+def joint_name(arm: Description, name: str) -> str:
+    """The joint's name for what the device calls it; any other text is left as it is."""
+    return next((joint.name for joint in arm.joints if name in (joint.name, joint.wire_name)), name)
+
+
+def _require_ready(arm: Description, state: DeviceState) -> None:
+    """Raises with the remedy where homing cannot begin."""
+    if state.fault or state.mode in (DeviceMode.FAULT, DeviceMode.ESTOP):
+        about = fault_text(state.fault, joint_name(arm, state.fault_joint))
+        raise Refused(f"homing refused: {about or state.mode.name}", check="device", remedy="arm.device.reset()")
+    if not state.armed:
+        remedy = "arm.device.arm(), then arm.home()"
+        raise Refused(f"homing refused: the drivers are off: {remedy}", check="device", remedy=remedy)
+    if state.mode in (DeviceMode.RUN, DeviceMode.HOLD, DeviceMode.HOMING):
+        raise Refused(f"homing refused: the device is in {state.mode.name}: wait, or arm.stop()", check="device")
+
+
+def _follow(session: Session, homing: Homing, on_progress: Callable[[dict[str, str]], object] | None) -> HomingReport:
+    node = session.node
+    began = node.monotonic()
+    status, state = session.latest(DEVICE_STATUS), session.latest(DEVICE_STATE)
+    told: dict[str, str] = {}
+
+    def tell() -> None:
+        if on_progress is not None and told != homing.phases:
+            told.update(homing.phases)
+            on_progress(dict(homing.phases))
+
+    def trouble() -> str:
+        elapsed = node.monotonic() - began
+        if status.message is not None and not status.message.online and state.age() > OFFLINE:
+            return f"the device went offline: {status.message.reason}"
+        if state.age() > BRAKING:
+            return "the device has fallen silent"
+        if not homing.has_begun and elapsed > TO_BEGIN:
+            return "the device did not begin"
+        return f"it has not ended after {elapsed:.0f} s" if elapsed > homing.longest else ""
+
+    session.wait_for(lambda: homing.is_over or bool(trouble()), None, tell)
+    session.wait_for(lambda: homing.is_done or bool(homing.reason or trouble()), LAST_WORDS)
+    tell()
+    took = node.monotonic() - began
+    if homing.is_done:
+        return HomingReport(homing.homed, homing.steps_off, took)
+    missing = ", ".join(name for name in homing.phases if name not in homing.homed)
+    reason = homing.reason or trouble() or f"the device ended it without {missing}"
+    raise Aborted(f"homing ended after {took:.1f} s: {reason}", GoalStatusCode.ABORTED)
+
+
+def _phase_of(joint: Joint, velocity: float) -> str:
+    """What the joint does at `velocity` [steps/s]; empty where it stands, as it does at every turn."""
+    if abs(velocity) < 1.0 or joint.drive.homing is None:
+        return ""
+    towards = 1.0 if joint.drive.homing.direction is HomingDirection.UPPER else -1.0
+    return TO if math.copysign(1.0, velocity) == towards else OFF
+
+
+def _stopped_text(detail: str) -> str:
+    """Why the device broke off."""
+    if detail == "heartbeat":
+        return "the device heard nothing from stepper_gateway for too long and stopped: home again"
+    return "it was stopped; the joints that were not home yet are unreferenced: home again"

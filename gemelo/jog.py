@@ -1,0 +1,149 @@
+"""Moving by hand: jog commands and streamed targets. Both stop by themselves when nothing more is said."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+from msgspec.structs import replace
+
+from gemelo.errors import BadArgument, Interrupted, Lost, Refused
+from gemelo.session import Session
+from gemelo.targets import Joints, Vector, joint_state, named_joints, vector
+from schemas.device import DeviceEvent
+from schemas.joints import JointTargets
+from schemas.planning import JogCommand, JogStatus
+from schemas.topics import DEVICE_EVENTS, JOG, JOG_STATUS, JOINT_TARGETS
+from services.arm.description import Arm as Description
+
+PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
+ANSWER = 3.0  # [s] of jogging without a word of the planner, after which it counts as lost
+PAUSE = 0.5  # [s] without a command, after which the next one begins a new jog
+REST = 5.0  # [s] that the arm may take to come to rest
+FASTEST = 1.0  # [m/s] of the tool of a desktop arm
+FASTEST_TURN = math.pi  # [rad/s] of its tool
+
+
+class Jogging:
+    """One connection's commands, and what the planner says to them."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._began = self._said = -math.inf  # [s] monotonic, of this jog's first and last command
+
+    def say(self, command: JogCommand) -> JogStatus | None:
+        """Moves for 0.1 s; the planner's newest word on this jog. Raises `Refused` or `Lost`."""
+        now = time.monotonic()
+        newest = self._session.latest(JOG_STATUS)
+        if now - self._said > PAUSE:
+            self._began = now
+        self._said = now
+        node = self._session.node
+        node.publisher(JOG).put(replace(command, stamp=node.now()))
+        heard = newest.message if newest.age() < now - self._began else None
+        if heard is None and now - self._began > ANSWER:
+            raise Lost("the planner does not answer to jogging: is it running? `gemelo node list`")
+        if heard is not None and not heard.active and heard.limited_by and now - self._began > PERIOD:
+            raise Refused(f"refused: {heard.limited_by}", check="jog")
+        return heard
+
+    def hold(
+        self, command: JogCommand, duration: float, on_progress: Callable[[JogStatus], object] | None
+    ) -> JogStatus:
+        """Says it for `duration` [s], then waits until the arm rests; raises `Interrupted` at Ctrl-C, when it rests."""
+        end = time.monotonic() + duration
+        try:
+            while time.monotonic() < end:
+                status = self.say(command)
+                if status is not None and on_progress is not None:
+                    on_progress(status)
+                self._session.wait_for(lambda: False, min(PERIOD, max(0.0, end - time.monotonic())))
+        except KeyboardInterrupt:
+            self.rest()
+            raise Interrupted("jogging stopped by Ctrl-C") from None
+        return self.rest()
+
+    def rest(self) -> JogStatus:
+        """Waits until the planner leads no more; its last word."""
+        newest = self._session.latest(JOG_STATUS)
+        began = self._began
+
+        def is_at_rest() -> bool:
+            status = newest.message if newest.age() < time.monotonic() - began else None
+            return status is not None and not status.active
+
+        if not self._session.wait_for(is_at_rest, REST) or newest.message is None:
+            raise Lost(f"the planner does not say within {REST:g} s that the jog has ended")
+        self._session.changed()
+        if newest.message.limited_by and not newest.message.limits:
+            raise Refused(f"refused: {newest.message.limited_by}", check="jog")
+        return newest.message
+
+
+class Streaming:
+    """One connection's streamed targets. The gateway follows the newest, and brakes 0.5 s after the last."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._refused = ""  # why the gateway did not take the last target
+        self._said = -math.inf  # [s] monotonic
+
+    def say(self, joints: Joints) -> None:
+        """Raises `BadArgument`, or `Refused` where the gateway has refused the target before."""
+        arm = self._session.description
+        state = joint_state(arm, joints, "stream")
+        _require_within(arm, dict(zip(state.name, state.position, strict=True)))
+        self._session.latest(DEVICE_EVENTS, self._on_event)
+        node = self._session.node
+        self._said = time.monotonic()
+        reason, self._refused = self._refused, ""
+        if reason:
+            raise Refused(f"refused: {reason}", check="stream")
+        node.publisher(JOINT_TARGETS).put(JointTargets(stamp=node.now(), name=state.name, position=state.position))
+        self._session.changed()
+
+    def _on_event(self, event: DeviceEvent) -> None:
+        """Only of the stream that runs: events of before may come late."""
+        if event.event == "target_refused" and time.monotonic() - self._said < PAUSE:
+            self._refused = event.detail
+
+
+def jog_command(arm: Description, joints: Joints | None, twist: Vector | None, frame: str) -> JogCommand:
+    """The command; raises `BadArgument` for what cannot be meant."""
+    if (joints is None) == (twist is None):
+        raise BadArgument("jog by one of joints= (speeds by name) and twist= (speed of the tool)")
+    if joints is not None:
+        speeds = named_joints(arm, joints, "joints")
+        for name, speed in speeds.items():
+            _require_speed(f'joint "{name}"', speed, arm.joint(name).unit, arm.joint(name).velocity)
+        return JogCommand(name=tuple(speeds), velocity=tuple(speeds.values()))
+    values = tuple(twist or ())
+    if len(values) not in (3, 6):
+        raise BadArgument(f"twist= takes 3 numbers (m/s) or 6 (m/s and rad/s), not {len(values)}")
+    values = vector("twist", values, len(values), "m/s, rad/s")
+    for index, value in enumerate(values):
+        _require_speed("twist", value, *(("m", FASTEST) if index < 3 else ("rad", FASTEST_TURN)))
+    if frame not in ("", arm.base_frame, arm.tool_frame):
+        raise BadArgument(f'frame="{frame}": a twist is along the axes of {arm.base_frame} or {arm.tool_frame}')
+    in_tool = arm.tool_frame if frame == arm.tool_frame else ""
+    return JogCommand(linear=values[:3], angular=values[3:], frame=in_tool)
+
+
+def _require_speed(owner: str, value: float, unit: str, most: float) -> None:
+    """Refuses a speed that is more than twice `most` as it stands, and not so in degrees or millimetres."""
+    helper = "deg" if unit == "rad" else "mm"
+    factor = math.radians(1.0) if unit == "rad" else 0.001
+    if abs(value) > 2.0 * most and abs(value) * factor <= 2.0 * most:
+        hint = f"if it is in {helper}/s, write gemelo.{helper}({value:g})"
+        raise BadArgument(f"{owner}: {value:g} {unit}/s is far beyond {most:.3g} {unit}/s: {hint}")
+
+
+def _require_within(arm: Description, values: dict[str, float]) -> None:
+    for name, value in values.items():
+        joint = arm.joint(name)
+        if not joint.is_within(value):
+            raise BadArgument(
+                f'joint "{name}": {value:g} {joint.unit} is beyond its limits, {joint.lower:.4g} to {joint.upper:.4g}; '
+                f"nearest that can: {joint.clamp(value):.4g}"
+            )

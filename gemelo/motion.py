@@ -1,0 +1,227 @@
+"""A motion under way: how far it is, how it ended, and the rule that no motion runs unwatched."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from gemelo.errors import Aborted, Canceled, Interrupted, Lost, Refused
+from gemelo.planning import Plan, words_of
+from gemelo.session import Session
+from schemas.actions import GoalStatusCode
+from schemas.motion import (
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
+    JointTolerance,
+)
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY
+from services.runtime import errors as runtime
+from services.runtime.actions import ActionClient, GoalHandle
+
+Handle = GoalHandle[FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
+Client = ActionClient[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
+
+BRAKING = 10.0  # [s] that a cancelled motion may take to come to rest before it counts as lost
+
+
+class Motion:
+    """One plan that is being executed, or was.
+
+    >>> motion = arm.start(named="left")
+    >>> motion.wait()
+    <Motion rm1: named='left', succeeded ...>
+    """
+
+    def __init__(self, session: Session, plan: Plan, detached: bool) -> None:
+        self.plan = plan
+        self.is_detached = detached  # it goes on when this script ends
+        self._session = session
+        self._handle: Handle | None = None
+        self._wants_cancel = False
+
+    @property
+    def feedback(self) -> FollowJointTrajectoryFeedback | None:
+        """What the gateway says 20 times a second: desired, actual, error; None before the first.
+
+        >>> motion = arm.move(named="left")
+        >>> motion.feedback.joint_names == arm.joint_names
+        True
+        """
+        return self._handle.feedback if self._handle is not None else None
+
+    @property
+    def progress(self) -> float:
+        """The share of the trajectory's time that is over, 0 to 1.
+
+        >>> arm.move(named="left").progress
+        1.0
+        """
+        if self.status is GoalStatusCode.SUCCEEDED:
+            return 1.0
+        return min(1.0, self.elapsed / self.plan.duration) if self.plan.duration > 0.0 else 0.0
+
+    @property
+    def elapsed(self) -> float:
+        """[s] along the trajectory.
+
+        >>> motion = arm.move(named="left")
+        >>> 0.0 < motion.elapsed <= motion.plan.duration
+        True
+        """
+        return self.feedback.elapsed if self.feedback is not None else 0.0
+
+    @property
+    def status(self) -> GoalStatusCode:
+        """ACCEPTED, EXECUTING, CANCELING, or how it ended: SUCCEEDED, CANCELED, ABORTED, PREEMPTED.
+
+        >>> arm.move(named="left").status.name
+        'SUCCEEDED'
+        """
+        return self._handle.status if self._handle is not None else GoalStatusCode.UNKNOWN
+
+    @property
+    def is_over(self) -> bool:
+        """True once it has ended, or the gateway is lost.
+
+        >>> arm.move(named="left").is_over
+        True
+        """
+        return self._handle is not None and self._handle.is_over
+
+    @property
+    def result(self) -> FollowJointTrajectoryResult | None:
+        """How exactly it arrived: commanded and executed steps, final and largest following error; None before its end.
+
+        >>> result = arm.move(named="left").result
+        >>> result.executed_steps == result.commanded_steps, max(map(abs, result.final_error)) <= 0.5
+        (True, True)
+        """
+        outcome = self._handle.outcome if self._handle is not None else None
+        return outcome.result if outcome is not None else None
+
+    @property
+    def stopped_at(self) -> dict[str, float]:
+        """[rad] or [m] by joint, where it ended, from the steps that were read back; empty before its end.
+
+        >>> abs(arm.move(joints={"brazo_joint": 0.2}).stopped_at["brazo_joint"] - 0.2) < 0.001
+        True
+        """
+        result, arm = self.result or FollowJointTrajectoryResult(), self._session.description
+        steps = zip(result.joint_names, result.executed_steps, strict=False)
+        return {name: arm.joint(name).steps.to_position(count) for name, count in steps}
+
+    def cancel(self) -> None:
+        """The arm decelerates on its path; returns at once, `wait` returns when it rests.
+
+        >>> motion = arm.start(named="left", speed=0.2)
+        >>> motion.cancel()
+        >>> motion.wait().status.name
+        'CANCELED'
+        """
+        self._wants_cancel = True
+        if self._handle is not None:
+            self._handle.cancel()
+
+    def wait(self, timeout: float | None = None, on_progress: Callable[[Motion], object] | None = None) -> Motion:
+        """Returns the motion when it has succeeded, or was cancelled by `cancel`; calls `on_progress` in between.
+
+        Raises `Aborted`, `Canceled`, `Lost`, and TimeoutError after `timeout` [s]: then it goes on. At Ctrl-C the arm
+        decelerates, and `Interrupted` is raised when it rests.
+
+        >>> arm.start(named="left").wait(timeout=60.0).status.name
+        'SUCCEEDED'
+        """
+        try:
+            is_over = self._await(timeout, on_progress)
+        except KeyboardInterrupt:
+            raise self._interrupted() from None
+        if not is_over:
+            raise TimeoutError(f"the motion has not ended within {timeout:g} s; it goes on: wait() again, or cancel()")
+        self._session.changed()
+        return self._ended()
+
+    def _send(self, client: Client, goal: FollowJointTrajectoryGoal) -> None:
+        """Raises `Refused` with the gateway's reason, or `Lost`. Called once, by `start`."""
+        try:
+            self._handle = client.send(goal, lambda feedback: self._session.notify(), attached=not self.is_detached)
+        except runtime.GoalRefused as error:
+            raise Refused(f"refused by {client.action.server}: {error}", check="execution", code=error.code) from error
+        except runtime.Refused as error:
+            raise Refused(str(error)) from error
+        except (runtime.NoAnswer, runtime.BusError) as error:
+            raise Lost(str(error)) from error
+        self._handle.on_end = self._session.notify
+
+    def _await(self, timeout: float | None, on_progress: Callable[[Motion], object] | None) -> bool:
+        told: list[Any] = [None]
+
+        def tell() -> None:
+            if on_progress is not None and self.feedback is not told[0]:
+                told[0] = self.feedback
+                on_progress(self)
+
+        return self._session.wait_for(lambda: self.is_over, timeout, tell)
+
+    def _interrupted(self) -> Interrupted:
+        """Decelerates and waits for the rest; a second Ctrl-C leaves this at once."""
+        self._session.node.log.warning("Ctrl-C: the arm slows down on its path (again: leave without waiting)")
+        self.cancel()
+        if not self._session.wait_for(lambda: self.is_over, BRAKING):
+            return Interrupted(f"the arm was told to stop, but did not say within {BRAKING:g} s that it rests")
+        self._session.changed()
+        return Interrupted(f"stopped by Ctrl-C: {self!r}", self.stopped_at)
+
+    def _ended(self) -> Motion:
+        handle = self._handle
+        assert handle is not None
+        if handle.outcome is None:
+            raise Lost(str(handle.lost))
+        status, result = handle.outcome.status, handle.outcome.result
+        if status is GoalStatusCode.SUCCEEDED or (status is GoalStatusCode.CANCELED and self._wants_cancel):
+            return self
+        kind = Canceled if status is GoalStatusCode.CANCELED else Aborted
+        reason = f"{status.name.lower()} after {result.duration:.2f} s: {result.error_string or 'no reason was given'}"
+        raise kind(reason, status, result.error_code, self.stopped_at)
+
+    def __repr__(self) -> str:
+        about = f"<Motion {self.plan.robot}: {words_of(self.plan.target)}, {self.status.name.lower()}"
+        result = self.result
+        if result is None:
+            return f"{about}, {self.progress:.0%}>"
+        errors = ", ".join(
+            f"{name} {error:+.2f}" for name, error in zip(result.joint_names, result.final_error, strict=False)
+        )
+        return f"{about} in {result.duration:.2f} s, final error [steps] {errors}>"
+
+
+class Motions:
+    """All motions of one connection: sends them, and cancels those that are attached when it closes."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._client: Client | None = None
+        self._started: list[Motion] = []
+
+    def start(self, plan: Plan, detached: bool, tolerance: tuple[JointTolerance, ...] = ()) -> Motion:
+        """Sends the plan's trajectory; raises `Refused` or `Lost`."""
+        client = self._client = self._client or self._session.node.action(FOLLOW_JOINT_TRAJECTORY)
+        motion = Motion(self._session, plan, detached)
+        self._started = [each for each in self._started if not each.is_over] + [motion]
+        goal = FollowJointTrajectoryGoal(
+            trajectory=plan.trajectory, goal_tolerance=tolerance, scene_version=plan.response.scene_version
+        )
+        try:
+            motion._send(client, goal)
+        except BaseException:
+            self._started.remove(motion)
+            raise
+        return motion
+
+    def cancel_attached(self) -> None:
+        """Decelerates what this connection has started and nobody waits for, and waits until it rests."""
+        running = [motion for motion in self._started if not motion.is_detached and not motion.is_over]
+        for motion in running:
+            motion.cancel()
+        if running:
+            self._session.wait_for(lambda: all(motion.is_over for motion in running), BRAKING)

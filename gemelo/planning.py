@@ -1,0 +1,275 @@
+"""Plans: asked of the planner, shown while they are made, cancelled by Ctrl-C, and refused with the nearest goal.
+
+With `targets` the only place that knows the planner's messages.
+"""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+
+import msgspec
+from msgspec.structs import replace
+
+from gemelo.errors import Error, Interrupted, Lost, Refused
+from gemelo.frames import pose_from
+from gemelo.session import Session
+from gemelo.targets import Joints, LookUp, Target, ToolGoal, as_target, ik_request, named_joints, request_of
+from gemelo.units import Pose
+from schemas.motion import JointTrajectory
+from schemas.planning import (
+    FkRequest,
+    JointGoal,
+    PlanCancel,
+    PlanProgress,
+    PlanRequest,
+    PlanResponse,
+    PoseGoal,
+    Refusal,
+    StepMargin,
+)
+from schemas.topics import FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS
+from services.arm.description import Arm as Description
+
+MARGIN = 2.0  # [s] that a planner may take beyond its allowed time before it counts as gone
+TO_CANCEL = 0.5  # [s] for its answer to a cancel
+KINEMATICS = 10.0  # [s] for ik and fk
+
+OnPlanProgress = Callable[[PlanProgress], object]
+
+
+@dataclass(frozen=True, repr=False)
+class Plan:
+    """A verified trajectory that has not been executed, and what is known of it.
+
+    >>> plan = arm.plan(named="left")
+    >>> plan
+    <Plan rm1: named='left', ... s>
+    >>> plan.duration > 0.0, plan.end["brazo_joint"] == plan.trajectory.points[-1].positions[0]
+    (True, True)
+    """
+
+    robot: str
+    target: Target  # the arguments that it was made of
+    response: PlanResponse  # everything that the planner has said
+
+    @property
+    def duration(self) -> float:
+        """[s] that it takes at full speed.
+
+        >>> 0.1 < arm.plan(named="left").duration < 60.0
+        True
+        """
+        return self.response.duration
+
+    @property
+    def trajectory(self) -> JointTrajectory:
+        """Timed points: positions, velocities and accelerations of all joints.
+
+        >>> arm.plan(named="left").trajectory.joint_names == arm.joint_names
+        True
+        """
+        return self.response.trajectory
+
+    @property
+    def margins(self) -> dict[str, StepMargin]:
+        """By joint, how near it comes to what its stepper can do; `share` 1 is all.
+
+        >>> all(0.0 <= margin.share <= 1.0 for margin in arm.plan(named="left").margins.values())
+        True
+        """
+        return {margin.name: margin for margin in self.response.margins}
+
+    @property
+    def end(self) -> dict[str, float]:
+        """Joint values [rad] or [m] where it ends: `arm.plan(from_joints=plan.end, ...)` goes on from there.
+
+        >>> arm.plan(named="home", from_joints=arm.plan(named="left").end).duration > 0.0
+        True
+        """
+        last = self.trajectory.points[-1].positions
+        return dict(zip(self.trajectory.joint_names, last, strict=True))
+
+    @property
+    def planner(self) -> str:
+        """The planner that found the path.
+
+        >>> arm.plan(named="left").planner
+        'straight'
+        """
+        return self.response.planner_id
+
+    @property
+    def planning_time(self) -> float:
+        """[s] that the planner took.
+
+        >>> arm.plan(named="left").planning_time < 5.0
+        True
+        """
+        return self.response.planning_time
+
+    def save(self, path: str) -> None:
+        """Writes it as JSON, for `Plan.load`.
+
+        >>> arm.plan(named="left").save(folder + "/plan.json")
+        """
+        with open(path, "wb") as file:
+            file.write(
+                msgspec.json.encode({"robot": self.robot, "target": _plain(self.target), "response": self.response})
+            )
+
+    @classmethod
+    def load(cls, path: str) -> Plan:
+        """A plan that was saved; raises `gemelo.Error` where the file holds none.
+
+        >>> arm.plan(named="left").save(folder + "/plan.json")
+        >>> gemelo.Plan.load(folder + "/plan.json")
+        <Plan rm1: named='left', ... s>
+        """
+        try:
+            with open(path, "rb") as file:
+                saved = msgspec.json.decode(file.read(), type=SavedPlan)
+        except (OSError, msgspec.MsgspecError) as error:
+            raise Error(f"{path} holds no plan: {error}") from error
+        return cls(saved.robot, Target(**saved.target), saved.response)  # type: ignore[typeddict-item]
+
+    def __repr__(self) -> str:
+        return f"<Plan {self.robot}: {words_of(self.target)}, {self.duration:.2f} s>"
+
+
+class SavedPlan(msgspec.Struct, frozen=True, kw_only=True):
+    """The file that `Plan.save` writes."""
+
+    robot: str
+    target: dict[str, object]
+    response: PlanResponse
+
+
+def make_plan(session: Session, target: Target, look_up: LookUp, on_progress: OnPlanProgress | None = None) -> Plan:
+    """A verified trajectory; raises `Refused`, `BadArgument` or `Lost`. Ctrl-C ends it, and nothing moves."""
+    request = replace(request_of(session.description, target, look_up), request_id=uuid.uuid4().hex)
+    response = _ask(session, request, on_progress)
+    if response.refusal is not None:
+        raise refused(session.description, response.refusal, request, target, response.code)
+    if not response.trajectory.points:
+        raise Refused(f"the planner answered {response.code.name} without a trajectory", code=response.code)
+    return Plan(session.description.name, target, response)
+
+
+def find_configurations(
+    session: Session, target: ToolGoal, look_up: LookUp, near: Joints | None, solutions: int, touching: bool
+) -> list[dict[str, float]]:
+    """Joint values [rad] or [m] that bring the tool there, the nearest first; raises `Refused`."""
+    request = ik_request(session.description, target, look_up, near, solutions, touching)
+    response = session.call(IK, request, KINEMATICS)
+    if response.refusal is not None:
+        raise refused(
+            session.description, response.refusal, PlanRequest(goal=request.goal), as_target(target), response.code
+        )
+    return [dict(zip(response.name, found.position, strict=True)) for found in response.solutions]
+
+
+def find_poses(session: Session, joints: Joints | None, links: tuple[str, ...]) -> dict[str, Pose]:
+    """By link, its pose in the base frame for joint values; joints that are not named stand as they do now."""
+    values = named_joints(session.description, joints, "joints") if joints is not None else {}
+    request = FkRequest(name=tuple(values), position=tuple(values.values()), links=links)
+    response = session.call(FK, request, KINEMATICS)
+    if response.refusal is not None:
+        raise refused(session.description, response.refusal, PlanRequest(), Target(), response.code)
+    return {link: pose_from(pose) for link, pose in zip(response.links, response.poses, strict=True)}
+
+
+def refused(arm: Description, refusal: Refusal, request: PlanRequest, target: Target, code: int) -> Refused:
+    """The refusal as an exception, with the nearest goal as arguments."""
+    nearest = _nearest(arm, refusal, request, target)
+    about = f"refused ({refusal.check})" if refusal.check else "refused"
+    hint = f"nearest that can: {words_of(nearest)}" if nearest else refusal.remedy
+    return Refused(
+        f"{about}: {refusal.message}{f'; {hint}' if hint else ''}",
+        check=refusal.check,
+        subject=refusal.subject,
+        value=refusal.value,
+        limit=refusal.limit,
+        nearest=nearest,
+        remedy=refusal.remedy,
+        configuration=_by_joint(arm, refusal.posture),
+        way_out=_by_joint(arm, refusal.way_out),
+        code=code,
+    )
+
+
+def words_of(target: Mapping[str, object]) -> str:
+    """The arguments as they would be written, numbers rounded to 0.1 mm."""
+    return ", ".join(f"{name}={_short(value)}" for name, value in target.items())
+
+
+def _nearest(arm: Description, refusal: Refusal, request: PlanRequest, target: Target) -> Target:
+    """The nearest goal that can, in the form of the target; empty where there is none."""
+    values, goal = refusal.nearest, request.goal
+    sizes = (3, 6, 7) if isinstance(goal, PoseGoal) else (len(arm.joints), len(getattr(goal, "name", ())))
+    if refusal.check in NOT_THE_GOAL or len(values) not in sizes:
+        return Target()
+    kept = {name: value for name, value in target.items() if name not in GOALS}
+    if isinstance(goal, PoseGoal):
+        found: dict[str, object] = {"position": tuple(round(value, 6) for value in values[:3])}
+        if values[3:]:
+            found["along" if goal.tool_axis else "orientation"] = values[3:]
+        return Target(**{**kept, **found})  # type: ignore[typeddict-item]
+    names = goal.name if isinstance(goal, JointGoal) and len(goal.name) == len(values) else arm.joint_names
+    return Target(**{**kept, "joints": dict(zip(names, values, strict=False))})  # type: ignore[typeddict-item]
+
+
+NOT_THE_GOAL = ("start state",)  # checks whose nearest value is of something else
+GOALS = ("named", "joints", "position", "orientation", "rpy", "pose", "offset", "along")
+
+
+def _by_joint(arm: Description, values: tuple[float, ...]) -> dict[str, float]:
+    return dict(zip(arm.joint_names, values, strict=True)) if values else {}
+
+
+def _short(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}" if abs(value) < 1e-4 else f"{value:.4f}".rstrip("0").rstrip(".")
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{name!r}: {_short(each)}" for name, each in value.items()) + "}"
+    if isinstance(value, tuple | list):
+        return "(" + ", ".join(_short(each) for each in value) + ")"
+    return repr(value)
+
+
+def _plain(target: Target) -> dict[str, object]:
+    """What JSON can hold of it."""
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in target.items()}
+
+
+def _ask(session: Session, request: PlanRequest, on_progress: OnPlanProgress | None) -> PlanResponse:
+    heard: list[PlanProgress] = []
+
+    def show(progress: PlanProgress) -> None:
+        if progress.request_id == request.request_id:
+            heard.append(progress)
+
+    def tell() -> None:
+        while heard and on_progress is not None:
+            on_progress(heard.pop(0))
+
+    shown = session.node.subscribe(PLAN_PROGRESS, show) if on_progress is not None else None
+    try:
+        return session.call(PLAN, request, request.allowed_time + MARGIN, tell if on_progress is not None else None)
+    except Lost:
+        _cancel(session, request)  # it may be waiting behind the plans of others
+        raise
+    except KeyboardInterrupt:
+        _cancel(session, request)
+        raise Interrupted("the plan was cancelled: nothing moves") from None
+    finally:
+        if shown is not None:
+            shown.close()
+
+
+def _cancel(session: Session, request: PlanRequest) -> None:
+    """A planner that cannot be cancelled is left to its allowed time."""
+    with suppress(Lost, Refused):
+        session.call(PLAN_CANCEL, PlanCancel(request_id=request.request_id), TO_CANCEL)

@@ -1,0 +1,346 @@
+"""The planning scene: what stands around the arm, what it carries, and what may touch what."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import msgspec
+
+from gemelo.errors import BadArgument, Error, Refused
+from gemelo.session import PATIENCE, Session
+from gemelo.targets import Vector, number, point, quaternion, vector
+from schemas.frames import Transform
+from schemas.scene import (
+    AllowedPair,
+    BoxShape,
+    CylinderShape,
+    MeshShape,
+    PlaneShape,
+    PlanningScene,
+    SceneAction,
+    SceneObject,
+    SceneRequest,
+    Shape,
+    SphereShape,
+)
+from schemas.topics import SCENE, SCENE_EDIT
+from services.runtime.deployment import project_root
+
+TO_ANSWER = 10.0  # [s] a mesh of many triangles takes the planner some
+LARGEST_MESH = 10.0  # [m]; what is larger was drawn in mm
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+class Scene:
+    """What stands around the arm; every plan keeps clear of it. Places are in metres, in the base frame if not said.
+
+    >>> arm.scene.add_box("post", size=(0.04, 0.04, 0.16), at=(0.29, 0.27, 0.08))
+    >>> sorted(arm.scene.objects)
+    ['post']
+    >>> arm.scene.clear()
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._version = 0  # of the last edit
+
+    def add_box(
+        self,
+        name: str,
+        size: Vector,
+        at: Vector = ORIGIN,
+        orientation: Vector = UPRIGHT,
+        *,
+        frame: str = "",
+        attach: bool = False,
+        touch: Iterable[str] = (),
+        padding: float = 0.0,
+    ) -> None:
+        """A box of edges `size` (3,) [m] around `at` (3,) [m] in `frame`; one of that name is replaced.
+
+        `orientation`: quaternion (x, y, z, w). `attach`: the link `frame` carries it, and it may touch the links
+        `touch`. `padding` [m] is kept around it.
+
+        >>> arm.scene.add_box("table", size=(0.6, 0.4, 0.02), at=(0.3, 0.0, -0.05))
+        >>> arm.scene.remove("table")
+        """
+        shape = BoxShape(size=vector("size", size, 3, "whole edges in m"))
+        self._add(name, shape, at, orientation, frame, attach, touch, padding)
+
+    def add_sphere(
+        self,
+        name: str,
+        radius: float,
+        at: Vector = ORIGIN,
+        *,
+        frame: str = "",
+        attach: bool = False,
+        touch: Iterable[str] = (),
+        padding: float = 0.0,
+    ) -> None:
+        """A sphere of `radius` [m] around `at` (3,) [m]; the rest as in `add_box`.
+
+        >>> arm.scene.add_sphere("ball", radius=0.03, at=(0.3, 0.25, 0.1))
+        >>> arm.scene.remove("ball")
+        """
+        self._add(name, SphereShape(radius=number("radius", radius)), at, UPRIGHT, frame, attach, touch, padding)
+
+    def add_cylinder(
+        self,
+        name: str,
+        radius: float,
+        length: float,
+        at: Vector = ORIGIN,
+        orientation: Vector = UPRIGHT,
+        *,
+        frame: str = "",
+        attach: bool = False,
+        touch: Iterable[str] = (),
+        padding: float = 0.0,
+    ) -> None:
+        """A cylinder of `radius` and `length` [m] along z around `at` (3,) [m]; the rest as in `add_box`.
+
+        >>> arm.scene.add_cylinder("cup", radius=0.01, length=0.02, at=(0.2, 0.3, 0.04))
+        >>> arm.scene.remove("cup")
+        """
+        shape = CylinderShape(radius=number("radius", radius), length=number("length", length))
+        self._add(name, shape, at, orientation, frame, attach, touch, padding)
+
+    def add_plane(
+        self, name: str, at: Vector = ORIGIN, orientation: Vector = UPRIGHT, *, frame: str = "", padding: float = 0.0
+    ) -> None:
+        """All that lies below z = 0 of the pose (`at` [m], `orientation`) is solid.
+
+        >>> arm.scene.add_plane("floor", at=(0.0, 0.0, -0.1))
+        >>> arm.scene.remove("floor")
+        """
+        self._add(name, PlaneShape(), at, orientation, frame, False, (), padding)
+
+    def add_mesh(
+        self,
+        name: str,
+        path: str | Path,
+        at: Vector = ORIGIN,
+        orientation: Vector = UPRIGHT,
+        *,
+        scale: float = 1.0,
+        frame: str = "",
+        attach: bool = False,
+        touch: Iterable[str] = (),
+        padding: float = 0.0,
+    ) -> None:
+        """The STL file `path`, `scale` metres to its unit (0.001 where it is drawn in mm); the rest as in `add_box`.
+
+        >>> arm.scene.add_mesh("vice", "tests/gemelo/wedge.stl", at=(0.0, 0.5, 0.0), scale=0.001)
+        >>> arm.scene.remove("vice")
+        """
+        self._add(name, mesh_of(Path(path), scale), at, orientation, frame, attach, touch, padding)
+
+    def remove(self, name: str) -> None:
+        """Takes an object away; `Refused` where there is none of that name.
+
+        >>> arm.scene.add_sphere("ball", radius=0.03, at=(0.3, 0.25, 0.1))
+        >>> arm.scene.remove("ball")
+        """
+        self._edit(SceneRequest(action=SceneAction.REMOVE, name=name))
+
+    def move(self, name: str, at: Vector, orientation: Vector = UPRIGHT, *, frame: str = "") -> None:
+        """Puts an object elsewhere: `at` (3,) [m], turned by `orientation`, in `frame` as it is now.
+
+        >>> arm.scene.add_sphere("ball", radius=0.03, at=(0.3, 0.25, 0.1))
+        >>> arm.scene.move("ball", at=(0.3, 0.3, 0.1))
+        >>> arm.scene.objects["ball"].pose.translation
+        (0.3, 0.3, 0.1)
+        >>> arm.scene.remove("ball")
+        """
+        place = SceneObject(pose=_pose(at, orientation), frame=frame)
+        self._edit(SceneRequest(action=SceneAction.MOVE, name=name, object=place))
+
+    def resize(self, name: str, shape: Shape) -> None:
+        """Gives an object another shape: `schemas.scene.BoxShape(size=...)` and its kin.
+
+        >>> from schemas.scene import SphereShape
+        >>> arm.scene.add_sphere("ball", radius=0.03, at=(0.3, 0.25, 0.1))
+        >>> arm.scene.resize("ball", SphereShape(radius=0.02))
+        >>> arm.scene.remove("ball")
+        """
+        self._edit(SceneRequest(action=SceneAction.RESIZE, name=name, object=SceneObject(shape=shape)))
+
+    def attach(self, name: str, to: str, touch: Iterable[str] = ()) -> None:
+        """From now on the link `to` carries the object, from where it is; it may touch the links `touch` too.
+
+        >>> arm.scene.add_sphere("ball", radius=0.01, at=arm.pose().offset(z=-0.03).position)
+        >>> arm.scene.attach("ball", to=arm.tool_frame)
+        >>> arm.scene.objects["ball"].attached
+        True
+        >>> arm.scene.remove("ball")
+        """
+        place = SceneObject(frame=to, touch_links=tuple(touch))
+        self._edit(SceneRequest(action=SceneAction.ATTACH, name=name, object=place))
+
+    def detach(self, name: str) -> None:
+        """Leaves a carried object where it is.
+
+        >>> arm.scene.add_sphere("ball", radius=0.01, at=(0.0, 0.0, -0.03), frame=arm.tool_frame, attach=True)
+        >>> arm.scene.detach("ball")
+        >>> arm.scene.objects["ball"].attached
+        False
+        >>> arm.scene.remove("ball")
+        """
+        self._edit(SceneRequest(action=SceneAction.DETACH, name=name))
+
+    def allow(self, first: str, second: str) -> None:
+        """Lets two links or objects touch; "*" is any.
+
+        >>> arm.scene.add_sphere("ball", radius=0.03, at=(0.3, 0.25, 0.1))
+        >>> arm.scene.allow("ball", "efector_link")
+        >>> [(pair.first, pair.second) for pair in arm.scene.present.allowed]
+        [('ball', 'efector_link')]
+        >>> arm.scene.remove("ball")
+        """
+        self._edit(SceneRequest(action=SceneAction.ALLOW, pair=AllowedPair(first=first, second=second)))
+
+    def disallow(self, first: str, second: str) -> None:
+        """Takes an `allow` back.
+
+        >>> arm.scene.add_sphere("ball", radius=0.03, at=(0.3, 0.25, 0.1))
+        >>> arm.scene.allow("ball", "*")
+        >>> arm.scene.disallow("ball", "*")
+        >>> arm.scene.present.allowed
+        ()
+        >>> arm.scene.remove("ball")
+        """
+        self._edit(SceneRequest(action=SceneAction.DISALLOW, pair=AllowedPair(first=first, second=second)))
+
+    def clear(self) -> None:
+        """Takes everything away.
+
+        >>> arm.scene.clear()
+        >>> arm.scene.objects
+        {}
+        """
+        self._edit(SceneRequest(action=SceneAction.CLEAR))
+
+    def replace(self, scene: PlanningScene) -> None:
+        """The whole scene at once.
+
+        >>> before = arm.scene.present
+        >>> arm.scene.clear()
+        >>> arm.scene.replace(before)
+        """
+        self._edit(SceneRequest(action=SceneAction.REPLACE, scene=scene))
+
+    @contextmanager
+    def restored(self) -> Iterator[None]:
+        """Leaves the scene as it was found when the block ends, however it ends.
+
+        >>> with arm.scene.restored():
+        ...     arm.scene.add_sphere("ball", radius=0.03, at=(0.3, 0.25, 0.1))
+        >>> arm.scene.objects
+        {}
+        """
+        found = self.present
+        try:
+            yield
+        finally:
+            self.replace(found)
+
+    @property
+    def present(self) -> PlanningScene:
+        """The scene as it is now, every edit of this script included.
+
+        >>> arm.scene.present.version > 0
+        True
+        """
+        latest = self._session.latest(SCENE)
+        self._session.wait_for(lambda: latest.message is not None and latest.message.version >= self._version, PATIENCE)
+        return self._session.newest(SCENE)
+
+    @property
+    def objects(self) -> dict[str, SceneObject]:
+        """All objects, by name.
+
+        >>> arm.scene.objects
+        {}
+        """
+        return {item.name: item for item in self.present.objects}
+
+    def save(self, path: str | Path) -> None:
+        """Writes the scene as JSON, for `load` and `gemelo scene load`.
+
+        >>> arm.scene.save(folder + "/cell.json")
+        """
+        Path(path).write_bytes(msgspec.json.format(msgspec.json.encode(self.present)) + b"\n")
+
+    def load(self, path: str | Path) -> None:
+        """Replaces the scene by a file's.
+
+        >>> arm.scene.save(folder + "/cell.json")
+        >>> arm.scene.load(folder + "/cell.json")
+        """
+        try:
+            self.replace(msgspec.json.decode(Path(path).read_bytes(), type=PlanningScene))
+        except (OSError, ValueError) as error:
+            raise Error(f"{path} holds no scene: {error}") from error
+
+    def _add(
+        self,
+        name: str,
+        shape: Shape,
+        at: Vector,
+        orientation: Vector,
+        frame: str,
+        attach: bool,
+        touch: Iterable[str],
+        padding: float,
+    ) -> None:
+        if attach and not frame:
+            raise BadArgument("attach=True needs frame=, the link that carries the object")
+        item = SceneObject(
+            name=name,
+            shape=shape,
+            pose=_pose(at, orientation),
+            frame=frame,
+            attached=attach,
+            touch_links=tuple(touch),
+            padding=number("padding", padding),
+        )
+        self._edit(SceneRequest(action=SceneAction.ADD, object=item))
+
+    def _edit(self, request: SceneRequest) -> None:
+        response = self._session.call(SCENE_EDIT, request, TO_ANSWER)
+        if not response.accepted:
+            raise Refused(f"refused: {response.reason}", check="scene", subject=request.name or request.object.name)
+        self._version = response.version
+
+
+def mesh_of(path: Path, scale: float) -> MeshShape:
+    """By its path where it lies in the project, as every process finds it there; else by its content."""
+    if not path.is_file():
+        raise BadArgument(f'there is no file "{path}"')
+    content = path.read_bytes()
+    _require_size(path, content, number("scale", scale))
+    inside = path.resolve()
+    if inside.is_relative_to(project_root()):
+        return MeshShape(path=str(inside.relative_to(project_root())), scale=(scale,) * 3)
+    return MeshShape(data=content, scale=(scale,) * 3)
+
+
+def _require_size(path: Path, content: bytes, scale: float) -> None:
+    """Refuses what is far too large; what is no mesh at all the planner says."""
+    from services.arm.stl import BadMesh, read_stl  # numpy takes half of the time of `import gemelo`
+
+    try:
+        vertices = read_stl(content).vertices
+    except BadMesh:
+        return
+    longest = scale * float((vertices.max(axis=0) - vertices.min(axis=0)).max())
+    if longest > LARGEST_MESH:
+        raise BadArgument(f'"{path}" would be {longest:.4g} m long: if it is drawn in mm, give scale=0.001')
+
+
+def _pose(at: Vector, orientation: Vector) -> Transform:
+    return Transform(translation=point("at", at), rotation=quaternion("orientation", orientation))

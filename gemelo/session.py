@@ -1,0 +1,154 @@
+"""One script's connection: a node whose loop runs in a thread of its own, so that what is asked is always fresh."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import threading
+import time
+from collections.abc import Callable
+from itertools import count
+from typing import Any, TypeVar
+
+from gemelo.errors import Error, Lost, Refused
+from schemas.deployment import Deployment
+from schemas.message import Message
+from schemas.topics import Request, Topic
+from services.arm.description import Arm as Description
+from services.runtime import errors as runtime
+from services.runtime.node import Node
+from services.runtime.topics import Latest
+
+M = TypeVar("M", bound=Message)
+Q = TypeVar("Q", bound=Message)
+R = TypeVar("R", bound=Message)
+
+PATIENCE = 2.0  # [s] for the first message of a topic, and for one that is late
+IDLE_RATE = 1.0  # [Hz] of the thread's own step, which does nothing: messages wake it
+CLOSING = 1.0  # [s] that the thread may take to end
+_numbers = count(1)
+
+
+class Session:
+    """The node, its thread, and the newest message of every topic that was asked for. Any thread may use it."""
+
+    def __init__(self, deployment: Deployment, description: Description, name: str = "") -> None:
+        """Raises `Lost` where the bus cannot be used."""
+        self.deployment, self.description = deployment, description
+        self.news = threading.Condition()  # notified after every message that was handled
+        self._latest: dict[str, Latest[Any]] = {}
+        self._changed = 0.0  # [s] monotonic: what is asked from now on must have been heard after this
+        self._pid = os.getpid()
+        self._failure: BaseException | None = None
+        try:
+            self._node = Node(name or _node_name(), deployment, robot=description.name, log_level="warning")
+        except runtime.BusError as error:
+            raise Lost(str(error)) from error
+        self._thread = threading.Thread(target=self._run, name=self._node.name, daemon=True)
+        self._thread.start()
+
+    @property
+    def node(self) -> Node:
+        """The node, if it can be used from here; raises `Error` in a forked process, `Lost` after its end."""
+        if os.getpid() != self._pid:
+            raise Error(f"this connection belongs to process {self._pid}: a forked process calls gemelo.connect() anew")
+        if self._failure is not None:
+            raise Lost(f"the connection has ended: {self._failure}") from self._failure
+        if not self._thread.is_alive():
+            raise Lost("this connection is closed: call gemelo.connect() anew")
+        return self._node
+
+    def latest(self, topic: Topic[M], handle: Callable[[M], object] | None = None) -> Latest[M]:
+        """The newest message of `topic`, heard from the first call on; `handle` is called with every one of them."""
+        node = self.node
+        if topic.key not in self._latest:
+            latest = self._latest[topic.key] = Latest(topic)
+
+            def on_message(message: M) -> None:
+                with self.news:
+                    latest.on_message(message)
+                    if handle is not None:
+                        handle(message)
+                    self.news.notify_all()
+
+            node.subscribe(topic, on_message)
+        return self._latest[topic.key]
+
+    def newest(self, topic: Topic[M]) -> M:
+        """A message that came after the last motion or command, not older than its rate allows; raises `Lost`."""
+        latest = self.latest(topic)
+
+        def is_fresh() -> bool:
+            return not latest.is_stale and latest.age() < max(0.0, time.monotonic() - self._changed)
+
+        def is_there() -> bool:
+            return latest.message is not None if topic.rate is None else is_fresh()
+
+        if not self.wait_for(is_there, PATIENCE) or latest.message is None:
+            raise Lost(
+                f"nothing heard of {topic.key} for {PATIENCE:g} s: is {topic.writer} running? `gemelo node list`"
+            )
+        return latest.message
+
+    def changed(self) -> None:
+        """Something has moved or was switched: what was heard before is no longer fresh."""
+        self._changed = time.monotonic()
+
+    def notify(self) -> None:
+        """Wakes who waits; from any thread."""
+        with self.news:
+            self.news.notify_all()
+
+    def wait_for(
+        self, is_so: Callable[[], bool], timeout: float | None, on_news: Callable[[], None] | None = None
+    ) -> bool:
+        """Sleeps until `is_so()`, looking after every message; False after `timeout` [s]. `on_news` runs in between."""
+        if threading.current_thread() is self._thread:
+            raise Error("this waits for messages, so it cannot be called where messages are handled")
+        end = None if timeout is None else time.monotonic() + timeout
+        while True:
+            with self.news:
+                if is_so():
+                    return True
+                left = 1.0 if end is None else end - time.monotonic()
+                if left <= 0.0:
+                    return False
+                self.news.wait(min(left, 1.0))
+            self.node  # noqa: B018 raises where the connection has ended
+            if on_news is not None:
+                on_news()
+
+    def call(self, request: Request[Q, R], question: Q, timeout: float, on_tick: Callable[[], None] | None = None) -> R:
+        """The answer; raises `Refused` with the server's reason, or `Lost` where there is none within `timeout` [s].
+
+        `on_tick` is called 100 times a second meanwhile.
+        """
+        try:
+            return self.node.call(request, question, timeout, on_tick)
+        except runtime.Refused as error:
+            raise Refused(str(error)) from error
+        except (runtime.NoAnswer, runtime.BusError) as error:
+            raise Lost(str(error)) from error
+
+    def close(self) -> None:
+        """Leaves the bus; may be called twice."""
+        if os.getpid() == self._pid:
+            self._node.stop()
+            if threading.current_thread() is not self._thread:
+                self._thread.join(CLOSING)
+            self._node.close()
+
+    def _run(self) -> None:
+        try:
+            self._node.spin(rate=IDLE_RATE)
+        except BaseException as error:
+            self._failure = error
+        self.notify()
+
+
+def _node_name() -> str:
+    """The script's name and process, and a number from its second connection on: as `pick_and_place-4711`."""
+    script = re.sub(r"[^a-z0-9]+", "_", os.path.basename(sys.argv[0] if sys.argv else "").removesuffix(".py").lower())
+    number = next(_numbers)
+    return f"{script.strip('_') or 'python'}-{os.getpid()}{f'-{number}' if number > 1 else ''}"

@@ -1,0 +1,386 @@
+"""Where to and how, as arguments: what a person writes is checked here and becomes the planner's goal and motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TypedDict, cast
+
+from msgspec.structs import asdict, replace
+
+from gemelo.errors import BadArgument
+from gemelo.units import Pose
+from schemas.joints import JointState
+from schemas.planning import (
+    CircularMotion,
+    FreeMotion,
+    Goal,
+    IkRequest,
+    JointGoal,
+    LinearMotion,
+    Motion,
+    NamedGoal,
+    PlanRequest,
+    PointToPoint,
+    PoseGoal,
+    Timing,
+    WaypointGoal,
+)
+from services.arm.description import Arm as Description
+from services.arm.errors import suggestion
+from services.arm.transforms import from_rpy
+
+Joints = Mapping[str, float] | Sequence[float]
+Vector = Sequence[float]
+Waypoint = str | Mapping[str, float] | Pose | Vector
+LookUp = Callable[[str, str], Pose]  # (target, source): where the frame `source` is in `target` now
+
+LARGEST = 10.0  # [m] from the base; what is farther was meant in mm
+FASTEST = 5.0  # [m/s] of the tool; what is faster was meant in mm/s
+LONGEST_PLAN = 3600.0  # [s]
+FULL = 6  # joints that an arm has at least if it can turn its tool as it likes
+
+
+class ToolGoal(TypedDict, total=False):
+    """Where the tool is to be; what is left out does not matter."""
+
+    position: Vector  # (3,) [m] in `frame`
+    orientation: Vector  # unit quaternion (x, y, z, w) in `frame`
+    rpy: Vector  # (3,) [rad] the same as roll, pitch and yaw about the fixed axes of `frame`
+    pose: Pose  # position and orientation at once
+    offset: Vector  # (3,) [m] from where the tool is now, along the axes of `frame`; it stays turned as it is
+    axis: Vector  # (3,) of the tool, to point along `along`; its z if left out
+    along: Vector  # (3,) direction in `frame`
+    free_axis: Vector  # (3,) of the tool: turning about it does not matter
+    frame: str  # a link in which all this is given, as it is now; the base if left out
+    position_tolerance: float  # [m] exact if left out
+    orientation_tolerance: float  # [rad] exact if left out
+
+
+class Target(ToolGoal, total=False):
+    """Where to, on which path, and how fast: the arguments of `move`, `plan` and `start`. One goal is needed."""
+
+    named: str  # a named state of the SRDF
+    joints: Joints  # [rad] or [m] by name, the others stay; or all, in the arm's order
+    line: bool  # the tool on a straight line
+    ptp: bool  # the joints on a straight line
+    through: Vector  # (3,) [m] in `frame`: the tool on an arc through this point
+    center: Vector  # (3,) [m] in `frame`: the tool on the shorter arc about this point
+    via: Iterable[Waypoint]  # to be passed before the goal: positions [m], poses, named states, joints by name
+    blend: float  # [m] around each of them within which the corner may be cut
+    speed: float  # share of the joints' velocity limits, in (0, 1]
+    acceleration: float  # share of their acceleration limits, in (0, 1]; as `speed` if left out
+    tool_speed: float  # [m/s] at most, on a line or an arc
+    tool_acceleration: float  # [m/s^2] at most, on a line or an arc
+    least_fraction: float  # of a line or an arc that will do, in (0, 1]
+    max_step: float  # [m] between two checked points of a line or an arc
+    jump: float  # [rad] or [m] that a joint may move between them
+    planner: str  # "native", "RRTConnect", "RRTstar", "BITstar" or "PRM"
+    seed: int  # the same seed, the same plan
+    time_optimal: bool  # as fast as can be, without a limit of the jerk
+    allowed_time: float  # [s] for planning
+    from_joints: Joints  # plan from there; from where the arm is if left out
+
+
+def as_target(goal: ToolGoal) -> Target:
+    """The same arguments, to which others may be added."""
+    return cast(Target, dict(goal))
+
+
+def request_of(arm: Description, target: Target, look_up: LookUp) -> PlanRequest:
+    """The planner's request; raises `BadArgument` for what cannot be meant."""
+    _require_known(target, Target)
+    speed = _share("speed", target.get("speed", 1.0))
+    start = target.get("from_joints")
+    return PlanRequest(
+        goal=_by_way_of(goal_of(arm, target, look_up), arm, target),
+        start=None if start is None else joint_state(arm, start, "from_joints"),
+        velocity_scaling=speed,
+        acceleration_scaling=_share("acceleration", target.get("acceleration", speed)),
+        allowed_time=_positive("allowed_time", target.get("allowed_time", 5.0), "s", LONGEST_PLAN),
+        motion=_motion_of(target),
+        timing=Timing.TIME_OPTIMAL if target.get("time_optimal") else Timing.JERK_LIMITED,
+    )
+
+
+def ik_request(
+    arm: Description, target: ToolGoal, look_up: LookUp, near: Joints | None, solutions: int, touching: bool
+) -> IkRequest:
+    """The planner's request for configurations; raises `BadArgument`."""
+    _require_known(target, ToolGoal)
+    goal = goal_of(arm, as_target(target), look_up)
+    assert isinstance(goal, PoseGoal)
+    return IkRequest(
+        goal=goal,
+        near=None if near is None else joint_state(arm, near, "near"),
+        solutions=solutions,
+        avoid_collisions=not touching,
+    )
+
+
+def goal_of(arm: Description, target: Target, look_up: LookUp) -> PoseGoal | JointGoal | NamedGoal:
+    """The one goal among the arguments."""
+    given = [name for name in ("named", "joints", "position", "pose", "offset") if name in target]
+    if len(given) != 1:
+        said = f"not both {' and '.join(given)}" if given else "none is given"
+        raise BadArgument(f"say where to by one of named=, joints=, position=, pose= and offset=: {said}")
+    if given[0] in ("named", "joints"):
+        _refuse_with(target, given[0], (*ToolGoal.__annotations__, "through", "center"))
+    if "named" in target:
+        return named_goal(arm, target["named"])
+    if "joints" in target:
+        state = joint_state(arm, target["joints"], "joints")
+        return JointGoal(name=state.name, position=state.position)
+    return _pose_goal(arm, target, look_up)
+
+
+def named_goal(arm: Description, name: str) -> NamedGoal:
+    """A named state of the SRDF; raises `BadArgument` with the nearest name."""
+    if name not in arm.state_names:
+        raise BadArgument(f'no named state "{name}"{suggestion(name, arm.state_names)}')
+    return NamedGoal(name=name)
+
+
+def joint_state(arm: Description, joints: Joints, owner: str) -> JointState:
+    """Joint values [rad] or [m] by the names of the arm; raises `BadArgument`."""
+    values = named_joints(arm, joints, owner)
+    for name, value in values.items():
+        _require_unit(arm, name, value)
+    return JointState(name=tuple(values), position=tuple(values.values()))
+
+
+def named_joints(arm: Description, joints: Joints, owner: str) -> dict[str, float]:
+    """Finite numbers by the names of the arm's joints; raises `BadArgument`."""
+    if not isinstance(joints, Mapping):
+        values = vector(owner, joints, len(arm.joints), "one for every joint")
+        return dict(zip(arm.joint_names, values, strict=True))
+    if not joints:
+        raise BadArgument(f'{owner}= names no joint: write it as {{"{arm.joint_names[0]}": gemelo.deg(30)}}')
+    for name in joints:
+        if name not in arm.joint_names:
+            raise BadArgument(f'{arm.name} has no joint "{name}"{suggestion(str(name), arm.joint_names)}')
+    return {name: number(f'joint "{name}"', value) for name, value in joints.items()}
+
+
+def number(owner: str, value: float) -> float:
+    """A finite number; raises `BadArgument`."""
+    try:
+        found = float(value)
+    except (TypeError, ValueError):
+        raise BadArgument(f"{owner}: {value!r} is not a number") from None
+    if not math.isfinite(found):
+        raise BadArgument(f"{owner} is {found}: it must be finite")
+    return found
+
+
+def vector(owner: str, values: Iterable[float], size: int, what: str) -> tuple[float, ...]:
+    """`size` finite numbers; raises `BadArgument`."""
+    try:
+        found = tuple(values)
+    except TypeError:
+        raise BadArgument(f"{owner}= takes {size} numbers ({what}), not {values!r}") from None
+    if len(found) != size:
+        raise BadArgument(f"{owner}= takes {size} numbers ({what}), not {len(found)}")
+    return tuple(number(f"{owner}[{index}]", value) for index, value in enumerate(found))
+
+
+def point(owner: str, values: Iterable[float]) -> tuple[float, float, float]:
+    """A point (x, y, z) [m] that is not in another unit; raises `BadArgument`."""
+    x, y, z = vector(owner, values, 3, "x, y, z in m")
+    largest = max((x, y, z), key=abs)
+    if abs(largest) > LARGEST:
+        raise BadArgument(f"{owner}= has {largest:g} m: if it is in millimetres, write gemelo.mm({largest:g})")
+    return x, y, z
+
+
+def quaternion(owner: str, values: Iterable[float]) -> tuple[float, float, float, float]:
+    """A unit quaternion (x, y, z, w); raises `BadArgument`."""
+    x, y, z, w = vector(owner, values, 4, "a unit quaternion x, y, z, w")
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    if abs(length - 1.0) > 1e-3:
+        raise BadArgument(f"{owner}= is a quaternion of length {length:.4f}, not 1")
+    return x / length, y / length, z / length, w / length
+
+
+def turned(owner: str, values: Iterable[float]) -> tuple[float, float, float, float]:
+    """Roll, pitch, yaw [rad] as a quaternion; raises `BadArgument`."""
+    angles = vector(owner, values, 3, "roll, pitch, yaw in rad")
+    largest = max(angles, key=abs)
+    if abs(largest) > math.tau:
+        raise BadArgument(
+            f"{owner}= has {largest:g} rad, more than a turn: if it is in degrees, write gemelo.deg({largest:g})"
+        )
+    return from_rpy(*angles)
+
+
+def _pose_goal(arm: Description, target: Target, look_up: LookUp) -> PoseGoal:
+    turns = [name for name in ("orientation", "rpy", "pose", "along") if name in target]
+    if len(turns) > 1:
+        raise BadArgument(f"say how the tool is turned once, not by {' and '.join(turns)}")
+    if "axis" in target and "along" not in target:
+        raise BadArgument("axis= is an axis of the tool: say with along= in which direction it is to point")
+    if "offset" in target:
+        return _offset_goal(arm, target, look_up)
+    pose = target.get("pose")
+    orientation: tuple[float, ...] = ()
+    if pose is not None or "orientation" in target:
+        orientation = quaternion("orientation", pose.orientation if pose is not None else target["orientation"])
+    elif "rpy" in target:
+        orientation = turned("rpy", target["rpy"])
+    return PoseGoal(
+        position=point("position", pose.position if pose is not None else target["position"]),
+        orientation=orientation,
+        frame=_link(arm, target.get("frame", "")),
+        **_axes(target),
+        position_tolerance=number("position_tolerance", target.get("position_tolerance", 0.0)),
+        orientation_tolerance=number("orientation_tolerance", target.get("orientation_tolerance", 0.0)),
+    )
+
+
+def _axes(target: Target) -> dict[str, tuple[float, ...]]:
+    """The directions among the arguments, each (3,)."""
+    axes = {}
+    if "along" in target:
+        axes["direction"] = vector("along", target["along"], 3, "a direction")
+        axes["tool_axis"] = vector("axis", target.get("axis", (0.0, 0.0, 1.0)), 3, "an axis of the tool")
+    if "free_axis" in target:
+        axes["free_axis"] = vector("free_axis", target["free_axis"], 3, "an axis of the tool")
+    return axes
+
+
+def _offset_goal(arm: Description, target: Target, look_up: LookUp) -> PoseGoal:
+    """From where the tool is now. An arm of less than six joints keeps the direction of its tool's z axis alone."""
+    now = look_up(arm.base_frame, arm.tool_frame)
+    frame = _link(arm, target.get("frame", ""))
+    axes = look_up(arm.base_frame, frame) if frame else Pose((0.0, 0.0, 0.0))
+    step = axes.axis(point("offset", target["offset"]))
+    goal = Target(position=now.offset(*step).position)
+    for key in ("position_tolerance", "orientation_tolerance"):
+        if key in target:
+            goal[key] = target[key]
+    if "along" in target or "orientation" in target or "rpy" in target:
+        raise BadArgument("offset= leaves the tool turned as it is: give position= to turn it")
+    if len(arm.joints) >= FULL:
+        goal["orientation"] = now.orientation
+    else:
+        goal["along"] = now.axis()
+    return _pose_goal(arm, goal, look_up)
+
+
+def _by_way_of(goal: PoseGoal | JointGoal | NamedGoal, arm: Description, target: Target) -> Goal:
+    """By the points of via=; positions among them are turned as the goal is."""
+    if "via" not in target:
+        _refuse_with(target, "a goal without via=", ("blend",))
+        return goal
+    _refuse_with(target, "via=", ("through", "center"))
+    like = goal if isinstance(goal, PoseGoal) else PoseGoal()
+    points = tuple(_waypoint(each, arm, like) for each in target["via"])
+    blend = target.get("blend", 0.0)
+    return WaypointGoal(points=(*points, goal), blend=_positive("blend", blend, "m", LARGEST) if blend else 0.0)
+
+
+def _waypoint(given: Waypoint, arm: Description, like: PoseGoal) -> PoseGoal | JointGoal | NamedGoal:
+    if isinstance(given, str):
+        return named_goal(arm, given)
+    if isinstance(given, Mapping):
+        state = joint_state(arm, given, "via")
+        return JointGoal(name=state.name, position=state.position)
+    if isinstance(given, Pose):
+        return PoseGoal(
+            position=point("via", given.position), orientation=quaternion("via", given.orientation), frame=like.frame
+        )
+    return replace(like, position=point("via", given))
+
+
+def _motion_of(target: Target) -> Motion:
+    """The motion among the arguments."""
+    given = [name for name in ("line", "ptp", "through", "center") if target.get(name)]
+    if len(given) > 1:
+        raise BadArgument(f"one path at a time, not {' and '.join(given)}")
+    kind = given[0] if given else "free"
+    of_tool = ("tool_speed", "tool_acceleration", "least_fraction", "max_step", "jump")
+    if kind in ("free", "ptp"):
+        _refuse_with(target, f"a {kind} motion (only line=True, through= and center=)", of_tool)
+    if kind != "free":
+        _refuse_with(target, f"{kind}=", ("planner", "seed"))
+    if kind == "free":
+        return FreeMotion(planner_id=target.get("planner", ""), seed=target.get("seed", 0))
+    if kind == "ptp":
+        return PointToPoint()
+    values = {name: _positive(name, target[name], unit, most) for name, unit, most in TOOL_LIMITS if name in target}  # type: ignore[literal-required]
+    line = LinearMotion(
+        speed=values.get("tool_speed", 0.0),
+        acceleration=values.get("tool_acceleration", 0.0),
+        max_step=values.get("max_step", 0.0),
+        jump_threshold=values.get("jump", 0.0),
+        least_fraction=values.get("least_fraction", 1.0),
+    )
+    if kind == "line":
+        return line
+    interim = point("through", target["through"]) if kind == "through" else ()
+    center = point("center", target["center"]) if kind == "center" else ()
+    return CircularMotion(interim=interim, center=center, **asdict(line))
+
+
+TOOL_LIMITS = (
+    ("tool_speed", "m/s", FASTEST),
+    ("tool_acceleration", "m/s^2", 100.0 * FASTEST),
+    ("max_step", "m", LARGEST),
+    ("jump", "rad or m", math.inf),
+    ("least_fraction", "", 1.0),
+)
+
+
+def _require_known(target: Target | ToolGoal, kind: type) -> None:
+    known = {name for base in (ToolGoal, kind) for name in base.__annotations__}
+    for name in target:
+        if name not in known:
+            raise BadArgument(f'there is no argument "{name}"{suggestion(name, known)}')
+
+
+def _refuse_with(target: Target, what: str, names: Iterable[str]) -> None:
+    for name in names:
+        if name in target and target[name] is not None:  # type: ignore[literal-required]
+            raise BadArgument(f"{name}= does not go with {what}")
+
+
+def _link(arm: Description, name: str) -> str:
+    if name and name not in arm.model.link_names:
+        raise BadArgument(f'{arm.name} has no link "{name}"{suggestion(name, arm.model.link_names)}')
+    return name
+
+
+def _share(name: str, value: float) -> float:
+    found = number(name, value)
+    if not 0.0 < found <= 1.0:
+        hint = f": {found:g} per cent is {found / 100.0:g}" if 1.0 < found <= 100.0 else ""
+        raise BadArgument(f"{name}={found:g} is not in (0, 1], a share of the joints' limits{hint}")
+    return found
+
+
+def _positive(name: str, value: float, unit: str, most: float) -> float:
+    found = number(name, value)
+    if not found > 0.0:
+        raise BadArgument(f"{name}={found:g} is not above 0")
+    if found > most:
+        hint = f": if it is in millimetres, write gemelo.mm({found:g})" if unit.startswith("m") else ""
+        raise BadArgument(f"{name}={found:g} {unit} is more than {most:g}{hint}")
+    return found
+
+
+def _require_unit(arm: Description, name: str, value: float) -> None:
+    """Refuses what is out of the limits as it stands, and within them in degrees or millimetres."""
+    joint = arm.joint(name)
+    factor, unit, helper = (
+        (math.radians(1.0), "degrees", "deg") if joint.unit == "rad" else (0.001, "millimetres", "mm")
+    )
+    lower, upper = (joint.lower, joint.upper) if math.isfinite(joint.lower) else (-math.tau, math.tau)
+    if (
+        not lower <= value <= upper
+        and lower <= value * factor <= upper
+        and abs(value) >= 2.0 * max(abs(lower), abs(upper))
+    ):
+        raise BadArgument(
+            f'joint "{name}": {value:g} {joint.unit} is beyond its limits, {lower:.4g} to {upper:.4g} {joint.unit}: '
+            f"if it is in {unit}, write gemelo.{helper}({value:g})"
+        )

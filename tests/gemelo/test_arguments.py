@@ -1,0 +1,191 @@
+"""What cannot be meant is a sentence with the remedy, and nothing is asked of the planner."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import gemelo
+from gemelo.jog import jog_command
+from gemelo.planning import refused
+from gemelo.targets import Target, as_target, request_of
+from schemas.planning import (
+    CircularMotion,
+    JointGoal,
+    LinearMotion,
+    NamedGoal,
+    PlanRequest,
+    PointToPoint,
+    PoseGoal,
+    Refusal,
+    Timing,
+    WaypointGoal,
+)
+from services.arm.description import Arm as Description
+
+HERE = gemelo.Pose((0.2, 0.1, 0.15), (1.0, 0.0, 0.0, 0.0))
+
+
+def request(arm: Description, **target: Any) -> PlanRequest:
+    return request_of(arm, Target(**target), lambda target, source: HERE)
+
+
+BAD = [
+    ({}, "none is given"),
+    ({"named": "ready", "position": (0.2, 0.1, 0.1)}, "not both named and position"),
+    ({"joints": {"brazo_joint": 0.1}, "position": (0.2, 0.1, 0.1)}, "not both joints and position"),
+    ({"postion": (0.2, 0.1, 0.1)}, 'no argument "postion"; did you mean "position"?'),
+    ({"named": "redy"}, 'no named state "redy"; did you mean "ready"?'),
+    ({"joints": {"brazo": 0.1}}, 'rm1 has no joint "brazo"; did you mean "brazo_joint"?'),
+    ({"joints": {}}, "names no joint"),
+    ({"joints": (0.1, 0.2)}, "takes 3 numbers (one for every joint), not 2"),
+    ({"joints": {"brazo_joint": 30}}, "if it is in degrees, write gemelo.deg(30)"),
+    ({"joints": {"efector_joint": 40}}, "if it is in millimetres, write gemelo.mm(40)"),
+    ({"joints": {"brazo_joint": math.nan}}, 'joint "brazo_joint" is nan: it must be finite'),
+    ({"joints": {"brazo_joint": "much"}}, "'much' is not a number"),
+    ({"position": (0.2, math.inf, 0.1)}, "position[1] is inf: it must be finite"),
+    ({"position": (0.2, 0.1)}, "takes 3 numbers (x, y, z in m), not 2"),
+    ({"position": 0.2}, "takes 3 numbers (x, y, z in m), not 0.2"),
+    ({"position": (250, 150, 100)}, "if it is in millimetres, write gemelo.mm(250)"),
+    ({"position": (0.2, 0.1, 0.1), "frame": "hand"}, 'rm1 has no link "hand"'),
+    ({"position": (0.2, 0.1, 0.1), "orientation": (0, 0, 0, 2)}, "a quaternion of length 2.0000, not 1"),
+    ({"position": (0.2, 0.1, 0.1), "rpy": (180, 0, 0)}, "if it is in degrees, write gemelo.deg(180)"),
+    ({"position": (0.2, 0.1, 0.1), "rpy": (0, 0, 0), "along": (0, 0, 1)}, "not by rpy and along"),
+    ({"position": (0.2, 0.1, 0.1), "axis": (0, 0, 1)}, "say with along="),
+    ({"named": "ready", "frame": "base_link"}, "frame= does not go with named"),
+    ({"named": "ready", "speed": 50}, "not in (0, 1], a share of the joints' limits: 50 per cent is 0.5"),
+    ({"named": "ready", "speed": 0}, "speed=0 is not in (0, 1]"),
+    ({"named": "ready", "acceleration": -1}, "acceleration=-1 is not in (0, 1]"),
+    ({"named": "ready", "allowed_time": 0}, "allowed_time=0 is not above 0"),
+    ({"named": "ready", "blend": 0.01}, "blend= does not go with a goal without via="),
+    ({"named": "ready", "tool_speed": 0.1}, "tool_speed= does not go with a free motion"),
+    ({"named": "ready", "ptp": True, "line": True}, "one path at a time, not line and ptp"),
+    ({"position": (0.2, 0.1, 0.1), "line": True, "tool_speed": 30}, "write gemelo.mm(30)"),
+    ({"position": (0.2, 0.1, 0.1), "line": True, "seed": 3}, "seed= does not go with line="),
+    ({"position": (0.2, 0.1, 0.1), "line": True, "least_fraction": 1.5}, "least_fraction=1.5  is more than 1"),
+    ({"position": (0.2, 0.1, 0.1), "via": [(0.2, 0.1)], "blend": 0.1}, "via= takes 3 numbers"),
+    ({"position": (0.2, 0.1, 0.1), "via": ["redy"]}, 'did you mean "ready"?'),
+    ({"offset": (0, 0, 0.1), "rpy": (0, 0, 0)}, "offset= leaves the tool turned as it is"),
+    ({"offset": (0, 0, 50)}, "write gemelo.mm(50)"),
+]
+
+
+@pytest.mark.parametrize(("target", "said"), BAD, ids=[said for _, said in BAD])
+def test_an_argument_that_cannot_be_meant_is_refused_with_the_remedy(
+    rm1: Description, target: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(gemelo.BadArgument) as refusal:
+        request(rm1, **target)
+    assert said in str(refusal.value)
+
+
+def test_arguments_become_the_goal_that_they_name(rm1: Description) -> None:
+    assert request(rm1, named="ready").goal == NamedGoal(name="ready")
+    assert request(rm1, joints={"brazo_joint": 1}).goal == JointGoal(name=("brazo_joint",), position=(1.0,))
+    assert request(rm1, joints=(0.1, 0.2, 0.05)).goal == JointGoal(name=rm1.joint_names, position=(0.1, 0.2, 0.05))
+    goal = request(rm1, position=(0.2, 0.1, 0.1), along=(0, 0, -1), frame="brazo_link").goal
+    assert goal == PoseGoal(
+        position=(0.2, 0.1, 0.1), tool_axis=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0), frame="brazo_link"
+    )
+    assert request(rm1, pose=HERE).goal == PoseGoal(position=HERE.position, orientation=HERE.orientation)
+
+
+def test_arguments_become_the_motion_that_they_name(rm1: Description) -> None:
+    goal = {"position": (0.2, 0.1, 0.1)}
+    assert request(rm1, **goal, ptp=True).motion == PointToPoint()
+    assert request(rm1, **goal, line=True, tool_speed=0.03).motion == LinearMotion(speed=0.03)
+    assert request(rm1, **goal, through=(0.2, 0, 0.1)).motion == CircularMotion(interim=(0.2, 0.0, 0.1))
+    assert request(rm1, **goal, center=(0.2, 0, 0.1)).motion == CircularMotion(center=(0.2, 0.0, 0.1))
+    points = request(rm1, **goal, via=["ready", (0.3, 0.0, 0.1), {"brazo_joint": 0.1}, HERE], blend=0.01).goal
+    assert points == WaypointGoal(
+        points=(
+            NamedGoal(name="ready"),
+            PoseGoal(position=(0.3, 0.0, 0.1)),
+            JointGoal(name=("brazo_joint",), position=(0.1,)),
+            PoseGoal(position=HERE.position, orientation=HERE.orientation),
+            PoseGoal(position=(0.2, 0.1, 0.1)),
+        ),
+        blend=0.01,
+    )
+    asked = request(rm1, named="ready", speed=0.5, time_optimal=True, from_joints={"brazo_joint": 0.1})
+    assert (asked.velocity_scaling, asked.acceleration_scaling, asked.timing) == (0.5, 0.5, Timing.TIME_OPTIMAL)
+    assert asked.start is not None
+    assert asked.start.position == (0.1,)
+
+
+def test_an_offset_is_from_where_the_tool_is_and_keeps_what_the_arm_can_keep(rm1: Description) -> None:
+    goal = request(rm1, offset=(0.0, 0.0, -0.05)).goal
+    assert isinstance(goal, PoseGoal)
+    assert goal.position == pytest.approx((0.2, 0.1, 0.1))
+    assert (goal.direction, goal.orientation) == ((0.0, 0.0, -1.0), ())  # three joints: its axis, not its yaw
+    in_tool = request(rm1, offset=(0.0, 0.0, 0.05), frame="efector_link").goal
+    assert isinstance(in_tool, PoseGoal)
+    assert in_tool.position == pytest.approx((0.2, 0.1, 0.1))  # the tool's z looks down
+
+
+JOGS: list[tuple[Callable[[Description], object], str]] = [
+    (lambda arm: jog_command(arm, None, None, ""), "by one of joints= (speeds by name) and twist="),
+    (lambda arm: jog_command(arm, {"brazo_joint": 0.1}, (0, 0, 0.1), ""), "by one of"),
+    (lambda arm: jog_command(arm, {"brazo_joint": 30}, None, ""), "if it is in deg/s, write gemelo.deg(30)"),
+    (lambda arm: jog_command(arm, None, (50, 0, 0), ""), "if it is in mm/s, write gemelo.mm(50)"),
+    (lambda arm: jog_command(arm, None, (0, 0), ""), "takes 3 numbers (m/s) or 6 (m/s and rad/s), not 2"),
+    (lambda arm: jog_command(arm, None, (0, 0, math.nan), ""), "twist[2] is nan"),
+    (lambda arm: jog_command(arm, None, (0, 0, 0.1), "brazo_link"), "along the axes of base_link or efector_link"),
+]
+
+
+@pytest.mark.parametrize(("ask", "said"), JOGS, ids=[said for _, said in JOGS])
+def test_a_jog_that_cannot_be_meant_is_refused(
+    rm1: Description, ask: Callable[[Description], object], said: str
+) -> None:
+    with pytest.raises(gemelo.BadArgument) as refusal:
+        ask(rm1)
+    assert said in str(refusal.value)
+
+
+@given(value=st.floats(allow_nan=True, allow_infinity=True))
+def test_no_number_gets_through_that_a_message_would_not_take(rm1: Description, value: float) -> None:
+    for target in (
+        {"joints": {"brazo_joint": value}},
+        {"position": (value, 0.1, 0.1)},
+        {"named": "ready", "speed": value},
+    ):
+        try:
+            asked = request(rm1, **target)
+        except gemelo.BadArgument:
+            continue
+        msgspec.msgpack.encode(asked)
+        assert math.isfinite(value)
+
+
+@given(value=st.floats(min_value=-2.9, max_value=2.9))
+def test_what_is_within_the_limits_is_never_taken_for_another_unit(rm1: Description, value: float) -> None:
+    goal = request(rm1, joints={"brazo_joint": value}).goal
+    assert goal == JointGoal(name=("brazo_joint",), position=(value,))
+
+
+def test_the_nearest_goal_of_a_refusal_is_arguments_again(rm1: Description) -> None:
+    target = Target(position=(0.6, 0.1, 0.1), speed=0.5, frame="brazo_link", along=(0.0, 0.0, 1.0))
+    asked = request(rm1, **target)
+    refusal = Refusal(check="reach", message="too far", nearest=(0.4, 0.1, 0.1, 0.0, 0.0, -1.0), remedy="go nearer")
+    error = refused(rm1, refusal, asked, target, -31)
+    assert error.nearest == {
+        "position": (0.4, 0.1, 0.1), "speed": 0.5, "frame": "brazo_link", "along": (0.0, 0.0, -1.0)
+    }  # fmt: skip
+    assert "nearest that can: speed=0.5, frame='brazo_link', position=(0.4, 0.1, 0.1)" in str(error)
+    request(rm1, **error.nearest)
+    start = Refusal(check="start state", message="beyond", nearest=(0.2,), remedy="jog back")
+    assert refused(rm1, start, asked, target, -18).nearest == {}
+    assert str(refused(rm1, start, asked, target, -18)).endswith("beyond; jog back")
+
+
+def test_as_target_copies(rm1: Description) -> None:
+    goal = gemelo.ToolGoal(position=(0.1, 0.2, 0.3))
+    as_target(goal)["line"] = True
+    assert "line" not in goal
