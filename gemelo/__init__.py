@@ -27,7 +27,7 @@ from gemelo.targets import Target, ToolGoal
 from gemelo.units import Pose, deg, mm
 from schemas import topics
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceMode
+from schemas.device import DeviceMode, StopKind
 from services.runtime.node import Node
 
 __all__ = [
@@ -48,6 +48,7 @@ __all__ = [
     "Pose",
     "Refused",
     "Scene",
+    "StopKind",
     "Target",
     "ToolGoal",
     "connect",

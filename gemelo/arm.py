@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Self, Unpack
 
-from gemelo.device import Device, reference_request
+from gemelo.device import Device, reference_command
 from gemelo.errors import BadArgument
 from gemelo.frames import Frames
 from gemelo.homing import HomingReport, home
@@ -17,7 +17,7 @@ from gemelo.scene import Scene
 from gemelo.session import Session
 from gemelo.targets import Joints, Target, ToolGoal, Vector, Waypoint, as_target
 from gemelo.units import Pose
-from schemas.device import DeviceCommandKind, DeviceCommandRequest
+from schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
 from schemas.planning import JogStatus
 from schemas.topics import JOINT_STATES, SENSORS, STEP_ERRORS
 from services.arm.description import Arm as Description
@@ -232,12 +232,18 @@ class Arm:
     # Where it goes
 
     def move(
-        self, *, detached: bool = False, on_progress: OnProgress | None = None, **target: Unpack[Target]
+        self,
+        *,
+        detached: bool = False,
+        on_planning: OnPlanProgress | None = None,
+        on_progress: OnProgress | None = None,
+        **target: Unpack[Target],
     ) -> Motion:
         """Plans and goes there, and returns when the arm has arrived; the arguments are those of `gemelo.Target`.
 
         Raises `Refused` (nothing has moved), `Aborted`, `Lost` or `BadArgument`. At Ctrl-C the arm decelerates on its
-        path, and `Interrupted` is raised when it rests. `detached`: it goes on when this script dies.
+        path, and `Interrupted` is raised when it rests. `detached`: it goes on when this script dies. `on_planning` and
+        `on_progress` are called while it is planned, and while it goes.
 
         >>> arm.move(named="ready")
         <Motion rm1: named='ready', succeeded in ... s, ...>
@@ -246,7 +252,7 @@ class Arm:
         >>> arm.move(joints={"brazo_joint": gemelo.deg(30)}).status.name
         'SUCCEEDED'
         """
-        plan = self.plan(**target)
+        plan = self.plan(on_progress=on_planning, **target)
         return self._motions.start(plan, detached).wait(on_progress=on_progress)
 
     def line(self, *, speed: float | None = None, detached: bool = False, **goal: Unpack[ToolGoal]) -> Motion:
@@ -353,7 +359,7 @@ class Arm:
         >>> where = arm.joints
         >>> arm.reference(where)
         """
-        self.device.command(reference_request(self._session, joints))
+        self.device.command(reference_command(self._session, joints))
 
     def jog(
         self,
@@ -399,7 +405,7 @@ class Arm:
 
         >>> arm.stop()
         """
-        self._command(DeviceCommandKind.STOP)
+        self.device.command(StopKind.STOP)
 
     def hold(self) -> None:
         """Decelerates on the path and stands there; `resume` goes on.
@@ -410,7 +416,7 @@ class Arm:
         >>> motion.wait().status.name
         'SUCCEEDED'
         """
-        self._command(DeviceCommandKind.HOLD)
+        self.device.command(StopKind.HOLD)
 
     def resume(self) -> None:
         """Goes on along the path after `hold`; `Refused` where nothing is held.
@@ -421,7 +427,7 @@ class Arm:
         >>> motion.wait().status.name
         'SUCCEEDED'
         """
-        self._command(DeviceCommandKind.RESUME)
+        self.device.command(ResumeCommand())
 
     def speed(self, share: float) -> None:
         """Plays every path at `share` (0 to 1) of its planned speed from now on, also what is under way.
@@ -432,7 +438,7 @@ class Arm:
         if not 0.0 <= share <= 1.0:
             hint = f": {share:g} per cent is {share / 100.0:g}" if 1.0 < share <= 100.0 else ""
             raise BadArgument(f"speed({share:g}) is not in [0, 1], a share of the planned speed{hint}")
-        self.device.command(DeviceCommandRequest(command=DeviceCommandKind.SPEED, value=float(share)), "speed")
+        self.device.command(SpeedCommand(scale=float(share)))
 
     def output(self, name: str, on: bool) -> None:
         """Switches an output of robot.toml.
@@ -443,8 +449,7 @@ class Arm:
         known = [output.name for output in self.description.outputs]
         if name not in known:
             raise BadArgument(f'{self.name} has no output "{name}"{suggestion(name, known)}')
-        request = DeviceCommandRequest(command=DeviceCommandKind.OUTPUT, output=name, value=float(on))
-        self.device.command(request, f"output {name}")
+        self.device.command(OutputCommand(output=name, on=on), f"output {name}")
 
     # What could be
 
@@ -475,9 +480,6 @@ class Arm:
         ['base_link']
         """
         return find_poses(self._session, joints, tuple(links) or self.description.model.link_names)
-
-    def _command(self, kind: DeviceCommandKind) -> None:
-        self.device.command(DeviceCommandRequest(command=kind))
 
 
 def _with_speed(target: Target, speed: float | None) -> Target:

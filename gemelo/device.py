@@ -7,16 +7,21 @@ from gemelo.homing import joint_name
 from gemelo.session import PATIENCE, Session
 from gemelo.targets import Joints, joint_state, number
 from schemas.device import (
+    ArmCommand,
     ConfigureRequest,
-    DeviceCommandKind,
+    DeviceCommand,
     DeviceCommandRequest,
     DeviceConfiguration,
     DeviceFault,
     DeviceMode,
     DeviceState,
     DeviceStatus,
+    DeviceStopRequest,
     PressKind,
     PressRequest,
+    ReferenceCommand,
+    ResetCommand,
+    StopKind,
 )
 from schemas.device_faults import fault_text
 from schemas.topics import (
@@ -26,6 +31,7 @@ from schemas.topics import (
     DEVICE_PRESS,
     DEVICE_STATE,
     DEVICE_STATUS,
+    DEVICE_STOP,
 )
 from services.arm.errors import suggestion
 
@@ -103,7 +109,7 @@ class Device:
 
         >>> arm.device.arm()
         """
-        self.command(DeviceCommandRequest(command=DeviceCommandKind.ARM))
+        self.command(ArmCommand())
         lead = max(joint.driver.enable_lead_ms for joint in self._session.description.joints) * 1e-3
         self._session.wait_for(lambda: False, lead)
 
@@ -117,7 +123,7 @@ class Device:
         >>> arm.device.arm()
         >>> arm.reference(where)
         """
-        self.command(DeviceCommandRequest(command=DeviceCommandKind.DISARM))
+        self.command(StopKind.DISARM)
 
     def reset(self) -> None:
         """Leaves a fault or an emergency stop, once its cause is gone.
@@ -131,7 +137,7 @@ class Device:
         >>> arm.device.arm()
         >>> arm.reference(where)
         """
-        self.command(DeviceCommandRequest(command=DeviceCommandKind.RESET))
+        self.command(ResetCommand())
 
     def configure(self) -> None:
         """Gives the device what robot.toml says of it, if it has anything else: it disarms, and is referenced no more.
@@ -174,18 +180,20 @@ class Device:
         if not answer.accepted:
             raise Refused(f"refused: {answer.reason}", check="device")
 
-    def command(self, request: DeviceCommandRequest, what: str = "") -> DeviceMode:
+    def command(self, wanted: DeviceCommand | StopKind, what: str = "") -> DeviceMode:
         """Sends a command; the mode that the device answered with. Raises `Refused` with its reason.
 
-        >>> from schemas.device import DeviceCommandKind, DeviceCommandRequest
-        >>> arm.device.command(DeviceCommandRequest(command=DeviceCommandKind.STOP)).name
+        >>> arm.device.command(gemelo.StopKind.STOP).name
         'IDLE'
         """
-        answer = self._session.call(DEVICE_COMMAND, request, TO_ANSWER)
+        what = what or (wanted.value if isinstance(wanted, StopKind) else str(wanted.__struct_config__.tag))
+        if isinstance(wanted, StopKind):
+            answer = self._session.call(DEVICE_STOP, DeviceStopRequest(kind=wanted), TO_ANSWER)
+        else:
+            answer = self._session.call(DEVICE_COMMAND, DeviceCommandRequest(command=wanted), TO_ANSWER)
         self._session.changed()
         if not answer.accepted:
             mode = f" (device mode {answer.mode.name})" if f"mode {answer.mode.name}" not in answer.reason else ""
-            what = what or request.command.name.lower()
             raise Refused(f"{what} refused: {answer.reason}{mode}", check="device", subject=what)
         return answer.mode
 
@@ -203,13 +211,11 @@ class Device:
             raise BadArgument(f'"{kind}" needs a target; there is no "{target}"{suggestion(target, known)}')
 
 
-def reference_request(session: Session, joints: Joints | None) -> DeviceCommandRequest:
+def reference_command(session: Session, joints: Joints | None) -> ReferenceCommand:
     """Every joint named: those of `joints` [rad] or [m], the others at the reference position of robot.toml."""
     arm = session.description
     values = dict(zip(arm.joint_names, arm.reference_position, strict=True))
     if joints is not None:
         given = joint_state(arm, joints, "joints")
         values.update(zip(given.name, given.position, strict=True))
-    return DeviceCommandRequest(
-        command=DeviceCommandKind.REFERENCE, name=tuple(values), position=tuple(values.values())
-    )
+    return ReferenceCommand(name=tuple(values), position=tuple(values.values()))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from gemelo.errors import Aborted, BadArgument, Interrupted, Refused
 from gemelo.session import Session
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceEvent, DeviceMode, DeviceState
+from schemas.device import DeviceCommand, DeviceEvent, DeviceMode, DeviceState, HomeCommand, StopKind
 from schemas.device_faults import fault_text
 from schemas.robot import HomingDirection
 from schemas.topics import DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
@@ -24,7 +24,7 @@ LAST_WORDS = 0.5  # [s] for events that come after the state
 OFFLINE = 2.0  # [s] that the device may be away: a link that comes back, a clock that is synchronised anew
 BRAKING = 5.0  # [s] beyond the time-outs of robot.toml
 
-Command = Callable[[DeviceCommandRequest], object]
+Command = Callable[[DeviceCommand | StopKind], object]
 
 
 @dataclass(frozen=True)
@@ -116,12 +116,12 @@ def home(
     events = session.node.subscribe(DEVICE_EVENTS, homing.on_event)
     try:
         name = tuple(joint.name for joint in homing.joints)
-        command(DeviceCommandRequest(command=DeviceCommandKind.HOME, name=name))
+        command(HomeCommand(name=name))
         states = session.node.subscribe(DEVICE_STATE, homing.on_state)
         try:
             return _follow(session, homing, on_progress)
         except KeyboardInterrupt:
-            command(DeviceCommandRequest(command=DeviceCommandKind.STOP))
+            command(StopKind.STOP)
             session.wait_for(lambda: homing.is_over, BRAKING)
             raise Interrupted(f"homing stopped by Ctrl-C; home: {', '.join(homing.homed) or 'none'}") from None
         finally:

@@ -11,7 +11,7 @@ import pytest
 
 import gemelo
 from schemas.device import ShaftPositions
-from services.cli.stack import Stack
+from services.stack.stack import Stack
 
 NEEDED = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner")
 BROKER = "mosquitto" if shutil.which("mosquitto", path="/usr/bin:/usr/sbin:/usr/local/sbin") else "amqtt"

@@ -8,7 +8,7 @@ from types import ModuleType
 
 import gemelo
 
-SCHEMAS = {"DeviceMode", "GoalStatusCode", "Node", "topics"}  # not of this package: told of elsewhere
+SCHEMAS = {"DeviceMode", "GoalStatusCode", "Node", "StopKind", "topics"}  # not of this package: told of elsewhere
 TABLES = {"Target", "ToolGoal"}  # arguments: their fields are told of by comments, and used by every example
 
 

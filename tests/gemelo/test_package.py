@@ -1,0 +1,127 @@
+"""The package from outside: what it loads, what its types say, and what is said where no twin runs."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+import gemelo
+
+SLOW = {"zenoh", "numpy", "pinocchio", "coal", "ruckig", "rich", "asyncio", "argparse"}
+SCRIPT = """
+from typing import assert_type
+
+import gemelo
+from gemelo import Node, topics
+
+
+def carry(arm: gemelo.Arm) -> float:
+    plan = arm.plan(named="left", speed=0.5)
+    assert_type(plan, gemelo.Plan)
+    motion = arm.start(plan, detached=True)
+    assert_type(motion.progress, float)
+    assert_type(arm.joints, dict[str, float])
+    assert_type(arm.pose().position, tuple[float, float, float])
+    try:
+        arm.move(position=(0.25, 0.15, 0.10), allowed_time=2.0, seed=3)
+    except gemelo.Refused as refused:
+        assert_type(refused.nearest, gemelo.Target)
+        arm.move(**refused.nearest)
+    arm.line(offset=(0, 0, -0.05), speed=0.03)
+    arm.arc(through=(0.2, 0.0, 0.1), to=(0.1, 0.2, 0.1))
+    arm.path([(0.2, 0.0, 0.1), "ready", {"joint": 0.1}, arm.pose()], blend=0.01)
+    return plan.duration
+
+
+with gemelo.connect("parol6", deployment="deploy/local.toml") as arm:
+    carry(arm)
+    arm.scene.add_box("post", size=(0.04, 0.04, 0.16), at=(0.29, 0.27, 0.08))
+    arm.jog(twist=(0.0, 0.0, 0.01), duration=1.0)
+
+with Node("monitor") as node:
+    node.subscribe(topics.JOINT_STATES, lambda state: assert_type(state.position, tuple[float, ...]))
+"""
+WRONG = """
+import gemelo
+
+arm = gemelo.connect()
+arm.move(postion=(0.1, 0.2, 0.3))
+arm.move(named=3)
+arm.line(offset=(0, 0, 1), speed="fast")
+arm.joints["q1"].upper()
+"""
+
+
+def mypy(folder: Path, text: str, root: Path) -> subprocess.CompletedProcess[str]:
+    """`mypy --strict` on a script outside of the project."""
+    file = folder / "script.py"
+    file.write_text(text)
+    options = (
+        "--strict",
+        "--follow-imports=silent",
+        "--no-error-summary",
+        "--explicit-package-bases",
+        "--config-file=",
+    )
+    command = [sys.executable, "-m", "mypy", *options, "--cache-dir", str(root / ".mypy_cache"), str(file)]
+    return subprocess.run(
+        command, cwd=folder, env={**os.environ, "MYPYPATH": str(root)}, capture_output=True, text=True, timeout=180,
+        check=False,
+    )  # fmt: skip
+
+
+def test_a_script_of_a_user_is_type_complete(tmp_path: Path, root: Path) -> None:
+    checked = mypy(tmp_path, SCRIPT, root)
+    assert (checked.returncode, checked.stdout) == (0, "")
+
+
+def test_a_script_with_mistakes_is_told_of_each(tmp_path: Path, root: Path) -> None:
+    checked = mypy(tmp_path, WRONG, root)
+    lines = {int(line.split(":")[1]) for line in checked.stdout.splitlines() if ": error:" in line}
+    assert lines == {5, 6, 7, 8}
+
+
+def test_the_types_are_shipped(root: Path) -> None:
+    assert (root / "gemelo" / "py.typed").is_file()
+    assert "py.typed" in (root / "pyproject.toml").read_text()
+
+
+def test_every_public_name_is_there() -> None:
+    assert all(hasattr(gemelo, name) for name in gemelo.__all__)
+    assert gemelo.__all__ == sorted(gemelo.__all__)
+
+
+def test_importing_it_loads_no_slow_library(root: Path) -> None:
+    code = "import gemelo, json, sys; print(json.dumps(sorted(sys.modules)))"
+    loaded = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
+    assert not SLOW & set(json.loads(loaded.stdout))
+
+
+@pytest.mark.parametrize(
+    ("environ", "said"),
+    [
+        ({"GEMELO_ROUTER_PORT": "1"}, "Lost: no router at 127.0.0.1:1: start the twin with `make up`"),
+        ({"GEMELO_ROBOT": "urdf/nobody"}, "Error: "),
+        ({"GEMELO_CONFIG": "nothing.toml"}, "nothing.toml: there is no such file"),
+    ],
+)
+def test_without_a_twin_it_is_said_at_once_what_is_missing(root: Path, environ: dict[str, str], said: str) -> None:
+    code = textwrap.dedent("""
+        import gemelo
+        try:
+            gemelo.connect()
+        except gemelo.Error as error:
+            print(f"{type(error).__name__}: {error}")
+    """)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=root, env={**os.environ, **environ}, capture_output=True, text=True,
+        timeout=30, check=True,
+    )  # fmt: skip
+    assert said in done.stdout
+    assert done.stderr == ""
