@@ -1,6 +1,6 @@
 # What a person does with gemelo. Everything here needs only `deploy/bootstrap`, which `make setup` runs.
 .DEFAULT_GOAL := help
-.PHONY: help setup up down test check coverage format demo bench lock clean
+.PHONY: help setup up down test check coverage format docs demo bench lock clean
 MAKEFLAGS += --no-print-directory
 bin := .venv/bin
 # On every core at once; the tests of whole stacks and of what their processes do in time come after them, one by one.
@@ -32,7 +32,7 @@ check: setup ## ruff, mypy, import-linter, clang-format
 checks := check-types check-walls check-lint check-format check-cpp
 .PHONY: $(checks)
 check-types:
-	@$(bin)/mypy --no-error-summary gemelo schemas services firmware
+	@$(bin)/mypy --no-error-summary gemelo schemas services firmware docs examples
 check-walls:
 	@$(bin)/lint-imports --no-logo >/dev/null || $(bin)/lint-imports --no-logo
 check-lint:
@@ -45,6 +45,9 @@ check-cpp:
 format: setup ## let ruff and clang-format write
 	@$(bin)/ruff check --quiet --fix . ; $(bin)/ruff format --quiet .
 	@git ls-files '*.h' '*.hpp' '*.cpp' | xargs -r $(bin)/clang-format -i
+
+docs: setup ## docs/api.md from the docstrings of gemelo
+	@$(bin)/python docs/make_api.py
 
 demo: setup ## a sine and a tour, without a display: out/demo.json, recording, picture
 	@$(bin)/python -m services.demo

@@ -92,13 +92,17 @@ class Arm:
         return self.description.joint_names
 
     @property
-    def states(self) -> tuple[str, ...]:
-        """The named states of the SRDF, for `move(named=...)`.
+    def states(self) -> dict[str, dict[str, float]]:
+        """The named states of the SRDF: joint values [rad] or [m] by joint; some name only some joints.
 
-        >>> "ready" in arm.states
-        True
+        >>> arm.states["home"]
+        {'brazo_joint': 0.0, 'antebrazo_joint': 0.0, 'efector_joint': 0.0}
         """
-        return self.description.state_names
+        whole = {
+            name: dict(zip(self.joint_names, values, strict=True))
+            for name, values in self.description.named_states.items()
+        }
+        return {**whole, **self.description.partial_states}
 
     @property
     def base_frame(self) -> str:

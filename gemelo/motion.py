@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from gemelo.errors import Aborted, Canceled, Interrupted, Lost, Refused
+from gemelo.errors import Aborted, Canceled, Error, Interrupted, Lost, Refused
 from gemelo.planning import Plan, words_of
 from gemelo.session import Session
 from schemas.actions import GoalStatusCode
@@ -17,7 +17,7 @@ from schemas.motion import (
 )
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY
 from services.runtime import errors as runtime
-from services.runtime.actions import ActionClient, GoalHandle
+from services.runtime.actions import ActionClient, ActionOutcome, GoalHandle
 
 Handle = GoalHandle[FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
 Client = ActionClient[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
@@ -90,15 +90,18 @@ class Motion:
         return self._handle is not None and self._handle.is_over
 
     @property
-    def result(self) -> FollowJointTrajectoryResult | None:
-        """How exactly it arrived: commanded and executed steps, final and largest following error; None before its end.
+    def result(self) -> FollowJointTrajectoryResult:
+        """How exactly it arrived: commanded and executed steps, final and largest following error [steps].
+
+        Raises `Error` while it is under way, and where the gateway was lost.
 
         >>> result = arm.move(named="left").result
         >>> result.executed_steps == result.commanded_steps, max(map(abs, result.final_error)) <= 0.5
         (True, True)
         """
-        outcome = self._handle.outcome if self._handle is not None else None
-        return outcome.result if outcome is not None else None
+        if self._outcome is None:
+            raise Error("the motion has no result: it is under way, or the gateway was lost; see status, and wait()")
+        return self._outcome.result
 
     @property
     def stopped_at(self) -> dict[str, float]:
@@ -107,9 +110,15 @@ class Motion:
         >>> abs(arm.move(joints={"brazo_joint": 0.2}).stopped_at["brazo_joint"] - 0.2) < 0.001
         True
         """
-        result, arm = self.result or FollowJointTrajectoryResult(), self._session.description
+        if self._outcome is None:
+            return {}
+        result, arm = self._outcome.result, self._session.description
         steps = zip(result.joint_names, result.executed_steps, strict=False)
         return {name: arm.joint(name).steps.to_position(count) for name, count in steps}
+
+    @property
+    def _outcome(self) -> ActionOutcome[FollowJointTrajectoryResult] | None:
+        return self._handle.outcome if self._handle is not None else None
 
     def cancel(self) -> None:
         """The arm decelerates on its path; returns at once, `wait` returns when it rests.
@@ -186,9 +195,9 @@ class Motion:
 
     def __repr__(self) -> str:
         about = f"<Motion {self.plan.robot}: {words_of(self.plan.target)}, {self.status.name.lower()}"
-        result = self.result
-        if result is None:
+        if self._outcome is None:
             return f"{about}, {self.progress:.0%}>"
+        result = self._outcome.result
         errors = ", ".join(
             f"{name} {error:+.2f}" for name, error in zip(result.joint_names, result.final_error, strict=False)
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import signal
 import subprocess
 import time
@@ -12,17 +11,21 @@ import pytest
 
 from schemas.actions import GoalStatusCode
 from schemas.frames import FrameTransform, FrameTransforms, Transform
-from schemas.joints import JointState, JointTargets
+from schemas.joints import JointState
 from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
 from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, JOINT_TARGETS, PLAN, STATIC_FRAMES
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, PLAN, STATIC_FRAMES
+from services.arm.description import load_arm
 from services.runtime.actions import ActionServer, GoalDecision, accept
 from services.runtime.node import Node
 from tests.runtime.support import ROOT, RouterProcess, programs, spinning, until
 
 EXAMPLES = sorted(path.name for path in (ROOT / "examples").glob("*.py"))
-LONGEST = {"pick_and_place.py": 80, "straight_planner.py": 29}  # lines that do something
-LONGEST_FIRST_NODE = 20
+LONGEST = {"09_pick_and_place.py": 40, "14_straight_planner.py": 29}  # lines that do something
+LONGEST_OTHER = 20
+
+ARMS = [load_arm(ROOT / "urdf" / name) for name in ("rm1", "parol6")]
+ARM_WORDS = {word for arm in ARMS for word in (arm.name, *arm.joint_names, *arm.model.link_names)}
 
 Start = Callable[[str], subprocess.Popen[str]]
 
@@ -68,7 +71,7 @@ def line(process: subprocess.Popen[str]) -> str:
 
 
 def test_joint_monitor_prints_the_joints_and_notices_silence(start: Start, robot: Node) -> None:
-    process = start("joint_monitor.py")
+    process = start("10_joint_monitor.py")
     assert line(process) == "no joint states: is stepper_gateway running?\n"
     states = robot.publisher(JOINT_STATES)
     with spinning(robot, lambda now: states.put(JointState(stamp=now, name=("q1", "q2"), position=(0.5, -0.25)))):
@@ -81,7 +84,7 @@ def test_joint_monitor_prints_the_joints_and_notices_silence(start: Start, robot
 
 
 def test_tool_pose_warns_while_the_frame_does_not_exist_and_then_prints_it(start: Start, state_publisher: Node) -> None:
-    process = start("tool_pose.py")
+    process = start("11_tool_pose.py")
     assert process.stderr is not None
     assert "tool_pose WARNING" in process.stderr.readline()
     fixed = FrameTransform(parent="brazo_link", child="efector_link", transform=Transform(translation=(0.2, 0.0, 0.1)))
@@ -131,11 +134,11 @@ def test_custom_planner_moves_the_arm_and_feedback_monitor_sees_it(
 ) -> None:
     follower = Follower(robot)
     with spinning(robot, follower.step):
-        monitor = start("feedback_monitor.py")
+        monitor = start("12_feedback_monitor.py")
         with Node("observer", router.deployment, robot="rm1") as observer:
             assert until(lambda: "feedback_monitor" in observer.alive())
         time.sleep(0.3)
-        planner = start("custom_planner.py")
+        planner = start("13_custom_planner.py")
         output, errors = planner.communicate(timeout=10.0)
         assert (planner.returncode, errors) == (0, "")
         assert output == "SUCCEEDED  (100, -40)\n"
@@ -167,7 +170,7 @@ def test_ctrl_c_in_custom_planner_cancels_its_move(start: Start, robot: Node) ->
             server.finish(cancelled.pop(), GoalStatusCode.CANCELED, FollowJointTrajectoryResult(executed_steps=(3,)))
 
     with spinning(robot, step):
-        planner = start("custom_planner.py")
+        planner = start("13_custom_planner.py")
         assert until(lambda: running, 10.0)
         time.sleep(0.3)
         planner.send_signal(signal.SIGINT)
@@ -179,7 +182,7 @@ def test_straight_planner_takes_the_place_of_ours(start: Start, router: RouterPr
     states = robot.publisher(JOINT_STATES)
     joints = JointState(name=("q1", "q2"), position=(0.5, -0.25))
     with spinning(robot, lambda now: states.put(joints)):
-        process = start("straight_planner.py")
+        process = start("14_straight_planner.py")
         with Node("person", router.deployment, robot="rm1") as person:
             assert until(lambda: "planner" in person.alive(), 10.0)
             time.sleep(0.3)  # for its first joint state
@@ -192,26 +195,21 @@ def test_straight_planner_takes_the_place_of_ours(start: Start, router: RouterPr
     assert "joint values alone" in refused.refusal.message
 
 
-def test_demo_sine_streams_targets_about_where_the_arm_stands(start: Start, robot: Node) -> None:
-    heard: list[JointTargets] = []
-    robot.subscribe(JOINT_TARGETS, heard.append)
-    states = robot.publisher(JOINT_STATES)
-    with spinning(robot, lambda now: states.put(JointState(stamp=now, name=("q1",), position=(0.5,)))):
-        process = start("demo_sine.py")
-        assert until(lambda: len(heard) >= 12, 10.0)
-        end(process)
-    assert all(targets.name == ("q1",) and abs(targets.position[0] - 0.5) <= 0.02 for targets in heard)
-    gaps = [after.stamp - before.stamp for before, after in itertools.pairwise(heard)]
-    assert sorted(gaps)[len(gaps) // 2] == pytest.approx(1e8, rel=0.1)
-
-
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_is_short(name: str) -> None:
     text = (ROOT / "examples" / name).read_text(encoding="utf-8").splitlines()
     doing = [each for each in text if each.strip() and not each.startswith(("from ", "import ", '"""'))]
-    assert len(doing) <= LONGEST.get(name, LONGEST_FIRST_NODE)
+    assert len(doing) <= LONGEST.get(name, LONGEST_OTHER)
 
 
-def test_the_examples_that_are_promised_are_there() -> None:
-    first_nodes = {"joint_monitor.py", "custom_planner.py", "feedback_monitor.py", "tool_pose.py"}
-    assert first_nodes | {"pick_and_place.py", "straight_planner.py"} <= set(EXAMPLES)
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_says_what_it_shows_and_names_no_arm(name: str) -> None:
+    text = (ROOT / "examples" / name).read_text(encoding="utf-8")
+    assert text.startswith(('"""', "'"))
+    assert not [word for word in ARM_WORDS if word in text]
+
+
+def test_the_examples_are_numbered_and_those_that_are_promised_are_there() -> None:
+    assert [int(name.split("_")[0]) for name in EXAMPLES] == list(range(1, len(EXAMPLES) + 1))
+    nodes = {"joint_monitor", "custom_planner", "feedback_monitor", "tool_pose", "straight_planner"}
+    assert {"pick_and_place", *nodes} <= {name.split("_", 1)[1].removesuffix(".py") for name in EXAMPLES}

@@ -1,14 +1,13 @@
-"""A planner in place of ours: `gemelo move --joints` goes straight there, slowly, and heeds nothing on the way."""
+"""A node in place of our planner: `gemelo move --joints` goes straight there, slowly, and heeds nothing on the way."""
 
+from gemelo import Node, topics
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, Refusal
-from schemas.topics import JOINT_STATES, PLAN
-from services.runtime.node import Node
 
 SECONDS = 10.0  # for every move
 
 with Node("planner") as node:
-    joints = node.latest(JOINT_STATES)
+    joints = node.latest(topics.JOINT_STATES)
 
     def plan(request: PlanRequest) -> PlanResponse:
         if not isinstance(request.goal, JointGoal) or joints.message is None:
@@ -24,5 +23,5 @@ with Node("planner") as node:
         trajectory = JointTrajectory(joint_names=state.name, points=points)
         return PlanResponse(code=PlanCode.SUCCESS, trajectory=trajectory, duration=SECONDS)
 
-    node.serve(PLAN, plan)
+    node.serve(topics.PLAN, plan)
     node.spin()

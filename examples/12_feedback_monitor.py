@@ -1,10 +1,10 @@
-"""Prints how every trajectory goes that anybody sends: point, time and the largest error, as the gateway says it."""
+"""A node: prints how every trajectory goes, whoever sends it: point, time and the largest error on the way."""
 
+from gemelo import Node
 from schemas.actions import GoalFeedback
 from schemas.message import decode
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
 from services.runtime.action_keys import feedback_topic, status_topic
-from services.runtime.node import Node
 
 
 def show(message: GoalFeedback) -> None:

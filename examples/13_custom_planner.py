@@ -1,9 +1,8 @@
-"""A planner of one's own: every joint goes a little further and back, sent as a trajectory to the gateway."""
+"""A node that plans for itself: every joint goes a little further and back, sent as a trajectory to the gateway."""
 
+from gemelo import Node, topics
 from schemas.joints import JointState
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY, JOINT_STATES
-from services.runtime.node import Node
 
 
 def there_and_back(state: JointState, step: float = 0.02, time: float = 2.0) -> JointTrajectory:
@@ -16,14 +15,14 @@ def there_and_back(state: JointState, step: float = 0.02, time: float = 2.0) -> 
 
 
 with Node("custom_planner") as node:
-    joints = node.latest(JOINT_STATES)
+    joints = node.latest(topics.JOINT_STATES)
     while joints.message is None:
         node.wait(0.1)
     goal = FollowJointTrajectoryGoal(trajectory=there_and_back(joints.message))
-    handle = node.action(FOLLOW_JOINT_TRAJECTORY).send(goal)
+    handle = node.action(topics.FOLLOW_JOINT_TRAJECTORY).send(goal, attached=True)
     try:
         outcome = handle.wait(timeout=60.0)
-    except KeyboardInterrupt:  # the arm would go on by itself
+    except KeyboardInterrupt:
         handle.cancel()
         outcome = handle.wait(timeout=10.0)
     print(outcome.status.name, outcome.result.error_string, outcome.result.executed_steps, flush=True)

@@ -1,10 +1,9 @@
-"""Prints the joints twice a second, and says so when they fall silent."""
+"""A node: prints the joints twice a second, and says so when they fall silent."""
 
-from schemas.topics import JOINT_STATES
-from services.runtime.node import Node
+from gemelo import Node, topics
 
 with Node("joint_monitor") as node:
-    joints = node.latest(JOINT_STATES)
+    joints = node.latest(topics.JOINT_STATES)
 
     def show(now: int) -> None:
         if joints.message is None or joints.is_stale:
