@@ -218,7 +218,10 @@ class Motions:
         motion = Motion(self._session, plan, detached)
         self._started = [each for each in self._started if not each.is_over] + [motion]
         goal = FollowJointTrajectoryGoal(
-            trajectory=plan.trajectory, goal_tolerance=tolerance, scene_version=plan.response.scene_version
+            trajectory=plan.trajectory,
+            goal_tolerance=tolerance,
+            scene_version=plan.response.scene_version,
+            scene_epoch=plan.response.scene_epoch,
         )
         try:
             motion._send(client, goal)
