@@ -55,7 +55,7 @@ class Refused(Error):
         nearest: Target | None = None,
         remedy: str = "",
         configuration: Mapping[str, float] | None = None,
-        way_out: Mapping[str, float] | None = None,
+        nearest_free: Mapping[str, float] | None = None,
         code: int = 0,
     ) -> None:
         super().__init__(message)
@@ -66,7 +66,9 @@ class Refused(Error):
         self.nearest: Target = nearest or {}  # the nearest goal that can, as arguments: `arm.move(**refused.nearest)`
         self.remedy = remedy  # what a person can do
         self.configuration = dict(configuration or {})  # [rad] or [m] by joint, where the arm would touch something
-        self.way_out = dict(way_out or {})  # [rad] or [m] by joint, the nearest that touches nothing, if it touches now
+        self.nearest_free = dict(
+            nearest_free or {}
+        )  # [rad] or [m] by joint, the nearest that touches nothing, if it touches now
         self.code = code  # PlanCode of the planner, FollowErrorCode of the gateway
 
 

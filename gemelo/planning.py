@@ -194,8 +194,8 @@ def refused(arm: Description, refusal: Refusal, request: PlanRequest, target: Ta
         limit=refusal.limit,
         nearest=nearest,
         remedy=refusal.remedy,
-        configuration=_by_joint(arm, refusal.posture),
-        way_out=_by_joint(arm, refusal.way_out),
+        configuration=_by_joint(arm, refusal.configuration),
+        nearest_free=_by_joint(arm, refusal.nearest_free),
         code=code,
     )
 
