@@ -1,4 +1,4 @@
-"""What the core wants done: frames to send, messages to publish, news of goals, answers, log lines."""
+"""The outputs of the core: frames to send, messages to publish, news of goals, answers, log lines."""
 
 from __future__ import annotations
 

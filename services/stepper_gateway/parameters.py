@@ -1,4 +1,4 @@
-"""What a person may set on the gateway."""
+"""The parameters of the gateway."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ def _drift(exchanges: deque[Exchange], weights: list[float], at: float, offset: 
 
 
 def _agree(first: Exchange, second: Exchange) -> bool:
-    """Whether one clock can explain both: each is wrong by half its round trip at most.
+    """True if one clock can explain both: each is wrong by half its round trip at most.
 
     It cannot when this machine has slept meanwhile, as its monotonic clock stands still then.
     """

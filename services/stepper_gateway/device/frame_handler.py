@@ -1,4 +1,4 @@
-"""What the device says, taken in: frames and JSON change what the gateway knows, does and tells."""
+"""The handler of everything that the device says, in frames and in JSON."""
 
 from __future__ import annotations
 

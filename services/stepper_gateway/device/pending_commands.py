@@ -69,7 +69,10 @@ class PendingCommands:
         self, kind: DeviceCommandKind, moment: Moment, timeout: float, ticket: int = INTERNAL,
         arguments: Arguments = NO_ARGUMENTS, stream: int = 0,
     ) -> None:  # fmt: skip
-        """Have `kind` sent with the next frames; a stop of the same stream that is under way serves this caller too."""
+        """Have `kind` sent with the next frames and given up after `timeout` [s].
+
+        A stop of the same stream that is under way serves this caller too.
+        """
         tickets = [] if ticket == INTERNAL else [ticket]
         under_way = self._stop_under_way(kind, stream)
         if under_way is not None and len(under_way.tickets) < MOST_TICKETS:

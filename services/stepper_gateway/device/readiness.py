@@ -1,4 +1,4 @@
-"""Why a device that can be reached cannot start a motion, with what a person can do about it."""
+"""The reasons for which a device that can be reached cannot start a motion, each with its remedy."""
 
 from __future__ import annotations
 

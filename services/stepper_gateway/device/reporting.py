@@ -124,7 +124,7 @@ class Reporter:
         )
 
     def ack(self, ack: Ack, round_trip: float, stamp: int, steps: tuple[int, ...]) -> CommandAck:
-        """The device's answer to a chunk."""
+        """The device's answer to a chunk, `round_trip` [s] after it was sent; `stamp` [ns] UNIX, `steps` executed."""
         return CommandAck(
             stamp=stamp,
             stream=ack.stream,

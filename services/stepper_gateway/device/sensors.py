@@ -35,7 +35,7 @@ class SensorRelay:
         self._is_silent = False
 
     def on_readings(self, report: SensorReport, arrival: float, moment: Moment) -> None:
-        """Take what the board has measured."""
+        """Take what the board has measured; `arrival` [s] monotonic."""
         known = {name: value for name, value in report.values.items() if name in self._units}
         measured = self._device.session.clock.measured(report.t_us, arrival)
         self._readings = Readings(known, moment.unix_at(measured), arrival)

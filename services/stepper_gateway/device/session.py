@@ -70,11 +70,11 @@ class DeviceSession:
 
     @property
     def is_armed(self) -> bool:
-        """Whether the drivers are energised."""
+        """True if the drivers are energised."""
         return self.latest is not None and bool(self.latest.flags & StateFlag.ARMED)
 
     def fits(self, state: State) -> bool:
-        """Whether the state has this arm's joints; a device with another configuration has others."""
+        """True if the state has this arm's joints; a device with another configuration has others."""
         return len(state.steps) == self._joints
 
     def on_link(self, connected: bool, reason: str) -> None:
@@ -96,7 +96,10 @@ class DeviceSession:
             del self._reports[next(boot for boot in self._reports if boot != self.boot_id)]
 
     def on_state(self, state: State, arrival: float, timeout: float) -> tuple[bool, bool]:
-        """(is it news, does it tell of a new boot); raises `BadFrame` for one that no device says."""
+        """(is it news, does it tell of a new boot); raises `BadFrame` for one that no device says.
+
+        `arrival` [s] monotonic; states older than `timeout` [s] count as a pause.
+        """
         if state.mode not in DeviceMode._value2member_map_:
             raise BadFrame(f"a state with the unknown mode {state.mode}")
         is_fresh = arrival - self.state_arrival <= timeout
@@ -159,7 +162,7 @@ class DeviceSession:
         return self._tells_status and self.status is None and self.boot_id != 0 and self.is_fresh(moment, ASK_STATUS)
 
     def is_fresh(self, moment: Moment, timeout: float) -> bool:
-        """Whether a state has arrived within `timeout` seconds."""
+        """True if a state has arrived within `timeout` seconds."""
         return self.link_up and moment.monotonic - self.state_arrival <= timeout
 
     @property
@@ -167,7 +170,7 @@ class DeviceSession:
         return DeviceMode(self.latest.mode) if self.latest is not None else DeviceMode.BOOT
 
     def unreachable_reason(self, moment: Moment, timeout: float) -> str:
-        """Why the device cannot be reached, empty if it can."""
+        """Why the device cannot be reached: no link, or no state for `timeout` [s]; empty if it can."""
         name = self._device
         if not self.link_up:
             return f'no link to device "{name}": {self.link_reason}'

@@ -57,10 +57,11 @@ class ActiveGoal:
 
     @property
     def target_steps(self) -> tuple[float, ...]:
+        """[steps] where the goal ends, with their fraction."""
         return tuple(j.steps.to_steps(p) for j, p in zip(self.joints, self.goal.target, strict=True))
 
     def begin(self, stream: Stream, start_us: int, duration_us: int, deadline: float | None) -> None:
-        """Its first knot comes `start_us` along `stream`."""
+        """Its first knot comes `start_us` [us] along `stream`; it is late after `deadline` [s] monotonic."""
         self.stream, self.start_us, self.duration_us, self.deadline = stream, start_us, duration_us, deadline
 
     def follow(self, point: PathPoint, state: State) -> GoalEnding | None:
@@ -98,7 +99,7 @@ class ActiveGoal:
         return None
 
     def account(self, ending: GoalEnding, state: State | None, now: float) -> str:
-        """What moved where, how long, with what error, and why it ended otherwise; for the log."""
+        """A sentence for the log at `now` [s] monotonic: what moved where, how long, with what error, why it ended."""
         said = f"goal {self.goal_id} {ending.status.name.lower()} after {now - self.accepted.monotonic:.2f} s"
         if ending.reason:
             said += f": {ending.reason}"
@@ -125,7 +126,7 @@ class ActiveGoal:
         return all(bound is None or abs(error) <= bound for error, bound in (*places, *speeds))
 
     def late(self, state: State, now: float) -> GoalEnding:
-        """The ending for a goal that was not reached in time."""
+        """The ending for a goal that was not reached by `now` [s] monotonic."""
         errors = self.goal_errors(state)
         bounds = [math.inf if bound is None else bound for bound in self.goal.goal_tolerance.position]
         index = max(range(len(errors)), key=lambda i: abs(errors[i]) - bounds[i])

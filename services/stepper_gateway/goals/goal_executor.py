@@ -92,7 +92,7 @@ class GoalExecutor:
         return ""
 
     def step(self, moment: Moment, period: float) -> None:
-        """Start what has waited, and end what is late or refused."""
+        """Start what has waited, and end what is late or refused; `period` [s] since the last step."""
         self._start_waiting(moment)
         execution, controller = self._current, self._controller
         if execution is None:

@@ -49,6 +49,7 @@ class MotionStart:
 
     @classmethod
     def at_rest(cls, position: Vector) -> MotionStart:
+        """The arm rests at `position` [rad] or [m]."""
         return cls(Knot.at_rest(position), position, position)
 
     def joined(self, other: MotionStart) -> MotionStart:
@@ -111,7 +112,7 @@ class GoalValidator:
         return path
 
     def _is_same(self, motion_start: MotionStart, first: Knot) -> bool:
-        """Whether the path begins where the arm is: on the same whole steps, or to the wire's resolution."""
+        """True if the path begins where the arm is: on the same whole steps, or to the wire's resolution."""
         start = motion_start.start
         rows = list(zip(self._joints, start.position, first.position, strict=True))
         if start.is_at_rest and first.is_at_rest and not motion_start.is_sent:

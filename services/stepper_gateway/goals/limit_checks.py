@@ -34,12 +34,12 @@ def require_path_within(path: Path, joints: tuple[Joint, ...], parameters: Gatew
 
 
 def within(knot: Knot, joints: tuple[Joint, ...]) -> bool:
-    """Whether every joint is within its limits."""
+    """True if every joint is within its limits."""
     return all(j.lower - SLACK <= p <= j.upper + SLACK for j, p in zip(joints, knot.position, strict=True))
 
 
 def beyond(joint: Joint, position: float) -> str:
-    """The sentence for a position outside the limits."""
+    """The sentence for a `position` [rad] or [m] outside the limits."""
     side, limit = ("lower", joint.lower) if position < joint.lower else ("upper", joint.upper)
     return (
         f'joint "{joint.name}": {position:.4f} {joint.unit} is beyond the {side} limit {limit:.4f} {joint.unit}; '
@@ -59,6 +59,7 @@ class _Bound:
         self._rate_velocity = self.step_rate / joint.steps.per_unit
 
     def holds(self, position: float, velocity: float, acceleration: float) -> bool:
+        """True if the joint is within its limits; [rad] or [m], and per s and s^2."""
         return (
             self.lower <= position <= self.upper
             and abs(velocity) <= min(self.velocity, self._rate_velocity)
@@ -66,6 +67,7 @@ class _Bound:
         )
 
     def complaint(self, knot: Knot, column: int, t: float) -> str:
+        """The sentence for the limit that `knot` breaks at `t` [s] in its joint number `column`."""
         joint, unit = self.joint, self.joint.unit
         position, velocity, acceleration = (values[column] for values in knot)
         if not self.lower <= position <= self.upper:

@@ -1,4 +1,4 @@
-"""How a goal is turned away: a code of the action and a sentence that names the thing."""
+"""The rejection of a goal: a code of the action and a sentence that names the thing."""
 
 from __future__ import annotations
 

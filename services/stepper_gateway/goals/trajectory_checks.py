@@ -59,7 +59,7 @@ class Tolerances(NamedTuple):
 def tolerances(
     goal: FollowJointTrajectoryGoal, joints: tuple[Joint, ...], factor: float
 ) -> tuple[Tolerances, Tolerances]:
-    """Path and goal tolerance; raises `GoalRejected`.
+    """Path and goal tolerance, in [rad] or [m] and per s; raises `GoalRejected`.
 
     As ros2_control's joint_trajectory_controller: 0 is the default, -1 none, another negative value is refused. The
     defaults are robot.toml's times `factor` for positions, and none for velocities.

@@ -1,4 +1,4 @@
-"""What every wire has: a thread that connects again and again, and an inbox for what arrives."""
+"""The parts that all wires share: a thread that connects again and again, and a queue for what arrives."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CAPACITY = 4096  # [messages] 80 s of state
 BACK_OFF = (0.1, 0.2, 0.5, 1.0)  # [s] between attempts
 
 
-class Inbox:
+class ReceiveQueue:
     """Bounded: what is not taken in time makes room for what is newer; any thread may put, one takes."""
 
     def __init__(self, wake: Callable[[], None]) -> None:

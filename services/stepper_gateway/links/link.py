@@ -1,4 +1,4 @@
-"""What the gateway asks of any wire to the device."""
+"""The interface of every wire to the device."""
 
 from __future__ import annotations
 

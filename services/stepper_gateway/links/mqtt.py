@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
-from services.stepper_gateway.links.connection import Inbox, keep_connected
+from services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
 from services.stepper_gateway.links.link import FROM_DEVICE, Kind, Received
 
 PREFIX = "gemelo/v1"
@@ -33,7 +33,7 @@ class MqttLink:
         self._address = (host, port)
         self._prefix = f"{PREFIX}/{device}/"
         self._wake = wake
-        self._inbox = Inbox(wake)
+        self._inbox = ReceiveQueue(wake)
         self._client: paho.Client | None = None
         self._reason = f"no connection yet to the MQTT broker at {host}:{port}"
         self._lost = threading.Event()

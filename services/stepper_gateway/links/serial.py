@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable
 
 from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
-from services.stepper_gateway.links.connection import Inbox, keep_connected
+from services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
 from services.stepper_gateway.links.frames import FrameType
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.links.serial_port import Line, complaint, open_port
@@ -41,7 +41,7 @@ class SerialLink:
 
     def __init__(self, port: str, baud: int, wake: Callable[[], None]) -> None:
         self._port, self._baud, self._wake = port, baud, wake
-        self._inbox = Inbox(wake)
+        self._inbox = ReceiveQueue(wake)
         self._outgoing: deque[bytes] = deque()
         self._has_outgoing = threading.Event()
         self._line: Line | None = None

@@ -1,4 +1,4 @@
-"""What was sent along one stream, kept so that the command is known exactly at any played instant."""
+"""The path that was sent along one stream: the command at any played instant, exactly."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from services.stepper_gateway.motion.target_tracker import TargetTracker
 KNOT_TIME = 0.02  # [s] between knots
 
 
-class Motion(Protocol):
+class KnotSource(Protocol):
     """Knots after the one where it starts, `dt_us` apart."""
 
     @property
@@ -21,7 +21,7 @@ class Motion(Protocol):
 
     @property
     def is_finished(self) -> bool:
-        """Whether the last knot, at rest, has been taken."""
+        """True if the last knot, at rest, has been taken."""
 
     def take(self, count: int) -> list[Knot]:
         """The next knots, at most `count` of them."""

@@ -19,6 +19,7 @@ class Knot(NamedTuple):
 
     @classmethod
     def at_rest(cls, position: Vector) -> Knot:
+        """A knot that stands at `position` [rad] or [m]."""
         zeros = (0.0,) * len(position)
         return cls(tuple(position), zeros, zeros)
 

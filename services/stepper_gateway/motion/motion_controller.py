@@ -13,7 +13,7 @@ from services.stepper_gateway.links.frames import Ack, Chunk, State, encode
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.commanded_path import PathPoint
-from services.stepper_gateway.motion.knot_sources import Motion
+from services.stepper_gateway.motion.knot_sources import KnotSource
 from services.stepper_gateway.motion.knots import Knot, whole_steps
 from services.stepper_gateway.motion.stream import SentChunk, Stream
 from services.stepper_gateway.motion.transmission import Transmission
@@ -63,20 +63,20 @@ class MotionController:
 
     @property
     def is_followable(self) -> bool:
-        """Whether the device may have something of ours to play."""
+        """True if the device may have something of ours to play."""
         return self.stream is not None and not (self.stream.is_abandoned or self.stream.is_finished)
 
     @property
     def is_held(self) -> bool:
-        """Whether a person has asked for a hold, and has not ended it."""
+        """True if a person has asked for a hold, and has not ended it."""
         return self._holds or self._device.commands.is_pending(DeviceCommandKind.HOLD)
 
     def is_followed(self, state: State) -> bool:
-        """Whether the device plays the stream that we want it to play."""
+        """True if the device plays the stream that we want it to play."""
         return self.transmission.owns_motion and self.stream is not None and state.stream == self.stream.id
 
     def is_resting(self) -> bool:
-        """Whether the device stands idle with nothing under way to it."""
+        """True if the device stands idle with nothing under way to it."""
         if self._device.session.mode != DeviceMode.IDLE or (self._awaits_stop and not self.has_stopped()):
             return False
         stream = self.stream
@@ -84,11 +84,11 @@ class MotionController:
 
     @property
     def slowdown_share(self) -> float:
-        """Share of the time that a goal may end later, because a person wants the arm slow."""
+        """Share of the time, 0 to 1, by which a goal may end later, because a person wants the arm slow."""
         return self._slowness.share
 
-    def begin(self, motion: Motion, position: Vector, moment: Moment) -> Stream:
-        """A new stream from rest; its first chunk leaves at once."""
+    def begin(self, motion: KnotSource, position: Vector, moment: Moment) -> Stream:
+        """A new stream from rest at `position` [rad] or [m]; its first chunk leaves at once."""
         status = self._device.session.status
         capacity = status.queue_capacity if status is not None and status.queue_capacity else 128
         self._device.reporter.motion_begins()
@@ -163,7 +163,7 @@ class MotionController:
         self._device.commands.ask(DeviceCommandKind.STOP, moment, timeout, stream=stream)
 
     def has_stopped(self) -> bool:
-        """Whether the device has answered the latest STOP and has said since that it stands."""
+        """True if the device has answered the latest STOP and has said since that it stands."""
         state = self._device.session.latest
         return state is not None and 0 <= self._stopped_us < state.t_us and state.mode not in MOVING
 

@@ -25,6 +25,7 @@ class JoinedPath:
         self.duration = max(path.duration, meets)
 
     def at(self, t: float) -> Knot:
+        """The knot at `t` [s]."""
         return self._bridge.at(t) if t < self.meets else self._path.at(t)
 
 

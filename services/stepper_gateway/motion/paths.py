@@ -34,6 +34,7 @@ class SampledPath:
         self.duration = max(0.0, sampler.duration - offset)
 
     def at(self, t: float) -> Knot:
+        """The knot at `t` [s]."""
         return Knot(*self._sampler.at(t + self._offset))
 
 
@@ -60,6 +61,7 @@ class RoundedPath:
         self.duration = max(0.0, times[-1] + corner - offset)
 
     def at(self, t: float) -> Knot:
+        """The knot at `t` [s]."""
         late, early = t + self._offset, t + self._offset - self._corner
         p1, v1, s1 = self._line(late)
         p0, v0, s0 = self._line(early)
@@ -95,12 +97,13 @@ class ProfilePath:
         self.duration: float = trajectory.duration
 
     def at(self, t: float) -> Knot:
+        """The knot at `t` [s]."""
         position, velocity, acceleration = self._trajectory.at_time(min(max(t, 0.0), self.duration))
         return Knot(tuple(position), tuple(velocity), tuple(acceleration))
 
 
 def profile(start: Knot, target: Knot, limits: Limits, duration: float | None = None) -> ProfilePath | None:
-    """From `start` to `target` as fast as the limits allow, or in exactly `duration`; None if that cannot be."""
+    """From `start` to `target` as fast as the limits allow, or in exactly `duration` [s]; None if that cannot be."""
     problem = InputParameter(len(start.position))
     problem.current_position, problem.target_position = start.position, target.position
     problem.current_velocity, problem.target_velocity = start.velocity, target.velocity

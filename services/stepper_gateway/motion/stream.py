@@ -68,7 +68,7 @@ class Stream:
 
     @property
     def is_finished(self) -> bool:
-        """Whether the device has played it to its end and rests there."""
+        """True if the device has played it to its end and rests there."""
         state = self._play
         return (
             self.is_complete
@@ -79,7 +79,7 @@ class Stream:
 
     @property
     def has_started(self) -> bool:
-        """Whether the device has said that it plays this stream."""
+        """True if the device has said that it plays this stream."""
         return self._play is not None or self.acked > 0
 
     def add(self, knots: list[Knot], dt_us: int, last: bool) -> SentChunk:
@@ -136,14 +136,14 @@ class Stream:
         self.log.prune(state.play_us)
 
     def overdue(self, now: float) -> list[SentChunk]:
-        """Chunks whose acknowledgement is late, oldest first."""
+        """Chunks whose acknowledgement is late at `now` [s] monotonic, oldest first."""
         patience = min(max(3.0 * self._round_trip + 0.02, RETRY_MIN), RETRY_MAX)
         if self.is_abandoned or not self.unacked or now - self.unacked[0].sent < patience:
             return []
         return self._older_than(now - GAP_RETRY)
 
     def played_us(self, now: float, clock: ClockSync) -> int:
-        """Stream time that is being played now, by the latest state and the clock."""
+        """[us] of stream time that is played at `now` [s] monotonic, by the latest state and the clock."""
         if self._play is None:
             return 0
         since = max(0, clock.device_time(now) - self._play.t_us)

@@ -32,11 +32,11 @@ class TargetStream:
 
     @property
     def is_resting(self) -> bool:
-        """Whether the newest knot stands."""
+        """True if the newest knot stands."""
         return self._tracker is None or self._tracker.knot.is_at_rest
 
     def checked(self, targets: JointTargets) -> dict[int, float]:
-        """Column and position of every joint named; raises `GoalRejected`."""
+        """Column and position [rad] or [m] of every joint named; raises `GoalRejected`."""
         require_known(targets.name, self._joints)
         if not targets.name:
             raise invalid_joints("a target names no joint")
@@ -57,6 +57,7 @@ class TargetStream:
         self._latest = now
 
     def require_uninterrupted(self, silence: float) -> None:
+        """Raises `GoalRejected` until no target has come for `silence` [s] after an interruption."""
         if self._is_interrupted:
             raise invalid(
                 f"streaming was interrupted, and nothing resumes by itself: send no target for {silence:g} s, then "
@@ -64,7 +65,7 @@ class TargetStream:
             )
 
     def take(self, columns: dict[int, float], present: Vector) -> None:
-        """The newest target; joints that it does not name keep theirs, or stay where they are."""
+        """The newest target [rad] or [m] by column; joints that it does not name keep theirs, or stand still."""
         base = self._tracker.target if self._tracker is not None and not self._tracker.is_braking else self.target
         target = tuple(columns.get(index, value) for index, value in enumerate(base or present))
         if self._tracker is not None:
@@ -81,6 +82,7 @@ class TargetStream:
         return TargetKnots(self._tracker)
 
     def is_silent(self, now: float, silence: float) -> bool:
+        """True if no message has come for `silence` [s] at `now` [s] monotonic."""
         return now - self._latest > silence
 
     def fall_silent(self) -> None:

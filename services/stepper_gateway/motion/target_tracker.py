@@ -31,7 +31,7 @@ class TargetTracker:
         return self._knot
 
     def follow(self, target: Vector) -> None:
-        """Go for `target` from now on; within the joint limits, which the caller has checked."""
+        """Go for `target` [rad] or [m] from now on; within the joint limits, which the caller has checked."""
         self.target = target
         self.is_braking = False
 

@@ -6,7 +6,7 @@ from services.arm.description import Joint
 from services.stepper_gateway.device.clock import ClockSync
 from services.stepper_gateway.links.frames import Chunk
 from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.motion.knot_sources import Motion
+from services.stepper_gateway.motion.knot_sources import KnotSource
 from services.stepper_gateway.motion.knots import Knot, StepEncoder, stop_time
 from services.stepper_gateway.motion.stream import SentChunk, Stream
 
@@ -22,28 +22,28 @@ class Transmission:
         self._encoder = StepEncoder(joints)
         self._next_id = first_stream
         self.stream: Stream | None = None  # the present or the last one
-        self._motion: Motion | None = None
+        self._motion: KnotSource | None = None
         self._start: Knot | None = None
 
     @property
     def is_open(self) -> bool:
-        """Whether knots can still be added to the stream."""
+        """True if knots can still be added to the stream."""
         stream = self.stream
         return stream is not None and not (stream.is_complete or stream.is_abandoned)
 
     @property
     def owns_motion(self) -> bool:
-        """Whether what the device plays is what we want it to play."""
+        """True if the device plays what the gateway wants it to play."""
         return self.stream is not None and not self.stream.is_abandoned
 
-    def begin(self, motion: Motion, start: Knot, boot_id: int, capacity: int) -> Stream:
+    def begin(self, motion: KnotSource, start: Knot, boot_id: int, capacity: int) -> Stream:
         """A new stream from rest at `start`."""
         self.stream = Stream(self._next_id, boot_id, self._joints, self._encoder, capacity)
         self._next_id = self._next_id % 0xFFFFFFFF + 1
         self._motion, self._start = motion, start
         return self.stream
 
-    def splice(self, motion: Motion) -> None:
+    def splice(self, motion: KnotSource) -> None:
         """Go on with another motion, which continues from the last knot sent."""
         self._motion = motion
 
@@ -60,7 +60,7 @@ class Transmission:
         self.stream = None
 
     def pump(self, moment: Moment, clock: ClockSync, lead: float) -> list[tuple[Chunk, SentChunk]]:
-        """Chunks to send now: late ones again, then new ones until the lead is filled."""
+        """Chunks to send now: late ones again, then new ones until `lead` [s] of path is on its way."""
         stream = self.stream
         if stream is None or stream.is_abandoned:
             return []
