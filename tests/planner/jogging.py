@@ -18,7 +18,7 @@ from services.planner.collision.world import World
 from services.planner.jog.jog import PERIOD, Jog
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits
-from services.stepper_gateway.motion.target_tracker import Tracker
+from services.stepper_gateway.motion.target_tracker import TargetTracker
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class Jogged:
     def __init__(self, name: str, start: str = "ready", crowded: bool = True) -> None:
         self.arm, self.kinematics, self.world = arm_of(name), kinematics_of(name), world_of(name, crowded)
         self.jog = Jog(self.arm, self.kinematics, self.world)
-        self.tracker = Tracker(Limits.of(self.arm.joints), PERIOD, Knot.at_rest(self.arm.named_states[start]))
+        self.tracker = TargetTracker(Limits.of(self.arm.joints), PERIOD, Knot.at_rest(self.arm.named_states[start]))
         self.now = 0.0
         self.goal_is_active = False
         self.commanded: list[Array] = []
@@ -100,7 +100,7 @@ class Jogged:
     def abandoned(self) -> list[Knot]:
         """Where the arm would go if the targets ceased now."""
         knot = self.tracker.knot
-        alone = Tracker(Limits.of(self.arm.joints), PERIOD, knot)
+        alone = TargetTracker(Limits.of(self.arm.joints), PERIOD, knot)
         alone.follow(self.tracker.target)
         knots = [alone.step() for _ in range(200)]
         assert knots[-1].is_at_rest

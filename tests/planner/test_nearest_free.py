@@ -19,7 +19,7 @@ from services.planner.core import Planner
 from services.planner.jog.jog import PERIOD
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits
-from services.stepper_gateway.motion.target_tracker import Tracker
+from services.stepper_gateway.motion.target_tracker import TargetTracker
 from tests.planner.jogging import Array, Jogged, arm_of, kinematics_of
 
 ARMS, KINDS = ("rm1", "parol6"), ("itself", "a post", "what it carries")
@@ -115,7 +115,7 @@ def jogged_as_told(name: str, world: World, configuration: Array, remedy: str) -
     told = re.match(r"`gemelo jog --joint (.*) --for (\S+)` leads out; or ", remedy)
     assert told, remedy
     jogged = Jogged(name, crowded=False)
-    jogged.tracker = Tracker(Limits.of(jogged.arm.joints), PERIOD, Knot.at_rest(tuple(configuration.tolist())))
+    jogged.tracker = TargetTracker(Limits.of(jogged.arm.joints), PERIOD, Knot.at_rest(tuple(configuration.tolist())))
     jogged.world = world
     jogged.jog.set_world(world)
     command = command_of(arm_of(name), shlex.split(told[1]), (), (), False)
