@@ -19,9 +19,18 @@ from schemas.scene import (
     MeshShape,
     PlaneShape,
     PlanningScene,
-    SceneAction,
+    SceneAdd,
+    SceneAllow,
+    SceneAttach,
+    SceneClear,
+    SceneDetach,
+    SceneDisallow,
+    SceneMove,
     SceneObject,
+    SceneRemove,
+    SceneReplace,
     SceneRequest,
+    SceneResize,
     Shape,
     SphereShape,
 )
@@ -145,7 +154,7 @@ class Scene:
         >>> arm.scene.add_sphere("ball", radius=0.03, at=(0.3, 0.25, 0.1))
         >>> arm.scene.remove("ball")
         """
-        self._edit(SceneRequest(action=SceneAction.REMOVE, name=name))
+        self._edit(SceneRequest(edit=SceneRemove(name=name)))
 
     def move(self, name: str, at: Vector, orientation: Vector = UPRIGHT, *, frame: str = "") -> None:
         """Puts an object elsewhere: `at` (3,) [m], turned by `orientation`, in `frame` as it is now.
@@ -156,8 +165,7 @@ class Scene:
         (0.3, 0.3, 0.1)
         >>> arm.scene.remove("ball")
         """
-        place = SceneObject(pose=_pose(at, orientation), frame=frame)
-        self._edit(SceneRequest(action=SceneAction.MOVE, name=name, object=place))
+        self._edit(SceneRequest(edit=SceneMove(name=name, pose=_pose(at, orientation), frame=frame)))
 
     def resize(self, name: str, shape: Shape) -> None:
         """Gives an object another shape: `schemas.scene.BoxShape(size=...)` and its kin.
@@ -167,7 +175,7 @@ class Scene:
         >>> arm.scene.resize("ball", SphereShape(radius=0.02))
         >>> arm.scene.remove("ball")
         """
-        self._edit(SceneRequest(action=SceneAction.RESIZE, name=name, object=SceneObject(shape=shape)))
+        self._edit(SceneRequest(edit=SceneResize(name=name, shape=shape)))
 
     def attach(self, name: str, to: str, touch: Iterable[str] = ()) -> None:
         """From now on the link `to` carries the object, from where it is; it may touch the links `touch` too.
@@ -178,8 +186,7 @@ class Scene:
         True
         >>> arm.scene.remove("ball")
         """
-        place = SceneObject(frame=to, touch_links=tuple(touch))
-        self._edit(SceneRequest(action=SceneAction.ATTACH, name=name, object=place))
+        self._edit(SceneRequest(edit=SceneAttach(name=name, link=to, touch_links=tuple(touch))))
 
     def detach(self, name: str) -> None:
         """Leaves a carried object where it is.
@@ -190,7 +197,7 @@ class Scene:
         False
         >>> arm.scene.remove("ball")
         """
-        self._edit(SceneRequest(action=SceneAction.DETACH, name=name))
+        self._edit(SceneRequest(edit=SceneDetach(name=name)))
 
     def allow(self, first: str, second: str) -> None:
         """Lets two links or objects touch; "*" is any.
@@ -201,7 +208,7 @@ class Scene:
         [('ball', 'efector_link')]
         >>> arm.scene.remove("ball")
         """
-        self._edit(SceneRequest(action=SceneAction.ALLOW, pair=AllowedPair(first=first, second=second)))
+        self._edit(SceneRequest(edit=SceneAllow(pair=AllowedPair(first=first, second=second))))
 
     def disallow(self, first: str, second: str) -> None:
         """Takes an `allow` back.
@@ -213,7 +220,7 @@ class Scene:
         ()
         >>> arm.scene.remove("ball")
         """
-        self._edit(SceneRequest(action=SceneAction.DISALLOW, pair=AllowedPair(first=first, second=second)))
+        self._edit(SceneRequest(edit=SceneDisallow(pair=AllowedPair(first=first, second=second))))
 
     def clear(self) -> None:
         """Takes everything away.
@@ -222,7 +229,7 @@ class Scene:
         >>> arm.scene.objects
         {}
         """
-        self._edit(SceneRequest(action=SceneAction.CLEAR))
+        self._edit(SceneRequest(edit=SceneClear()))
 
     def replace(self, scene: PlanningScene) -> None:
         """The whole scene at once.
@@ -231,7 +238,7 @@ class Scene:
         >>> arm.scene.clear()
         >>> arm.scene.replace(before)
         """
-        self._edit(SceneRequest(action=SceneAction.REPLACE, scene=scene))
+        self._edit(SceneRequest(edit=SceneReplace(scene=scene)))
 
     @contextmanager
     def restored(self) -> Iterator[None]:
@@ -308,7 +315,7 @@ class Scene:
             touch_links=tuple(touch),
             padding=number("padding", padding),
         )
-        self._edit(SceneRequest(action=SceneAction.ADD, object=item))
+        self._edit(SceneRequest(edit=SceneAdd(object=item)))
 
     def _edit(self, request: SceneRequest) -> None:
         response = self._session.call(SCENE_EDIT, request, TO_ANSWER)

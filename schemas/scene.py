@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
-
 from schemas.frames import Transform
 from schemas.message import Message, Vector
 
@@ -71,29 +69,87 @@ class PlanningScene(Message, frozen=True, kw_only=True):
     allowed: tuple[AllowedPair, ...] = ()
 
 
-class SceneAction(StrEnum):
-    """What is to be done with a scene."""
+class SceneAdd(Message, frozen=True, kw_only=True, tag="add"):
+    """Put an object into the scene; one of its name is replaced."""
 
-    ADD = "add"  # `object`; one of that name is replaced
-    REMOVE = "remove"  # `name`
-    MOVE = "move"  # `name` to `object.pose` in `object.frame`
-    RESIZE = "resize"  # `name` to `object.shape`
-    ATTACH = "attach"  # `name` to the link `object.frame`, where it is now; `object.touch_links`
-    DETACH = "detach"  # `name`, left where it is now
-    ALLOW = "allow"  # `pair`
-    DISALLOW = "disallow"  # `pair`
-    REPLACE = "replace"  # all by `scene`
-    CLEAR = "clear"
+    object: SceneObject = SceneObject()
+
+
+class SceneRemove(Message, frozen=True, kw_only=True, tag="remove"):
+    """Take the object `name` out of the scene, with what was allowed to touch it."""
+
+    name: str = ""
+
+
+class SceneMove(Message, frozen=True, kw_only=True, tag="move"):
+    """Place the object `name` at `pose` in `frame` (empty: the base); an attached one stays attached."""
+
+    name: str = ""
+    pose: Transform = Transform()
+    frame: str = ""
+
+
+class SceneResize(Message, frozen=True, kw_only=True, tag="resize"):
+    """Give the object `name` another shape."""
+
+    name: str = ""
+    shape: Shape = BoxShape()
+
+
+class SceneAttach(Message, frozen=True, kw_only=True, tag="attach"):
+    """Attach the object `name` to `link`, where it is now; it may touch `touch_links` besides that link."""
+
+    name: str = ""
+    link: str = ""
+    touch_links: tuple[str, ...] = ()
+
+
+class SceneDetach(Message, frozen=True, kw_only=True, tag="detach"):
+    """Detach the object `name`; it stays where it is now."""
+
+    name: str = ""
+
+
+class SceneAllow(Message, frozen=True, kw_only=True, tag="allow"):
+    """Let a pair touch."""
+
+    pair: AllowedPair = AllowedPair()
+
+
+class SceneDisallow(Message, frozen=True, kw_only=True, tag="disallow"):
+    """No longer let a pair touch that the scene allowed."""
+
+    pair: AllowedPair = AllowedPair()
+
+
+class SceneReplace(Message, frozen=True, kw_only=True, tag="replace"):
+    """Replace all objects and allowed pairs by those of `scene`."""
+
+    scene: PlanningScene = PlanningScene()
+
+
+class SceneClear(Message, frozen=True, kw_only=True, tag="clear"):
+    """Remove all objects and allowed pairs."""
+
+
+SceneEdit = (
+    SceneAdd
+    | SceneRemove
+    | SceneMove
+    | SceneResize
+    | SceneAttach
+    | SceneDetach
+    | SceneAllow
+    | SceneDisallow
+    | SceneReplace
+    | SceneClear
+)
 
 
 class SceneRequest(Message, frozen=True, kw_only=True):
-    """A change."""
+    """One change of the scene."""
 
-    action: SceneAction = SceneAction.ADD
-    name: str = ""
-    object: SceneObject = SceneObject()
-    pair: AllowedPair = AllowedPair()
-    scene: PlanningScene = PlanningScene()
+    edit: SceneEdit = SceneAdd()
 
 
 class SceneResponse(Message, frozen=True, kw_only=True):

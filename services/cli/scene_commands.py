@@ -57,10 +57,10 @@ def add_options(parser: Parser) -> None:
 
 
 def add(options: Options) -> ExitCode:
-    from schemas.scene import SceneAction, SceneRequest
+    from schemas.scene import SceneAdd, SceneRequest
     from services.cli.scene_shape import object_of
 
-    return ask(SceneRequest(action=SceneAction.ADD, object=object_of(options)))
+    return ask(SceneRequest(edit=SceneAdd(object=object_of(options))))
 
 
 def ask(request: SceneRequest) -> ExitCode:
@@ -72,9 +72,9 @@ def ask(request: SceneRequest) -> ExitCode:
 
 
 def remove(options: Options) -> ExitCode:
-    from schemas.scene import SceneAction, SceneRequest
+    from schemas.scene import SceneRemove, SceneRequest
 
-    return ask(SceneRequest(action=SceneAction.REMOVE, name=options.name))
+    return ask(SceneRequest(edit=SceneRemove(name=options.name)))
 
 
 def move_options(parser: Parser) -> None:
@@ -83,11 +83,11 @@ def move_options(parser: Parser) -> None:
 
 
 def move(options: Options) -> ExitCode:
-    from schemas.scene import SceneAction, SceneObject, SceneRequest
+    from schemas.scene import SceneMove, SceneRequest
     from services.cli.scene_shape import pose_of
 
-    to = SceneObject(pose=pose_of(options.at, options.rpy), frame=options.frame)
-    return ask(SceneRequest(action=SceneAction.MOVE, name=options.name, object=to))
+    pose = pose_of(options.at, options.rpy)
+    return ask(SceneRequest(edit=SceneMove(name=options.name, pose=pose, frame=options.frame)))
 
 
 def resize_options(parser: Parser) -> None:
@@ -96,11 +96,10 @@ def resize_options(parser: Parser) -> None:
 
 
 def resize(options: Options) -> ExitCode:
-    from schemas.scene import SceneAction, SceneObject, SceneRequest
+    from schemas.scene import SceneRequest, SceneResize
     from services.cli.scene_shape import shape_of
 
-    item = SceneObject(shape=shape_of(options))
-    return ask(SceneRequest(action=SceneAction.RESIZE, name=options.name, object=item))
+    return ask(SceneRequest(edit=SceneResize(name=options.name, shape=shape_of(options))))
 
 
 def attach_options(parser: Parser) -> None:
@@ -110,16 +109,16 @@ def attach_options(parser: Parser) -> None:
 
 
 def attach(options: Options) -> ExitCode:
-    from schemas.scene import SceneAction, SceneObject, SceneRequest
+    from schemas.scene import SceneAttach, SceneRequest
 
-    to = SceneObject(frame=options.link, touch_links=tuple(options.touch))
-    return ask(SceneRequest(action=SceneAction.ATTACH, name=options.name, object=to))
+    touch_links = tuple(options.touch)
+    return ask(SceneRequest(edit=SceneAttach(name=options.name, link=options.link, touch_links=touch_links)))
 
 
 def detach(options: Options) -> ExitCode:
-    from schemas.scene import SceneAction, SceneRequest
+    from schemas.scene import SceneDetach, SceneRequest
 
-    return ask(SceneRequest(action=SceneAction.DETACH, name=options.name))
+    return ask(SceneRequest(edit=SceneDetach(name=options.name)))
 
 
 def pair_options(parser: Parser) -> None:
@@ -128,10 +127,17 @@ def pair_options(parser: Parser) -> None:
 
 
 def allow(options: Options) -> ExitCode:
-    from schemas.scene import AllowedPair, SceneAction, SceneRequest
+    from schemas.scene import AllowedPair, SceneAllow, SceneRequest
 
     pair = AllowedPair(first=options.first, second=options.second)
-    return ask(SceneRequest(action=SceneAction[options.command.words[1].upper()], pair=pair))
+    return ask(SceneRequest(edit=SceneAllow(pair=pair)))
+
+
+def disallow(options: Options) -> ExitCode:
+    from schemas.scene import AllowedPair, SceneDisallow, SceneRequest
+
+    pair = AllowedPair(first=options.first, second=options.second)
+    return ask(SceneRequest(edit=SceneDisallow(pair=pair)))
 
 
 def show(options: Options) -> ExitCode:
@@ -151,10 +157,10 @@ def file_option(parser: Parser) -> None:
 
 
 def load(options: Options) -> ExitCode:
-    from schemas.scene import SceneAction, SceneRequest
+    from schemas.scene import SceneReplace, SceneRequest
     from services.cli.scene import load
 
-    return ask(SceneRequest(action=SceneAction.REPLACE, scene=load(options.file)))
+    return ask(SceneRequest(edit=SceneReplace(scene=load(options.file))))
 
 
 def save(options: Options) -> ExitCode:
@@ -167,9 +173,9 @@ def save(options: Options) -> ExitCode:
 
 
 def clear(options: Options) -> ExitCode:
-    from schemas.scene import SceneAction, SceneRequest
+    from schemas.scene import SceneClear, SceneRequest
 
-    return ask(SceneRequest(action=SceneAction.CLEAR))
+    return ask(SceneRequest(edit=SceneClear()))
 
 
 def object_words() -> Words:
@@ -203,7 +209,7 @@ COMMANDS = (
             "gemelo scene detach cup", object_words),
     Command(("scene", "allow"), "let two things touch", allow, pair_options, "gemelo scene allow cup table",
             pair_words),
-    Command(("scene", "disallow"), "take that back", allow, pair_options, "gemelo scene disallow cup table",
+    Command(("scene", "disallow"), "take that back", disallow, pair_options, "gemelo scene disallow cup table",
             pair_words),
     Command(("scene", "list"), "all objects, and what may touch", show, json_option),
     Command(("scene", "load"), "replace the scene by a file's", load, file_option, "gemelo scene load cell.json"),

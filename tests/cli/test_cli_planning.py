@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import pytest
 
 from schemas.planning import NamedGoal, PlanPhase, PlanProgress, PlanRequest
-from schemas.scene import SceneAction, SceneRequest
+from schemas.scene import SceneReplace, SceneRequest
 from schemas.topics import PLAN_PROGRESS, SCENE_EDIT
 from services.cli import planning
 from services.cli.exits import CommandError, ExitCode
@@ -38,7 +38,7 @@ def walled(session, network, deployment) -> Iterator[None]:
 
     thread = threading.Thread(target=serve)
     thread.start()
-    request = SceneRequest(action=SceneAction.REPLACE, scene=WALLED)
+    request = SceneRequest(edit=SceneReplace(scene=WALLED))
     assert session.node.call(SCENE_EDIT, request, PATIENCE).accepted
     yield
     stop.set()

@@ -13,7 +13,7 @@ import pytest
 
 from schemas.device import ShaftPositions
 from schemas.frames import Transform
-from schemas.scene import BoxShape, PlanningScene, SceneObject, SceneRequest
+from schemas.scene import BoxShape, PlanningScene, SceneAdd, SceneObject, SceneRequest
 from schemas.topics import DEVICE_SHAFT, SCENE, SCENE_EDIT, STEP_ERRORS
 from services.arm.kinematics import Kinematics
 from services.stack.stack import Stack
@@ -34,7 +34,7 @@ def operator(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     environment, out = {"GEMELO_ROBOT": f"urdf/{request.param}"}, tmp_path_factory.mktemp("out")
     with Stack(broker=BROKER, out=out, processes=NEEDED, environment=environment) as stack:
         person = Operator(stack)
-        assert person.node.call(SCENE_EDIT, SceneRequest(object=SHELF)).accepted
+        assert person.node.call(SCENE_EDIT, SceneRequest(edit=SceneAdd(object=SHELF))).accepted
         yield person
         person.close()
 

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from schemas.deployment import Deployment, PathsSection
 from schemas.planning import NamedGoal, PlanCancel, PlanCode, PlanPhase, PlanProgress, PlanRequest, PlanResponse
-from schemas.scene import SceneAction, SceneRequest
+from schemas.scene import SceneClear, SceneReplace, SceneRequest
 from schemas.topics import PLAN, PLAN_CANCEL, PLAN_PROGRESS, SCENE_EDIT
 from services.planner.main import run
 from services.runtime.errors import NoAnswer
@@ -105,7 +105,7 @@ def cancel(node: Node, request_id: str) -> bool:
 
 
 def build_walls(node: Node) -> None:
-    assert node.call(SCENE_EDIT, SceneRequest(action=SceneAction.REPLACE, scene=WALLED), PATIENCE).accepted
+    assert node.call(SCENE_EDIT, SceneRequest(edit=SceneReplace(scene=WALLED)), PATIENCE).accepted
 
 
 def test_two_clients_plan_side_by_side_and_each_ends_its_own(bus: Bus) -> None:
@@ -149,7 +149,7 @@ def test_a_client_that_is_gone_leaves_a_plan_that_anyone_may_end(bus: Bus) -> No
             pass
         watcher.sees_search_of("planner-1")
         assert cancel(third, "planner-1")
-        third.call(SCENE_EDIT, SceneRequest(action=SceneAction.CLEAR), PATIENCE)
+        third.call(SCENE_EDIT, SceneRequest(edit=SceneClear()), PATIENCE)
         assert third.call(PLAN, SHORT, PATIENCE).code is PlanCode.SUCCESS
 
 

@@ -15,7 +15,19 @@ from schemas.deployment import Deployment, PathsSection
 from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint
-from schemas.scene import BoxShape, PlanningScene, SceneAction, SceneObject, SceneRequest, SceneResponse, SphereShape
+from schemas.scene import (
+    BoxShape,
+    PlanningScene,
+    SceneAdd,
+    SceneAttach,
+    SceneClear,
+    SceneEdit,
+    SceneObject,
+    SceneRemove,
+    SceneRequest,
+    SceneResponse,
+    SphereShape,
+)
 from schemas.topics import CONTACTS, JOINT_STATES, PLAN, SCENE, SCENE_EDIT
 from services.arm.description import Arm
 from services.arm.kinematics import Kinematics
@@ -57,8 +69,8 @@ def asker(tmp_path: Path) -> Iterator[Node]:
         yield node
 
 
-def edit(asker: Node, action: SceneAction, name: str = "", item: SceneObject | None = None) -> SceneResponse:
-    return asker.call(SCENE_EDIT, SceneRequest(action=action, name=name, object=item or SceneObject()), timeout=WAIT)
+def edit(asker: Node, edit: SceneEdit) -> SceneResponse:
+    return asker.call(SCENE_EDIT, SceneRequest(edit=edit), timeout=WAIT)
 
 
 def stand(asker: Node, arm: Arm) -> None:
@@ -93,7 +105,7 @@ def block(arm: Arm) -> SceneObject:
 
 
 def test_an_edit_is_answered_latched_and_heeded_by_the_next_plan(asker: Node, rm1: Arm) -> None:
-    assert edit(asker, SceneAction.ADD, item=block(rm1)) == SceneResponse(accepted=True, version=1)
+    assert edit(asker, SceneAdd(object=block(rm1))) == SceneResponse(accepted=True, version=1)
     scene = asker.latest(SCENE)
     asker.wait(0.2)
     assert scene.message is not None
@@ -102,13 +114,13 @@ def test_an_edit_is_answered_latched_and_heeded_by_the_next_plan(asker: Node, rm
     assert refused.refusal is not None
     assert "box block" in refused.refusal.message
     assert refused.scene_version == 1
-    assert edit(asker, SceneAction.REMOVE, "block").version == 2
+    assert edit(asker, SceneRemove(name="block")).version == 2
     assert plan(asker, rm1).code is PlanCode.SUCCESS
 
 
 def test_what_touches_is_shown_until_a_plan_succeeds(asker: Node, rm1: Arm) -> None:
     contacts = asker.latest(CONTACTS)
-    edit(asker, SceneAction.ADD, item=block(rm1))
+    edit(asker, SceneAdd(object=block(rm1)))
     refused = plan(asker, rm1)
     asker.wait(0.2)
     assert contacts.message is not None
@@ -117,7 +129,7 @@ def test_what_touches_is_shown_until_a_plan_succeeds(asker: Node, rm1: Arm) -> N
     assert contacts.message.position == refused.refusal.configuration
     assert contacts.message.contacts[0].second == "block"
     assert len(contacts.message.contacts[0].point) == 3
-    edit(asker, SceneAction.CLEAR)
+    edit(asker, SceneClear())
     plan(asker, rm1)
     asker.wait(0.2)
     assert contacts.message.contacts == ()
@@ -126,37 +138,37 @@ def test_what_touches_is_shown_until_a_plan_succeeds(asker: Node, rm1: Arm) -> N
 def test_what_is_put_onto_the_arm_is_shown_to_touch_it_until_it_is_taken_away(asker: Node, rm1: Arm) -> None:
     contacts, states = asker.latest(CONTACTS), asker.publisher(JOINT_STATES)
     standing = JointState(name=rm1.joint_names, position=(0.6, 0.0, 0.0))
-    edit(asker, SceneAction.CLEAR)  # answered: the planner is there and hears where the arm stands
-    for action, name, item in ((SceneAction.ADD, "", block(rm1)), (SceneAction.REMOVE, "block", None)):
+    edit(asker, SceneClear())  # answered: the planner is there and hears where the arm stands
+    for change in (SceneAdd(object=block(rm1)), SceneRemove(name="block")):
         states.put(msgspec.structs.replace(standing, stamp=asker.now()))
         asker.wait(0.1)
-        edit(asker, action, name, item=item)
+        edit(asker, change)
         asker.wait(0.2)
         assert contacts.message is not None
         touching = [contact.second for contact in contacts.message.contacts]
-        assert touching == (["block"] if action is SceneAction.ADD else [])
+        assert touching == (["block"] if isinstance(change, SceneAdd) else [])
         assert contacts.message.position == (standing.position if touching else ())
 
 
 def test_a_bad_edit_is_refused_by_name_and_changes_nothing(asker: Node) -> None:
-    response = edit(asker, SceneAction.REMOVE, "block")
+    response = edit(asker, SceneRemove(name="block"))
     assert response == SceneResponse(reason='there is no object "block"; none is known')
-    response = edit(asker, SceneAction.ADD, item=SceneObject(name="ball", shape=SphereShape(radius=0.0)))
+    response = edit(asker, SceneAdd(object=SceneObject(name="ball", shape=SphereShape(radius=0.0))))
     assert response.reason.startswith('object "ball": radius of the sphere is 0 m')
     assert response.version == 0
 
 
 def test_attaching_needs_to_know_where_the_arm_is(asker: Node, rm1: Arm) -> None:
-    edit(asker, SceneAction.ADD, item=SceneObject(name="cup", shape=SphereShape(radius=0.01)))
-    attach = SceneObject(frame=rm1.tool_frame)
-    assert "it is not known where the arm is" in edit(asker, SceneAction.ATTACH, "cup", attach).reason
+    edit(asker, SceneAdd(object=SceneObject(name="cup", shape=SphereShape(radius=0.01))))
+    attach = SceneAttach(name="cup", link=rm1.tool_frame)
+    assert "it is not known where the arm is" in edit(asker, attach).reason
     stand(asker, rm1)
-    assert edit(asker, SceneAction.ATTACH, "cup", attach).accepted
+    assert edit(asker, attach).accepted
 
 
 def test_a_restart_has_the_scene_as_it_was(tmp_path: Path, rm1: Arm) -> None:
     with planning(tmp_path) as asker:
-        edit(asker, SceneAction.ADD, item=block(rm1))
+        edit(asker, SceneAdd(object=block(rm1)))
         before = asker.latest(SCENE)
         asker.wait(0.2)
     with planning(tmp_path) as asker:
@@ -166,7 +178,7 @@ def test_a_restart_has_the_scene_as_it_was(tmp_path: Path, rm1: Arm) -> None:
         assert after.message == before.message
         assert refused.refusal is not None
         assert "box block" in refused.refusal.message
-        assert edit(asker, SceneAction.CLEAR).version == 2
+        assert edit(asker, SceneClear()).version == 2
 
 
 def test_a_damaged_file_is_kept_aside_and_the_planner_serves(tmp_path: Path, rm1: Arm) -> None:
@@ -174,7 +186,7 @@ def test_a_damaged_file_is_kept_aside_and_the_planner_serves(tmp_path: Path, rm1
     with planning(tmp_path) as asker:
         assert plan(asker, rm1).code is PlanCode.SUCCESS
         assert (tmp_path / "scene.json.damaged").read_text() == '{"objects": ['
-        assert edit(asker, SceneAction.ADD, item=block(rm1)).version == 1
+        assert edit(asker, SceneAdd(object=block(rm1))).version == 1
 
 
 def test_what_does_not_fit_the_arm_is_left_out_and_the_rest_stays(tmp_path: Path, rm1: Arm) -> None:
@@ -182,7 +194,7 @@ def test_what_does_not_fit_the_arm_is_left_out_and_the_rest_stays(tmp_path: Path
     save_scene(tmp_path / "scene.json", PlanningScene(version=5, objects=(block(rm1), lost)))
     with planning(tmp_path) as asker:
         scene = asker.latest(SCENE)
-        assert edit(asker, SceneAction.REMOVE, "lost").reason == 'there is no object "lost"; known are block'
+        assert edit(asker, SceneRemove(name="lost")).reason == 'there is no object "lost"; known are block'
         asker.wait(0.1)
         assert scene.message is not None
         assert scene.message.objects == (block(rm1),)

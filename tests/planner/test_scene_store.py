@@ -19,9 +19,19 @@ from schemas.scene import (
     MeshShape,
     PlaneShape,
     PlanningScene,
-    SceneAction,
+    SceneAdd,
+    SceneAllow,
+    SceneAttach,
+    SceneClear,
+    SceneDetach,
+    SceneDisallow,
+    SceneEdit,
+    SceneMove,
     SceneObject,
+    SceneRemove,
+    SceneReplace,
     SceneRequest,
+    SceneResize,
     Shape,
     SphereShape,
 )
@@ -53,12 +63,11 @@ class Scene:
         self.links: Poses | None = HERE
         self.now = 0
 
-    def edit(self, action: SceneAction, **fields: object) -> str:
+    def edit(self, edit: SceneEdit) -> str:
         """The reason of a refusal; empty where it was accepted."""
         self.now += 1
         before = self.store.scene
-        request = msgspec.convert({"action": action, **fields}, SceneRequest, from_attributes=True)
-        response = self.store.edit(request, lambda: self.links, self.now)
+        response = self.store.edit(SceneRequest(edit=edit), lambda: self.links, self.now)
         assert response.accepted == (response.reason == "")
         assert response.version == self.store.scene.version
         assert response.accepted or self.store.scene is before
@@ -66,7 +75,7 @@ class Scene:
 
     def add(self, name: str, shape: Shape | None = None, **fields: object) -> str:
         item = SceneObject(name=name, shape=shape or SphereShape(radius=0.1))
-        return self.edit(SceneAction.ADD, object=msgspec.structs.replace(item, **fields))
+        return self.edit(SceneAdd(object=msgspec.structs.replace(item, **fields)))
 
     def object(self, name: str) -> SceneObject:
         return next(item for item in self.store.scene.objects if item.name == name)
@@ -100,26 +109,23 @@ def test_every_change_is_one_version_and_an_object_of_the_same_name_is_replaced(
 def test_an_edit_that_changes_nothing_is_accepted_and_is_no_new_version() -> None:
     scene = Scene()
     scene.add("box")
-    scene.edit(SceneAction.ALLOW, pair=AllowedPair(first="box", second="base_link"))
-    assert scene.edit(SceneAction.ALLOW, pair=AllowedPair(first="base_link", second="box")) == ""
+    scene.edit(SceneAllow(pair=AllowedPair(first="box", second="base_link")))
+    assert scene.edit(SceneAllow(pair=AllowedPair(first="base_link", second="box"))) == ""
     assert scene.store.scene.version == 2
 
 
 def test_what_is_carried_moves_with_the_arm_and_stays_where_it_is_let_go() -> None:
     scene = Scene()
     scene.add("cup", pose=at(0.3, 0.1, 0.2))
-    assert scene.edit(SceneAction.ATTACH, name="cup", object=SceneObject(frame=TOOL, touch_links=("base_link",))) == ""
+    assert scene.edit(SceneAttach(name="cup", link=TOOL, touch_links=("base_link",))) == ""
     assert_same_place(in_base(scene.object("cup"), HERE), at(0.3, 0.1, 0.2))
     assert scene.object("cup").touch_links == ("base_link",)
     scene.links = THERE
     held = in_base(scene.object("cup"), THERE)
-    assert scene.edit(SceneAction.DETACH, name="cup") == ""
+    assert scene.edit(SceneDetach(name="cup")) == ""
     assert scene.object("cup").frame == ""
     assert_same_place(scene.object("cup").pose, held)
-    assert (
-        scene.edit(SceneAction.DETACH, name="cup")
-        == 'object "cup" is not attached to any link; there is nothing to detach'
-    )
+    assert scene.edit(SceneDetach(name="cup")) == 'object "cup" is not attached to any link; there is nothing to detach'
 
 
 def test_an_object_placed_by_a_link_stands_still_from_then_on() -> None:
@@ -133,11 +139,8 @@ def test_an_object_placed_by_a_link_stands_still_from_then_on() -> None:
 def test_moving_and_resizing_keep_the_rest() -> None:
     scene = Scene()
     scene.add("cup", pose=at(0.3, 0.1, 0.2), padding=0.01)
-    assert scene.edit(SceneAction.MOVE, name="cup", object=SceneObject(pose=at(0.1, 0.0, 0.0))) == ""
-    assert (
-        scene.edit(SceneAction.RESIZE, name="cup", object=SceneObject(shape=CylinderShape(radius=0.1, length=1.0)))
-        == ""
-    )
+    assert scene.edit(SceneMove(name="cup", pose=at(0.1, 0.0, 0.0))) == ""
+    assert scene.edit(SceneResize(name="cup", shape=CylinderShape(radius=0.1, length=1.0))) == ""
     assert scene.object("cup") == SceneObject(
         name="cup", shape=CylinderShape(radius=0.1, length=1.0), pose=scene.object("cup").pose, padding=0.01
     )
@@ -147,9 +150,9 @@ def test_moving_and_resizing_keep_the_rest() -> None:
 def test_a_carried_object_that_is_moved_stays_carried() -> None:
     scene = Scene()
     scene.add("cup", frame=TOOL, attached=True)
-    assert scene.edit(SceneAction.MOVE, name="cup", object=SceneObject(pose=at(0.0, 0.0, 0.1), frame=TOOL)) == ""
+    assert scene.edit(SceneMove(name="cup", pose=at(0.0, 0.0, 0.1), frame=TOOL)) == ""
     assert_same_place(scene.object("cup").pose, at(0.0, 0.0, 0.1))
-    assert scene.edit(SceneAction.MOVE, name="cup", object=SceneObject(pose=at(0.2, 0.1, 0.1))) == ""
+    assert scene.edit(SceneMove(name="cup", pose=at(0.2, 0.1, 0.1))) == ""
     assert_same_place(in_base(scene.object("cup"), HERE), at(0.2, 0.1, 0.1))
     assert scene.object("cup").attached
 
@@ -158,12 +161,12 @@ def test_what_was_allowed_to_an_object_goes_with_it() -> None:
     scene = Scene()
     scene.add("cup")
     scene.add("table", PlaneShape())
-    scene.edit(SceneAction.ALLOW, pair=AllowedPair(first="cup", second="table"))
-    scene.edit(SceneAction.ALLOW, pair=AllowedPair(first="*", second="table"))
-    assert scene.edit(SceneAction.REMOVE, name="cup") == ""
+    scene.edit(SceneAllow(pair=AllowedPair(first="cup", second="table")))
+    scene.edit(SceneAllow(pair=AllowedPair(first="*", second="table")))
+    assert scene.edit(SceneRemove(name="cup")) == ""
     assert scene.store.scene.allowed == (AllowedPair(first="*", second="table"),)
-    assert scene.edit(SceneAction.DISALLOW, pair=AllowedPair(first="table", second="*")) == ""
-    assert scene.edit(SceneAction.CLEAR) == ""
+    assert scene.edit(SceneDisallow(pair=AllowedPair(first="table", second="*"))) == ""
+    assert scene.edit(SceneClear()) == ""
     assert scene.store.scene.objects == ()
 
 
@@ -172,9 +175,8 @@ def test_refusals_name_the_thing_the_value_and_the_remedy() -> None:
     scene.add("table", PlaneShape())
     scene.add("cup", frame=TOOL, attached=True)
     sphere = SphereShape(radius=0.1)
-    attach, move = SceneAction.ATTACH, SceneAction.MOVE
     scene.links = None
-    assert scene.edit(SceneAction.REMOVE, name="tabel") == 'there is no object "tabel"; did you mean "table"?'
+    assert scene.edit(SceneRemove(name="tabel")) == 'there is no object "tabel"; did you mean "table"?'
     assert scene.add("base_link") == '"base_link" is a link of rm1; give the object another name'
     assert scene.add("*").startswith('"*" stands for any name')
     assert scene.add("").startswith('"" is no name for an object')
@@ -194,29 +196,27 @@ def test_refusals_name_the_thing_the_value_and_the_remedy() -> None:
     assert scene.add("ball", sphere, frame=TOOL).startswith(
         f'object "ball" cannot be placed by "{TOOL}": it is not known where the arm is'
     )
-    assert scene.edit(move, name="cup", object=SceneObject(frame="nose")).startswith(
+    assert scene.edit(SceneMove(name="cup", frame="nose")).startswith(
         'object "cup" cannot be placed: rm1 has no link "nose"'
     )
-    assert scene.edit(attach, name="table", object=SceneObject(frame="nose")).startswith(
+    assert scene.edit(SceneAttach(name="table", link="nose")).startswith(
         'object "table" cannot be attached: rm1 has no link "nose"'
     )
     scene.links = HERE
-    assert scene.edit(attach, name="table", object=SceneObject(frame=TOOL)).startswith('object "table" is a plane')
-    assert scene.edit(SceneAction.RESIZE, name="cup", object=SceneObject(shape=PlaneShape())).startswith(
-        'object "cup" is a plane'
-    )
+    assert scene.edit(SceneAttach(name="table", link=TOOL)).startswith('object "table" is a plane')
+    assert scene.edit(SceneResize(name="cup", shape=PlaneShape())).startswith('object "cup" is a plane')
     pairs = {
         ("*", "*"): 'the pair "*" and "*" allows everything to touch everything',
         ("cup", "cup"): 'the pair "cup" and "cup" allows "cup" to touch itself',
         ("cup", "tabel"): 'there is no link or object "tabel"; did you mean "table"?',
     }
     for (first, second), reason in pairs.items():
-        assert scene.edit(SceneAction.ALLOW, pair=AllowedPair(first=first, second=second)).startswith(reason)
-    assert scene.edit(SceneAction.DISALLOW, pair=AllowedPair(first="cup", second="table")).startswith(
+        assert scene.edit(SceneAllow(pair=AllowedPair(first=first, second=second))).startswith(reason)
+    assert scene.edit(SceneDisallow(pair=AllowedPair(first="cup", second="table"))).startswith(
         '"cup" and "table" are not allowed to touch by this scene: allowed is nothing'
     )
     twice = PlanningScene(objects=(SceneObject(name="a", shape=sphere), SceneObject(name="a", shape=sphere)))
-    assert scene.edit(SceneAction.REPLACE, scene=twice).startswith('the scene has two objects "a"')
+    assert scene.edit(SceneReplace(scene=twice)).startswith('the scene has two objects "a"')
 
 
 def test_a_mesh_is_read_when_it_is_added(tmp_path: Path) -> None:
@@ -261,9 +261,22 @@ pairs = st.builds(AllowedPair, first=names, second=names)
 scenes = st.builds(
     PlanningScene, objects=st.lists(objects, max_size=3).map(tuple), allowed=st.lists(pairs, max_size=2).map(tuple)
 )
-requests = st.builds(
-    SceneRequest, action=st.sampled_from(SceneAction), name=names, object=objects, pair=pairs, scene=scenes
+shapes = st.builds(lambda item: item.shape, objects)
+poses = st.builds(lambda item: item.pose, objects)
+links = st.lists(names, max_size=2).map(tuple)
+edits_of_a_scene = st.one_of(
+    st.builds(SceneAdd, object=objects),
+    st.builds(SceneRemove, name=names),
+    st.builds(SceneMove, name=names, pose=poses, frame=names),
+    st.builds(SceneResize, name=names, shape=shapes),
+    st.builds(SceneAttach, name=names, link=names, touch_links=links),
+    st.builds(SceneDetach, name=names),
+    st.builds(SceneAllow, pair=pairs),
+    st.builds(SceneDisallow, pair=pairs),
+    st.builds(SceneReplace, scene=scenes),
+    st.builds(SceneClear),
 )
+requests = st.builds(SceneRequest, edit=edits_of_a_scene)
 
 
 @settings(max_examples=150, deadline=None)

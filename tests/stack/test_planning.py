@@ -13,7 +13,7 @@ import pytest
 from schemas.actions import GoalStatusCode
 from schemas.motion import FollowErrorCode
 from schemas.planning import PlanCancel, PlanPhase, PlanProgress
-from schemas.scene import PlanningScene, SceneAction, SceneObject, SceneRequest, SphereShape
+from schemas.scene import PlanningScene, SceneAdd, SceneObject, SceneReplace, SceneRequest, SphereShape
 from schemas.topics import PLAN, PLAN_CANCEL, PLAN_PROGRESS, SCENE_EDIT
 from services.runtime.errors import GoalRefused, NoAnswer
 from tests.planner.walled import NAMES, WALLED, past_the_wall
@@ -23,7 +23,7 @@ PATIENCE = 20.0  # [s]
 
 
 def show(operator, scene):
-    response = operator.node.call(SCENE_EDIT, SceneRequest(action=SceneAction.REPLACE, scene=scene), timeout=5.0)
+    response = operator.node.call(SCENE_EDIT, SceneRequest(edit=SceneReplace(scene=scene)), timeout=5.0)
     assert response.accepted, response.reason
 
 
@@ -96,7 +96,7 @@ def test_a_planner_that_is_killed_while_it_plans_is_there_again_with_its_scene(s
 def test_a_plan_made_before_an_edit_is_refused_and_one_made_before_a_restart_is_not(stack, operator):
     early = operator.plan()
     ball = SceneObject(name="ball", shape=SphereShape(radius=0.01))
-    assert operator.node.call(SCENE_EDIT, SceneRequest(object=ball), timeout=5.0).accepted
+    assert operator.node.call(SCENE_EDIT, SceneRequest(edit=SceneAdd(object=ball)), timeout=5.0).accepted
     with pytest.raises(
         GoalRefused, match=r"planned in scene version \d+, the scene is version \d+ now: plan again"
     ) as no:

@@ -1,4 +1,4 @@
-"""One change of a planning scene: what each `SceneAction` makes of it. Pure; raises `SceneError`."""
+"""One change of a planning scene, for each kind of `SceneEdit`. Pure; raises `SceneError`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,22 @@ from collections.abc import Callable, Mapping
 import msgspec
 
 from schemas.frames import Transform
-from schemas.scene import AllowedPair, PlanningScene, SceneAction, SceneObject, SceneRequest
+from schemas.scene import (
+    AllowedPair,
+    PlanningScene,
+    SceneAdd,
+    SceneAllow,
+    SceneAttach,
+    SceneClear,
+    SceneDetach,
+    SceneDisallow,
+    SceneEdit,
+    SceneMove,
+    SceneObject,
+    SceneRemove,
+    SceneReplace,
+    SceneResize,
+)
 from services.arm.description import Arm
 from services.arm.errors import suggestion
 from services.arm.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
@@ -21,33 +36,33 @@ LinkPoses = Callable[
 replace = msgspec.structs.replace
 
 
-def edited(arm: Arm, scene: PlanningScene, request: SceneRequest, links: LinkPoses) -> PlanningScene:
-    """The scene after the change; whether it can be is `scene_check`'s to say. Its version stays."""
-    edit = SceneEdit(arm, scene, links)
-    match request.action:
-        case SceneAction.ADD:
-            return edit.add(request.object)
-        case SceneAction.REMOVE:
-            return edit.remove(request.name)
-        case SceneAction.MOVE:
-            return edit.move(request.name, request.object)
-        case SceneAction.RESIZE:
-            return edit.put(replace(edit.named(request.name), shape=request.object.shape))
-        case SceneAction.ATTACH:
-            return edit.attach(request.name, request.object.frame, request.object.touch_links)
-        case SceneAction.DETACH:
-            return edit.detach(request.name)
-        case SceneAction.ALLOW:
-            return edit.allow(request.pair)
-        case SceneAction.DISALLOW:
-            return edit.disallow(request.pair)
-        case SceneAction.REPLACE:
-            return edit.replace_by(request.scene)
-        case SceneAction.CLEAR:
+def edited(arm: Arm, scene: PlanningScene, edit: SceneEdit, links: LinkPoses) -> PlanningScene:
+    """The scene after the change, with the same version; `scene_check` says if it is valid. Raises `SceneError`."""
+    editor = SceneEditor(arm, scene, links)
+    match edit:
+        case SceneAdd(object=item):
+            return editor.add(item)
+        case SceneRemove(name=name):
+            return editor.remove(name)
+        case SceneMove():
+            return editor.move(edit)
+        case SceneResize(name=name, shape=shape):
+            return editor.put(replace(editor.named(name), shape=shape))
+        case SceneAttach():
+            return editor.attach(edit)
+        case SceneDetach(name=name):
+            return editor.detach(name)
+        case SceneAllow(pair=pair):
+            return editor.allow(pair)
+        case SceneDisallow(pair=pair):
+            return editor.disallow(pair)
+        case SceneReplace(scene=other):
+            return editor.replace_by(other)
+        case SceneClear():
             return replace(scene, objects=(), allowed=())
 
 
-class SceneEdit:
+class SceneEditor:
     """One scene and where the arm's links are, to be changed in one way or another."""
 
     def __init__(self, arm: Arm, scene: PlanningScene, links: LinkPoses) -> None:
@@ -76,22 +91,22 @@ class SceneEdit:
         allowed = tuple(pair for pair in self._scene.allowed if name not in (pair.first, pair.second))
         return replace(self._scene, objects=objects, allowed=allowed)
 
-    def move(self, name: str, to: SceneObject) -> PlanningScene:
-        """An attached object stays attached, elsewhere on its link."""
-        item = self.named(name)
-        pose = pose_of(replace(to, name=name))
-        if not (item.attached and to.frame == item.frame):
-            pose = compose(self._frame(to.frame, name), pose)
+    def move(self, edit: SceneMove) -> PlanningScene:
+        """The object at another pose; an attached object stays attached, elsewhere on its link."""
+        item = self.named(edit.name)
+        pose = pose_of(replace(item, pose=edit.pose))
+        if not (item.attached and edit.frame == item.frame):
+            pose = compose(self._frame(edit.frame, edit.name), pose)
             if item.attached:
-                pose = compose(inverse(self._frame(item.frame, name)), pose)
+                pose = compose(inverse(self._frame(item.frame, edit.name)), pose)
         return self.put(replace(item, pose=to_message(pose)))
 
-    def attach(self, name: str, link: str, touch_links: tuple[str, ...]) -> PlanningScene:
-        """From where it is now, be that in the base or on another link."""
-        item = self.named(name)
-        require_link(self._arm, link, f'object "{name}" cannot be attached')
-        pose = compose(inverse(self._frame(link, name)), self._in_base(item))
-        return self.put(replace(item, pose=to_message(pose), frame=link, attached=True, touch_links=touch_links))
+    def attach(self, edit: SceneAttach) -> PlanningScene:
+        """The object attached from where it is now, be that in the base or on another link."""
+        item = self.named(edit.name)
+        require_link(self._arm, edit.link, f'object "{edit.name}" cannot be attached')
+        pose = to_message(compose(inverse(self._frame(edit.link, edit.name)), self._in_base(item)))
+        return self.put(replace(item, pose=pose, frame=edit.link, attached=True, touch_links=edit.touch_links))
 
     def detach(self, name: str) -> PlanningScene:
         item = self.named(name)

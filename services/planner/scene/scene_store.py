@@ -28,7 +28,7 @@ class SceneStore:
     def edit(self, request: SceneRequest, links: LinkPoses, stamp: int) -> SceneResponse:
         """True if the scene is changed, or why not; `links` says where the links are now, `stamp` is [ns] UNIX."""
         try:
-            changed = edited(self._arm, self.scene, request, links)
+            changed = edited(self._arm, self.scene, request.edit, links)
             if changed != self.scene:
                 require_scene(self._arm, changed, self._folders)
                 epoch, version = self.scene.epoch or drawn_epoch(), self.scene.version + 1

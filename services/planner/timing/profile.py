@@ -108,7 +108,7 @@ def solved(demand: InputParameter, what: str) -> Trajectory:
         result = Ruckig(1).calculate(demand, profile)
     except RuckigError as error:
         raise NoProfile(f"no jerk-limited profile for {what}") from error
-    if result not in (Result.Working, Result.VerifiedTrajectory):
+    if result not in (Result.Working, Result.Finished):
         raise NoProfile(f"no jerk-limited profile for {what}: {result.name}")
     return profile
 
