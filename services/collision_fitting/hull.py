@@ -1,4 +1,4 @@
-"""What of many points decides the size of a convex shape around them."""
+"""Convex hull, smallest ball and smallest rectangle of points: the sizes of a convex shape around them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a link looks like, as one mesh in the link's frame: read by trimesh, and refused where it cannot be a link."""
+"""The visual meshes of a link as one mesh in its frame: read by trimesh, refused where it cannot be a link."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever is commanded, a jogged arm keeps its limits and its distance, and can always stop."""
+"""A jogged arm keeps its limits and its distance whatever is commanded, and can always stop."""
 
 from __future__ import annotations
 

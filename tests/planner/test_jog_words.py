@@ -1,4 +1,4 @@
-"""What a jogged arm says of itself: what slows it, with its figures, and the device's own reason to stand still."""
+"""The status of a jogged arm: what slows it, with its figures, and the device's own reason to stand still."""
 
 from __future__ import annotations
 

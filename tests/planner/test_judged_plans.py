@@ -1,4 +1,4 @@
-"""Whatever is asked, of both arms: what comes back holds before another library's eyes, or is a reason."""
+"""Plans of both arms for any request: each holds before another library's eyes, or is a refusal with a reason."""
 
 from __future__ import annotations
 

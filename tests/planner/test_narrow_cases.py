@@ -1,4 +1,4 @@
-"""Where it is narrow, both arms: slots, boxes, their own bodies, goals and starts that touch, limits, singularities."""
+"""Narrow cases on both arms: slots, boxes, their own bodies, goals and starts that touch, limits, singularities."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an arm can do with its tool, read from its joints: real arms, and arms that lack joints."""
+"""The task space of arms, read from their joints: real arms, and arms that lack joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a way goes by in time, and the peaks of the quintics that tell it."""
+"""Time laws along a path, and the peaks of the quintics between its points."""
 
 from __future__ import annotations
 

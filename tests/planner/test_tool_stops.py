@@ -1,4 +1,4 @@
-"""How far lines, arcs and waypoints go and why no farther, alike for all of them; at singularities above all."""
+"""The ends of lines, arcs and waypoint paths and their reasons, alike for all of them; at singularities above all."""
 
 from __future__ import annotations
 

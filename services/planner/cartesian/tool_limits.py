@@ -1,4 +1,4 @@
-"""What a line or an arc of the tool may do besides what the joints may; nonsense is refused by name."""
+"""Limits of the tool on a line or an arc, besides those of the joints; nonsense is refused by name."""
 
 from __future__ import annotations
 

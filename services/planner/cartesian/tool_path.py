@@ -42,9 +42,11 @@ class Straight:
 
     @property
     def metres(self) -> float:
+        """Length [m] of the tool's translation."""
         return self.length * float(np.linalg.norm(self.twist[:3]))
 
     def at(self, along: float) -> Pose:
+        """Pose of the tool in the base after the length `along` of this piece."""
         return moved(self.start, along * self.twist)
 
     def part(self, begin: float, end: float) -> Straight:
@@ -66,14 +68,17 @@ class Corner:
 
     @property
     def length(self) -> float:
+        """Length of the piece, from where it leaves the first line to where it joins the second."""
         return 2.0 * self.radius
 
     @property
     def metres(self) -> float:
+        """Length [m] of the tool's translation, by chords."""
         rows = np.array([self.at(along).position for along in np.linspace(0.0, self.length, CORNER_ROWS)])
         return float(np.linalg.norm(np.diff(rows, axis=0), axis=1).sum())
 
     def at(self, along: float) -> Pose:
+        """Pose of the tool in the base after the length `along` of this piece."""
         turned = self.length * blending(along / self.length)
         offset = (along - self.radius) * self.coming + turned * (self.leaving - self.coming)
         return moved(self.corner, offset)
@@ -91,13 +96,16 @@ class Arc:
 
     @property
     def metres(self) -> float:
+        """Length [m] of the arc."""
         return self.angle * float(np.linalg.norm(self.start.position - self.centre))
 
     @property
     def length(self) -> float:
+        """Length of the piece: [m], or the weighted turn if that is longer."""
         return max(self.metres, METRES_PER_RADIAN * float(np.linalg.norm(self.turn)))
 
     def at(self, along: float) -> Pose:
+        """Pose of the tool in the base after the length `along` of this piece."""
         share = along / self.length
         spoke = pin.exp3(share * self.angle * self.normal) @ (self.start.position - self.centre)
         return Pose(self.centre + spoke, pin.exp3(share * self.turn) @ self.start.rotation)

@@ -1,4 +1,4 @@
-"""How near things may come, and how far along a path the arm can go before they do."""
+"""The clearance that is kept, and walks along a path until something comes nearer (conservative advancement)."""
 
 from __future__ import annotations
 

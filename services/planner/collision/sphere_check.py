@@ -62,6 +62,7 @@ class NativeCheck:
         self._shown: World | None = None
 
     def planner(self, world: World, margin: float) -> NativePlanner:
+        """The native planner with the scene of `world`, to keep `margin` [m]."""
         planner = self._planner
         if self._shown is not world:
             show_scene(planner, world)
@@ -70,9 +71,11 @@ class NativeCheck:
         return planner
 
     def is_free(self, world: World, positions: Positions, margin: float) -> bool:
+        """True if the spheres around the links keep the margin [m] in this configuration (n,)."""
         return bool(self.planner(world, margin).free(np.array([positions]))[0])
 
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
+        """The verdict of the spheres on the polyline through `rows` (m, n), and what they leave open."""
         planner = self.planner(world, margin)
         if planner.path_free(rows):
             return Resolution()
@@ -92,12 +95,15 @@ class ExactShapesOnly:
     """Where the native planner is not built: nothing is known before coal looks."""
 
     def planner(self, world: World, margin: float) -> None:
+        """None: there is no native planner."""
         return None
 
     def is_free(self, world: World, positions: Positions, margin: float) -> bool:
+        """False: nothing is known."""
         return False
 
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
+        """The whole polyline (m, n), unresolved."""
         return Resolution(unresolved=(rows,))
 
 

@@ -34,15 +34,18 @@ class Box:
 
     @property
     def half(self) -> Array:
+        """(3,) half sizes [m] of the box around it."""
         return np.array(self.half_sizes)
 
     def depth(self, points: Array) -> Array:
+        """(...) [m] to the surface from inside; below 0 outside. Points are (..., 3) [m]."""
         over = np.abs(points) - self.half
         outside = np.linalg.norm(np.maximum(over, 0.0), axis=-1)
         depth: Array = np.where(outside > 0.0, -outside, -over.max(axis=-1))
         return depth
 
     def nearest(self, points: Array) -> Array:
+        """(..., 3) [m] the points themselves, or the nearest ones of the solid to those outside."""
         nearest: Array = np.clip(points, -self.half, self.half)
         return nearest
 
@@ -56,15 +59,18 @@ class Cylinder:
 
     @property
     def half(self) -> Array:
+        """(3,) half sizes [m] of the box around it."""
         return np.array([self.radius, self.radius, self.half_length])
 
     def depth(self, points: Array) -> Array:
+        """(...) [m] to the surface from inside; below 0 outside. Points are (..., 3) [m]."""
         aside = np.hypot(points[..., 0], points[..., 1]) - self.radius
         above = np.abs(points[..., 2]) - self.half_length
         outside = np.hypot(np.maximum(aside, 0.0), np.maximum(above, 0.0))
         return np.where(outside > 0.0, -outside, -np.maximum(aside, above))
 
     def nearest(self, points: Array) -> Array:
+        """(..., 3) [m] the points themselves, or the nearest ones of the solid to those outside."""
         aside = np.maximum(np.hypot(points[..., 0], points[..., 1]), self.radius)
         moved = points.copy()
         moved[..., :2] *= (self.radius / aside)[..., None]
@@ -81,13 +87,16 @@ class Capsule:
 
     @property
     def half(self) -> Array:
+        """(3,) half sizes [m] of the box around it."""
         return np.array([self.radius, self.radius, self.half_length + self.radius])
 
     def depth(self, points: Array) -> Array:
+        """(...) [m] to the surface from inside; below 0 outside. Points are (..., 3) [m]."""
         distance: Array = np.linalg.norm(points - self._on_axis(points), axis=-1)
         return self.radius - distance
 
     def nearest(self, points: Array) -> Array:
+        """(..., 3) [m] the points themselves, or the nearest ones of the solid to those outside."""
         axis = self._on_axis(points)
         off = points - axis
         distance = np.maximum(np.linalg.norm(off, axis=-1, keepdims=True), self.radius)

@@ -1,4 +1,4 @@
-"""How fast velocities of all joints may change together, and where the arm comes to rest from them.
+"""Limits on the change of all joint velocities together, and the configuration in which the arm comes to rest.
 
 Braking is as gentle as the gateway's jerk limit: a joint slows by `speed / (d'(speed) + dt)` at most, where d is its
 jerk-limited path to rest. Then the place where it would come to rest never moves back from one period to the next.

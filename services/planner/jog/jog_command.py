@@ -1,4 +1,4 @@
-"""What a jog command asks of the joints, before anything but their speed limits is in its way."""
+"""Joint velocities for a jog command, within the joints' velocity limits alone; where the jog begins."""
 
 from __future__ import annotations
 

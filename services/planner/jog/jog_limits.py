@@ -1,4 +1,4 @@
-"""What slows a jogged arm, in words: the thing, how it stands, and the limit."""
+"""The limits that slow a jogged arm, in words: the thing, its value, and the limit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands in the way of a jogged arm, itself included, and how it comes out where it touches already."""
+"""Obstacles before a jogged arm, itself included, and the way out of a contact."""
 
 from __future__ import annotations
 

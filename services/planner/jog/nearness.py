@@ -1,4 +1,4 @@
-"""How far apart the shapes of every pair are while the arm moves on: few pairs have to be looked at again.
+"""Distances of all pairs of shapes while the arm moves on: few pairs have to be looked at again.
 
 Two shapes that were seen so far apart stay apart until the joints between them may have carried them that far.
 """
@@ -63,6 +63,7 @@ class Nearness:
         return speeds
 
     def names(self, pair: int) -> LinkPair:
+        """Names of the two links or objects of a pair."""
         return self._world.pair_names[pair]
 
     def _moved(self, displacement: Array) -> Array:

@@ -1,4 +1,4 @@
-"""How much of a wanted velocity leaves room to stop: before joint limits, singularities and what the arm may touch."""
+"""The largest share of a velocity from which the arm can stop: before limits, singularities and obstacles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a redundant arm does with the freedom that its target leaves it: its joints go towards their middles."""
+"""Self-motion of a redundant arm: its joints go towards the middles of their ranges, the tool stays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the tool is to be, and how far it is from there."""
+"""Targets of the tool: position, rotation or pointing direction, tolerances, and the error of a configuration."""
 
 from __future__ import annotations
 

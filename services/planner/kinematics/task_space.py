@@ -1,4 +1,4 @@
-"""What an arm can do with its tool, known from its joints before any goal is asked for.
+"""The task space of an arm: which turns of its tool it can choose, read from its joints before any goal is asked.
 
 The rotations of the tool over all configurations are read from the Jacobian; where they are turns about one axis only,
 how far a goal is from them is plain geometry."""

@@ -1,4 +1,4 @@
-"""Why no configuration meets a pose goal, and the nearest pose that one does."""
+"""Refusals of pose goals that no configuration meets, with the nearest pose that one does."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a plan of the native planner ends with."""
+"""Results of the native planner: a free path, or the reason why none was found."""
 
 from __future__ import annotations
 
@@ -73,5 +73,6 @@ class FreePath:
 
 
 def sum_of(weights: tuple[Array, ...], points: list[Array]) -> Array:
+    """(m, n) the sum of points (m, n), each times its weight (m, 1)."""
     total: Array = np.sum([weight * point for weight, point in zip(weights, points, strict=True)], axis=0)
     return total

@@ -1,4 +1,4 @@
-"""What a search ends with, and how much time it has."""
+"""The result of a search: a collision-free joint path, or the reason why none was found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which search looks for a path, by `planner_id`, and what it asks about collisions."""
+"""Path search in the joint space: the searches by `planner_id`, and the native planner before all others."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def _around(arm: Arm, reach: Array, start: Array) -> Iterator[Array]:
 
 
 def _comes_away(checker: CollisionChecker, start: Array, end: Array) -> bool:
-    """True if nothing that is nearer than the clearance comes nearer on the straight path."""
+    """True if no pair that is closer than the clearance gets closer along the straight joint path."""
     before: dict[tuple[str, str], float] | None = None
     for share in np.linspace(0.0, 1.0, LOOKS + 1).tolist():
         near = checker.contacts(start + share * (end - start), CLEARANCE)

@@ -1,4 +1,4 @@
-"""Why there is no plan: every refusal names the check, the thing, its value, its limit and what would do."""
+"""Refusals of a plan: each names the check, the thing, its value, its limit and what would do."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a plan begins: the request's start, completed by the present state, and checked."""
+"""The start of a plan: the request's start state, completed by the present state, and checked."""
 
 from __future__ import annotations
 

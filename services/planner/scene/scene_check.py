@@ -1,4 +1,4 @@
-"""What every scene must be: names that mean one thing, links that exist, shapes that have a size."""
+"""Validation of planning scenes: names that mean one thing, links that exist, shapes that have a size."""
 
 from __future__ import annotations
 

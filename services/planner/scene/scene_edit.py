@@ -82,6 +82,7 @@ class SceneEditor:
         return replace(self._scene, objects=objects if known else (*objects, item))
 
     def add(self, item: SceneObject) -> PlanningScene:
+        """The scene with the object, in place of one of its name; raises `SceneError`."""
         return self.put(self._settled(item))
 
     def remove(self, name: str) -> PlanningScene:
@@ -109,6 +110,7 @@ class SceneEditor:
         return self.put(replace(item, pose=pose, frame=edit.link, attached=True, touch_links=edit.touch_links))
 
     def detach(self, name: str) -> PlanningScene:
+        """The scene with the object standing in the base where it is now; raises `SceneError`."""
         item = self.named(name)
         if not item.attached:
             raise SceneError(f'object "{name}" is not attached to any link; there is nothing to detach')
@@ -116,11 +118,13 @@ class SceneEditor:
         return self.put(replace(item, pose=pose, frame="", attached=False, touch_links=()))
 
     def allow(self, pair: AllowedPair) -> PlanningScene:
+        """The scene with the pair allowed to touch."""
         if self._is_allowed(pair):
             return self._scene
         return replace(self._scene, allowed=(*self._scene.allowed, pair))
 
     def disallow(self, pair: AllowedPair) -> PlanningScene:
+        """The scene without the allowed pair; raises `SceneError` if it was not allowed."""
         if not self._is_allowed(pair):
             named = "; ".join(f'"{old.first}" and "{old.second}"' for old in self._scene.allowed) or "nothing"
             raise SceneError(
@@ -130,6 +134,7 @@ class SceneEditor:
         return replace(self._scene, allowed=tuple(old for old in self._scene.allowed if not _same(old, pair)))
 
     def replace_by(self, scene: PlanningScene) -> PlanningScene:
+        """The objects and allowed pairs of another scene; raises `SceneError`."""
         objects = tuple(self._settled(item) for item in scene.objects)
         return replace(self._scene, objects=objects, allowed=scene.allowed)
 

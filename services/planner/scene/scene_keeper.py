@@ -47,7 +47,7 @@ class SceneKeeper:
         self._show()
         node.serve(SCENE_EDIT, self._edit)
 
-    def heed(self, response: PlanResponse) -> None:
+    def show_refusal(self, response: PlanResponse) -> None:
         """Shows what touches where a plan was refused, until one succeeds."""
         refusal = response.refusal
         if refusal is not None and refusal.configuration:

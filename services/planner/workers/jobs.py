@@ -1,4 +1,4 @@
-"""What goes between the planner's process and its workers: messages behind their length, over pipes."""
+"""Messages between the planner's process and its workers: each behind its length, over pipes."""
 
 from __future__ import annotations
 

@@ -39,5 +39,5 @@ class PlanService:
             self._path.put(self._planner.planned_path(response.trajectory, self._node.now()))
         elif response.refusal is not None:
             self._node.log.info(f"refused: {response.refusal.message}")
-        self._keeper.heed(response)
+        self._keeper.show_refusal(response)
         pending.reply(replace(response, planning_time=self._node.monotonic() - began))

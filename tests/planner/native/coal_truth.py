@@ -1,4 +1,4 @@
-"""What is really true: pinocchio and coal on the links' own geometry, in doubles, one configuration at a time."""
+"""The reference: pinocchio and coal on the links' own geometry, in doubles, one configuration at a time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where eight configurations at once put the spheres: against pinocchio, and every build against every other."""
+"""Sphere centres of eight configurations at once: against pinocchio, and every build against every other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-// What goes wrong when a model is built; becomes a ValueError.
+// The error of a model that cannot be built; becomes a ValueError.
 #pragma once
 
 #include <stdexcept>

@@ -20,7 +20,7 @@ inline Vector cross(const Vector& a, const Vector& b) {
 inline double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 inline double length(const Vector& a) { return std::sqrt(dot(a, a)); }
 
-// Whether the triangle and the axis-aligned cube share a point (separating axes; Akenine-Moller 2001).
+// True if the triangle and the axis-aligned cube share a point (separating axes; Akenine-Moller 2001).
 inline bool reaches_cube(const Triangle& triangle, const Vector& centre, double half) {
     const Vector corners[3] = {minus(triangle[0], centre), minus(triangle[1], centre), minus(triangle[2], centre)};
     const auto is_separating = [&](const Vector& axis) {

@@ -1,4 +1,5 @@
-// Whether an arm touches itself or anything else, in eight configurations at once. Compiled once for each processor.
+// The collision check of an arm with itself and its surroundings, for eight configurations at once. Compiled once for
+// each processor.
 //
 // Spheres in trees: what is far from the sphere around a whole link is far from the link. `near` asks the same question
 // with the path added that a part may move within the stretch that a lane stands for: a lane that is not near is free

@@ -1,4 +1,4 @@
-// Whether a whole path is free, nothing left out between the samples.
+// Motion validation: true for a path that is free as a whole, nothing left out between the samples.
 //
 // A sample stands for the stretch around it. Eight stretches, taken from all over the path, make one question to the
 // check. No part moves farther within a stretch than its bound, so a lane without anything that near is free on all of

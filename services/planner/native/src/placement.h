@@ -1,4 +1,4 @@
-// Where frames and points are in eight configurations at once.
+// Forward kinematics: frames and points in eight configurations at once.
 #pragma once
 
 #include "trigonometry.h"

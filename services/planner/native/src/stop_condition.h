@@ -1,4 +1,4 @@
-// When to give up: another thread's flag, or the clock.
+// The end of a search: another thread's flag, or the clock.
 #pragma once
 
 #include <atomic>

@@ -1,4 +1,4 @@
-// What the check reads and writes: plain records without functions, so that it can be compiled for several processors.
+// Input and output of the check: plain records without functions, so that it can be compiled for several processors.
 //
 // Lengths in m, angles in rad. A rigid transform is 12 floats: the 3 x 3 rotation by rows, then the translation.
 #pragma once
