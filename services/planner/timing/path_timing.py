@@ -18,6 +18,14 @@ from numpy.typing import NDArray
 from schemas.planning import Timing
 from services.planner.path.path_curve import PathCurve
 from services.planner.request.deadline import Deadline
+from services.planner.timing.bounds import (
+    PathDerivatives,
+    QuantityLimits,
+    acceleration_bound,
+    crossing_term,
+    jerk_bound,
+    speed_bound,
+)
 from services.planner.timing.profile import JointLimits, NoProfile, require_short
 from services.planner.timing.sections import Section
 from services.planner.timing.time_law import TimeLaw
@@ -49,25 +57,18 @@ class Law(Protocol):
 
 @dataclass(frozen=True)
 class Demand:
-    """(m, k) each: how the limited quantities change with the length, their absolute values; limits (k,)."""
+    """A path at lengths `along` (m,), and the limits of the k quantities that it moves: the joints, and the tool."""
 
     along: Array  # (m,)
-    first: Array
-    second: Array
-    third: Array
-    velocity: Array
-    acceleration: Array
-    jerk: Array
+    path: PathDerivatives
+    limits: QuantityLimits
     marks: Array  # lengths from 0 to the end between which the path is of one kind
 
     @cached_property
     def speeds(self) -> Array:
         """(m,) that each row allows."""
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            straight = _least(self.velocity / self.first)
-            bent = np.sqrt(_least(CENTRIPETAL * self.acceleration / self.second))
-            twisted = np.cbrt(_least(JERK_OF_SPEED * self.jerk / self.third))
-        return np.fmin(np.fmin(straight, bent), twisted)
+            return _least(speed_bound(self.path, self.limits, CENTRIPETAL, JERK_OF_SPEED))
 
     def rows(self, edges: Array) -> NDArray[np.int64]:
         """(j, 2) which of them are in each stretch between edges, from one up to another."""
@@ -101,18 +102,14 @@ def demand_of(curve: PathCurve, limits: JointLimits, tool: tuple[float, float], 
     rows = (np.linspace(0.0, end, ROWS + 1), curve.knots, middles, marks[:-1] + aside, marks[1:] - aside)
     along = np.unique(np.concatenate((*rows, *inside)))
     _, *derivatives = curve.at(along)
-    first, second, third = [np.hstack((np.abs(part[:, :joints]), _norms(part[:, joints:]))) for part in derivatives]
+    path = PathDerivatives(*(np.hstack((np.abs(part[:, :joints]), _norms(part[:, joints:]))) for part in derivatives))
     speed, most = (value if value > 0.0 else math.inf for value in tool)
-    return Demand(
-        along,
-        first,
-        second,
-        third,
+    of_tool = QuantityLimits(
         velocity=MARGIN * np.append(limits.velocity, speed),
         acceleration=MARGIN * np.append(limits.acceleration, most),
         jerk=MARGIN * np.append(limits.jerk, math.inf),
-        marks=marks,
     )
+    return Demand(along, path, of_tool, marks)
 
 
 def time_law(demand: Demand, deadline: Deadline) -> TimeLaw:
@@ -158,17 +155,15 @@ def _sections(demand: Demand, edges: Array, share: float) -> list[Section]:
     """With what every row in each of them allows at every speed up to the one given; raises `NoProfile`."""
     end = float(demand.along[-1])
     bounds = demand.rows(edges)
-    first, second, third = demand.first, demand.second, demand.third
+    path, limits = demand.path, demand.limits
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         speed = np.fmin(share * _least_in(demand.speeds, bounds), FASTEST * end)
         fast = _spread(speed, bounds, len(demand.along))[:, None]
-        bend, twist = second * fast * fast, 3.0 * second * fast
-        rises = np.fmin(_least((demand.acceleration - bend) / first), _least(JERK_OF_BOTH * demand.jerk / twist))
+        rises = _least(acceleration_bound(path, limits, fast, JERK_OF_BOTH))
         rise = np.fmin(_least_in(rises, bounds), FASTEST * speed)
         steep = _spread(rise, bounds, len(demand.along))[:, None]
-        jerk = np.fmin(
-            _least_in(_least((demand.jerk - third * fast**3 - twist * steep) / first), bounds), FASTEST * rise
-        )
+        jerks = _least(jerk_bound(path, limits, fast, crossing_term(path, fast, steep)))
+        jerk = np.fmin(_least_in(jerks, bounds), FASTEST * rise)
         require_short(float(np.sum(np.diff(edges) / speed)))
         require_short(math.sqrt(end / float(rise.max())))
     rows = zip(*(column.tolist() for column in (np.diff(edges), speed, rise, jerk)), strict=True)

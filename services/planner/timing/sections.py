@@ -1,8 +1,4 @@
-"""A smooth path in sections, in each of which the movement along it has bounds under which no joint exceeds its own.
-
-With y the joints by the path's length, divided by their speed limits, and a dash for a derivative by it:
-q' = y' v, q'' = y'' v^2 + y' a, q''' = y''' v^3 + 3 y'' v a + y' j.
-"""
+"""A smooth path in sections, in each of which the movement along it has bounds under which no joint exceeds its own."""
 
 from __future__ import annotations
 
@@ -14,6 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.planner.path.curve import Curve
+from services.planner.timing.bounds import (
+    PathDerivatives,
+    QuantityLimits,
+    acceleration_bound,
+    crossing_term,
+    jerk_bound,
+    speed_bound,
+)
 from services.planner.timing.profile import JointLimits
 
 Array = NDArray[np.float64]
@@ -43,16 +47,16 @@ class Section:
 def sections_of(run: Curve, limits: JointLimits) -> list[Section]:
     """Some for each piece of the curve, with the bounds of all their samples; those that are alike are one."""
     lengths, derivatives = run.cut(CUTS, SHARES)
-    y1, y2, y3 = (np.abs(part) + TINY for part in derivatives[1:])
-    most_a, most_j = limits.acceleration / limits.velocity, limits.jerk / limits.velocity
-    speeds = np.minimum(1.0 / y1, np.minimum((BENDING * most_a / y2) ** 0.5, (TWISTING * most_j / y3) ** (1.0 / 3.0)))
-    v = _least(speeds)
+    path = PathDerivatives(*(np.abs(part) + TINY for part in derivatives[1:]))
+    scale = limits.velocity  # joint values are divided by their velocity limits
+    of_joints = QuantityLimits(np.ones_like(scale), limits.acceleration / scale, limits.jerk / scale)
+    v = _least(speed_bound(path, of_joints, BENDING, TWISTING))
     speed = np.repeat(v, len(SHARES))[:, None]
-    crossing = 3.0 * y2 * speed
-    a = np.minimum(_least((most_a - y2 * speed**2) / y1), _least(CROSSING * most_j / crossing))
-    left = most_j - y3 * speed**3 - np.minimum(CROSSING * most_j, crossing * most_a / y1)
-    bends = _least(-y2) < -STRAIGHT
-    rows = zip(*(column.tolist() for column in (lengths, v, a, _least(left / y1), bends)), strict=True)
+    a = _least(acceleration_bound(path, of_joints, speed, CROSSING))
+    crossed = np.minimum(CROSSING * of_joints.jerk, crossing_term(path, speed, of_joints.acceleration / path.first))
+    j = _least(jerk_bound(path, of_joints, speed, crossed))
+    bends = _least(-path.second) < -STRAIGHT
+    rows = zip(*(column.tolist() for column in (lengths, v, a, j, bends)), strict=True)
     return _merged([Section(*row) for row in rows])
 
 
