@@ -16,6 +16,7 @@ from services.collision_fitting.mesh_fit import LinkFit, depths
 from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 OUTSIDE = 1e-6  # [m] that a corner may be outside the shapes as they are loaded again: a rounding
 
 

@@ -16,6 +16,7 @@ from services.planner.collision_geometry.shapes import matrix_of
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 GRID, DIGITS = 1e-5, 5  # [m] to which places are rounded, and half sizes rounded up
 THINNEST = 2e-4  # [m] that an edge or a radius has at least
 # How much less one shape must hold than another to be taken: what stands along the link's axes is easier to read, and

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 FLAT = 1e-6  # thickness as a share of the length below which there is no hull
 SIDES = 3  # of the hull's flat sides, the largest
 ALIKE = 0.999  # cosine between the normals of one side

@@ -14,6 +14,7 @@ from services.planner.collision_geometry.shapes import TriangleMesh, matrix_of
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 SMALLEST, LARGEST = 0.002, 3.0  # [m] along its longest side; what is beyond is in another unit
 FLAT = 1e-3  # thickness as a share of the longest side below which a mesh is no solid
 MOST_TRIANGLES = 500_000

@@ -21,6 +21,7 @@ from services.planner.collision_geometry.shapes import CollisionShape, TriangleM
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 MOST = 6  # shapes of a link
 FACETS = 12  # along each edge of the box around a shape, where the path to the mesh is measured
 

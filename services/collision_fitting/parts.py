@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 Cut = tuple[float, NDArray[np.bool_]]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 LEAST_GAIN = 0.02  # of the volume so far, that one more shape must save
 FINEST = 1.0 / 20.0  # of the longest side: longer edges are halved, so that large triangles can be parted
 LOOKED_AT = 4  # of the cuts on all axes, the best by their boxes

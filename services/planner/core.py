@@ -48,6 +48,7 @@ from services.planner.verification.verify import sample
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 PATH_POINTS = 100
 MOST_GOALS = 8  # configurations of one goal that are tried
 LONGEST = 120.0  # [s] that may be allowed

@@ -28,6 +28,7 @@ from services.planner.timing.timing import States, at_limits, at_speed, trajecto
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 DEEPER = 1.06  # share of the margin that the path keeps, so that samples taken elsewhere keep the margin itself
 LEAST_LOOK = 0.1  # share of the margin by which the arm moves on at least from one look to the next
 SHORTEST_PATH = 1e-4  # of length: less is no way

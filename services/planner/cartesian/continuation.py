@@ -18,6 +18,7 @@ from services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 SPACING = 0.02  # of length between configurations; halved until the spline between them is exact enough
 LEAST_CONFIGURATIONS = 12
 FINEST = 2e-5  # of length: nearer configurations are not tried, and a place is not told more exactly

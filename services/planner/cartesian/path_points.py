@@ -18,6 +18,7 @@ from services.planner.verification.verify import Samples, sample_between
 Array = NDArray[np.float64]
 Error = Callable[[float, Array], float]  # [m] that the configuration (n,) at a length is off the path
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 SPACING = 0.04  # [s] between points, before it is halved where that is too much
 HALVINGS = 6
 OFF = 5e-5  # [m] by which the finished motion may leave the path

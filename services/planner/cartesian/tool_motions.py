@@ -37,6 +37,7 @@ from services.planner.timing.profile import JointLimits
 Array = NDArray[np.float64]
 
 INVALID = PlanCode.INVALID_GOAL_CONSTRAINTS
+# Tuning constants: chosen, where a line does not say measured or standard.
 FARTHEST = 1e3  # [m] a blend beyond it is a mistake
 
 

@@ -18,6 +18,7 @@ from services.planner.path.path_curve import NO_LENGTH, blending, cut
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 METRES_PER_RADIAN = 0.1  # a line that mostly turns is as long as its turn
 CORNER_ROWS = 16  # along a corner, for its length in metres
 

@@ -14,6 +14,7 @@ from services.planner.cartesian.tool_path import METRES_PER_RADIAN
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 LARGEST_STEP = 0.3  # [rad] or [m] of a joint in one iteration
 EXACT = 1e-11  # [m] at which the tool is where it should be; as much for its turn
 LAST_STEP = 1e-5  # [rad] or [m]: what is left after a step so small is its square

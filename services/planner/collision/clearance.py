@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 CLEARANCE = 0.004  # [m] that links which may not touch keep between them
 ROUNDING = 0.0002  # [m] more, for a configuration that is rounded before it is told
 MOST_LOOKS = 50_000

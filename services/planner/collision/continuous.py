@@ -21,6 +21,7 @@ from services.planner.collision.world_geometry import WorldGeometry
 Array = NDArray[np.float64]
 Look = Callable[[Array, Sequence[int]], Array]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 FINEST = 0.25  # of the margin: so far at least does a look answer, whatever it sees
 MOST_LOOKS = 50_000
 

@@ -17,6 +17,7 @@ from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 Folders = Sequence[Path]
 
 ANY = "*"
+# Tuning constants: chosen, where a line does not say measured or standard.
 LARGEST = 1e4  # [m] that a size or a coordinate may have
 
 

@@ -23,6 +23,7 @@ from services.planner.collision.world_geometry import LowerBounds, WorldGeometry
 from services.planner.collision_geometry.coal_shapes import is_inside
 
 Array = NDArray[np.float64]
+# Tuning constants: chosen, where a line does not say measured or standard.
 MANY = 2000  # triangles
 Positions = Sequence[float] | Array
 

@@ -19,6 +19,7 @@ from services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
 from services.planner.collision_geometry.shapes import CollisionShape, matrix_of
 
 Array = NDArray[np.float64]
+# Tuning constants: chosen, where a line does not say measured or standard.
 ENDLESS = 1e6  # [m]
 FEW = 100  # pairs of solids: coal is done with them before numpy has said which of them matter
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 Array = NDArray[np.float64]
+# Tuning constants: chosen, where a line does not say measured or standard.
 WHOLE_TURN = 4.0 * np.pi  # the solid angle of everything
 
 

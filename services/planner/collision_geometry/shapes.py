@@ -25,6 +25,7 @@ class ShapeKind(StrEnum):
     MESH = "mesh"  # nothing
 
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "half_space": 0, "mesh": 0}
 
 

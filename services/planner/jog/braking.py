@@ -13,6 +13,7 @@ from services.arm.description import Arm
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 # The gateway tracks a target at the full acceleration: what asks for a little less is followed, not chased.
 ACCELERATION_SHARE = 0.8
 LAST = 0.05  # of the rate that the jerk limit reaches in a period

@@ -24,8 +24,9 @@ from services.planner.jog.velocity_limiter import VelocityLimiter
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 PERIOD = 0.02  # [s] between two steps, however late they come: a late step makes the arm slower, never faster
-DEAD_MAN = 0.1  # [s] without a command until the arm brakes
+DEAD_MAN = 0.1  # [s] without a command until the arm brakes; standard: MoveIt Servo's command time-out
 STATUS_PERIOD = 0.1  # [s]
 SILENCE = 0.6  # [s] without a command after which an interrupted jog may begin again; the gateway wants 0.5
 FOLLOW = 0.6  # [s] that the arm may be behind its targets, with the gateway's lead and the states' way back

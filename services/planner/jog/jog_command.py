@@ -19,6 +19,7 @@ from services.planner.request.start_state import resolve_start
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 FASTEST_TWIST = 1e3  # [m/s] and [rad/s]: more is as absurd, and loses its digits
 
 

@@ -14,6 +14,7 @@ from services.planner.jog.nearness import Nearness, Pairs
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 LEAST_LOOK = 0.001  # [m] that two shapes move against one another at most between two looks at their distance
 SLACK = 0.0006  # [m] more than the clearance, for what happens between two looks
 MOST_LOOKS = 24  # at distances for one velocity: a longer way along an obstacle has to be gone slower

@@ -14,6 +14,7 @@ from services.planner.collision.world import World
 Array = NDArray[np.float64]
 Pairs = NDArray[np.int_]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 STILL = 1e-9  # [m] that two shapes move against one another: they do not
 
 

@@ -16,6 +16,7 @@ from services.arm.kinematics import Kinematics
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 SAMPLES = 64  # configurations that tell what is much for this arm
 RANK = 1e-6  # [m/s] below which a direction is none
 NEAR = 0.1  # share of the largest manipulability below which a singularity is near

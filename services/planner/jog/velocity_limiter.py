@@ -17,6 +17,7 @@ from services.planner.jog.jog_obstacles import Obstacles
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 LIMIT_SHARES, LIMIT_ROUNDS = 25, 3  # that are tried at once, and how often more finely
 SINGULARITY_HALVINGS = 6
 FACTORS = (1.2, 0.9, 0.5)  # of the share of the tick before, where something is in the way

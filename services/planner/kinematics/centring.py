@@ -12,6 +12,7 @@ from services.planner.kinematics.targets import Target
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 STEPS = 6
 LARGEST_STEP = 0.5  # [rad] or [m]
 LEAST_GAIN = 1e-3  # share of the eccentricity by which a step must improve

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 JOINTS = 6  # with fewer, EAIK answers positions or pairs of turns only
 SAMPLES = 8  # configurations at which EAIK's forward kinematics is held against ours
 AGREEMENT = 1e-9  # [m], and per entry of the rotation

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 Residual = Callable[[Array], tuple[Array, Array]]  # what is missing at a configuration, and how the joints change that
 Test = Callable[[Array], bool]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 ITERATIONS = 40
 STALL = 1e-5  # share of the squared error by which an iteration must improve
 LARGEST_STEP = 0.8  # [rad] or [m] a joint may move in one iteration

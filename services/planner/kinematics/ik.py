@@ -20,6 +20,7 @@ from services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 STARTS = 24  # beside the present configuration
 FULL_POSE_JOINTS, MORE_STARTS = 6, 64  # that many where a full pose has to be searched for
 BATCH = 4  # starts that are tried together before their solutions are handed out

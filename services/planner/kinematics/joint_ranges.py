@@ -12,6 +12,7 @@ from services.arm.description import Arm, Joint
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 NEVER = 1e9  # [m] after which a slide would be where it was
 MOST_TURNS = 64  # combinations of full turns of one branch
 ROUNDING = 1e-9  # [rad] or [m] by which a solution may be beyond a limit before it is put onto it

@@ -18,6 +18,7 @@ from services.planner.request.deadline import NEVER, Deadline
 from services.planner.request.refusals import PlanRefused, in_collision, malformed, unknown_name
 from services.planner.request.start_state import require_parallel, resolve_start
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 MOST_SOLUTIONS = 64
 LOOKED_THROUGH = 256  # configurations, of which all may touch something
 

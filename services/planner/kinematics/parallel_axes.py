@@ -19,6 +19,7 @@ from services.planner.kinematics.targets import any_normal
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 JOINTS = 3
 SAMPLES = 8  # configurations at which the answers are held against the kinematics
 AGREEMENT = 1e-9  # [m]

@@ -13,6 +13,7 @@ from services.arm.kinematics import Kinematics, Pose
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 POSITION_TOLERANCE = 1e-7  # [m] at which a solution is exact
 ROTATION_TOLERANCE = 1e-6  # [rad]
 EDGE = 0.99  # share of a tolerance that is used, so that rounding does not put the end of a descent outside

@@ -24,6 +24,7 @@ from services.planner.request.refusals import PlanRefused, out_of_reach
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 PRINTED = 1e-4  # [m] to which the nearest point is rounded that a person is told
 NEAREST_TRIED = 6  # configurations
 LIGHT = 0.002  # [m/rad] a turn that must not cost position

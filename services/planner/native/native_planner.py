@@ -20,6 +20,7 @@ from services.planner.request.deadline import CancelFlag
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 MARGIN = 0.001  # [m]
 FINEST = 0.0002  # [m] how much nearer than the margin a way may seem before it is refused
 FREE, TOUCHING = 0, 1  # motion_validator.h

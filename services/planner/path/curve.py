@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 PARTS = 8  # of a piece, within which its length is integrated and looked up
 NEWTON = 3  # steps from the look-up to the parameter
 SMALLEST = 1e-12  # of a path's whole length: a piece that is shorter is none

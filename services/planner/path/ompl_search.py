@@ -24,6 +24,7 @@ from services.planner.request.refusals import SearchFailure
 Array = NDArray[np.float64]
 
 PLANNERS = ("RRTConnect", "RRTstar", "BITstar", "PRM")
+# Tuning constants: chosen, where a line does not say measured or standard.
 BETTERING = {"RRTstar": 600, "BITstar": 3000}  # questions "are we done?" after the first way
 RANGE = 0.4  # [s] at full speed that a tree grows by at most
 BATCH = 60  # "are we done?" while the roadmap grows, until it is looked at

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Neighbours = dict[int, list[tuple[int, float]]]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 TRIED = 10  # nearest places to which an end is joined
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DEFAULT = "RRTConnect"  # where the native planner is not built, or finds nothing
+# Tuning constants: chosen, where a line does not say measured or standard.
 PATIENCE = 0.5  # share of the time left that the native planner is given, where another may follow
 KNOWN = (NATIVE, *PLANNERS)
 SEEDS = 2**32  # that are told apart; the generators take none below 0

@@ -12,6 +12,7 @@ from services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 CUTS = 60  # tried; each costs the check of a line
 FRUITLESS = 15  # of them in a row are enough
 WIDEST = 0.5  # share of an edge that its corner may be rounded over

@@ -11,6 +11,7 @@ from services.planner.path.curve import spline_rows
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 ROWS = 24  # configurations in a span of a curve, between which it is looked at as straight
 
 

@@ -18,6 +18,7 @@ from services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 FREE = CLEARANCE + 0.001  # [m] that is clear of everything there, so that a plan can begin
 NEAREST, FARTHEST, GROWTH = 0.003, 0.15, 1.25  # [m] that any point of the arm moves at most on the ways that are tried
 DIRECTIONS = 24  # of all joints together, at each distance, besides those of one joint

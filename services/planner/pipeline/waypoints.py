@@ -31,6 +31,7 @@ from services.planner.timing.timing import at_limits, trajectory_of
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 BLENDS = 4  # times that the blend is halved where a cut corner touches, before the arm stops at every one
 
 

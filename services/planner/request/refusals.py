@@ -12,6 +12,7 @@ from services.arm.errors import nearest_name, suggestion
 
 Point = Sequence[float]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 LEAST_SCALING = 1e-300  # with less, a time is no longer a number
 LONGEST_NAME = 64  # characters of a name that is not known, which a person is shown
 

@@ -10,7 +10,8 @@ from schemas.planning import PlanCode
 from services.arm.description import Arm, Joint
 from services.planner.request.refusals import malformed, moving_start, stale_state, start_beyond_limit, unknown_name
 
-STALE_AFTER = 0.5  # [s] without a joint state: as long as the device waits for a heartbeat
+# Tuning constants: chosen, where a line does not say measured or standard.
+STALE_AFTER = 0.5  # [s] without a joint state; standard: as long as the device waits for a heartbeat
 REST = 0.01  # share of a joint's velocity limit below which it stands
 MOST_TURNED = 90.0  # [rad] of a joint without limits: the native planner takes 100, and a search goes half a turn more
 ROUNDING = 0.51  # [steps] executed positions are whole steps, so they may be this far beyond a limit

@@ -11,6 +11,7 @@ from services.arm.description import Arm
 from services.arm.errors import suggestion
 from services.planner.collision.scene_shapes import ANY, Folders, SceneError, shape_of
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 LONGEST_NAME = 64
 MOST_OBJECTS = 1000
 

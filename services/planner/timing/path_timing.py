@@ -34,6 +34,7 @@ from services.planner.timing.timing import stretches_through
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 NEAR = 1e-4  # share of the length: marks that are nearer to one another are one
 ASIDE = 1e-6  # share of the length from a mark at which the path is that of one side
 ROWS = 128  # of length at which limits are looked at, besides the knots and the marks

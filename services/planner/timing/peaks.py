@@ -9,6 +9,7 @@ from services.planner.timing.profile import JointLimits
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 SHARES = np.linspace(0.0, 1.0, 5)[1:-1]  # of a segment, at which velocities are looked at
 
 

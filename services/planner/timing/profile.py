@@ -19,7 +19,8 @@ from services.arm.description import Arm
 
 Array = NDArray[np.float64]
 
-SPACING = 0.05  # [s] between points, where the profile does not change its jerk
+# Tuning constants: chosen, where a line does not say measured or standard.
+SPACING = 0.05  # [s] between points, where the profile does not change its jerk; measured: README.md
 MOST_POINTS = 400
 SHORTEST = 1e-4  # [s] two points nearer than that are one: below it the quintic's coefficients lose their digits
 MARGIN = 0.997  # share of the limits that is used, for what SHORTEST leaves out

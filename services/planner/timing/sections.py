@@ -22,6 +22,7 @@ from services.planner.timing.profile import JointLimits
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 BENDING = 0.8  # share of the acceleration's limit that bending may use
 TWISTING = 0.6  # share of the jerk's limit that the bend's own change may use
 CROSSING = 0.2  # share of the jerk's limit for accelerating in a bend

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Stretch = tuple[float, float, float, float, float]  # [s] duration, then length, speed, acceleration, jerk at its begin
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 NEWTON = 8  # steps to where a length is reached
 FEWEST = 1e-3  # [s] times nearer than that are one
 

@@ -19,6 +19,7 @@ from services.planner.timing.toppra_speeds import optimal_speeds
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 GRID = 500  # grid points at least
 BLUR = 0.03  # [s] in which an acceleration comes and goes
 SPACING = 0.01  # [s] between points

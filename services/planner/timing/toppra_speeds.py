@@ -19,6 +19,7 @@ from services.planner.timing.profile import JointLimits, NoProfile, require_shor
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 DERATED = 0.95  # share of the limits that toppra may use
 SHORTEST = 0.03  # [s] that a unit of time has at least
 MUCH = 1e4  # of a normalised limit: beyond it nothing is limited

@@ -23,8 +23,9 @@ from services.planner.verification.verify import at_times
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-KNOT = 0.02  # [s] between knots
-SLOT = 0.001  # [s] in which the device spreads its steps evenly
+# Tuning constants: chosen, where a line does not say measured or standard.
+KNOT = 0.02  # [s] between knots; standard: firmware/PROTOCOL.md
+SLOT = 0.001  # [s] in which the device spreads its steps evenly; standard: firmware/PROTOCOL.md
 LEAD = 0.30  # [s] of path that the gateway keeps in the queue, besides half of what braking takes
 Q8 = 256
 FULL = 1.0 + 1e-3  # knots are rounded to 1/256 step, so a profile that touches its limit may look so much beyond

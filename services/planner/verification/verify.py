@@ -14,6 +14,7 @@ from services.planner.timing.profile import JointLimits
 
 Array = NDArray[np.float64]
 
+# Tuning constants: chosen, where a line does not say measured or standard.
 DENSITY = 10  # samples between two points
 ROUNDING = 1e-9  # [rad] or [m], and a share of limits: what floating point may add
 
