@@ -101,7 +101,6 @@ class Streaming:
         if reason:
             raise Refused(f"refused: {reason}", check="stream")
         node.publisher(JOINT_TARGETS).put(JointTargets(stamp=node.now(), name=state.name, position=state.position))
-        self._session.changed()
 
     def _on_event(self, event: DeviceEvent) -> None:
         """Only of the stream that runs: events of before may come late."""

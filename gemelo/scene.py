@@ -54,7 +54,7 @@ class Scene:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._version = 0  # of the last edit
+        self._version = self._epoch = 0  # of the last edit
 
     def add_box(
         self,
@@ -263,7 +263,12 @@ class Scene:
         True
         """
         latest = self._session.latest(SCENE)
-        self._session.wait_for(lambda: latest.message is not None and latest.message.version >= self._version, PATIENCE)
+
+        def has_last_edit() -> bool:
+            scene = latest.message
+            return scene is not None and (scene.version >= self._version or scene.epoch != self._epoch)
+
+        self._session.wait_for(has_last_edit, PATIENCE)
         return self._session.newest(SCENE)
 
     @property
@@ -321,7 +326,8 @@ class Scene:
         response = self._session.call(SCENE_EDIT, request, TO_ANSWER)
         if not response.accepted:
             raise Refused(f"refused: {response.reason}", check="scene", subject=request.name or request.object.name)
-        self._version = response.version
+        heard = self._session.latest(SCENE).message
+        self._version, self._epoch = response.version, heard.epoch if heard is not None else 0
 
 
 def mesh_of(path: Path, scale: float) -> MeshShape:

@@ -8,17 +8,17 @@ in `ledger` and `report`; times are those of the planner (`plan_ms`) and of the 
 from __future__ import annotations
 
 import argparse
+import os
 import shutil
 import sys
 from pathlib import Path
 
 import msgspec
 
-from services.arm.description import load_arm
+import gemelo
 from services.demo.performance import Performance
 from services.demo.report import complaints, report_of, text_of
 from services.runtime.deployment import load_deployment, project_root
-from services.runtime.node import Node
 from services.stack.stack import Stack, StackError
 
 MOSQUITTO = (shutil.which("mosquitto"), shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin"))
@@ -54,10 +54,9 @@ def demonstrate(out: Path, broker: str, with_picture: bool) -> int:
     say(f"starting the stack with {broker}")
     with Stack(broker=broker, viewer="none", out=folder, environment=environment) as stack:
         say(f"all ready after {stack.ready_seconds:.1f} s")
-        deployment = load_deployment(None, stack.environment)
-        arm = load_arm(project_root() / deployment.robot)
-        with Node("demo", deployment, robot=arm.name) as node:
-            performance = Performance(node, arm, say)
+        os.environ.update(stack.deployment)  # where the arm is found
+        with gemelo.connect(name="demo") as arm:
+            performance = Performance(arm, say)
             performance.run()
     say("the stack has stopped")
     report = report_of(arm.name, performance.moves, performance.ledger)

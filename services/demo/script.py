@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from schemas.planning import JointGoal, NamedGoal, PoseGoal
+from gemelo import Target
 from services.arm.chain import link_transforms
 from services.arm.description import Arm, Joint
 from services.arm.transforms import compose, inverse
@@ -19,15 +19,13 @@ RANGE_SHARE = 0.15  # of the joint's travel, at most, to either side
 JOINT_TOUR = ((0.65, 0.35, 0.40), (0.35, 0.65, 0.60))  # shares of each joint's travel; repeated for more joints
 POSE_TOUR = ((0.60, 0.60, 0.30), (0.40, 0.60, 0.50), (0.55, 0.35, 0.20))
 
-Goal = PoseGoal | JointGoal | NamedGoal
-
 
 @dataclass(frozen=True)
 class Stop:
     """One planned move of the tour."""
 
     name: str
-    goal: Goal
+    target: Target
 
 
 @dataclass(frozen=True)
@@ -54,16 +52,16 @@ def sine_of(joint: Joint, start: float) -> Sine:
 
 def tour(arm: Arm) -> tuple[Stop, ...]:
     """Every named state, home, some joint goals, some tool positions; it ends where the step counts are not zero."""
-    named = [Stop(f"named {name}", NamedGoal(name=name)) for name in arm.named_states if name != "home"]
+    named = [Stop(f"named {name}", Target(named=name)) for name in arm.named_states if name != "home"]
     joints = [
-        Stop(f"joints {number}", JointGoal(name=arm.joint_names, position=positions_at(arm, shares)))
+        Stop(f"joints {number}", Target(joints=positions_at(arm, shares)))
         for number, shares in enumerate(JOINT_TOUR, 1)
     ]
     poses = [
-        Stop(f"tool {number}", PoseGoal(position=tool_at(arm, positions_at(arm, shares))))
+        Stop(f"tool {number}", Target(position=tool_at(arm, positions_at(arm, shares))))
         for number, shares in enumerate(POSE_TOUR, 1)
     ]
-    home = JointGoal(name=arm.joint_names, position=arm.reference_position)
+    home = Target(joints=arm.reference_position)
     return (*named, Stop("home", home), *joints, *poses)
 
 
