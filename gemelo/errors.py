@@ -66,9 +66,7 @@ class Refused(Error):
         self.nearest: Target = nearest or {}  # the nearest goal that can, as arguments: `arm.move(**refused.nearest)`
         self.remedy = remedy  # what a person can do
         self.configuration = dict(configuration or {})  # [rad] or [m] by joint, where the arm would touch something
-        self.nearest_free = dict(
-            nearest_free or {}
-        )  # [rad] or [m] by joint, the nearest that touches nothing, if it touches now
+        self.nearest_free = dict(nearest_free or {})  # [rad] or [m] by joint, the nearest to a start that touches
         self.code = code  # PlanCode of the planner, FollowErrorCode of the gateway
 
 
