@@ -325,7 +325,8 @@ class Scene:
     def _edit(self, request: SceneRequest) -> None:
         response = self._session.call(SCENE_EDIT, request, TO_ANSWER)
         if not response.accepted:
-            raise Refused(f"refused: {response.reason}", check="scene", subject=request.name or request.object.name)
+            changed = request.edit.object if isinstance(request.edit, SceneAdd) else request.edit
+            raise Refused(f"refused: {response.reason}", check="scene", subject=getattr(changed, "name", ""))
         heard = self._session.latest(SCENE).message
         self._version, self._epoch = response.version, heard.epoch if heard is not None else 0
 
