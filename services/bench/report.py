@@ -12,7 +12,7 @@ import msgspec
 import psutil
 
 from services.bench.figure import Figure
-from services.cli.columns import table
+from services.cli.text_table import table
 
 
 class BenchReport(msgspec.Struct, frozen=True):

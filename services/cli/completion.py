@@ -1,10 +1,13 @@
-"""Words for the shell: a bash script (zsh takes it after `autoload bashcompinit && bashcompinit`)."""
+"""`gemelo completion`: a completion script for bash (zsh takes it after `autoload bashcompinit && bashcompinit`)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from services.cli.parser import Command, Parser
+from services.cli.commands import COMMANDS
+from services.cli.errors import CommandError, ExitCode
+from services.cli.parser import Command, Options, Parser, complete
+from services.cli.session import Robot, load_robot
 
 _SCRIPT = """_gemelo() {{
     local here=${{COMP_WORDS[COMP_CWORD]}} words
@@ -19,8 +22,22 @@ complete -F _gemelo gemelo
 """
 
 
-def script(commands: Iterable[Command]) -> str:
-    """Completes commands, groups and options; topics and actions by their table, the arm's parts by robot.toml."""
+def run(options: Options) -> ExitCode:
+    """Prints the script for the deployment's robot."""
+    print(script(COMMANDS, robot_if_readable()), end="")
+    return ExitCode.OK
+
+
+def robot_if_readable() -> Robot | None:
+    """The deployment's robot; None if its files cannot be read, which no shell should complain of at its start."""
+    try:
+        return load_robot()
+    except CommandError:
+        return None
+
+
+def script(commands: Iterable[Command], robot: Robot | None) -> str:
+    """Completes commands, groups and options, and the names that each command's `choices` know."""
     commands = list(commands)
     following: dict[str, list[str]] = {"": []}
     for command in commands:
@@ -30,8 +47,8 @@ def script(commands: Iterable[Command]) -> str:
             if word not in known:
                 known.append(word)
         own = " ".join(command.words)
-        following[own] = [*arguments_of(command), *options_of(command)]
-        for given, words in command.words_after().items():
+        following[own] = options_of(command)
+        for given, words in choices_of(command, robot).items():
             following.setdefault(f"{own} {given}".strip(), []).extend(words)
     # The longest first: `topic list` must not be taken for `topic` and a word that follows.
     cases = [f'        "{before}") words="{" ".join(words)}" ;;' for before, words in following.items()]
@@ -42,15 +59,12 @@ def script(commands: Iterable[Command]) -> str:
 def options_of(command: Command) -> list[str]:
     """The long options of a command."""
     parser = Parser(add_help=False)
-    command.add_options(parser)
+    complete(parser, command)
     return [word for word in parser._option_string_actions if word.startswith("--")]
 
 
-def arguments_of(command: Command) -> list[str]:
-    """What its first argument can be, where a table says so."""
-    from schemas.topics import ACTIONS, REQUESTS, TOPICS
-
-    if len(command.words) < 2 or command.words[1] == "list":
-        return []
-    tables = {"topic": TOPICS, "request": REQUESTS, "action": ACTIONS}
-    return [row.key for row in tables.get(command.words[0], ())]  # type: ignore[attr-defined]
+def choices_of(command: Command, robot: Robot | None) -> dict[str, list[str]]:
+    """The words that may follow a command, by its arguments so far."""
+    if not command.choices:
+        return {}
+    return {given: list(words) for given, words in command.load("choices")(robot).items()}

@@ -1,4 +1,4 @@
-"""What a board is told over its serial line, once: networks, broker, passwords. No password is ever an argument."""
+"""The credentials that a board gets over its serial line: networks, broker, passwords. No password is an argument."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import msgspec
 
-from services.cli.exits import usage
+from services.cli.errors import usage
 
 WIFI_PASSWORD, MQTT_PASSWORD = "GEMELO_WIFI_PASSWORD", "GEMELO_MQTT_PASSWORD"
 LONGEST_SSID = 32  # [bytes] IEEE 802.11
@@ -17,7 +17,7 @@ WPA = (8, 63)  # [characters] of a passphrase
 
 
 class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """The JSON of `provision` in firmware/PROTOCOL.md; what is None stays as the device has it."""
+    """The JSON of `provision` in firmware/PROTOCOL.md; None leaves what the device has."""
 
     device: str | None = None
     wifi_ssid: str | None = None
@@ -29,11 +29,11 @@ class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     factory_reset: bool = False
 
     def text(self) -> bytes:
-        """As it is sent."""
+        """The JSON as it is sent."""
         return msgspec.json.encode(self)
 
     def summary(self) -> str:
-        """What is given, without a password."""
+        """The given fields as a line, without a password."""
         said = [f"{name} {value}" for name in ("device", "wifi_ssid", "mqtt_uri", "mqtt_user")
                 if (value := getattr(self, name)) is not None]  # fmt: skip
         hidden = [name for name in ("wifi_password", "mqtt_password", "mqtt_ca") if getattr(self, name) is not None]
@@ -41,7 +41,7 @@ class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
 
 def require_sound(credentials: Credentials) -> Credentials:
-    """Raises on what no board could use, before it is sent."""
+    """Returns `credentials`; raises `CommandError` for values that no board could use."""
     ssid, uri = credentials.wifi_ssid, credentials.mqtt_uri
     if ssid is not None and len(ssid.encode()) > LONGEST_SSID:
         raise usage(f"--wifi-ssid has {len(ssid.encode())} bytes: a network's name has at most {LONGEST_SSID}")
@@ -55,7 +55,7 @@ def require_sound(credentials: Credentials) -> Credentials:
 
 
 def password(what: str, variable: str, environ: Mapping[str, str]) -> str:
-    """From the environment, else asked on a terminal without showing it, else a line of standard input."""
+    """The password from the environment, else asked for on a terminal without echo, else a line of standard input."""
     if variable in environ:
         return environ[variable]
     if sys.stdin.isatty():
@@ -67,7 +67,7 @@ def password(what: str, variable: str, environ: Mapping[str, str]) -> str:
 
 
 def certificate(path: Path | None) -> str | None:
-    """The text of a PEM file."""
+    """The text of a PEM file; raises `CommandError` if it cannot be read or holds no certificate."""
     if path is None:
         return None
     try:

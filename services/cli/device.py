@@ -1,4 +1,4 @@
-"""What a person may ask of the device besides a motion: from `gemelo hold` to `gemelo speed`."""
+"""The commands that the device obeys at once: hold, resume, stop, reset, arm, disarm, reference, output, speed."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ from schemas.device import (
     StopKind,
 )
 from schemas.topics import DEVICE_COMMAND, DEVICE_STOP
-from services.cli.device_names import require_name
-from services.cli.exits import CommandError, ExitCode, usage
+from services.cli.errors import CommandError, ExitCode, usage
+from services.cli.parser import Choices, Options, Parser, finite_number
+from services.cli.robot_names import require_name
+from services.cli.session import Robot, Session, connect, load_robot
 from services.cli.units import parse_joints, show
 
 if TYPE_CHECKING:
     from services.arm.description import Arm
-    from services.cli.session import Session
 
 TIMEOUT = 3.0  # [s]
 BY_NAME: dict[str, DeviceCommand | StopKind] = {
@@ -42,8 +43,68 @@ AFTERWARDS: dict[str, str] = {
 }
 
 
+def run(options: Options) -> ExitCode:
+    """Sends the command that the last word names."""
+    with connect() as session:
+        return command(session, options.command.words[-1])
+
+
+def reference_options(parser: Parser) -> None:
+    """Adds the joints' positions."""
+    parser.add_argument(
+        "--joints", nargs="+", default=[], metavar="JOINT=VALUE", help="where they stand, as 30deg or 40mm"
+    )
+
+
+def reference_choices(robot: Robot | None) -> Choices:
+    """The joints, after --joints."""
+    return {} if robot is None else {"--joints": [f"{joint.name}=" for joint in robot.arm.joints]}
+
+
+def run_reference(options: Options) -> ExitCode:
+    """Declares where the joints stand."""
+    with connect() as session:
+        return reference(session, options.joints)
+
+
+def output_options(parser: Parser) -> None:
+    """Adds the output and its state."""
+    parser.add_argument("output", metavar="OUTPUT", help="a name of robot.toml's [[output]]")
+    parser.add_argument("state", choices=("on", "off"), help="on or off")
+
+
+def run_output(options: Options) -> ExitCode:
+    """Switches an output; a wrong name is refused before the stack is asked."""
+    robot = load_robot()
+    require_name("output", options.output, robot.arm.outputs)
+    with connect(robot) as session:
+        return output(session, options.output, options.state == "on")
+
+
+def output_choices(robot: Robot | None) -> Choices:
+    """The outputs, then on and off."""
+    names = [output.name for output in robot.arm.outputs] if robot else []
+    return {"": names, **dict.fromkeys(names, ("on", "off"))}
+
+
+def percent(text: str) -> float:
+    return finite_number(text.removesuffix("%"))
+
+
+def speed_options(parser: Parser) -> None:
+    """Adds the speed."""
+    parser.add_argument("percent", metavar="PERCENT", type=percent, help="of the planned speed, 0 to 100")
+
+
+def run_speed(options: Options) -> ExitCode:
+    """Sets the speed; one that is out of range is refused before the stack is asked."""
+    share_of(options.percent)
+    with connect() as session:
+        return speed(session, options.percent)
+
+
 def command(session: Session, name: str) -> ExitCode:
-    """Sends a command of `BY_NAME` and says what the device answered."""
+    """Sends a command of `BY_NAME` and prints the device's answer; raises `CommandError` if it refuses."""
     code = _send(session, BY_NAME[name])
     if name == "arm":
         wait_for_drivers(session)
@@ -53,7 +114,7 @@ def command(session: Session, name: str) -> ExitCode:
 
 
 def reference(session: Session, assignments: Sequence[str]) -> ExitCode:
-    """Declares where the joints stand now; those not named are at robot.toml's reference position."""
+    """Declares where the joints stand now; those not named stand at robot.toml's reference position."""
     request = reference_request(session.arm, assignments)
     code = _send(session, request)
     for name, position in zip(request.name, request.position, strict=True):
@@ -69,7 +130,7 @@ def reference_request(arm: Arm, assignments: Sequence[str]) -> ReferenceCommand:
 
 
 def output(session: Session, name: str, is_on: bool) -> ExitCode:
-    """Switches an output of robot.toml."""
+    """Switches the output `name` of robot.toml."""
     require_name("output", name, session.arm.outputs)
     return _send(
         session,
@@ -79,20 +140,20 @@ def output(session: Session, name: str, is_on: bool) -> ExitCode:
 
 
 def speed(session: Session, percent: float) -> ExitCode:
-    """How fast the device plays every path from now on [%]."""
+    """Sets how fast the device plays every path from now on [%]."""
     request = SpeedCommand(scale=share_of(percent))
     return _send(session, request, f"speed {percent:g} %")
 
 
 def share_of(percent: float) -> float:
-    """The time scale, 0 to 1."""
+    """The time scale, 0 to 1; raises `CommandError` outside of 0 to 100 %."""
     if not 0.0 <= percent <= 100.0:
         raise usage(f"a speed of {percent:g} % is not in 0 to 100: the planner's own speed is 100")
     return percent / 100.0
 
 
 def ask(session: Session, wanted: DeviceCommand | StopKind, what: str = "") -> DeviceCommandResponse:
-    """The device's answer; a no is raised with its reason."""
+    """Sends what is `wanted` and returns the answer; raises `CommandError` with the device's reason if it refuses."""
     if isinstance(wanted, StopKind):
         answer = session.node.call(DEVICE_STOP, DeviceStopRequest(kind=wanted), timeout=TIMEOUT)
     else:
@@ -104,7 +165,7 @@ def ask(session: Session, wanted: DeviceCommand | StopKind, what: str = "") -> D
 
 
 def wait_for_drivers(session: Session) -> None:
-    """Until drivers that were just energised take steps: the next command may be a homing."""
+    """Waits until drivers that were just energised accept steps: the next command may be a homing."""
     session.node.wait(max(joint.driver.enable_lead_ms for joint in session.arm.joints) * 1e-3)
 
 

@@ -1,8 +1,6 @@
-"""`gemelo device config`: what robot.toml asks of the device, whether it works with it, and giving it anew."""
+"""`gemelo device config`: shows the device's configuration, or sends it anew."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -15,20 +13,34 @@ from schemas.device import (
     StopKind,
 )
 from schemas.topics import DEVICE_CONFIGURE
-from services.cli.confirm import confirm
 from services.cli.device import ask, wait_for_drivers
-from services.cli.device_view import DeviceView
-from services.cli.exits import CommandError, ExitCode
-
-if TYPE_CHECKING:
-    from services.cli.session import Session
+from services.cli.device_snapshot import DeviceView
+from services.cli.errors import CommandError, ExitCode
+from services.cli.parser import Options, Parser, json_option
+from services.cli.session import Session, connect
+from services.cli.terminal import confirm
 
 TO_ANSWER = 10.0  # [s] for a configuration: a board may write it to its flash first
 QUESTION = "The drivers go off (an arm that its motors hold up may sink) and every joint has to be referenced anew."
 
 
+def add_options(parser: Parser) -> None:
+    """Adds --show, --push, --yes and --json."""
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--show", action="store_true", help="what robot.toml asks for, and whether it is in force")
+    what.add_argument("--push", action="store_true", help="disarm, give the device its configuration, arm again")
+    parser.add_argument("-y", "--yes", action="store_true", help="do not ask before the drivers go off")
+    json_option(parser)
+
+
+def run(options: Options) -> ExitCode:
+    """Shows or pushes the configuration."""
+    with connect() as session:
+        return push(session, options.yes) if options.push else show(session, options.json)
+
+
 def show(session: Session, as_json: bool) -> ExitCode:
-    """Prints the configuration and whether it is in force."""
+    """Prints the configuration that robot.toml asks for, and its state on the device."""
     wanted = _wanted(DeviceView(session))
     if as_json:
         print(msgspec.json.encode(wanted).decode())
@@ -39,7 +51,7 @@ def show(session: Session, as_json: bool) -> ExitCode:
 
 
 def push(session: Session, yes: bool) -> ExitCode:
-    """Disarms, configures and arms again; asks first where a person would lose something."""
+    """Disarms, configures and arms again; asks before the drivers go off. Raises `CommandError` if refused."""
     view = DeviceView(session)
     state, wanted = view.require_state(), _wanted(view)
     if wanted.accepted:

@@ -1,36 +1,52 @@
-"""`gemelo device monitor`: a line for everything that changes, and on a terminal the device as it is below."""
+"""`gemelo device monitor`: a line for every change, and on a terminal the device's status below."""
 
 from __future__ import annotations
 
 import datetime
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
 
-from schemas.device import DeviceConfiguration, DeviceState, DeviceStatus
+from schemas.device import DeviceConfiguration, DeviceEvent, DeviceState, DeviceStatus
+from schemas.device_faults import fault_text
 from schemas.topics import DEVICE_CONFIGURATION, DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
-from services.cli.device_changes import configuration_changes, event_text, state_changes, status_changes
-from services.cli.device_status import snapshot_of
-from services.cli.device_text import text_of
-from services.cli.device_view import DeviceView
-from services.cli.exits import ExitCode
-from services.cli.live import LiveBlock
+from services.cli.device_snapshot import DeviceView, snapshot_of
+from services.cli.device_status import text_of
+from services.cli.errors import ExitCode
+from services.cli.parser import Options, Parser, json_option, positive_integer, positive_number
+from services.cli.robot_names import joint_name
+from services.cli.session import Session, connect
+from services.cli.terminal import LiveBlock
 
 if TYPE_CHECKING:
-    from services.cli.session import Session
+    from services.arm.description import Arm
 
 REFRESH = 5.0  # [Hz]
 
 
-class Change(msgspec.Struct, frozen=True):
-    """A line of `--json`."""
+def add_options(parser: Parser) -> None:
+    """Adds the end of monitoring and --json."""
+    parser.add_argument("-n", "--count", type=positive_integer, metavar="N", help="end after N lines")
+    parser.add_argument("-d", "--duration", type=positive_number, metavar="SECONDS", help="end after so long")
+    json_option(parser)
 
-    stamp: int  # [ns] UNIX time of hearing it
+
+def run(options: Options) -> ExitCode:
+    """Monitors the device."""
+    with connect() as session:
+        return monitor(session, options.count, options.duration, options.json)
+
+
+class Change(msgspec.Struct, frozen=True):
+    """One line of --json."""
+
+    stamp: int  # [ns] UNIX time of its reception
     text: str
 
 
 class Monitor:
-    """Says every change once, at most `count` of them."""
+    """Prints every change once, at most `count` of them."""
 
     def __init__(self, session: Session, block: LiveBlock, count: int | None, as_json: bool) -> None:
         self._session, self._block, self._count, self._as_json = session, block, count, as_json
@@ -86,3 +102,64 @@ def monitor(session: Session, count: int | None, duration: float | None, as_json
 def _timed(now: int, line: str) -> str:
     time = datetime.datetime.fromtimestamp(now / 1e9).strftime("%H:%M:%S.%f")[:-3]
     return f"{time} {line}"
+
+
+def status_changes(before: DeviceStatus | None, after: DeviceStatus) -> list[str]:
+    """A line if the device came online, went offline or restarted."""
+    if before is None or (before.online, before.boot_id, before.reason) != (after.online, after.boot_id, after.reason):
+        reason = f": {after.reason}" if after.reason else ""
+        boot = f", boot {after.boot_id:08x} ({after.reset_cause})" if after.online else ""
+        return [f"{after.device or 'the device'} is {'online' if after.online else 'OFFLINE'}{boot}{reason}"]
+    return []
+
+
+def configuration_changes(before: DeviceConfiguration | None, after: DeviceConfiguration) -> list[str]:
+    """A line if the configuration in force changed."""
+    known = None if before is None else (before.crc32, before.accepted, before.reason)
+    if known == (after.crc32, after.accepted, after.reason):
+        return []
+    said = "in force" if after.accepted else f"NOT in force: {after.reason or 'the device has another'}"
+    return [f"configuration {after.crc32:08x} {said}"]
+
+
+def state_changes(arm: Arm, before: DeviceState | None, after: DeviceState) -> list[str]:
+    """A line for every change of the state, steps and times left out."""
+    old = before or DeviceState()
+    lines = [] if before is not None and old.mode is after.mode else [f"mode {after.mode.name}"]
+    if after.fault and (old.fault, old.fault_joint) != (after.fault, after.fault_joint):
+        lines.append(f"fault {fault_text(after.fault, joint_name(arm, after.fault_joint))}")
+    if before is None or old.armed != after.armed:
+        lines.append("drivers armed" if after.armed else "drivers disarmed")
+    lines += _referenced(old, after)
+    lines += _named("input", old.inputs, after.inputs, "PRESSED", "released")
+    lines += _named("output", old.outputs, after.outputs, "on", "off")
+    lines += [f"speed {after.speed:.0%}"] if old.speed != after.speed else []
+    counters = ("underruns", "refused", "bad_frames")
+    lines += [
+        f"{name.replace('_', ' ')} {getattr(after, name)}"
+        for name in counters
+        if before is not None and getattr(old, name) != getattr(after, name)
+    ]
+    return lines
+
+
+def event_text(event: DeviceEvent) -> str:
+    """A line for an event of the device."""
+    return f"event {event.event}" + (f": {event.detail}" if event.detail else "")
+
+
+def _referenced(before: DeviceState, after: DeviceState) -> list[str]:
+    old = dict(zip(before.name, before.referenced, strict=False))
+    new = dict(zip(after.name, after.referenced, strict=False))
+    return [
+        f"{name} is {'referenced' if known else 'UNREFERENCED'}"
+        for name, known in new.items()
+        if old.get(name) != known
+    ]
+
+
+def _named(kind: str, before: Sequence[str], after: Sequence[str], yes: str, no: str) -> list[str]:
+    return [
+        *(f"{kind} {name} {yes}" for name in after if name not in before),
+        *(f"{kind} {name} {no}" for name in before if name not in after),
+    ]

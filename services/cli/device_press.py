@@ -1,4 +1,4 @@
-"""`gemelo device press`: what a hand could do to a virtual device, or an accident."""
+"""`gemelo device press`: a person's hand on a virtual device, or an accident."""
 
 from __future__ import annotations
 
@@ -9,22 +9,55 @@ from typing import TYPE_CHECKING
 
 from schemas.device import PressKind, PressRequest
 from schemas.topics import DEVICE_PRESS
-from services.cli.device_names import joint_of, require_name
-from services.cli.device_view import DeviceView
-from services.cli.exits import CommandError, ExitCode, usage
-from services.cli.names import unknown
+from services.cli.device_snapshot import DeviceView
+from services.cli.errors import CommandError, ExitCode, unknown, usage
+from services.cli.parser import Choices, Options, Parser
+from services.cli.robot_names import joint_of, require_name
+from services.cli.session import Robot, Session, connect, load_robot
 
 if TYPE_CHECKING:
     from services.arm.description import Arm
-    from services.cli.session import Session
 
 TIMEOUT = 3.0  # [s]
 HELD = {"on": 1.0, "off": 0.0, "auto": -1.0}
 
 
+def add_options(parser: Parser) -> None:
+    """Adds the words, and a list of all ways of pressing."""
+    parser.add_argument("what", metavar="WHAT", help="see below")
+    parser.add_argument("rest", metavar="VALUE", nargs="*", default=[], help="what it is done to, and how much")
+    parser.epilog = f"what:\n{listing()}\n\n{parser.epilog}"
+
+
+def run(options: Options) -> ExitCode:
+    """Presses; wrong words are refused before the stack is asked."""
+    robot = load_robot()
+    request_of(robot.arm, options.what, options.rest)
+    with connect(robot) as session:
+        return press(session, options.what, options.rest)
+
+
+def choices(robot: Robot | None) -> Choices:
+    """The ways of pressing, then the parts of the robot that they are for."""
+    words: dict[str, list[str]] = {"": list(PRESSES)}
+    if robot is None:
+        return words
+    arm = robot.arm
+    parts = {
+        "JOINT": arm.joint_names,
+        "INPUT": tuple(each.name for each in arm.inputs),
+        "SENSOR": tuple(each.name for each in arm.sensors),
+    }
+    for word, press in PRESSES.items():
+        names = parts.get(press.follows[0], ()) if press.follows else ()
+        words |= {word: list(names)} if names else {}
+    words |= {f"switch {name}": list(HELD) for name in parts["INPUT"]}
+    return words
+
+
 @dataclass(frozen=True)
 class Press:
-    """One word of the command: what follows it, what it does, and the request it becomes."""
+    """One way of pressing: its arguments, its meaning, and the request it becomes."""
 
     follows: tuple[str, ...]
     about: str
@@ -32,7 +65,7 @@ class Press:
 
 
 def request_of(arm: Arm, word: str, rest: Sequence[str]) -> PressRequest:
-    """The request that the words ask for; raises with what would be right."""
+    """The request that the words ask for; raises `CommandError` with the right form."""
     if word not in PRESSES:
         raise unknown("thing to press", word, PRESSES)
     press = PRESSES[word]
@@ -42,7 +75,7 @@ def request_of(arm: Arm, word: str, rest: Sequence[str]) -> PressRequest:
 
 
 def press(session: Session, word: str, rest: Sequence[str]) -> ExitCode:
-    """Presses, and says what the virtual device answered."""
+    """Sends the request and prints the device's answer; raises `CommandError` for a device that is not virtual."""
     request = request_of(session.arm, word, rest)
     status = DeviceView(session).require_status()
     if status.online and not status.virtual:
@@ -55,7 +88,7 @@ def press(session: Session, word: str, rest: Sequence[str]) -> ExitCode:
 
 
 def number(text: str, what: str) -> float:
-    """A finite number; raises naming `what`."""
+    """A finite number of `what`; raises `CommandError` otherwise."""
     try:
         value = float(text)
     except ValueError:
@@ -66,7 +99,7 @@ def number(text: str, what: str) -> float:
 
 
 def seconds(text: str) -> float:
-    """A time that is not negative."""
+    """A time [s] that is not negative; raises `CommandError` otherwise."""
     value = number(text, "s")
     if value < 0.0:
         raise usage(f"{text} s is negative")
@@ -117,7 +150,7 @@ PRESSES = {
 
 
 def listing() -> str:
-    """Everything that can be pressed."""
+    """All ways of pressing, a line each."""
     lines = [(" ".join([word, *press.follows]), press.about) for word, press in PRESSES.items()]
     width = max(len(words) for words, _ in lines)
     return "\n".join(f"  {words:<{width}}  {about}" for words, about in lines)

@@ -1,17 +1,78 @@
-"""What is known of the device, put together from the newest messages. Pure."""
+"""The newest messages about the device, and one snapshot of all of them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from schemas.device import DeviceConfiguration, DeviceState, DeviceStatus, SensorReadings
 from schemas.device_faults import Explanation, explain
-from services.cli.device_names import joint_name
+from schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATE, DEVICE_STATUS, SENSORS
+from services.cli.errors import CommandError, ExitCode
+from services.cli.robot_names import joint_name
+from services.cli.session import Session
 
 if TYPE_CHECKING:
     from services.arm.description import Arm
+
+PATIENCE = 2.0  # [s] for the first messages
+POLL = 0.02  # [s]
+
+
+class DeviceView:
+    """The newest message of every topic about the device."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        node = session.node
+        self.status = node.latest(DEVICE_STATUS)
+        self.state = node.latest(DEVICE_STATE)
+        self.configuration = node.latest(DEVICE_CONFIGURATION)
+        self.sensors = node.latest(SENSORS)
+
+    def wait_for(self, is_enough: Callable[[], bool], timeout: float = PATIENCE) -> bool:
+        """Handles messages until `is_enough()`; False if that takes longer than `timeout` [s]."""
+        node = self.session.node
+        deadline = node.monotonic() + timeout
+        while not is_enough():
+            if node.monotonic() >= deadline:
+                return False
+            node.wait(POLL)
+        return True
+
+    def require_heard(self) -> None:
+        """Waits for the first message of the device; raises `CommandError` if there is none."""
+        self.wait_for(lambda: self._is_settled)
+        if self.status.message is None and self.state.message is None:
+            raise CommandError(
+                f"nothing heard of the device in {PATIENCE:g} s: is stepper_gateway running? `gemelo node list`",
+                ExitCode.NO_STACK,
+            )
+
+    def require_state(self) -> DeviceState:
+        """The device's state; raises `CommandError` with the reason if it is offline or silent."""
+        self.require_heard()
+        status = self.status.message
+        if status is not None and not status.online:
+            raise CommandError(f"the device is offline: {status.reason or 'no reason is known'}")
+        if self.state.message is None or self.state.is_stale:
+            raise CommandError("the device says nothing of its state: `gemelo device status`", ExitCode.NO_STACK)
+        return self.state.message
+
+    def require_status(self) -> DeviceStatus:
+        """The device's status; raises `CommandError` if nobody publishes it."""
+        self.wait_for(lambda: self.status.message is not None)
+        if self.status.message is None:
+            raise CommandError("nobody says who the device is: is stepper_gateway running?", ExitCode.NO_STACK)
+        return self.status.message
+
+    @property
+    def _is_settled(self) -> bool:
+        """True if nothing more is to be expected: an offline device has no state."""
+        status = self.status.message
+        return status is not None and (not status.online or self.state.message is not None)
 
 
 class DeviceJoint(msgspec.Struct, frozen=True, kw_only=True):
@@ -21,7 +82,7 @@ class DeviceJoint(msgspec.Struct, frozen=True, kw_only=True):
     referenced: bool | None = None
     steps: int | None = None
     velocity: float | None = None  # [steps/s]
-    switches: dict[str, bool] = {}  # by name, whether it is active
+    switches: dict[str, bool] = {}  # by name, True if pressed
 
 
 class Reading(msgspec.Struct, frozen=True, kw_only=True):
@@ -33,12 +94,12 @@ class Reading(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class DeviceSnapshot(msgspec.Struct, frozen=True, kw_only=True):
-    """The device at one glance; also what `--json` prints."""
+    """All that is known of the device; --json prints it."""
 
     status: DeviceStatus
     state: DeviceState | None
     configured: bool
-    configuration: str  # why it is not in force, or which is
+    configuration: str  # the one in force, or the reason why it is not
     fault: str = ""
     fault_joint: str = ""
     meaning: str = ""
@@ -49,6 +110,17 @@ class DeviceSnapshot(msgspec.Struct, frozen=True, kw_only=True):
     sensors: tuple[Reading, ...] = ()
 
 
+def snapshot_of(view: DeviceView) -> DeviceSnapshot:
+    """The snapshot of a view; sensor readings that are no longer fresh are left out."""
+    return device_snapshot(
+        view.session.arm,
+        view.status.message,
+        view.state.message,
+        view.configuration.message,
+        None if view.sensors.is_stale else view.sensors.message,
+    )
+
+
 def device_snapshot(
     arm: Arm,
     status: DeviceStatus | None,
@@ -56,7 +128,7 @@ def device_snapshot(
     configuration: DeviceConfiguration | None,
     sensors: SensorReadings | None,
 ) -> DeviceSnapshot:
-    """What has been heard so far; what has not is None."""
+    """The snapshot of the messages received so far; None for one that was not."""
     status = status or DeviceStatus(reason="nobody has said who the device is")
     about = explain(state.fault) if state is not None else None
     about = about or Explanation("", "", "")
@@ -80,7 +152,7 @@ def device_snapshot(
 
 
 def readings(arm: Arm, sensors: SensorReadings | None) -> tuple[Reading, ...]:
-    """Every sensor of robot.toml, with its reading where there is one."""
+    """Every sensor of robot.toml with its reading, None if there is none."""
     sensors = sensors or SensorReadings()
     values = dict(zip(sensors.name, sensors.value, strict=False))
     return tuple(Reading(name=each.name, value=values.get(each.name), unit=each.unit) for each in arm.sensors)

@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import msgspec
 
-from services.cli.columns import table
-from services.cli.device_snapshot import DeviceSnapshot, device_snapshot, readings
-from services.cli.device_text import text_of
-from services.cli.device_view import DeviceView
-from services.cli.exits import CommandError, ExitCode
+from schemas.device import DeviceMode, DeviceState, DeviceStatus
+from services.cli.device_snapshot import DeviceJoint, DeviceSnapshot, DeviceView, Reading, readings, snapshot_of
+from services.cli.errors import CommandError, ExitCode
+from services.cli.parser import Options
+from services.cli.session import Session, connect
+from services.cli.text_table import table
 
-if TYPE_CHECKING:
-    from services.cli.session import Session
+FOR_SENSORS = 0.5  # [s] that `gemelo device status` waits for readings
+HINTS = {
+    DeviceMode.BOOT: "it has no configuration yet: `gemelo device config --push`",
+    DeviceMode.UNREFERENCED: "it does not know where its joints are: `gemelo home` or `gemelo reference`",
+    DeviceMode.HOLD: "it stands on its path: `gemelo resume` or `gemelo stop`",
+}
 
-FOR_SENSORS = 0.5  # [s] that a glance waits for them
+
+def run(options: Options) -> ExitCode:
+    """Prints the device's status."""
+    with connect() as session:
+        return status(session, options.json)
+
+
+def run_sensors(options: Options) -> ExitCode:
+    """Prints the sensors' readings."""
+    with connect() as session:
+        return sensors(session, options.json)
 
 
 def status(session: Session, as_json: bool) -> ExitCode:
-    """Prints who the device is and how."""
+    """Prints the snapshot of the device."""
     view = DeviceView(session)
     view.require_heard()
     if session.arm.sensors and view.state.message is not None:
@@ -29,19 +42,8 @@ def status(session: Session, as_json: bool) -> ExitCode:
     return ExitCode.OK
 
 
-def snapshot_of(view: DeviceView) -> DeviceSnapshot:
-    """What is known now; readings that are no longer fresh are left out."""
-    return device_snapshot(
-        view.session.arm,
-        view.status.message,
-        view.state.message,
-        view.configuration.message,
-        None if view.sensors.is_stale else view.sensors.message,
-    )
-
-
 def sensors(session: Session, as_json: bool) -> ExitCode:
-    """Prints every sensor's reading; fails where there is none."""
+    """Prints every sensor's reading; raises `CommandError` if there is none."""
     if not session.arm.sensors:
         raise CommandError("robot.toml has no [[sensor]], so there is none to read")
     view = DeviceView(session)
@@ -55,3 +57,83 @@ def sensors(session: Session, as_json: bool) -> ExitCode:
         rows = [(each.name, "-" if each.value is None else f"{each.value:.6g}", each.unit or "-") for each in shown]
         print(table(("sensor", "value", "unit"), rows))
     return ExitCode.OK
+
+
+def text_of(view: DeviceSnapshot) -> str:
+    """The snapshot as one screen of text."""
+    lines = [f"device   {_who(view.status)}", f"config   {view.configuration}"]
+    if view.state is None:
+        return "\n".join(lines)
+    lines += [f"mode     {_mode(view)}", *_fault(view), f"drivers  {_drivers(view.state)}"]
+    lines += [f"speed    {_speed(view.state)}"]
+    lines += _named("inputs", view.inputs, "PRESSED", "released") + _named("outputs", view.outputs, "on", "off")
+    lines += [f"sensors  {', '.join(map(reading_text, view.sensors))}"] if view.sensors else []
+    return "\n".join([*lines, f"link     {_link(view.state)}", "", _joints(view)])
+
+
+def reading_text(reading: Reading) -> str:
+    """`ultra 12.5 cm`."""
+    value = "-" if reading.value is None else f"{reading.value:.6g}"
+    return f"{reading.name} {value} {reading.unit}".rstrip()
+
+
+def _who(status: DeviceStatus) -> str:
+    name = status.device or "unknown"
+    if not status.online:
+        return f"{name}: OFFLINE: {status.reason or 'no reason is known'}"
+    kind = "virtual, " if status.virtual else ""
+    return (
+        f"{name}: online, {kind}firmware {status.firmware}, boot {status.boot_id:08x} ({status.reset_cause}), "
+        f"{status.joints} joints, tick {status.tick_hz / 1000:g} kHz"
+    )
+
+
+def _mode(view: DeviceSnapshot) -> str:
+    mode = view.state.mode if view.state is not None else DeviceMode.BOOT
+    hint = "" if view.fault else view.status.reason or HINTS.get(mode)
+    return f"{mode.name}: {hint}" if hint else mode.name
+
+
+def _fault(view: DeviceSnapshot) -> list[str]:
+    if not view.fault:
+        return []
+    where = f' at joint "{view.fault_joint}"' if view.fault_joint else ""
+    return [f"fault    {view.fault}{where}: {view.meaning}", f"remedy   {view.remedy}"]
+
+
+def _drivers(state: DeviceState) -> str:
+    return "armed: the motors hold" if state.armed else "disarmed: the motors are without current, `gemelo device arm`"
+
+
+def _speed(state: DeviceState) -> str:
+    is_on_path = state.mode in (DeviceMode.RUN, DeviceMode.HOLD)
+    now = f"; the path runs at {state.time_scale:.0%} now" if is_on_path else ""
+    return f"{state.speed:.0%} of the planned one{now}"
+
+
+def _named(heading: str, parts: dict[str, bool], yes: str, no: str) -> list[str]:
+    said = ", ".join(f"{name} {yes if is_on else no}" for name, is_on in parts.items())
+    return [f"{heading:<8} {said}"] if said else []
+
+
+def _link(state: DeviceState) -> str:
+    return (
+        f"round trip {state.round_trip * 1e3:.1f} ms, {state.buffered:.2f} s of path queued; since boot "
+        f"{state.underruns} under-runs, {state.refused} refused, {state.bad_frames} bad frames"
+    )
+
+
+def _joints(view: DeviceSnapshot) -> str:
+    return table(("joint", "referenced", "steps", "velocity [steps/s]", "switches"), [_row(j) for j in view.joints])
+
+
+def _row(joint: DeviceJoint) -> tuple[str, ...]:
+    words = {None: "-", True: "yes", False: "NO"}
+    switches = ", ".join(f"{name} {'PRESSED' if on else 'released'}" for name, on in joint.switches.items())
+    return (
+        joint.name,
+        words[joint.referenced],
+        "-" if joint.steps is None else str(joint.steps),
+        "-" if joint.velocity is None else f"{joint.velocity:.1f}",
+        switches or "none",
+    )

@@ -1,8 +1,8 @@
-"""`gemelo home`: let the joints find their switches, and say how it goes."""
+"""`gemelo home`: homes joints on their switches and shows the phase of each."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -11,16 +11,16 @@ from schemas.device import DeviceMode, DeviceState, HomeCommand, StopKind
 from schemas.device_faults import fault_text
 from schemas.topics import DEVICE_EVENTS, DEVICE_STATE
 from services.cli.device import ask
-from services.cli.device_names import homing_joints, joint_name
-from services.cli.device_view import DeviceView
-from services.cli.exits import CommandError, ExitCode
+from services.cli.device_snapshot import DeviceView
+from services.cli.errors import CommandError, ExitCode
 from services.cli.homing import HOME, HomeReport, Homing, home_text
-from services.cli.interrupt import Interrupt, two_stage_interrupt
-from services.cli.live import LiveBlock
+from services.cli.parser import Choices, Options, Parser, json_option
+from services.cli.robot_names import joint_name, joint_of
+from services.cli.session import Robot, Session, connect, load_robot
+from services.cli.terminal import Interrupt, LiveBlock, two_stage_interrupt
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm
-    from services.cli.session import Session
+    from services.arm.description import Arm, Joint
 
 TO_BEGIN = 3.0  # [s] from the device's yes to its first word of homing
 LAST_WORDS = 0.5  # [s] for events that come after the state
@@ -28,8 +28,27 @@ BRAKING = 5.0  # [s] beyond the time-outs of robot.toml
 POLL = 0.02  # [s]
 
 
+def add_options(parser: Parser) -> None:
+    """Adds the joints and --json."""
+    parser.add_argument("joints", metavar="JOINT", nargs="*", help="all that have a home switch, if none is named")
+    json_option(parser)
+
+
+def run(options: Options) -> ExitCode:
+    """Homes the joints named; a wrong name is refused before the stack is asked."""
+    robot = load_robot()
+    homing_joints(robot.arm, options.joints)
+    with connect(robot) as session:
+        return home(session, options.joints, options.json)
+
+
+def choices(robot: Robot | None) -> Choices:
+    """The joints that have a home switch."""
+    return {"": [joint.name for joint in robot.arm.joints if joint.drive.homing is not None]} if robot else {}
+
+
 def home(session: Session, wanted: Sequence[str], as_json: bool = False) -> ExitCode:
-    """Homes the joints named, or all that can; ends when they are home, or with the reason why not."""
+    """Homes the joints named, or all that can; raises `CommandError` with the reason if not all are home."""
     homing = Homing(session.arm, homing_joints(session.arm, wanted))
     view = DeviceView(session)
     session.node.subscribe(DEVICE_EVENTS, homing.on_event)
@@ -44,8 +63,25 @@ def home(session: Session, wanted: Sequence[str], as_json: bool = False) -> Exit
     return _end(report, homing, as_json)
 
 
+def homing_joints(arm: Arm, names: Iterable[str]) -> list[Joint]:
+    """The joints named, or all that have a home switch; raises `CommandError` with the remedy for any other."""
+    asked = [joint_of(arm, name) for name in names]
+    without = [joint.name for joint in asked if joint.drive.homing is None]
+    if without:
+        raise CommandError(
+            f'joint "{without[0]}" has no [joint.homing] in robot.toml, so it cannot home: '
+            f"declare where it stands, `gemelo reference --joints {without[0]}=...`"
+        )
+    found = asked or [joint for joint in arm.joints if joint.drive.homing is not None]
+    if not found:
+        raise CommandError(
+            "no joint has a [joint.homing] in robot.toml: declare where they stand with `gemelo reference`"
+        )
+    return found
+
+
 def require_ready(arm: Arm, state: DeviceState) -> None:
-    """Raises with the remedy where homing cannot begin."""
+    """Raises `CommandError` with the remedy if homing cannot begin."""
     if state.fault or state.mode in (DeviceMode.FAULT, DeviceMode.ESTOP):
         about = fault_text(state.fault, joint_name(arm, state.fault_joint))
         raise CommandError(f"homing refused: {about or state.mode.name}")
@@ -56,7 +92,7 @@ def require_ready(arm: Arm, state: DeviceState) -> None:
 
 
 def longest(homing: Homing) -> float:
-    """[s] that it may take: the groups one after another, each as long as its slowest joint."""
+    """The longest time that it may take [s]: the groups one after another, each as long as its slowest joint."""
     groups: dict[int, float] = {}
     for joint in homing.joints:
         if joint.drive.homing is not None:
@@ -75,7 +111,7 @@ def _follow(session: Session, view: DeviceView, homing: Homing, interrupt: Inter
         elapsed = node.monotonic() - began
         if not quiet:
             said = _show(block, homing, said, elapsed)
-        reason = _trouble(view, homing, elapsed)
+        reason = _reason_to_give_up(view, homing, elapsed)
     if not reason and not homing.reason:
         view.wait_for(lambda: homing.is_done or bool(homing.reason), LAST_WORDS)
     if not quiet:
@@ -100,7 +136,7 @@ def _stop_once(session: Session, interrupt: Interrupt, quiet: bool) -> None:
 
 
 def _show(block: LiveBlock, homing: Homing, said: dict[str, str], elapsed: float) -> dict[str, str]:
-    """A line for every joint whose phase has changed, and the block of all; the phases that are said now."""
+    """Prints a line for every joint whose phase has changed and redraws the block; returns the present phases."""
     changed = {name: phase for name, phase in homing.phases.items() if said[name] != phase}
     block.say(*(_line(homing, name, phase) for name, phase in changed.items() if phase == HOME or not block.is_live))
     rows = [f"  {name:<20} {phase}" for name, phase in homing.phases.items()]
@@ -112,8 +148,8 @@ def _line(homing: Homing, name: str, phase: str) -> str:
     return home_text(name, homing.steps_off.get(name)) if phase == HOME else f"{name}: {phase}"
 
 
-def _trouble(view: DeviceView, homing: Homing, elapsed: float) -> str:
-    """Why there is nothing more to wait for, or an empty text."""
+def _reason_to_give_up(view: DeviceView, homing: Homing, elapsed: float) -> str:
+    """The reason to wait no longer; empty if there is none."""
     status = view.status.message
     if status is not None and not status.online:
         return f"the device went offline: {status.reason}"

@@ -1,4 +1,4 @@
-"""How a homing goes, from what the device says of it. Pure."""
+"""The progress of a homing, from the device's states and events. Pure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import msgspec
 from schemas.device import DeviceEvent, DeviceMode, DeviceState
 from schemas.device_faults import fault_text
 from schemas.robot import HomingDirection
-from services.cli.device_names import joint_name
+from services.cli.robot_names import joint_name
 
 if TYPE_CHECKING:
     from services.arm.description import Arm, Joint
@@ -21,7 +21,7 @@ WAITS, TO, OFF, HOME = "waits", "to its switch", "off its switch", "home"
 
 
 class HomeReport(msgspec.Struct, frozen=True, kw_only=True):
-    """How a homing ended; also what `--json` prints."""
+    """The end of a homing; --json prints it."""
 
     homed: tuple[str, ...] = ()
     steps_off: dict[str, int] = {}  # of joints whose place had been known before
@@ -48,7 +48,7 @@ class Homing:
 
     @property
     def is_over(self) -> bool:
-        """Whether the device has left Homing, or has said why it will."""
+        """True if the device has left the mode Homing again."""
         return self.has_begun and self._mode is not DeviceMode.HOMING
 
     @property
@@ -56,7 +56,7 @@ class Homing:
         return len(self.homed) == len(self.phases)
 
     def on_event(self, event: DeviceEvent) -> None:
-        """What the device reports once."""
+        """Takes an event of the device."""
         match event.event:
             case "homed":
                 self._on_homed(event.detail)
@@ -64,7 +64,7 @@ class Homing:
                 self.reason = self.reason or stopped_text(event.detail)
 
     def on_state(self, state: DeviceState) -> None:
-        """How it is now; a state from before the homing, which may still be on its way, is passed over."""
+        """Takes a state of the device; one from before the homing, which may still be under way, is ignored."""
         self.has_begun = self.has_begun or state.mode is DeviceMode.HOMING or state.fault != 0
         if not self.has_begun:
             return
@@ -88,7 +88,7 @@ class Homing:
 
 
 def phase_of(joint: Joint, velocity: float) -> str:
-    """What the joint does at `velocity` [steps/s]; empty where it stands, as it does at every turn."""
+    """The phase of a joint that moves at `velocity` [steps/s]; empty at standstill, as at every reversal."""
     if abs(velocity) < 1.0 or joint.drive.homing is None:
         return ""
     towards = 1.0 if joint.drive.homing.direction is HomingDirection.UPPER else -1.0
@@ -96,7 +96,7 @@ def phase_of(joint: Joint, velocity: float) -> str:
 
 
 def home_text(name: str, steps_off: int | None) -> str:
-    """What is said of a joint that has found its place."""
+    """One line about a homed joint; `steps_off` is how far its counter was from its true position [steps]."""
     if steps_off is None:
         return f"{name}: home"
     if abs(steps_off) <= 1:
@@ -105,7 +105,7 @@ def home_text(name: str, steps_off: int | None) -> str:
 
 
 def stopped_text(detail: str) -> str:
-    """Why the device broke off."""
+    """The reason for which the device ended the homing."""
     if detail == "heartbeat":
         return "the device heard nothing from stepper_gateway for too long and stopped: `gemelo home` again"
     return "it was stopped; the joints that were not home yet are unreferenced: `gemelo home` again"

@@ -1,50 +1,132 @@
-"""`gemelo jog`: move by hand, with keys or for a given time; what is not said again stops the arm."""
+"""`gemelo jog`: moves the arm by hand or for a given time; the arm stops when the commands stop."""
 
 from __future__ import annotations
 
+import math
 import shutil
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from schemas.planning import JogCommand, JogLimit, JogStatus
 from schemas.topics import JOG, JOG_STATUS, JOINT_STATES
-from services.arm.kinematics import Kinematics
-from services.cli.exits import CommandError, ExitCode
-from services.cli.interrupt import two_stage_interrupt
-from services.cli.jog_commands import HELP
-from services.cli.jog_keys import JogKeys
-from services.cli.keyboard import keyboard
-from services.cli.live import LiveBlock
-from services.cli.session import Session
-from services.cli.units import show
+from services.cli.errors import CommandError, ExitCode, usage
+from services.cli.jog_keys import JogKeys, keyboard, require_terminal
+from services.cli.parser import Choices, Options, Parser, finite_number, positive_number
+from services.cli.session import Robot, Session, connect, load_robot
+from services.cli.terminal import LiveBlock, two_stage_interrupt
+from services.cli.units import parse_joints, show
+
+if TYPE_CHECKING:
+    from services.arm.description import Arm
 
 PERIOD = 0.02  # [s] between two commands
-ANSWER = 3.0  # [s] that the planner may take to its first word
+ANSWER = 3.0  # [s] that the planner may take to its first answer
 REST = 5.0  # [s] that the arm may take to come to rest
 FIRST_STATE = 1.0  # [s]
-DRAWN = 0.1  # [s]
+DRAWN = 0.1  # [s] between two drawings
+HELP = """Hold a key to move; letting go stops the arm.
+  tool    w/s +x -x      a/d +y -y      q/e +z -z      t axes of the base, or of the tool
+  turn    i/k about x    j/l about y    u/o about z
+  joint   1-9 choose     arrows move it
+  +/- faster, slower     space stop     x, Esc or Ctrl-C leave"""
+EXAMPLES = f"""{HELP}
+
+It slows down before joint limits, singularities and obstacles, and says which.
+
+examples:
+  gemelo jog                                              # with the keys
+  gemelo jog --joint brazo_joint=10deg/s --for 0.5
+  gemelo jog --twist 0.05 0 0 --frame tool --for 1        # 50 mm/s along the tool's x"""
+
+
+def add_options(parser: Parser) -> None:
+    """Adds joint speeds, twist and duration."""
+    parser.epilog = EXAMPLES
+    parser.add_argument(
+        "--joint", nargs="+", default=[], metavar="JOINT=SPEED", help="10deg/s, 0.2rad/s, 5mm/s; several move together"
+    )
+    parser.add_argument(
+        "--twist", nargs=3, type=finite_number, default=[], metavar=("VX", "VY", "VZ"), help="speed of the tool [m/s]"
+    )
+    parser.add_argument(
+        "--turn",
+        nargs=3,
+        type=finite_number,
+        default=[],
+        metavar=("WX", "WY", "WZ"),
+        help="at which the tool turns [deg/s]",
+    )
+    parser.add_argument(
+        "--frame",
+        choices=("base", "tool"),
+        default="base",
+        help="whose axes --twist and --turn are along; the base's, if not said",
+    )
+    parser.add_argument(
+        "--for",
+        dest="seconds",
+        type=positive_number,
+        metavar="SECONDS",
+        help="how long it moves with --joint, --twist or --turn",
+    )
+
+
+def run(options: Options) -> ExitCode:
+    """Jogs with the keys, or as the options say."""
+    by_hand = not (options.joint or options.twist or options.turn)
+    if by_hand and options.seconds is None:
+        require_terminal("give --joint or --twist, and --for so many seconds")
+        with connect() as session:
+            return jog_by_hand(session)
+    if by_hand or options.seconds is None:
+        raise usage("give --joint or --twist and --for so many seconds, or none of them to move with the keys")
+    robot = load_robot()
+    command = command_of(robot.arm, options.joint, options.twist, options.turn, options.frame == "tool")
+    with connect(robot) as session:
+        return jog_for(session, command, options.seconds)
+
+
+def choices(robot: Robot | None) -> Choices:
+    """The joints, after --joint."""
+    return {} if robot is None else {"--joint": [f"{joint.name}=" for joint in robot.arm.joints]}
+
+
+def command_of(
+    arm: Arm, joints: Sequence[str], twist: Sequence[float], turn: Sequence[float], in_tool: bool
+) -> JogCommand:
+    """The command in SI units: speeds of joints, or a twist of the tool in its own frame if `in_tool`."""
+    if joints and (twist or turn):
+        raise usage("--joint and a twist exclude one another")
+    if joints:
+        speeds = parse_joints([text.removesuffix("/s") for text in joints], arm.joints)
+        return JogCommand(name=tuple(speeds), velocity=tuple(speeds.values()))
+    angular = tuple(math.radians(value) for value in turn)
+    return JogCommand(linear=tuple(twist), angular=angular, frame=arm.tool_frame if in_tool else "")
 
 
 class Jogging:
-    """One client's commands, and what the planner says to them."""
+    """The stream of jog commands, and the planner's newest answer to it."""
 
     def __init__(self, session: Session) -> None:
         self.node, self.arm = session.node, session.arm
         self._commands = self.node.publisher(JOG)
         self._states = self.node.latest(JOINT_STATES)
         self.status: JogStatus | None = None
-        self.limits: dict[tuple[str, str], JogLimit] = {}  # all that did, as it was last
+        self.limits: dict[tuple[str, str], JogLimit] = {}  # by check and subject, the newest of each
+        from services.arm.kinematics import Kinematics  # loads numpy
+
         self._kinematics = Kinematics(self.arm)
         self.node.subscribe(JOG_STATUS, self._on_status)
 
-    def say(self, command: JogCommand) -> None:
+    def send(self, command: JogCommand) -> None:
         self._commands.put(msgspec.structs.replace(command, stamp=self.node.now()))
 
     @property
-    def place(self) -> str:
-        """Where the arm stands, for a person."""
+    def position_line(self) -> str:
+        """The position of tool and joints as a line."""
         state = self._states.message
         found = {} if state is None else dict(zip(state.name, state.position, strict=False))
         if any(name not in found for name in self.arm.joint_names):
@@ -54,7 +136,7 @@ class Jogging:
         return f"tool x {x:z.1f}  y {y:z.1f}  z {z:z.1f} mm; {joints}"
 
     def await_state(self) -> None:
-        """Until it is known where the arm stands; not for long, for without the stack it never will be."""
+        """Waits for the first joint state, at most `FIRST_STATE` [s]."""
         end = self.node.monotonic() + FIRST_STATE
         while self._states.message is None and self.node.monotonic() < end:
             self.node.wait(PERIOD)
@@ -65,23 +147,26 @@ class Jogging:
 
 
 def jog_for(session: Session, command: JogCommand, seconds: float) -> ExitCode:
-    """Says `command` for so long, waits until the arm rests, and tells where; a refusal is raised with its reason."""
+    """Sends `command` for `seconds`, waits until the arm rests and prints where.
+
+    Raises `CommandError` with the reason if the planner refuses.
+    """
     jogging = Jogging(session)
     with two_stage_interrupt() as interrupt:
         began = jogging.node.monotonic()
         while jogging.node.monotonic() - began < seconds and not interrupt.is_set:
-            jogging.say(command)
+            jogging.send(command)
             jogging.node.wait(PERIOD)
             _require_answer(jogging, jogging.node.monotonic() - began)
         _rest(jogging)
-    print(jogging.place)
+    print(jogging.position_line)
     for limit in jogging.limits.values():
         print(f"limited by {limit.message}")
     return ExitCode.CANCELLED if interrupt.is_set else ExitCode.OK
 
 
 def jog_by_hand(session: Session) -> ExitCode:
-    """Follows the keys until one that leaves; letting go stops."""
+    """Jogs while keys are held, until one that leaves."""
     with keyboard() as typed, two_stage_interrupt() as interrupt:
         jogging, keys, block = Jogging(session), JogKeys(session.arm.joints, session.arm.tool_frame), LiveBlock()
         block.say(HELP)
@@ -92,18 +177,18 @@ def jog_by_hand(session: Session) -> ExitCode:
             keys.press(typed(), now)
             command = keys.command(now)
             if command is not None:
-                jogging.say(command)
+                jogging.send(command)
             if now - drawn >= DRAWN:
                 drawn = now
-                block.draw(_folded([keys.line, jogging.place, *words_of(jogging.status)]))
+                block.draw(_folded([keys.line, jogging.position_line, *status_lines(jogging.status)]))
             jogging.node.wait(PERIOD)
         _rest(jogging)
-        block.say(jogging.place)
+        block.say(jogging.position_line)
     return ExitCode.OK
 
 
-def words_of(status: JogStatus | None) -> list[str]:
-    """The newest word of the planner, a line each."""
+def status_lines(status: JogStatus | None) -> list[str]:
+    """The planner's newest status as lines."""
     if status is None or not (status.active or status.limited_by):
         return ["at rest"]
     if not status.active:
@@ -115,7 +200,7 @@ def words_of(status: JogStatus | None) -> list[str]:
 
 
 def _folded(lines: Iterable[str]) -> str:
-    """No line longer than the terminal is wide: a sentence that says what to do is not to be cut off."""
+    """The lines wrapped to the width of the terminal: a remedy must not be cut off."""
     width = max(20, shutil.get_terminal_size().columns - 1)
     return "\n".join(part for line in lines for part in textwrap.wrap(line, width, subsequent_indent="  "))
 
@@ -129,7 +214,7 @@ def _require_answer(jogging: Jogging, waited: float) -> None:
 
 
 def _rest(jogging: Jogging) -> None:
-    """Waits until the planner leads no more."""
+    """Waits until the planner moves the arm no more, at most `REST` [s]."""
     end = jogging.node.monotonic() + REST
     while jogging.status is not None and jogging.status.active and jogging.node.monotonic() < end:
         jogging.node.wait(PERIOD)

@@ -1,12 +1,24 @@
-"""What the keys of `gemelo jog` mean: pressed, held by the terminal's own repetition, let go by its silence."""
+"""The keys of `gemelo jog`: read one by one from the terminal and turned into jog commands.
+
+A key counts as held while the terminal repeats it.
+"""
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Sequence
+import select
+import signal
+import sys
+import termios
+import tty
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
 from typing import Protocol
 
 from schemas.planning import JogCommand
+from services.cli.errors import usage
 from services.cli.units import NamedJoint
 
 HELD = 0.15  # [s] after which a key that does not repeat has been let go
@@ -18,6 +30,7 @@ TURN_SPEED = 1.0  # [rad/s] at full speed
 AXES = {"w": (0, 1.0), "s": (0, -1.0), "a": (1, 1.0), "d": (1, -1.0), "q": (2, 1.0), "e": (2, -1.0)}
 TURNS = {"i": (0, 1.0), "k": (0, -1.0), "j": (1, 1.0), "l": (1, -1.0), "u": (2, 1.0), "o": (2, -1.0)}
 ARROWS = {"\x1b[A": 1.0, "\x1b[C": 1.0, "\x1b[B": -1.0, "\x1b[D": -1.0}
+BYTES_AT_ONCE = 256
 LEAVE = ("x", "\x1b", "\x03", "\x04")
 
 _KEYS = re.compile(r"\x1b[\[O][A-Z]|\x1b\[[0-9;]*[~A-Za-z]|.", re.DOTALL)
@@ -43,17 +56,17 @@ class JogKeys:
         self.wants_to_leave = False
 
     def press(self, text: str, now: float) -> None:
-        """What the terminal gave, perhaps several keys; the last one counts."""
+        """Takes the terminal's input, perhaps several keys; the last one counts."""
         for key in _KEYS.findall(text):
             self._press("\x1b[" + key[2] if key.startswith("\x1bO") else key, now)
 
     def command(self, now: float) -> JogCommand | None:
-        """What to say now; None while no key is held."""
+        """The command to send at `now` [s]; None if no key is held."""
         return self._motion if now - self._pressed <= HELD else None
 
     @property
     def line(self) -> str:
-        """The choices that were made, as a person reads them."""
+        """The present speed, axes and joint as a line."""
         frame = "tool" if self.frame else "base"
         return (
             f"speed {self.speed * 100.0:.0f} %, along the axes of the {frame}, "
@@ -76,7 +89,7 @@ class JogKeys:
             self._motion, self._pressed = self._moving(key.lower() if len(key) == 1 else key), now
 
     def _moving(self, key: str) -> JogCommand | None:
-        """The motion that a key stands for; None, which is a stop, for any other."""
+        """The motion of a key; None, which is a stop, for any other key."""
         if key in AXES:
             return JogCommand(linear=_along(*AXES[key], self.speed * TOOL_SPEED), frame=self.frame)
         if key in TURNS:
@@ -89,3 +102,35 @@ class JogKeys:
 
 def _along(axis: int, sign: float, speed: float) -> tuple[float, ...]:
     return tuple(sign * speed if index == axis else 0.0 for index in range(3))
+
+
+def require_terminal(remedy: str) -> None:
+    """Raises `CommandError` with the remedy if standard input is no terminal."""
+    if not sys.stdin.isatty():
+        raise usage(f"there is no terminal to read keys from: {remedy}")
+
+
+@contextmanager
+def keyboard() -> Iterator[Callable[[], str]]:
+    """Yields a function that returns the keys typed since its last call; restores the terminal whatever happens."""
+    descriptor = sys.stdin.fileno()
+    before = termios.tcgetattr(descriptor)
+    signals = {number: signal.signal(number, _raise_interrupt) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        tty.setcbreak(descriptor)
+        yield lambda: _typed(descriptor)
+    finally:
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        for number, handler in signals.items():
+            signal.signal(number, handler)
+
+
+def _typed(descriptor: int) -> str:
+    if not select.select([descriptor], [], [], 0.0)[0]:
+        return ""
+    read = os.read(descriptor, BYTES_AT_ONCE)
+    return read.decode("utf-8", "ignore") if read else "\x04"  # the terminal is gone
+
+
+def _raise_interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt

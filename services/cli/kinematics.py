@@ -1,41 +1,152 @@
-"""`gemelo ik` and `gemelo fk`: configurations for a tool pose, and poses of links for a configuration. Nothing
-moves."""
+"""`gemelo ik` and `gemelo fk`: configurations for a tool pose, and poses of links; nothing moves."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import msgspec
 
-from schemas.planning import FkRequest, FkResponse, IkRequest, IkResponse
+from schemas.joints import JointState
+from schemas.planning import FkRequest, FkResponse, IkRequest, IkResponse, PoseGoal
 from schemas.topics import FK, IK
-from services.cli.columns import table
-from services.cli.exits import CommandError, ExitCode
-from services.cli.goals import refusal_text
-from services.cli.units import SHOWN
+from services.arm.transforms import from_rpy
+from services.cli.errors import CommandError, ExitCode
+from services.cli.move_request import refusal_text
+from services.cli.parser import Choices, Options, Parser, finite_number, json_option, positive_integer
+from services.cli.session import Robot, Session, connect, load_robot
+from services.cli.text_table import table
+from services.cli.units import SHOWN, length, parse_joints, turn
 
 if TYPE_CHECKING:
     from services.arm.description import Arm
-    from services.cli.session import Session
 
 PATIENCE = 10.0  # [s] that the planner may search
+XYZ = ("X", "Y", "Z")
+IK_EXAMPLES = """examples:
+  gemelo ik --to 0.25 0.15 0.10
+  gemelo ik --to 0.25 0.15 0.10 --axis 0 0 1 --along 0 0 -1
+  gemelo ik --to 0.25 0.15 0.10 --quaternion 1 0 0 0 --turn-tolerance 5 --solutions 8"""
+
+
+def ik_options(parser: Parser) -> None:
+    """Adds the tool pose, tolerances and output options."""
+    parser.epilog = IK_EXAMPLES
+    parser.add_argument("--to", nargs=3, type=length, metavar=XYZ, required=True, help="the tool, as 300mm or 0.3")
+    turned = parser.add_mutually_exclusive_group()
+    turned.add_argument(
+        "--quaternion", nargs=4, type=finite_number, metavar=(*XYZ, "W"), default=(), help="orientation of the tool"
+    )
+    turned.add_argument(
+        "--rpy",
+        nargs=3,
+        type=turn,
+        metavar=("R", "P", "Y"),
+        help="the same as roll, pitch, yaw: 90deg, 1.57rad or 90",
+    )
+    turned.add_argument(
+        "--axis", nargs=3, type=finite_number, metavar=XYZ, default=(), help="of the tool, to point --along"
+    )
+    _vector(parser, "--along", "direction in which --axis is to point")
+    _vector(parser, "--free-axis", "of the tool: turning about it does not matter")
+    parser.add_argument("--frame", default="", metavar="LINK", help="in which all this is given; the base, if none")
+    parser.add_argument("--tolerance", type=finite_number, default=0.0, metavar="MM", help="of the position")
+    parser.add_argument("--turn-tolerance", type=finite_number, default=0.0, metavar="DEG", help="of the orientation")
+    parser.add_argument(
+        "--near",
+        nargs="+",
+        default=[],
+        metavar="JOINT=VALUE",
+        help="the posture to be near to; where the arm is, if none",
+    )
+    parser.add_argument("--solutions", type=positive_integer, default=1, help="at most so many, the nearest first")
+    parser.add_argument("--touching", action="store_true", help="those at which links touch as well")
+    json_option(parser)
+
+
+def _vector(parser: Parser, name: str, about: str) -> None:
+    parser.add_argument(name, nargs=3, type=finite_number, metavar=XYZ, default=(), help=about)
+
+
+def run_ik(options: Options) -> ExitCode:
+    """Asks the planner for configurations and prints them."""
+    robot = load_robot()
+    request = ik_request(options, robot.arm)
+    with connect(robot) as session:
+        return ik(session, request, options.json)
+
+
+def ik_choices(robot: Robot | None) -> Choices:
+    """The joints after --near, the links after --frame."""
+    if robot is None:
+        return {}
+    return {"--near": [f"{joint.name}=" for joint in robot.arm.joints], "--frame": robot.arm.model.link_names}
+
+
+def ik_request(options: Options, arm: Arm) -> IkRequest:
+    """The request in SI units."""
+    near = parse_joints(options.near, arm.joints)
+    orientation = options.quaternion
+    if options.rpy is not None:
+        orientation = from_rpy(*options.rpy)
+    goal = PoseGoal(
+        position=tuple(options.to),
+        orientation=tuple(orientation),
+        frame=options.frame,
+        free_axis=tuple(options.free_axis),
+        tool_axis=tuple(options.axis),
+        direction=tuple(options.along),
+        position_tolerance=options.tolerance / 1000.0,
+        orientation_tolerance=math.radians(options.turn_tolerance),
+    )
+    return IkRequest(
+        goal=goal,
+        near=JointState(name=tuple(near), position=tuple(near.values())) if near else None,
+        solutions=options.solutions,
+        avoid_collisions=not options.touching,
+    )
+
+
+def fk_options(parser: Parser) -> None:
+    """Adds joint values, links and --json."""
+    parser.add_argument(
+        "joints", nargs="*", metavar="JOINT=VALUE", help="30deg, 40mm, ...; the others stand where they are now"
+    )
+    parser.add_argument("--links", nargs="+", default=[], metavar="LINK", help="the tool, if none is named")
+    json_option(parser)
+
+
+def run_fk(options: Options) -> ExitCode:
+    """Asks the planner for the poses of links and prints them."""
+    robot = load_robot()
+    values = parse_joints(options.joints, robot.arm.joints)
+    request = FkRequest(name=tuple(values), position=tuple(values.values()), links=tuple(options.links))
+    with connect(robot) as session:
+        return fk(session, request, options.json)
+
+
+def fk_choices(robot: Robot | None) -> Choices:
+    """Joints to set, and links after --links."""
+    if robot is None:
+        return {}
+    return {"": [f"{joint.name}=" for joint in robot.arm.joints], "--links": robot.arm.model.link_names}
 
 
 def ik(session: Session, request: IkRequest, as_json: bool) -> ExitCode:
-    """Prints the configurations, the nearest first; a refusal is raised with its reason and what would do."""
+    """Prints the configurations, the nearest first; raises `CommandError` with the planner's reason and remedy."""
     response: IkResponse = session.node.call(IK, request, timeout=PATIENCE)
     if response.refusal is not None:
         raise CommandError(refusal_text(response.refusal, request.goal, session.arm))
-    print(as_text(response) if as_json else configurations(session.arm, response))
+    print(as_text(response) if as_json else configurations_text(session.arm, response))
     return ExitCode.OK
 
 
 def fk(session: Session, request: FkRequest, as_json: bool) -> ExitCode:
-    """Prints the poses of the links in the base frame."""
+    """Prints the poses of the links in the base frame; raises `CommandError` with the planner's reason."""
     response: FkResponse = session.node.call(FK, request, timeout=PATIENCE)
     if response.refusal is not None:
         raise CommandError(f"refused ({response.refusal.check}): {response.refusal.message}; {response.refusal.remedy}")
-    print(as_text(response) if as_json else poses(response))
+    print(as_text(response) if as_json else poses_text(response))
     return ExitCode.OK
 
 
@@ -44,8 +155,8 @@ def as_text(response: IkResponse | FkResponse) -> str:
     return msgspec.json.encode(response).decode()
 
 
-def configurations(arm: Arm, response: IkResponse) -> str:
-    """A row a configuration."""
+def configurations_text(arm: Arm, response: IkResponse) -> str:
+    """A table with a row for each configuration."""
     units = [SHOWN[arm.joint(name).unit] for name in response.name]
     headings = [f"{name} [{unit}]" for name, (unit, _) in zip(response.name, units, strict=True)]
     rows = [
@@ -55,8 +166,8 @@ def configurations(arm: Arm, response: IkResponse) -> str:
     return table([*headings, "away [s]"], rows)
 
 
-def poses(response: FkResponse) -> str:
-    """A row a link: position and unit quaternion."""
+def poses_text(response: FkResponse) -> str:
+    """A table with a row for each link: position and unit quaternion in the base frame."""
     headings = ["link", "x [m]", "y [m]", "z [m]", "qx", "qy", "qz", "qw"]
     rows = [
         [link, *(f"{value:z.6f}" for value in (*pose.translation, *pose.rotation))]

@@ -1,4 +1,4 @@
-"""The `gemelo` command. Each command imports what it needs when it runs; there is no daemon."""
+"""The `gemelo` command: finds the command in the table and runs it. There is no daemon."""
 
 from __future__ import annotations
 
@@ -6,43 +6,24 @@ import os
 import sys
 from collections.abc import Sequence
 
-from services.cli import (
-    arm_commands,
-    bus_commands,
-    collision_commands,
-    device_commands,
-    jog_commands,
-    kinematic_commands,
-    scene_commands,
-    system_commands,
-)
-from services.cli.exits import CommandError, ExitCode
-from services.cli.parser import Options, Parser, build
+from services.cli.commands import COMMANDS, GROUPS
+from services.cli.errors import CommandError, ExitCode
+from services.cli.parser import Options, build
 
 ABOUT = "The twin's command line: move the arm, and see everything that is said about it."
 EPILOG = "The deployment is deploy/local.toml, or the file that $GEMELO_CONFIG names."
-COMMANDS = (
-    *arm_commands.COMMANDS, *jog_commands.COMMANDS, *kinematic_commands.COMMANDS, *device_commands.COMMANDS,
-    *bus_commands.COMMANDS, *scene_commands.COMMANDS, *collision_commands.COMMANDS, *system_commands.COMMANDS,
-)  # fmt: skip
-GROUPS = {
-    **device_commands.GROUPS,
-    **scene_commands.GROUPS,
-    **collision_commands.GROUPS,
-    **bus_commands.GROUPS,
-    **system_commands.GROUPS,
-}
 
 
-def parser() -> Parser:
-    return build(COMMANDS, GROUPS, ABOUT, EPILOG)
+def parse(arguments: Sequence[str]) -> Options:
+    """The options of one command line; ends the process with a sentence if it cannot be understood."""
+    return build(COMMANDS, GROUPS, ABOUT, EPILOG, arguments).parse_args(arguments)
 
 
 def run(arguments: Sequence[str] | None = None) -> ExitCode:
-    """Runs one command line; every failure is one sentence on stderr."""
-    options: Options = parser().parse_args(arguments)
+    """Runs one command line, by default that of the process; prints every failure as one sentence on stderr."""
+    options = parse(sys.argv[1:] if arguments is None else arguments)
     try:
-        code: ExitCode = options.command.run(options)
+        code: ExitCode = options.command.load("run")(options)
         sys.stdout.flush()
         return code
     except CommandError as error:

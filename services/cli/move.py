@@ -1,26 +1,113 @@
-"""`gemelo move`: plan, follow, and say how exactly the arm arrived."""
+"""`gemelo move`: plans a motion, executes it, and prints how exactly the arm arrived."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import replace
 
-from schemas.actions import GoalStatusCode
-from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
+from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal
 from schemas.planning import PlanRequest, PlanResponse
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY
-from services.cli.exits import CommandError, ExitCode
-from services.cli.interrupt import Interrupt, two_stage_interrupt
-from services.cli.move_report import MoveReport, summary, tool_error_mm
+from services.cli.errors import CommandError, ExitCode
+from services.cli.move_report import MoveReport, report_of, summary
+from services.cli.move_request import request_from
+from services.cli.parser import Choices, Options, Parser, finite_number
 from services.cli.planning import make_plan
-from services.cli.progress import progress
-from services.cli.session import Session
-from services.cli.units import show
-from services.runtime.actions import GoalHandle
+from services.cli.session import Robot, Session, connect, load_robot
+from services.cli.terminal import Interrupt, motion_progress, two_stage_interrupt
+from services.cli.units import length, turn
 from services.runtime.errors import GoalRefused
 
+if TYPE_CHECKING:
+    from argparse import _ArgumentGroup as Group
+
+    from services.runtime.actions import GoalHandle
+
 LONGEST_HOLD = 3600.0  # [s] that a person may hold the arm on its way
+XYZ = ("X", "Y", "Z")
+EXAMPLES = """examples:
+  gemelo move --to 0.25 0.15 0.10
+  gemelo move --joints brazo_joint=30deg antebrazo_joint=-45deg efector_joint=40mm
+  gemelo move --named ready --speed 0.5
+  gemelo move --to 0.18 0.05 0.17 --rpy 180 0 0 --line --tool-speed 50
+  gemelo move --to 0.18 -0.05 0.17 --arc 0.20 0 0.17
+  gemelo move --via 0.25 0.05 0.15 --via 0.25 0.10 0.15 --to 0.25 0.15 0.10 --line --blend 10
+  gemelo move --named left --planner RRTstar --time 3"""
+
+
+def add_options(parser: Parser) -> None:
+    """Adds goal, motion, speed and output options."""
+    parser.epilog = EXAMPLES
+    _goal_options(parser.add_argument_group("where to"))
+    _motion_options(parser.add_argument_group("on which way (any that is free, if nothing is said)"))
+    parser.add_argument("--speed", type=finite_number, default=1.0, help="share of the velocity limits, in (0, 1]")
+    parser.add_argument("--time", type=finite_number, default=1.0, metavar="S", help="that planning may take")
+    parser.add_argument("--plan-only", action="store_true", help="plan, and do not move")
+    parser.add_argument("--json", action="store_true", help="one JSON object instead of a line")
+
+
+def _goal_options(group: Group) -> None:
+    goal = group.add_mutually_exclusive_group(required=True)
+    goal.add_argument("--to", nargs=3, type=length, metavar=XYZ, help="the tool in the base frame, as 300mm or 0.3")
+    goal.add_argument(
+        "--joints", nargs="+", metavar="JOINT=VALUE", help="30deg, 0.5rad, 40mm, 0.04m; a bare number is rad or m"
+    )
+    goal.add_argument("--named", metavar="STATE", help="a named state of the SRDF")
+    turned = group.add_mutually_exclusive_group()
+    turned.add_argument(
+        "--quaternion", "--quat", nargs=4, type=finite_number, metavar=(*XYZ, "W"), help="orientation of the tool"
+    )
+    turned.add_argument("--rpy", nargs=3, type=turn, metavar=("R", "P", "Y"), help="the same, as 90deg, 1.57rad or 90")
+    turned.add_argument("--axis", nargs=3, type=finite_number, metavar=XYZ, help="of the tool, to point --along")
+    group.add_argument("--along", nargs=3, type=finite_number, metavar=XYZ, help="where --axis is to point; it is z")
+    group.add_argument(
+        "--free-axis", nargs=3, type=finite_number, metavar=XYZ, help="of the tool: turning about it does not matter"
+    )
+    group.add_argument("--frame", default="", metavar="LINK", help="in which positions are; the base, if none")
+
+
+def _motion_options(group: Group) -> None:
+    way = group.add_mutually_exclusive_group()
+    way.add_argument("--line", action="store_true", help="the tool on a straight line")
+    way.add_argument("--arc", nargs=3, type=length, metavar=XYZ, help="the tool on an arc through this point")
+    way.add_argument("--center", nargs=3, type=length, metavar=XYZ, help="on the shorter arc about this point")
+    way.add_argument("--ptp", action="store_true", help="the joints on a straight line")
+    group.add_argument(
+        "--via",
+        nargs=3,
+        type=length,
+        metavar=XYZ,
+        action="append",
+        default=[],
+        help="a point before; repeatable",
+    )
+    group.add_argument("--blend", type=finite_number, metavar="MM", help="around --via within which corners are cut")
+    group.add_argument("--tool-speed", type=finite_number, metavar="MM/S", help="at most, on a line or an arc")
+    group.add_argument("--tool-acceleration", type=finite_number, metavar="MM/S2", help="at most, on a line or an arc")
+    group.add_argument("--fraction", type=finite_number, metavar="F", help="of a line or an arc that will do")
+    group.add_argument("--max-step", type=finite_number, metavar="MM", help="between two looks, on a line or an arc")
+    group.add_argument(
+        "--jump", type=finite_number, metavar="RAD", help="that a joint may move between them [rad] or [m]"
+    )
+    group.add_argument("--time-optimal", action="store_true", help="as fast as can be, without a limit of the jerk")
+    group.add_argument("--planner", metavar="ID", help="native, RRTConnect, RRTstar, BITstar or PRM")
+    group.add_argument("--seed", type=int, help="the same seed, the same plan")
+
+
+def run(options: Options) -> ExitCode:
+    """Plans and, without --plan-only, executes."""
+    robot = load_robot()
+    request = request_from(options, robot.arm)
+    with connect(robot) as session:
+        return move(session, request, options.plan_only, options.json)
+
+
+def choices(robot: Robot | None) -> Choices:
+    """The named states and joints, after their options."""
+    if robot is None:
+        return {}
+    return {"--named": robot.arm.state_names, "--joints": [f"{joint.name}=" for joint in robot.arm.joints]}
 
 
 def move(session: Session, request: PlanRequest, plan_only: bool, as_json: bool) -> ExitCode:
@@ -39,7 +126,7 @@ def move(session: Session, request: PlanRequest, plan_only: bool, as_json: bool)
 def follow(session: Session, plan: PlanResponse, quiet: bool = False) -> MoveReport:
     """Executes `plan`; Ctrl-C cancels and waits for where the arm came to rest."""
     client = session.node.action(FOLLOW_JOINT_TRAJECTORY)
-    with progress(plan.duration, quiet) as shown, two_stage_interrupt() as interrupt:
+    with motion_progress(plan.duration, quiet) as shown, two_stage_interrupt() as interrupt:
 
         def on_feedback(feedback: FollowJointTrajectoryFeedback) -> None:
             shown(feedback.elapsed, feedback.duration)
@@ -62,35 +149,3 @@ def cancel_once(handle: GoalHandle[Any, Any], interrupt: Interrupt, quiet: bool)
         handle.cancel()
         if not quiet:
             print("cancelling: the arm slows down on its path (Ctrl-C again leaves without waiting)", flush=True)
-
-
-def report_of(
-    session: Session,
-    plan: PlanResponse,
-    status: GoalStatusCode,
-    result: FollowJointTrajectoryResult | None,
-    interrupted: bool,
-) -> MoveReport:
-    """What became of the goal, from the steps that were read back."""
-    arm = session.arm
-    result = result or FollowJointTrajectoryResult()
-    errors = dict(zip(result.joint_names, result.final_error, strict=False))
-    stopped_at = {
-        name: show(arm.joint(name).steps.to_position(steps), arm.joint(name).unit)
-        for name, steps in zip(result.joint_names, result.executed_steps, strict=False)
-    }
-    succeeded = status is GoalStatusCode.SUCCEEDED
-    return MoveReport(
-        robot=arm.name,
-        status=status.name,
-        succeeded=succeeded,
-        interrupted=interrupted,
-        reason=result.error_string,
-        planned_ms=plan.planning_time * 1e3,
-        duration_s=plan.duration,
-        took_s=result.duration,
-        final_error_mm=tool_error_mm(arm, plan.trajectory, errors) if succeeded else None,
-        final_error_steps=errors,
-        max_following_error_steps=dict(zip(result.joint_names, result.max_following_error, strict=False)),
-        stopped_at=stopped_at,
-    )

@@ -1,4 +1,4 @@
-"""What is said about a move when it has ended."""
+"""The report of one move: printed as a line or, with --json, as an object."""
 
 from __future__ import annotations
 
@@ -8,15 +8,19 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from schemas.motion import JointTrajectory
-from services.cli.exits import ExitCode
+from schemas.actions import GoalStatusCode
+from schemas.motion import FollowJointTrajectoryResult, JointTrajectory
+from schemas.planning import PlanResponse
+from services.cli.errors import ExitCode
+from services.cli.units import show
 
 if TYPE_CHECKING:
     from services.arm.description import Arm
+    from services.cli.session import Session
 
 
 class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
-    """The outcome of one move; also what `--json` prints."""
+    """The outcome of one move."""
 
     robot: str
     status: str = "PLANNED"
@@ -43,8 +47,40 @@ class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
         return msgspec.json.encode(self).decode()
 
 
+def report_of(
+    session: Session,
+    plan: PlanResponse,
+    status: GoalStatusCode,
+    result: FollowJointTrajectoryResult | None,
+    interrupted: bool,
+) -> MoveReport:
+    """The report of a goal that has ended, from the steps that the device executed."""
+    arm = session.arm
+    result = result or FollowJointTrajectoryResult()
+    errors = dict(zip(result.joint_names, result.final_error, strict=False))
+    stopped_at = {
+        name: show(arm.joint(name).steps.to_position(steps), arm.joint(name).unit)
+        for name, steps in zip(result.joint_names, result.executed_steps, strict=False)
+    }
+    succeeded = status is GoalStatusCode.SUCCEEDED
+    return MoveReport(
+        robot=arm.name,
+        status=status.name,
+        succeeded=succeeded,
+        interrupted=interrupted,
+        reason=result.error_string,
+        planned_ms=plan.planning_time * 1e3,
+        duration_s=plan.duration,
+        took_s=result.duration,
+        final_error_mm=tool_error_mm(arm, plan.trajectory, errors) if succeeded else None,
+        final_error_steps=errors,
+        max_following_error_steps=dict(zip(result.joint_names, result.max_following_error, strict=False)),
+        stopped_at=stopped_at,
+    )
+
+
 def summary(report: MoveReport, plan_only: bool = False) -> str:
-    """The one line that a person reads."""
+    """The report as one line for a person."""
     planned = f"planned in {report.planned_ms:.1f} ms"
     if report.stopped_by:
         planned = f"{planned} {report.fraction:.1%} of the way ({report.stopped_by})"
@@ -62,7 +98,7 @@ def summary(report: MoveReport, plan_only: bool = False) -> str:
 
 
 def tool_error_mm(arm: Arm, trajectory: JointTrajectory, errors: Mapping[str, float]) -> float:
-    """How far the tool is from where the trajectory ends [mm], by the final `errors` [steps] of the joints.
+    """The tool's distance from the end of the trajectory [mm], from the joints' final `errors` [steps].
 
     Forward kinematics of both: the goal, and the goal minus the error.
     """

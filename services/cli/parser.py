@@ -1,48 +1,43 @@
-"""The tree of commands, from the table of them. argparse, because the first word must come at once: a richer
-library costs 0.3 s at every start."""
+"""The parser of the command line, built from the table of commands.
+
+argparse, because the first line of output must come at once: a richer library costs 0.3 s at every start. Of all
+commands only the one that was typed gets its options, so that no other command's module is loaded.
+"""
 
 from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any, NoReturn
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib import import_module
+from typing import Any, NamedTuple, NoReturn
 
-from services.cli.exits import CommandError, ExitCode
-from services.cli.names import nearest
-from services.cli.units import parse_value
+from services.cli.errors import ExitCode, nearest
 
 Options = argparse.Namespace
-_NEGATIVE_NUMBER = re.compile(r"^-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:deg|rad|mm|m|°)?$")
+Choices = Mapping[str, Iterable[str]]  # words that may follow, by the arguments so far (joined by a blank)
+_NEGATIVE_NUMBER = re.compile(r"^-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:[A-Za-z°%][A-Za-z0-9/^²]*)?$")
 
 
-Words = Mapping[str, Iterable[str]]  # what may follow, by the arguments given so far, joined by a blank
-
-
-def no_options(parser: Parser) -> None:
-    """For a command that takes none."""
-
-
-def no_words() -> Words:
-    """For a command whose arguments no table knows."""
-    return {}
-
-
-@dataclass(frozen=True)
-class Command:
-    """A row of the table: its words, one line of help, its options, and what runs it."""
+class Command(NamedTuple):
+    """A row of the table of commands; `module:function` names a function below services.cli."""
 
     words: tuple[str, ...]  # one, or a group and one
     about: str
-    run: Callable[[Options], ExitCode]
-    add_options: Callable[[Parser], None] = no_options
+    run: str  # takes the parsed `Options`, returns the `ExitCode`
+    add_options: str = ""  # takes the `Parser`
     example: str = ""
-    words_after: Callable[[], Words] = no_words  # for completion
+    choices: str = ""  # takes the `Robot` (None if its files cannot be read), returns `Choices` for completion
+
+    def load(self, name: str) -> Callable[..., Any]:
+        """Imports the module and returns the function that the field `name` refers to."""
+        module, function = getattr(self, name).split(":")
+        found: Callable[..., Any] = getattr(import_module(f"services.cli.{module}"), function)
+        return found
 
 
 class Parser(argparse.ArgumentParser):
-    """Says the nearest word where one is wrong, and takes -1e-3 and -20mm for numbers."""
+    """Suggests the nearest word for a wrong one, and takes -1e-3, -20mm and -10deg/s for numbers."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
@@ -61,8 +56,10 @@ class Parser(argparse.ArgumentParser):
         self.exit(ExitCode.USAGE, f"{self.prog}: {message}\n")
 
 
-def build(commands: Iterable[Command], groups: dict[str, str], about: str, epilog: str) -> Parser:
-    """The parser of `gemelo`; a parsed line carries its `Command` as `command`."""
+def build(
+    commands: Iterable[Command], groups: Mapping[str, str], about: str, epilog: str, arguments: Sequence[str]
+) -> Parser:
+    """The parser of `gemelo` for `arguments`; what it parses carries its `Command` as `command`."""
     root = Parser(prog="gemelo", description=about, epilog=epilog, allow_abbrev=False)
     top = root.add_subparsers(metavar="COMMAND", title="commands", required=True)
     parents = {}
@@ -73,17 +70,26 @@ def build(commands: Iterable[Command], groups: dict[str, str], about: str, epilo
             parents[group[0]] = parent.add_subparsers(metavar="COMMAND", title="commands", required=True)
         where = parents[group[0]] if group else top
         leaf = where.add_parser(word, help=command.about, description=command.about, allow_abbrev=False)
-        leaf.epilog = f"example:\n  {command.example}" if command.example else None
-        command.add_options(leaf)
-        leaf.set_defaults(command=command)
+        if command.words == tuple(arguments[: len(command.words)]):
+            complete(leaf, command)
     return root
 
 
+def complete(leaf: Parser, command: Command) -> None:
+    """Gives the parser of one command its options and its example."""
+    leaf.epilog = f"example:\n  {command.example}" if command.example else None
+    if command.add_options:
+        command.load("add_options")(leaf)
+    leaf.set_defaults(command=command)
+
+
 def json_option(parser: Parser) -> None:
-    parser.add_argument("--json", action="store_true", help="JSON instead of text")
+    """Adds --json."""
+    parser.add_argument("--json", action="store_true", help="JSON in SI units instead of text")
 
 
 def positive_integer(text: str) -> int:
+    """An argument's type: an integer above 0."""
     value = int(text)
     if value < 1:
         raise argparse.ArgumentTypeError(f"{value} is not above 0")
@@ -91,30 +97,15 @@ def positive_integer(text: str) -> int:
 
 
 def positive_number(text: str) -> float:
+    """An argument's type: a finite number above 0."""
     value = float(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not above 0 and finite")
     return value
 
 
-def length(text: str) -> float:
-    """[m], from 0.3 or 300mm."""
-    return _measured(text, "m")
-
-
-def turn(text: str) -> float:
-    """[rad], from 90deg or 1.57rad; a bare number is in degrees."""
-    return _measured(f"{text}deg" if text[-1:].isdecimal() else text, "rad")
-
-
-def _measured(text: str, unit: str) -> float:
-    try:
-        return parse_value(text, unit, "it")
-    except CommandError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
-
-
 def finite_number(text: str) -> float:
+    """An argument's type: a finite number."""
     value = float(text)
     if not abs(value) < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not finite")

@@ -1,4 +1,4 @@
-"""Asking the planner: how it stands is shown where that takes long, and Ctrl-C ends it."""
+"""Requests to the planner: progress is shown while it plans, and Ctrl-C cancels."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from msgspec.structs import replace
 
 from schemas.planning import PlanCancel, PlanProgress, PlanRequest, PlanResponse
 from schemas.topics import PLAN, PLAN_CANCEL, PLAN_PROGRESS
-from services.cli.exits import CommandError, ExitCode
-from services.cli.goals import refusal_text
-from services.cli.interrupt import Interrupt, two_stage_interrupt
-from services.cli.live import LiveBlock
+from services.cli.errors import CommandError, ExitCode
+from services.cli.move_request import refusal_text
 from services.cli.session import Session
+from services.cli.terminal import Interrupt, LiveBlock, two_stage_interrupt
 from services.runtime.errors import NoAnswer, Refused
 
 MARGIN = 2.0  # [s] that a planner may take beyond its allowed time before it counts as gone

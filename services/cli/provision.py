@@ -1,16 +1,20 @@
-"""`gemelo device provision`: speaks with a board over its serial line, without the stack."""
+"""`gemelo device provision`: gives a board its networks over its serial line, without the stack."""
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Protocol, TypeVar
 
 import msgspec
 
-from services.cli.credentials import Credentials
-from services.cli.exits import CommandError, ExitCode
+from services.cli.credentials import MQTT_PASSWORD, WIFI_PASSWORD, Credentials, certificate, password, require_sound
+from services.cli.errors import CommandError, ExitCode, usage
+from services.cli.parser import Options, Parser, positive_integer
+from services.cli.terminal import confirm
 from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame, sync_frame
 
 T = TypeVar("T", bound=msgspec.Struct)
@@ -18,7 +22,44 @@ T = TypeVar("T", bound=msgspec.Struct)
 BAUD = 921_600
 PATIENCE = 15.0  # [s] for a board to start and answer
 AGAIN = 2.0  # [s] between two tries
-TO_RESTART = 8.0  # [s] for the first word after it
+TO_RESTART = 8.0  # [s] for the first message after it
+PASSWORDS = """Passwords are no arguments, because every user of a machine sees those: they are asked for, or taken from
+$GEMELO_WIFI_PASSWORD and $GEMELO_MQTT_PASSWORD, or read as lines of standard input, in this order."""
+
+
+def add_options(parser: Parser) -> None:
+    """Adds port, names, networks and --factory-reset."""
+    parser.add_argument("--serial", required=True, metavar="PORT", help="as /dev/ttyUSB0")
+    parser.add_argument("--baud", type=positive_integer, default=BAUD, metavar="BAUD", help="921600 if not said")
+    parser.add_argument("--device", metavar="NAME", help="its name: that of [device] in robot.toml")
+    parser.add_argument("--wifi-ssid", metavar="NAME", help="the network; its password is asked for")
+    parser.add_argument("--mqtt-uri", metavar="URI", help="as mqtt://host:1883, or mqtts://host:8883")
+    parser.add_argument("--mqtt-user", metavar="NAME", help="at the broker; its password is asked for")
+    parser.add_argument("--mqtt-ca", type=Path, metavar="FILE", help="the certificate that mqtts trusts, PEM")
+    parser.add_argument("--factory-reset", action="store_true", help="forget everything, configuration included")
+    parser.add_argument("-y", "--yes", action="store_true", help="do not ask before a factory reset")
+    parser.epilog = f"{PASSWORDS}\n\n{parser.epilog}"
+
+
+def run(options: Options) -> ExitCode:
+    """Provisions the board, or resets it to its factory state after asking."""
+    given = (options.device, options.wifi_ssid, options.mqtt_uri, options.mqtt_user, options.mqtt_ca)
+    if options.factory_reset:
+        if any(each is not None for each in given):
+            raise usage("--factory-reset forgets everything: tell the device anew afterwards, in a command of its own")
+        confirm(f"The device at {options.serial} forgets its networks, passwords and configuration.", options.yes)
+        return provision(options.serial, options.baud, Credentials(factory_reset=True))
+    wifi, mqtt = options.wifi_ssid, options.mqtt_user
+    credentials = Credentials(
+        device=options.device,
+        wifi_ssid=wifi,
+        mqtt_uri=options.mqtt_uri,
+        mqtt_user=mqtt,
+        mqtt_ca=certificate(options.mqtt_ca),
+        wifi_password=None if wifi is None else password("Wi-Fi password", WIFI_PASSWORD, os.environ),
+        mqtt_password=None if mqtt is None else password("MQTT password", MQTT_PASSWORD, os.environ),
+    )
+    return provision(options.serial, options.baud, require_sound(credentials))
 
 
 class Line(Protocol):
@@ -28,30 +69,30 @@ class Line(Protocol):
     def read(self, size: int = 1, /) -> bytes: ...
 
 
-class Answer(msgspec.Struct, frozen=True):
+class ProvisionAnswer(msgspec.Struct, frozen=True):
     """The JSON of `provision/ack`."""
 
     accepted: bool
     reason: str = ""
 
 
-class Who(msgspec.Struct, frozen=True):
-    """What counts here of the JSON of `status`."""
+class BoardStatus(msgspec.Struct, frozen=True):
+    """The fields of the JSON of `status` that are printed."""
 
     device: str = ""
     firmware: str = ""
 
 
 def provision(port: str, baud: int, credentials: Credentials) -> ExitCode:
-    """Tells the board, and says what it answered."""
+    """Sends the credentials and prints the answer; raises `CommandError` if the board refuses or is silent."""
     with open_line(port, baud) as line:
-        conversation = Conversation(line)
-        answer = conversation.tell(credentials.text())
+        exchange = Exchange(line)
+        answer = exchange.send(credentials.text())
         if not answer.accepted:
             raise CommandError(f"the device refused: {answer.reason or 'without a reason'}")
         said = "everything forgotten" if credentials.factory_reset else f"taken: {credentials.summary()}"
         print(f"{said}; the device starts anew", flush=True)
-        who = conversation.meet()
+        who = exchange.status()
     if who is None:
         print(f"no word from it for {TO_RESTART:g} s: look at `gemelo device status`, or at the port's own messages")
     else:
@@ -59,27 +100,30 @@ def provision(port: str, baud: int, credentials: Credentials) -> ExitCode:
     return ExitCode.OK
 
 
-class Conversation:
-    """Frames to and from one board."""
+class Exchange:
+    """The exchange of frames with one board."""
 
     def __init__(self, line: Line) -> None:
         self._line = line
         self._packets = Packets()
 
-    def tell(self, text: bytes, patience: float = PATIENCE) -> Answer:
-        """Sends `text` again and again until the board answers: it may be starting because the port was opened."""
+    def send(self, text: bytes, patience: float = PATIENCE) -> ProvisionAnswer:
+        """Sends `text` until the board answers: opening the port may have restarted it.
+
+        Raises `CommandError` without an answer in `patience` [s].
+        """
         ack = self._exchange(packet(json_frame(JsonFrame.PROVISION, text)), JsonFrame.PROVISION_ACK, patience, AGAIN)
         if ack is None:
             raise CommandError(
                 f"no answer in {patience:g} s: is it the right --serial port and --baud, and does gemelo's firmware "
                 "run there? `python -m serial.tools.list_ports` lists the ports"
             )
-        return _decoded(ack, Answer)
+        return _decoded(ack, ProvisionAnswer)
 
-    def meet(self, patience: float = TO_RESTART) -> Who | None:
-        """Who it is when it has started; None if it says nothing."""
+    def status(self, patience: float = TO_RESTART) -> BoardStatus | None:
+        """The board's status after its restart; None if it says nothing for `patience` [s]."""
         status = self._exchange(packet(sync_frame(0)), JsonFrame.STATUS, patience, 1.0)
-        return None if status is None else _decoded(status, Who)
+        return None if status is None else _decoded(status, BoardStatus)
 
     def _exchange(self, question: bytes, answer: JsonFrame, patience: float, again: float) -> bytes | None:
         deadline, next_try = time.monotonic() + patience, 0.0
@@ -103,7 +147,10 @@ def _decoded(text: bytes, kind: type[T]) -> T:
 
 @contextmanager
 def open_line(port: str, baud: int) -> Iterator[Line]:
-    """The port; what is wrong with it is one sentence. Its control lines stay low: many boards reset by them."""
+    """Yields the port at `baud` [bit/s]; raises `CommandError` if it cannot be opened or fails.
+
+    Its control lines stay low: many boards reset by them.
+    """
     import serial
 
     try:

@@ -1,39 +1,189 @@
-"""`gemelo scene`: what stands around the arm, and what it carries."""
+"""`gemelo scene`: the objects around the arm, and those that it carries."""
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 
-from schemas.message import Vector
 from schemas.scene import (
-    BoxShape,
-    CylinderShape,
-    MeshShape,
-    PlaneShape,
+    AllowedPair,
     PlanningScene,
-    SceneObject,
+    SceneAdd,
+    SceneAllow,
+    SceneAttach,
+    SceneClear,
+    SceneDetach,
+    SceneDisallow,
+    SceneMove,
+    SceneRemove,
+    SceneReplace,
     SceneRequest,
+    SceneResize,
     SceneResponse,
-    Shape,
-    SphereShape,
 )
 from schemas.topics import SCENE, SCENE_EDIT
-from services.cli.columns import table
-from services.cli.exits import CommandError, ExitCode, usage
+from services.cli.errors import CommandError, ExitCode
+from services.cli.parser import Choices, Options, Parser, positive_number
+from services.cli.scene_object import object_of, pose_of, shape_of
+from services.cli.scene_text import listing, read_scene, write_scene
+from services.cli.session import Robot, Session, connect
 
-if TYPE_CHECKING:
-    from services.cli.session import Session
+PATIENCE = 10.0  # [s] the planner takes that long for a mesh of many triangles
+LATCHED_WAIT = 1.0  # [s] for the latched scene
+KEPT = "scene.json"  # in the run folder; the planner writes it
+ADD_EXAMPLES = """examples:
+  gemelo scene add table --box 600mm 400mm 20mm --at 300mm 0 -10mm
+  gemelo scene add floor --plane --at 0 0 -20mm
+  gemelo scene add vice --mesh parts/vice.stl --scale 0.001 --at 250mm 100mm 0 --rpy 0 0 90deg
+  gemelo scene add cup --cylinder 30mm 80mm --attach efector_link --at 0 0 40mm"""
+NAME, LINK, XYZ, ZEROS = "NAME", "LINK", ("X", "Y", "Z"), ("0", "0", "0")
 
-PATIENCE = 10.0  # [s] a mesh of many triangles takes the planner some
-LATCHED_WAIT = 1.0  # [s] for a scene that is there already
+
+def name_option(parser: Parser) -> None:
+    """Adds the object's name."""
+    parser.add_argument("name", metavar=NAME, help="an object of `gemelo scene list`")
+
+
+def shape_options(parser: Parser) -> None:
+    """Adds the shapes, one of which is required."""
+    shape = parser.add_mutually_exclusive_group(required=True)
+    shape.add_argument("--box", nargs=3, metavar=XYZ, help="its edges, as 300mm or 0.3")
+    shape.add_argument("--sphere", metavar="RADIUS", help="as 50mm or 0.05")
+    shape.add_argument("--cylinder", nargs=2, metavar=("RADIUS", "LENGTH"), help="along its z axis")
+    shape.add_argument("--plane", action="store_true", help="all below its z = 0 is solid")
+    shape.add_argument("--mesh", metavar="STL", help="an STL file")
+    parser.add_argument("--scale", type=positive_number, default=1.0, help="metres per unit of the STL file")
+
+
+def place_options(parser: Parser, required: bool = False) -> None:
+    """Adds position, rotation and frame."""
+    parser.add_argument("--at", nargs=3, default=ZEROS, required=required, metavar=XYZ, help="where, as 300mm or 0.3")
+    parser.add_argument(
+        "--rpy", nargs=3, default=ZEROS, metavar=("R", "P", "Y"), help="how turned, as 90deg or 1.57rad"
+    )
+    parser.add_argument("--frame", default="", metavar=LINK, help="in which this is given, as it is now; else the base")
+
+
+def touch_option(parser: Parser) -> None:
+    """Adds --touch."""
+    parser.add_argument("--touch", nargs="+", default=[], metavar=LINK, help="links that it may touch while carried")
+
+
+def add_options(parser: Parser) -> None:
+    """Adds name, shape, place and what carries it."""
+    parser.epilog = ADD_EXAMPLES
+    parser.add_argument("name", metavar=NAME, help="one of that name is replaced")
+    shape_options(parser)
+    place_options(parser)
+    parser.add_argument("--attach", metavar=LINK, help="it is carried by this link, and its place is in it")
+    touch_option(parser)
+    parser.add_argument("--padding", default="0", metavar="DISTANCE", help="kept around it besides the clearance")
+
+
+def add(options: Options) -> ExitCode:
+    """Adds an object, or replaces the one of its name."""
+    return ask(SceneRequest(edit=SceneAdd(object=object_of(options))))
+
+
+def ask(request: SceneRequest) -> ExitCode:
+    """Connects and sends the change."""
+    with connect() as session:
+        return edit(session, request)
+
+
+def remove(options: Options) -> ExitCode:
+    """Removes an object."""
+    return ask(SceneRequest(edit=SceneRemove(name=options.name)))
+
+
+def move_options(parser: Parser) -> None:
+    """Adds name and place."""
+    name_option(parser)
+    place_options(parser, required=True)
+
+
+def move(options: Options) -> ExitCode:
+    """Moves an object."""
+    pose = pose_of(options.at, options.rpy)
+    return ask(SceneRequest(edit=SceneMove(name=options.name, pose=pose, frame=options.frame)))
+
+
+def resize_options(parser: Parser) -> None:
+    """Adds name and shape."""
+    name_option(parser)
+    shape_options(parser)
+
+
+def resize(options: Options) -> ExitCode:
+    """Gives an object another shape."""
+    shape = shape_of(options)
+    return ask(SceneRequest(edit=SceneResize(name=options.name, shape=shape)))
+
+
+def attach_options(parser: Parser) -> None:
+    """Adds object, link and --touch."""
+    name_option(parser)
+    parser.add_argument("link", metavar=LINK, help="that carries it from now on")
+    touch_option(parser)
+
+
+def attach(options: Options) -> ExitCode:
+    """Attaches an object to a link, at its present pose."""
+    touch_links = tuple(options.touch)
+    return ask(SceneRequest(edit=SceneAttach(name=options.name, link=options.link, touch_links=touch_links)))
+
+
+def detach(options: Options) -> ExitCode:
+    """Detaches an object at its present pose."""
+    return ask(SceneRequest(edit=SceneDetach(name=options.name)))
+
+
+def pair_options(parser: Parser) -> None:
+    """Adds the two names."""
+    parser.add_argument("first", metavar="FIRST", help='a link or an object; "*" is any')
+    parser.add_argument("second", metavar="SECOND", help='another one; "*" is any')
+
+
+def allow(options: Options) -> ExitCode:
+    """Allows or disallows a pair, as the last word says."""
+    pair = AllowedPair(first=options.first, second=options.second)
+    is_allowed = options.command.words[-1] == "allow"
+    return ask(SceneRequest(edit=SceneAllow(pair=pair) if is_allowed else SceneDisallow(pair=pair)))
+
+
+def show(options: Options) -> ExitCode:
+    """Prints the scene."""
+    with connect() as session:
+        scene = present(session)
+    print(msgspec.json.encode(scene).decode() if options.json else listing(scene))
+    return ExitCode.OK
+
+
+def file_option(parser: Parser) -> None:
+    """Adds the file."""
+    parser.add_argument("file", metavar="FILE", type=Path, help="a scene as JSON")
+
+
+def load(options: Options) -> ExitCode:
+    """Replaces the scene by that of a file."""
+    return ask(SceneRequest(edit=SceneReplace(scene=read_scene(options.file))))
+
+
+def save(options: Options) -> ExitCode:
+    """Writes the scene into a file."""
+    with connect() as session:
+        write_scene(present(session), options.file)
+    return ExitCode.OK
+
+
+def clear(options: Options) -> ExitCode:
+    """Removes every object and every allowed pair."""
+    return ask(SceneRequest(edit=SceneClear()))
 
 
 def edit(session: Session, request: SceneRequest) -> ExitCode:
-    """Asks for the change; a refusal is raised with its reason."""
+    """Sends the change and prints the new version; raises `CommandError` with the planner's reason if refused."""
     response: SceneResponse = session.node.call(SCENE_EDIT, request, timeout=PATIENCE)
     if not response.accepted:
         raise CommandError(f"refused: {response.reason}")
@@ -42,7 +192,7 @@ def edit(session: Session, request: SceneRequest) -> ExitCode:
 
 
 def present(session: Session) -> PlanningScene:
-    """The scene as the planner published it last."""
+    """The newest scene of the planner; raises `CommandError` if nobody publishes one."""
     scene = session.node.latest(SCENE)
     until = session.node.monotonic() + LATCHED_WAIT
     while scene.message is None and session.node.monotonic() < until:
@@ -52,69 +202,35 @@ def present(session: Session) -> PlanningScene:
     return scene.message
 
 
-def listing(scene: PlanningScene) -> str:
-    """A table of the objects, and the pairs that may touch."""
-    headings = ("object", "shape [mm]", "x y z [mm]", "turned", "in", "touches", "padding [mm]")
-    rows = [_row(item) for item in scene.objects]
-    lines = [table(headings, rows)] if rows else ["nothing is around the arm"]
-    lines += [f"{pair.first} and {pair.second} may touch" for pair in scene.allowed]
-    return "\n".join([*lines, f"version {scene.version}"])
+def object_choices(robot: Robot | None) -> Choices:
+    """The names of the objects."""
+    return {"": _object_names(robot)}
 
 
-def save(scene: PlanningScene, path: Path) -> None:
-    """Writes the scene as JSON."""
+def attach_choices(robot: Robot | None) -> Choices:
+    """An object, then a link."""
+    names = _object_names(robot)
+    return {"": names, **dict.fromkeys(names, _link_names(robot))}
+
+
+def pair_choices(robot: Robot | None) -> Choices:
+    """Two objects or links."""
+    names = [*_object_names(robot), *_link_names(robot)]
+    return {"": names, **dict.fromkeys(names, names)}
+
+
+def _object_names(robot: Robot | None) -> list[str]:
+    """Those that the shell can complete, from the planner's file; none if it cannot be read."""
+    from services.runtime.deployment import project_root
+
+    if robot is None:
+        return []
     try:
-        path.write_bytes(msgspec.json.format(msgspec.json.encode(scene)) + b"\n")
-    except OSError as error:
-        raise CommandError(f"{path} cannot be written: {error.strerror}") from error
-    print(f"{path} has the scene, version {scene.version}")
+        kept = read_scene(project_root() / Path(robot.deployment.paths.run) / KEPT)
+    except CommandError:
+        return []
+    return [item.name for item in kept.objects if " " not in item.name]
 
 
-def load(path: Path) -> PlanningScene:
-    """The scene of a file."""
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=PlanningScene)
-    except OSError as error:
-        raise usage(f"{path} cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise usage(f"{path} holds no scene: {error}") from error
-
-
-def _row(item: SceneObject) -> tuple[str, ...]:
-    at = " ".join(f"{1000.0 * value:z.1f}" for value in item.pose.translation)
-    held = f"{item.frame} (attached)" if item.attached else item.frame or "base"
-    touches = ", ".join(item.touch_links) or "-"
-    return (
-        item.name,
-        shape_text(item.shape),
-        at,
-        turn_text(item.pose.rotation),
-        held,
-        touches,
-        f"{1000.0 * item.padding:g}",
-    )
-
-
-def turn_text(rotation: Vector) -> str:
-    """How far [deg] and about which axis an object (x, y, z, w) is turned."""
-    sine = math.hypot(*rotation[:3])
-    angle = math.degrees(2.0 * math.atan2(sine, rotation[3]))
-    if abs(angle) < 0.05:
-        return "-"
-    return f"{angle:.1f} deg about {' '.join(f'{value / sine:z.2f}' for value in rotation[:3])}"
-
-
-def shape_text(shape: Shape) -> str:
-    """The shape in words, in mm."""
-    match shape:
-        case BoxShape():
-            return f"box {' x '.join(f'{1000.0 * edge:g}' for edge in shape.size)}"
-        case SphereShape():
-            return f"sphere of radius {1000.0 * shape.radius:g}"
-        case CylinderShape():
-            return f"cylinder of radius {1000.0 * shape.radius:g}, length {1000.0 * shape.length:g}"
-        case PlaneShape():
-            return "plane, solid below"
-        case MeshShape():
-            scale = "" if set(shape.scale) == {1.0} else f", scale {shape.scale[0]:g}"
-            return f"mesh {shape.path or f'of {len(shape.data)} bytes'}{scale}"
+def _link_names(robot: Robot | None) -> tuple[str, ...]:
+    return robot.arm.model.link_names if robot else ()

@@ -1,4 +1,4 @@
-"""What a command needs to speak with the stack: the deployment, the arm, and a node of its own."""
+"""The connection of one command: the deployment and the arm from their files, and a node on the robot's bus."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ import os
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from services.cli.exits import CommandError, ExitCode, usage
+from services.cli.errors import CommandError, ExitCode, usage
 
 if TYPE_CHECKING:
     from schemas.deployment import Deployment
@@ -19,29 +18,35 @@ if TYPE_CHECKING:
 CONNECT_TIMEOUT = 1.0  # [s]
 
 
-@dataclass(frozen=True)
-class Session:
-    """One command's connection."""
+class Robot(NamedTuple):
+    """The robot that a command is about, from its files; read once for a command."""
+
+    deployment: Deployment
+    arm: Arm
+
+
+class Session(NamedTuple):
+    """A robot, and this command's own node on its bus."""
 
     deployment: Deployment
     arm: Arm
     node: Node
 
 
-def load() -> tuple[Deployment, Arm]:
-    """Deployment and arm from their files; what is wrong with them is one sentence."""
+def load_robot() -> Robot:
+    """Reads the deployment and the arm's files; raises `CommandError` with one sentence if they are wrong."""
     from services.arm.description import load_arm
     from services.runtime.deployment import load_deployment, project_root
 
     try:
         deployment = load_deployment()
-        return deployment, load_arm(project_root() / deployment.robot)
+        return Robot(deployment, load_arm(project_root() / deployment.robot))
     except (ValueError, OSError) as error:
         raise usage(str(error)) from error
 
 
 def require_router(deployment: Deployment) -> None:
-    """Raises at once, instead of waiting for a stack that is not there."""
+    """Raises `CommandError` at once if no router listens, instead of waiting for a stack that does not run."""
     address = (deployment.router.host, deployment.router.port)
     try:
         socket.create_connection(address, timeout=CONNECT_TIMEOUT).close()
@@ -51,9 +56,12 @@ def require_router(deployment: Deployment) -> None:
 
 
 @contextmanager
-def connect() -> Iterator[Session]:
-    """A node of this command on the robot's bus; refusals and silence become exit codes."""
-    deployment, arm = load()
+def connect(robot: Robot | None = None) -> Iterator[Session]:
+    """Yields a session with `robot`, by default the deployment's own.
+
+    Raises `CommandError` if there is no router, if nobody answers, or if a server refuses.
+    """
+    deployment, arm = robot or load_robot()
     require_router(deployment)
     from services.runtime.errors import BusError, NoAnswer, Refused, ServerLost
     from services.runtime.node import Node

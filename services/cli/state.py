@@ -1,4 +1,4 @@
-"""`gemelo state`: the joints, the tool, the steps, and the device, at one glance."""
+"""`gemelo state`: joints, tool, steps and device at one glance."""
 
 from __future__ import annotations
 
@@ -7,23 +7,135 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from schemas.device import DeviceState, DeviceStatus
+from schemas.joints import JointState, StepErrors
 from schemas.topics import DEVICE_STATE, DEVICE_STATUS, FRAMES, JOINT_STATES, STATIC_FRAMES, STEP_ERRORS
-from services.cli.exits import CommandError, ExitCode
-from services.cli.snapshot import Snapshot, snapshot, text_of
+from services.arm.frames import FrameBuffer, FrameError
+from services.cli.errors import CommandError, ExitCode
+from services.cli.parser import Options, Parser
+from services.cli.session import Session, connect
+from services.cli.text_table import table
+from services.cli.units import SHOWN
 
 if TYPE_CHECKING:
-    from services.cli.session import Session
+    from services.arm.description import Arm
 
 PATIENCE = 2.0  # [s] for the first messages
 REFRESH = 0.2  # [s] of --watch
+
+
+def add_options(parser: Parser) -> None:
+    """Adds --watch and --json."""
+    parser.add_argument("-w", "--watch", action="store_true", help="again and again, until Ctrl-C")
+    parser.add_argument("--json", action="store_true", help="JSON, in SI units")
+
+
+def run(options: Options) -> ExitCode:
+    """Prints the state once, or again and again."""
+    with connect() as session:
+        return state(session, options.watch, options.json)
+
+
+class JointLine(msgspec.Struct, frozen=True):
+    """One joint, in SI units."""
+
+    name: str
+    unit: str
+    position: float | None = None  # [rad] or [m]
+    velocity: float | None = None  # [rad/s] or [m/s]
+    commanded_steps: float | None = None
+    executed_steps: int | None = None
+    error_steps: float | None = None
+
+
+class Snapshot(msgspec.Struct, frozen=True):
+    """Everything that `gemelo state` shows."""
+
+    robot: str
+    joints: tuple[JointLine, ...]
+    tool_frame: str
+    tool: tuple[float, ...] | None  # (3,) [m] in the base frame
+    device: str
+    mode: str
+    online: bool
+    reason: str
+    time_scale: float | None
+    buffered: float | None  # [s]
+    round_trip_ms: float | None
+
+
+def snapshot(
+    arm: Arm,
+    states: JointState | None,
+    errors: StepErrors | None,
+    device: DeviceState | None,
+    status: DeviceStatus | None,
+    tool: tuple[float, ...] | None,
+) -> Snapshot:
+    """The `Snapshot` of the messages received so far; None for one that was not."""
+    states, errors = states or JointState(), errors or StepErrors()
+    position = dict(zip(states.name, states.position, strict=False))
+    velocity = dict(zip(states.name, states.velocity, strict=False))
+    commanded = dict(zip(errors.name, errors.commanded, strict=False))
+    executed = dict(zip(errors.name, errors.executed, strict=False))
+    error = dict(zip(errors.name, errors.error, strict=False))
+    lines = tuple(
+        JointLine(
+            joint.name, joint.unit, position.get(joint.name), velocity.get(joint.name),
+            commanded.get(joint.name), executed.get(joint.name), error.get(joint.name),
+        )
+        for joint in arm.joints
+    )  # fmt: skip
+    return Snapshot(
+        robot=arm.name,
+        joints=lines,
+        tool_frame=arm.tool_frame,
+        tool=tool,
+        device=status.device if status else "",
+        mode=device.mode.name if device else "unknown",
+        online=bool(status and status.online),
+        reason=status.reason if status else "nothing heard from stepper_gateway",
+        time_scale=device.time_scale if device else None,
+        buffered=device.buffered if device else None,
+        round_trip_ms=device.round_trip * 1e3 if device else None,
+    )
+
+
+def text_of(view: Snapshot) -> str:
+    """The snapshot as a table and three lines."""
+    headings = ("joint", "position", "unit", "velocity [unit/s]", "commanded [steps]", "executed [steps]",
+                "error [steps]")  # fmt: skip
+    rows = [_row(line) for line in view.joints]
+    tool = (
+        "unknown" if view.tool is None else "x {:z.2f}  y {:z.2f}  z {:z.2f} mm".format(*(v * 1e3 for v in view.tool))
+    )
+    link = "online" if view.online else f"offline: {view.reason}"
+    if view.online and view.round_trip_ms is not None:
+        link += f", round trip {view.round_trip_ms:.1f} ms"
+    device = f"{view.device or 'unknown'}: {view.mode}"
+    if view.time_scale is not None and view.buffered is not None:
+        device += f", time scale {view.time_scale:.2f}, {view.buffered:.2f} s of path buffered"
+    if view.online and view.reason:
+        device += f"; {view.reason}"
+    return f"{table(headings, rows)}\n\ntool {view.tool_frame}: {tool}\ndevice {device}\nlink   {link}"
+
+
+def _row(line: JointLine) -> tuple[str, ...]:
+    shown, factor = SHOWN[line.unit]
+    return (
+        line.name, _number(line.position, factor, 3), shown, _number(line.velocity, factor, 3),
+        _number(line.commanded_steps, 1.0, 2), _number(line.executed_steps, 1.0, 0), _number(line.error_steps, 1.0, 2),
+    )  # fmt: skip
+
+
+def _number(value: float | None, factor: float, digits: int) -> str:
+    return "-" if value is None else f"{value * factor:z.{digits}f}"
 
 
 class StateView:
     """Collects the newest of every message that a snapshot needs."""
 
     def __init__(self, session: Session) -> None:
-        from services.arm.frames import FrameBuffer
-
         self._arm = session.arm
         node = session.node
         self.frames = FrameBuffer()
@@ -36,23 +148,24 @@ class StateView:
 
     @property
     def is_complete(self) -> bool:
+        """True if every message has been received."""
         parts = (self._states.message, self._errors.message, self._device.message, self._status.message)
         return None not in parts and self.tool() is not None
 
     @property
     def is_empty(self) -> bool:
+        """True if neither joint states nor the device's status have been received."""
         return self._states.message is None and self._status.message is None
 
     def tool(self) -> tuple[float, ...] | None:
-        """Where the tool is in the base frame [m], by the frames that the state_publisher says."""
-        from services.arm.frames import FrameError
-
+        """The tool's position (3,) [m] in the base frame, by the frames of state_publisher; None if not known."""
         try:
             return tuple(self.frames.look_up(self._arm.base_frame, self._arm.tool_frame).translation)
         except FrameError:
             return None
 
     def snapshot(self) -> Snapshot:
+        """Everything received so far."""
         return snapshot(
             self._arm,
             self._states.message,
@@ -74,7 +187,7 @@ def state(session: Session, watch: bool, as_json: bool) -> ExitCode:
 
 
 def wait_for(session: Session, view: StateView) -> None:
-    """Handles messages until all have come, or `PATIENCE` is over; nothing at all is an error."""
+    """Waits for all messages, at most `PATIENCE` [s]; raises `CommandError` if there is none at all."""
     deadline = session.node.monotonic() + PATIENCE
     while not view.is_complete and session.node.monotonic() < deadline:
         session.node.wait(0.02)

@@ -6,13 +6,13 @@ is never taken for a radian.
 
 from __future__ import annotations
 
+import argparse
 import math
 import re
 from collections.abc import Iterable
 from typing import Protocol
 
-from services.cli.exits import usage
-from services.cli.names import unknown
+from services.cli.errors import CommandError, unknown, usage
 
 SI_PER_UNIT = {"deg": math.radians(1.0), "rad": 1.0, "m": 1.0, "mm": 0.001}
 SI_UNIT = {"deg": "rad", "rad": "rad", "m": "m", "mm": "m"}
@@ -76,3 +76,20 @@ def show(value: float, unit: str, digits: int = 3) -> str:
     """An SI value as a person reads it: degrees or millimetres."""
     shown, factor = SHOWN[unit]
     return f"{value * factor:z.{digits}f} {shown}"  # z: no "-0.00"
+
+
+def length(text: str) -> float:
+    """[m], from 0.3 or 300mm."""
+    return _measured(text, "m")
+
+
+def turn(text: str) -> float:
+    """[rad], from 90deg or 1.57rad; a bare number is in degrees."""
+    return _measured(f"{text}deg" if text[-1:].isdecimal() else text, "rad")
+
+
+def _measured(text: str, unit: str) -> float:
+    try:
+        return parse_value(text, unit, "it")
+    except CommandError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import msgspec
 
-from services.cli.columns import table
+from services.cli.text_table import table
 from services.demo.ledger import Ledger
 
 # Half a step is what rounding to whole steps alone makes; the path itself is known to 1/256 step.

@@ -9,7 +9,7 @@ import pytest
 
 from services.arm.srdf_edit import entries
 from services.arm.urdf import read_urdf
-from services.cli.exits import ExitCode
+from services.cli.errors import ExitCode
 from services.cli.main import run
 
 

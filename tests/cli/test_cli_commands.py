@@ -9,9 +9,10 @@ import pytest
 import yaml
 
 from schemas.topics import JOINT_TARGETS, TOPICS
-from services.cli.exits import CommandError, ExitCode
+from services.cli.errors import CommandError, ExitCode
 from services.cli.main import run
-from services.cli.topics import message_of, topic_of
+from services.cli.messages import message_of
+from services.cli.topic import topic_of
 
 
 @pytest.fixture
@@ -117,10 +118,10 @@ def test_bash_takes_the_completion():
 
 
 def test_a_goal_may_come_from_a_file(tmp_path):
-    from services.cli.action_goal import text_of
+    from services.cli.action import goal_text
 
     path = tmp_path / "goal.json"
     path.write_text(json.dumps({"goal_time_tolerance": 1.0}))
-    assert text_of(str(path)) == path.read_text()
+    assert goal_text(str(path)) == path.read_text()
     with pytest.raises(CommandError, match="cannot read the goal"):
-        text_of(str(tmp_path / "none.json"))
+        goal_text(str(tmp_path / "none.json"))

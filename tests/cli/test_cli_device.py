@@ -23,7 +23,7 @@ from schemas.device import (
 )
 from services.cli import device, device_config, device_monitor, device_status
 from services.cli.device_press import PRESSES, press, request_of
-from services.cli.exits import CommandError, ExitCode
+from services.cli.errors import CommandError, ExitCode
 from services.cli.home import home
 from services.cli.main import run
 from services.runtime.memory_bus import MemoryBus
@@ -163,7 +163,7 @@ def test_sensors_are_a_table_with_units(session, rm1_device, capsys):
 
 
 def test_silent_sensors_are_an_error(session, rm1_device, monkeypatch):
-    from services.cli.device_view import DeviceView
+    from services.cli.device_snapshot import DeviceView
 
     wait = DeviceView.wait_for
     monkeypatch.setattr(DeviceView, "wait_for", lambda view, is_enough, timeout=0.2: wait(view, is_enough, timeout))

@@ -12,22 +12,22 @@ from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.planning import JointGoal, NamedGoal, PoseGoal, Refusal
 from services.arm.description import load_arm
 from services.cli.device import reference_request
-from services.cli.exits import CommandError, ExitCode
-from services.cli.goals import as_typed, goal_of, refusal_text, request_of
-from services.cli.main import parser
+from services.cli.errors import CommandError, ExitCode
+from services.cli.main import parse
 from services.cli.move_report import MoveReport, summary, tool_error_mm
+from services.cli.move_request import as_typed, goal_of, refusal_text, request_of
 from services.cli.units import parse_joints
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 
 
 def test_the_command_line_becomes_a_pose_goal():
-    options = parser().parse_args(["move", "--to", "0.25", "-0.15", "-1e-3"])
+    options = parse(["move", "--to", "0.25", "-0.15", "-1e-3"])
     assert goal_of(ARM, options.to, (), None) == PoseGoal(position=(0.25, -0.15, -0.001))
 
 
 def test_the_command_line_becomes_a_joint_goal():
-    options = parser().parse_args(["move", "--joints", "brazo_joint=30deg", "q3=-40mm"])
+    options = parse(["move", "--joints", "brazo_joint=30deg", "q3=-40mm"])
     goal = goal_of(ARM, options.to, options.joints, options.named)
     assert goal == JointGoal(name=("brazo_joint", "efector_joint"), position=(pytest.approx(math.pi / 6), -0.04))
 
@@ -52,7 +52,7 @@ def test_the_command_line_becomes_a_named_goal():
 )
 def test_what_cannot_be_understood_ends_with_two(words):
     with pytest.raises(SystemExit) as ended:
-        parser().parse_args(words)
+        parse(words)
     assert ended.value.code == ExitCode.USAGE
 
 

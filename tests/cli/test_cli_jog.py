@@ -14,11 +14,9 @@ import pytest
 
 from schemas.planning import JogCommand, JogLimit, JogStatus
 from schemas.topics import JOG, JOG_STATUS
-from services.cli import keyboard as keys_of_terminal
-from services.cli.exits import CommandError, ExitCode
-from services.cli.jog import jog_by_hand, jog_for
-from services.cli.jog_commands import command_of
-from services.cli.jog_keys import FASTER, FIRST_SPEED, HELD, TOOL_SPEED, JogKeys
+from services.cli.errors import CommandError, ExitCode
+from services.cli.jog import command_of, jog_by_hand, jog_for
+from services.cli.jog_keys import FASTER, FIRST_SPEED, HELD, TOOL_SPEED, JogKeys, keyboard
 from services.cli.main import run
 from services.runtime.memory_bus import MemoryBus
 from services.runtime.node import Node
@@ -116,7 +114,7 @@ def test_the_terminal_is_as_it_was_whatever_ends_the_command(terminal, number):
     outer, inner = terminal
 
     def use_it() -> None:
-        with keys_of_terminal.keyboard() as typed:
+        with keyboard() as typed:
             assert not termios.tcgetattr(inner)[3] & termios.ICANON
             os.write(outer, b"w\x1b[A")
             assert typed() == "w\x1b[A"

@@ -13,9 +13,10 @@ import pytest
 from schemas.joints import JointState
 from schemas.planning import FkRequest, IkRequest, PoseGoal
 from schemas.topics import FK, IK
-from services.cli import session as session_module
-from services.cli.exits import ExitCode
+from services.cli import kinematics
+from services.cli.errors import ExitCode
 from services.cli.main import run
+from services.cli.session import load_robot
 from services.planner.kinematics.kinematic_requests import KinematicRequests
 from services.runtime.memory_bus import MemoryBus
 from services.runtime.node import Node
@@ -37,10 +38,10 @@ def asked(arm, network, deployment, session, monkeypatch: pytest.MonkeyPatch) ->
         return answers.fk(request, home)
 
     @contextmanager
-    def connect():
+    def connect(robot=None):
         yield session
 
-    monkeypatch.setattr(session_module, "connect", connect)
+    monkeypatch.setattr(kinematics, "connect", connect)
     with Node("planner", deployment, robot="rm1", bus=MemoryBus(network)) as node:
         node.serve(IK, ik)
         node.serve(FK, fk)
@@ -124,9 +125,6 @@ def test_what_cannot_be_understood_is_a_usage_error(line: str, capsys):
 
 
 def test_links_and_joints_can_be_completed():
-    from services.cli.kinematic_commands import COMMANDS
-
-    fk = next(command for command in COMMANDS if command.words == ("fk",))
-    words = fk.words_after()
+    words = kinematics.fk_choices(load_robot())
     assert "brazo_joint=" in words[""]
     assert "efector_link" in words["--links"]

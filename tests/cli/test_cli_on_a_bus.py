@@ -19,11 +19,11 @@ from schemas.device import (
 )
 from schemas.planning import JointGoal, NamedGoal, PlanRequest, PoseGoal
 from schemas.topics import JOINT_STATES, JOINT_TARGETS
-from services.cli import device, nodes, state, topics, traffic
-from services.cli.action_goal import send_goal
-from services.cli.exits import CommandError, ExitCode
-from services.cli.interrupt import Interrupt
+from services.cli import action, device, node, state, topic
+from services.cli.errors import CommandError, ExitCode
+from services.cli.messages import message_of
 from services.cli.move import move
+from services.cli.terminal import Interrupt
 from services.runtime.errors import NoAnswer
 
 READY = PlanRequest(goal=NamedGoal(name="ready"))
@@ -124,7 +124,7 @@ def test_nothing_heard_of_the_arm_is_no_stack(session, monkeypatch):
 
 
 def test_echo_prints_yaml_documents(session, stack, capsys):
-    assert traffic.echo(session, JOINT_STATES, 3, as_json=False) is ExitCode.OK
+    assert topic.echo(session, JOINT_STATES, 3, as_json=False) is ExitCode.OK
     *documents, rest = capsys.readouterr().out.split("---\n")
     assert len(documents) == 3
     assert rest == ""
@@ -132,20 +132,20 @@ def test_echo_prints_yaml_documents(session, stack, capsys):
 
 
 def test_hz_measures_the_rate(session, stack, capsys):
-    assert traffic.hz(session, JOINT_STATES, 1000, 1) is ExitCode.OK
+    assert topic.hz(session, JOINT_STATES, 1000, 1) is ExitCode.OK
     words = capsys.readouterr().out.split()
     assert words[:2] == ["average", "rate:"]
     assert 25.0 < float(words[2]) < 100.0
 
 
 def test_hz_of_silence_says_so(session, capsys):
-    assert traffic.hz(session, JOINT_STATES, 1000, 1) is ExitCode.OK
+    assert topic.hz(session, JOINT_STATES, 1000, 1) is ExitCode.OK
     assert capsys.readouterr().out == "no new messages on joint_states\n"
 
 
 def test_only_the_writer_of_a_topic_may_publish_on_it(session):
     with pytest.raises(CommandError, match="only stepper_gateway writes joint_states"):
-        traffic.publish(session, JOINT_STATES, JOINT_STATES.message(), None, 1)
+        topic.publish(session, JOINT_STATES, JOINT_STATES.message(), None, 1)
 
 
 def test_pub_stamps_what_has_no_stamp(session, network, deployment, capsys):
@@ -156,7 +156,7 @@ def test_pub_stamps_what_has_no_stamp(session, network, deployment, capsys):
     with Node("listener", deployment, robot="rm1", bus=MemoryBus(network)) as listener:
         listener.subscribe(JOINT_TARGETS, heard.append)
         message = JOINT_TARGETS.message(name=("brazo_joint",), position=(0.1,))
-        assert traffic.publish(session, JOINT_TARGETS, message, 50.0, 2) is ExitCode.OK
+        assert topic.publish(session, JOINT_TARGETS, message, 50.0, 2) is ExitCode.OK
         listener.wait(0.1)
     assert [each.position for each in heard][-1] == (0.1,)
     assert heard[-1].stamp > 0
@@ -192,20 +192,20 @@ def test_a_reference_says_where_the_joints_are_now(session, stack, capsys):
 
 
 def test_nodes_are_listed_without_the_command_itself(session, stack):
-    assert nodes.living(session) == ["planner", "stepper_gateway"]
-    assert "stepper_gateway  rm1" in nodes.listing(session)
-    assert "follow_joint_trajectory" in nodes.information(session, "stepper_gateway")
+    assert node.living(session) == ["planner", "stepper_gateway"]
+    assert "stepper_gateway  rm1" in node.listing(session)
+    assert "follow_joint_trajectory" in node.information(session, "stepper_gateway")
 
 
 def test_an_unknown_node_is_answered_with_the_nearest(session, stack):
     with pytest.raises(CommandError, match='did you mean "planner"'):
-        nodes.information(session, "planer")
+        node.information(session, "planer")
 
 
 def test_a_goal_can_be_sent_without_a_planner(session, gateway, capsys):
-    action = topics.action_of("follow_joint_trajectory")
-    goal = topics.message_of(action.goal, '{"trajectory": {"joint_names": ["brazo_joint"]}}')
-    assert send_goal(session, action, goal, with_feedback=True) is ExitCode.OK
+    row = action.action_of("follow_joint_trajectory")
+    goal = message_of(row.goal, '{"trajectory": {"joint_names": ["brazo_joint"]}}')
+    assert action.send_goal(session, row, goal, with_feedback=True) is ExitCode.OK
     text = capsys.readouterr().out
     assert text.startswith("accepted: goal ")
     assert "feedback:\n  stamp: 0" in text

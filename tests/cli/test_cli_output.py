@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from schemas.device import DeviceMode, DeviceState
 from schemas.joints import JointState
-from services.cli.columns import table
-from services.cli.rate import RateWindow
+from services.cli.text_table import table
+from services.cli.topic import RateWindow
 from services.cli.yaml import dump
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)

@@ -14,9 +14,9 @@ from schemas.planning import NamedGoal, PlanPhase, PlanProgress, PlanRequest
 from schemas.scene import SceneReplace, SceneRequest
 from schemas.topics import PLAN_PROGRESS, SCENE_EDIT
 from services.cli import planning
-from services.cli.exits import CommandError, ExitCode
-from services.cli.live import LiveBlock
+from services.cli.errors import CommandError, ExitCode
 from services.cli.move import move
+from services.cli.terminal import LiveBlock
 from services.planner.main import run
 from services.runtime.errors import NoAnswer
 from services.runtime.memory_bus import MemoryBus

@@ -23,9 +23,11 @@ from schemas.scene import (
     SphereShape,
 )
 from schemas.topics import JOINT_STATES, SCENE
-from services.cli import session as session_module
-from services.cli.exits import ExitCode
+from services.cli import scene as scene_module
+from services.cli.errors import ExitCode
 from services.cli.main import run
+from services.cli.scene import attach_choices, pair_choices
+from services.cli.session import load_robot
 from services.planner.scene.scene_keeper import SceneKeeper
 from services.runtime.memory_bus import MemoryBus
 from services.runtime.node import Node
@@ -39,10 +41,10 @@ def keeper(arm, network, deployment, session, monkeypatch, tmp_path) -> Iterator
     """A planner's scene on the same bus, with an arm at rest; the commands reach it."""
 
     @contextmanager
-    def connect():
+    def connect(robot=None):
         yield session
 
-    monkeypatch.setattr(session_module, "connect", connect)
+    monkeypatch.setattr(scene_module, "connect", connect)
     with Node("planner", deployment, robot="rm1", bus=MemoryBus(network)) as node:
         SceneKeeper(node, arm, node.latest(JOINT_STATES), tmp_path, lambda world: None)
         states = session.node.publisher(JOINT_STATES)
@@ -206,12 +208,11 @@ def test_a_file_that_is_no_scene_is_refused(tmp_path: Path, capsys):
 
 
 def test_completion_knows_the_kept_objects_and_the_links(monkeypatch, tmp_path):
-    from services.cli.scene_words import objects_and_links, pairs
-
     monkeypatch.setenv("GEMELO_PATHS_RUN", str(tmp_path))
-    assert objects_and_links() == {"": []}
+    robot = load_robot()
+    assert attach_choices(robot) == {"": []}
     (tmp_path / "scene.json").write_text('{"objects": [{"name": "cup"}, {"name": "two words"}]}')
-    words = objects_and_links()
+    words = attach_choices(robot)
     assert words[""] == ["cup"]
     assert "efector_link" in words["cup"]
-    assert "cup" in pairs()["efector_link"]
+    assert "cup" in pair_choices(robot)["efector_link"]

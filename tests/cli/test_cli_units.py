@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.cli.exits import CommandError, ExitCode
+from services.cli.errors import CommandError, ExitCode
 from services.cli.units import parse_joints, parse_value, show
 
 

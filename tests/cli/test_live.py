@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from services.cli.live import LiveBlock
+from services.cli.terminal import LiveBlock
 
 
 def screen(written: str) -> list[str]:

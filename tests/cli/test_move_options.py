@@ -18,16 +18,17 @@ from schemas.planning import (
 )
 from services.arm.description import load_arm
 from services.arm.transforms import from_rpy
-from services.cli.exits import CommandError
-from services.cli.main import parser
-from services.cli.move_options import EXAMPLES, request_from
+from services.cli.errors import CommandError
+from services.cli.main import parse
+from services.cli.move import EXAMPLES
 from services.cli.move_report import MoveReport, summary
+from services.cli.move_request import request_from
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 
 
 def request(words: str) -> PlanRequest:
-    return request_from(parser().parse_args(["move", *words.split()]), ARM)
+    return request_from(parse(["move", *words.split()]), ARM)
 
 
 def test_without_a_way_any_will_do():
@@ -100,7 +101,7 @@ def test_what_does_not_go_together_is_refused_by_name(words: str, said: str):
 )
 def test_two_ways_at_once_and_what_is_no_number_end_with_two(words: str):
     with pytest.raises(SystemExit) as ended:
-        parser().parse_args(["move", *words.split()])
+        parse(["move", *words.split()])
     assert ended.value.code == 2
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from services.cli import provision as module
 from services.cli.credentials import Credentials, certificate, password, require_sound
-from services.cli.exits import CommandError, ExitCode
+from services.cli.errors import CommandError, ExitCode
 from services.cli.main import run
 from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
 
@@ -69,8 +69,8 @@ def line():
 def quick(monkeypatch):
     for name, value in (("PATIENCE", 0.5), ("AGAIN", 0.1), ("TO_RESTART", 0.5)):
         monkeypatch.setattr(module, name, value)
-    monkeypatch.setattr(module.Conversation.tell, "__defaults__", (0.5,))
-    monkeypatch.setattr(module.Conversation.meet, "__defaults__", (0.5,))
+    monkeypatch.setattr(module.Exchange.send, "__defaults__", (0.5,))
+    monkeypatch.setattr(module.Exchange.status, "__defaults__", (0.5,))
 
 
 def test_a_board_is_told_what_is_given_and_nothing_else(line, monkeypatch, capsys):
@@ -123,8 +123,8 @@ def test_a_factory_reset_asks_first_and_then_says_only_that(line, capsys, monkey
 
 
 def test_no_option_takes_a_password():
+    from services.cli.commands import COMMANDS
     from services.cli.completion import options_of
-    from services.cli.device_commands import COMMANDS
 
     (command,) = [each for each in COMMANDS if each.words == ("device", "provision")]
     assert [option for option in options_of(command) if "pass" in option] == []

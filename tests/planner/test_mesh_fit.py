@@ -17,7 +17,7 @@ from services.arm.errors import DescriptionError
 from services.arm.kinematics import Kinematics
 from services.arm.srdf_edit import with_pairs
 from services.arm.urdf_edit import with_collisions
-from services.cli.collision import plan_of
+from services.cli.robot_folder import plan_of
 from services.collision_fitting.fit_writing import touching_states, write_fits
 from services.collision_fitting.fitted_shape import Fitted, Kind
 from services.collision_fitting.fitting import fitted

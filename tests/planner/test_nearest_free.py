@@ -12,7 +12,7 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import NamedGoal, PlanCode, PlanRequest
 from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.cli.jog_commands import command_of
+from services.cli.jog import command_of
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.world import World
 from services.planner.core import Planner

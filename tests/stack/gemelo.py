@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from services.cli.exits import ExitCode
+from services.cli.errors import ExitCode
 from services.stack.stack import Stack
 
 LONGEST = 120.0  # [s] of one command

@@ -12,7 +12,7 @@ import pytest
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceMode
 from schemas.topics import DEVICE_SHAFT
-from services.cli.exits import ExitCode
+from services.cli.errors import ExitCode
 from tests.stack import gemelo as command
 
 NEAR_ITS_SWITCHES = ("brazo_joint=-2.9", "antebrazo_joint=-2.9", "efector_joint=0.19")  # a homing is short from there

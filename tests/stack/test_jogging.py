@@ -13,7 +13,7 @@ from schemas.joints import JointState
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.planning import NamedGoal, PlanCode, PlanRequest
 from schemas.topics import PLAN, STEP_ERRORS
-from services.cli.exits import ExitCode
+from services.cli.errors import ExitCode
 from tests.stack.gemelo import COMMAND, gemelo
 from tests.stack.person import jumps
 from tests.stack.typist import Typist

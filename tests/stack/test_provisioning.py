@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from services.cli.exits import ExitCode
+from services.cli.errors import ExitCode
 from services.stack.stack import Stack
 from tests.optional import need
 from tests.stack.gemelo import gemelo

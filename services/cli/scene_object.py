@@ -1,4 +1,4 @@
-"""The words of a `gemelo scene` line as an object: sizes, places and turns with their units."""
+"""The options of `gemelo scene` turned into a scene object: shape, pose and frame, in SI units."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from schemas.frames import Transform
 from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, Shape, SphereShape
 from services.arm.transforms import from_rpy
-from services.cli.exits import usage
+from services.cli.errors import usage
 from services.cli.parser import Options
 from services.cli.units import parse_value
 from services.runtime.deployment import project_root
@@ -19,7 +19,7 @@ LARGEST_MESH = 10.0  # [m]; what is larger was drawn in mm
 
 
 def object_of(options: Options) -> SceneObject:
-    """The object that a line of `scene add` describes."""
+    """The object that the options of `scene add` describe."""
     link = options.attach or ""
     return SceneObject(
         name=options.name,
@@ -33,7 +33,7 @@ def object_of(options: Options) -> SceneObject:
 
 
 def shape_of(options: Options) -> Shape:
-    """The one shape that is given."""
+    """The shape that the options give; raises `CommandError` for a mesh that cannot be."""
     if options.box is not None:
         return BoxShape(size=lengths(options.box, "--box"))
     if options.sphere is not None:
@@ -47,7 +47,10 @@ def shape_of(options: Options) -> Shape:
 
 
 def mesh_of(path: Path, scale: float) -> MeshShape:
-    """By its path where it lies in the project, as every process finds it there; else by its content."""
+    """The mesh of an STL file: by path inside the project, where every process finds it, else by content.
+
+    `scale` is [m] for each unit of the file. Raises `CommandError` if the file cannot be read or is far too large.
+    """
     if not path.is_file():
         raise usage(f'there is no file "{path}"')
     _require_size(path, scale)
@@ -61,7 +64,7 @@ def mesh_of(path: Path, scale: float) -> MeshShape:
 
 
 def _require_size(path: Path, scale: float) -> None:
-    """Refuses what is far too large; what is no mesh at all the planner says."""
+    """Raises `CommandError` for a mesh longer than `LARGEST_MESH`; the planner refuses files that are no mesh."""
     from services.arm.stl import BadMesh, read_stl
 
     try:
@@ -74,7 +77,7 @@ def _require_size(path: Path, scale: float) -> None:
 
 
 def pose_of(at: Sequence[str], rpy: Sequence[str]) -> Transform:
-    """Position and roll, pitch, yaw about the frame's fixed axes."""
+    """The pose of a position and of roll, pitch, yaw about the frame's fixed axes."""
     x, y, z = lengths(at, "--at")
     return Transform(translation=(x, y, z), rotation=from_rpy(*(angle(text) for text in rpy)))
 

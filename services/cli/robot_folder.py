@@ -1,4 +1,4 @@
-"""`gemelo collision`: the shapes and spheres of a robot's links, and the pairs of links that need no check."""
+"""`gemelo check` and `gemelo collision`: a robot's folder, its collision shapes and its allowed pairs of links."""
 
 from __future__ import annotations
 
@@ -8,13 +8,76 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from services.cli.columns import table
-from services.cli.exits import CommandError, ExitCode, usage
+from services.cli.errors import CommandError, ExitCode, usage
+from services.cli.parser import Options, Parser, positive_integer, positive_number
+from services.cli.text_table import table
 
 if TYPE_CHECKING:
     from services.arm.collision_matrix import Verdict
 
 FIT = "services.collision_fitting.main"  # in a process of its own: the command line loads no planner
+FIT_EXAMPLES = """examples:
+  gemelo collision fit urdf/parol6
+  gemelo collision fit urdf/my_arm --meshes
+  gemelo collision fit urdf/my_arm --meshes --link forearm --most 3 --write"""
+
+
+def folder_option(parser: Parser) -> None:
+    """Adds the folder."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="a robot's folder, as urdf/rm1")
+
+
+def run_check(options: Options) -> ExitCode:
+    """Checks a robot's folder."""
+    return print_findings(options.folder)
+
+
+def print_findings(folder: Path) -> ExitCode:
+    """Prints every finding; FAILED if one of them is an error."""
+    from services.arm.check import Severity
+    from services.arm.check import check as findings_in
+
+    findings = findings_in(folder)
+    for finding in findings:
+        print(finding)
+    errors = sum(finding.severity is Severity.ERROR for finding in findings)
+    print(f"{folder}: {errors} errors, {len(findings) - errors} warnings" if findings else f"{folder}: all is well")
+    return ExitCode.FAILED if errors else ExitCode.OK
+
+
+def fit_options(parser: Parser) -> None:
+    """Adds folder, bulge and what --meshes takes."""
+    parser.epilog = FIT_EXAMPLES
+    folder_option(parser)
+    parser.add_argument(
+        "--bulge", type=positive_number, default=5.0, metavar="MM", help="that a sphere may reach beyond its link"
+    )
+    parser.add_argument("--meshes", action="store_true", help="fit boxes, cylinders, plates, capsules and balls")
+    parser.add_argument(
+        "--most", type=positive_integer, default=6, metavar="N", help="shapes for a link, with --meshes"
+    )
+    parser.add_argument("--link", nargs="+", default=[], metavar="LINK", help="fit to these alone; the others stay")
+    parser.add_argument("--write", action="store_true", help="replace the links' <collision> elements; the rest stays")
+
+
+def run_fit(options: Options) -> ExitCode:
+    """Fits spheres or shapes."""
+    if options.meshes:
+        return shapes(options.folder, options.most, options.link, options.write)
+    if options.write or options.link:
+        raise usage("--write and --link go with --meshes: spheres are the core's own and stand in no file")
+    return spheres(options.folder, options.bulge)
+
+
+def matrix_options(parser: Parser) -> None:
+    """Adds folder and --write."""
+    folder_option(parser)
+    parser.add_argument("--write", action="store_true", help="change the SRDF; its comments stay")
+
+
+def run_matrix(options: Options) -> ExitCode:
+    """Prints and writes the pairs."""
+    return print_matrix(options.folder, options.write)
 
 
 def spheres(folder: Path, bulge: float) -> ExitCode:
@@ -23,7 +86,7 @@ def spheres(folder: Path, bulge: float) -> ExitCode:
 
 
 def shapes(folder: Path, most: int, links: Sequence[str], write: bool) -> ExitCode:
-    """Prints what fits the links' meshes, with at most so many shapes each; writes it into the URDF with `write`."""
+    """Prints the shapes that fit the links' meshes, at most `most` for each; writes them into the URDF if `write`."""
     only = [f"--link={link}" for link in links]
     return _fitted(folder, "--meshes", f"--most={most}", *only, *(["--write"] if write else []))
 
@@ -33,8 +96,8 @@ def _fitted(folder: Path, *options: str) -> ExitCode:
     return ExitCode.OK if ended.returncode == 0 else ExitCode.FAILED
 
 
-def matrix(folder: Path, write: bool) -> ExitCode:
-    """Prints what sampling finds and what that changes in the SRDF; changes it with `write`."""
+def print_matrix(folder: Path, write: bool) -> ExitCode:
+    """Prints the pairs that sampling finds and the changes of the SRDF; changes it if `write`."""
     from services.arm.collision_matrix import collision_matrix
     from services.arm.description import load_arm
     from services.arm.srdf_edit import with_pairs
@@ -57,7 +120,7 @@ def matrix(folder: Path, write: bool) -> ExitCode:
 
 
 def plan_of(text: str, verdicts: list[Verdict]) -> tuple[dict[tuple[str, str], str], list[str]]:
-    """The pairs that the SRDF is to have with their reasons, and each change in words; a person's reasons stay."""
+    """The pairs that the SRDF is to have with their reasons, and each change as a line; a person's reasons stay."""
     from services.arm.collision_matrix import Reason
     from services.arm.srdf_edit import entries
 
@@ -88,7 +151,7 @@ def _why(verdict: Verdict | None) -> str:
 
 
 def listing(verdicts: list[Verdict]) -> str:
-    """A table of all pairs."""
+    """A table of all pairs, distances in [mm]."""
     rows = [
         (
             *verdict.pair,

@@ -1,0 +1,117 @@
+"""`gemelo action`: the table of actions, and sending a goal without a planner."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from schemas.actions import GoalStatusCode
+from schemas.message import Message
+from schemas.topics import ACTIONS, Action
+from services.cli.errors import CommandError, ExitCode, unknown, usage
+from services.cli.messages import fields_of, message_of
+from services.cli.move import LONGEST_HOLD, cancel_once
+from services.cli.parser import Choices, Options, Parser
+from services.cli.session import Robot, Session, connect
+from services.cli.terminal import two_stage_interrupt
+from services.cli.text_table import table
+from services.cli.yaml import dump
+from services.runtime.errors import GoalRefused
+
+
+def run_list(options: Options) -> ExitCode:
+    """Prints the table of actions."""
+    print(listing())
+    return ExitCode.OK
+
+
+def action_option(parser: Parser) -> None:
+    """Adds the action."""
+    parser.add_argument("action", metavar="ACTION", help="a key of `gemelo action list`")
+
+
+def run_info(options: Options) -> ExitCode:
+    """Prints one action."""
+    print(information(action_of(options.action)), end="")
+    return ExitCode.OK
+
+
+def goal_options(parser: Parser) -> None:
+    """Adds action, goal and --feedback."""
+    action_option(parser)
+    parser.add_argument("goal", metavar="GOAL", help="the goal as JSON, a file that holds it, or - for standard input")
+    parser.add_argument("-f", "--feedback", action="store_true", help="show the feedback")
+
+
+def run_send_goal(options: Options) -> ExitCode:
+    """Sends a goal and waits for its result."""
+    action = action_of(options.action)
+    goal = message_of(action.goal, goal_text(options.goal))
+    with connect() as session:
+        return send_goal(session, action, goal, options.feedback)
+
+
+def choices(robot: Robot | None) -> Choices:
+    """The actions."""
+    return {"": [action.key for action in ACTIONS]}
+
+
+def listing() -> str:
+    """The table of all actions."""
+    rows = [(a.key, a.goal.__name__, a.feedback.__name__, a.result.__name__, a.server, a.about) for a in ACTIONS]
+    return table(("action", "goal", "feedback", "result", "server", "about"), rows)
+
+
+def action_of(name: str) -> Action[Message, Message, Message]:
+    """The action of that name; raises `CommandError` with the nearest name."""
+    for action in ACTIONS:
+        if action.key == name.strip("/"):
+            return action
+    raise unknown("action", name, [action.key for action in ACTIONS])
+
+
+def information(action: Action[Message, Message, Message]) -> str:
+    """One action and the fields of its three messages as YAML."""
+    parts = {"goal": action.goal, "feedback": action.feedback, "result": action.result}
+    fields = {part: {"message": kind.__name__, "fields": fields_of(kind)} for part, kind in parts.items()}
+    return dump({"action": action.key, "about": action.about, "server": action.server, **fields})
+
+
+def goal_text(source: str) -> str:
+    """The goal's JSON: `source` itself, standard input for `-`, or the content of the file of that name."""
+    if source.lstrip().startswith("{"):
+        return source
+    try:
+        if source == "-":
+            return sys.stdin.read()
+        with open(source, encoding="utf-8") as file:
+            return file.read()
+    except (OSError, UnicodeDecodeError) as error:
+        raise usage(f"cannot read the goal: {error}") from error
+
+
+def send_goal(
+    session: Session, action: Action[Message, Message, Message], goal: Message, with_feedback: bool
+) -> ExitCode:
+    """Sends the goal and waits for its result; Ctrl-C cancels."""
+    client = session.node.action(action)
+
+    def on_feedback(feedback: Any) -> None:
+        print(f"feedback:\n{indented(feedback)}---", flush=True)
+
+    with two_stage_interrupt() as interrupt:
+        try:
+            handle = client.send(goal, on_feedback=on_feedback if with_feedback else None)
+        except GoalRefused as error:
+            raise CommandError(f"refused by {action.server}: {error}") from error
+        print(f"accepted: goal {handle.goal_id}", flush=True)
+        outcome = handle.wait(LONGEST_HOLD, on_tick=lambda: cancel_once(handle, interrupt, quiet=False))
+    print(f"result: {outcome.status.name}\n{indented(outcome.result) if outcome.result else ''}", end="")
+    if outcome.status is GoalStatusCode.SUCCEEDED:
+        return ExitCode.OK
+    return ExitCode.CANCELLED if interrupt.is_set else ExitCode.FAILED
+
+
+def indented(message: Message) -> str:
+    """The message as YAML, indented."""
+    return "".join(f"  {line}\n" for line in dump(message).splitlines())

@@ -1,0 +1,163 @@
+"""The options of `gemelo move` turned into the planner's request, and a refusal turned back into options."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from msgspec.structs import asdict, replace
+
+from schemas.planning import (
+    CircularMotion,
+    FreeMotion,
+    Goal,
+    JointGoal,
+    LinearMotion,
+    Motion,
+    NamedGoal,
+    PlanRequest,
+    PointToPoint,
+    PoseGoal,
+    Refusal,
+    Timing,
+    WaypointGoal,
+)
+from services.arm.transforms import from_rpy
+from services.cli.errors import unknown, usage
+from services.cli.parser import Options
+from services.cli.units import SHOWN, parse_joints
+
+if TYPE_CHECKING:
+    from services.arm.description import Arm
+
+LONGEST_TIME = 3600.0  # [s] that planning may be allowed
+ORIENTATION = ("quaternion", "rpy", "axis", "along", "free_axis")
+TOOL_MOTION = ("tool_speed", "tool_acceleration", "fraction", "max_step", "jump")
+
+
+def request_from(options: Options, arm: Arm) -> PlanRequest:
+    """The request in SI units; raises `CommandError` naming options that do not go together."""
+    goal = goal_of(arm, options.to, options.joints or (), options.named)
+    request = request_of(_with_waypoints(_with_orientation(goal, options), options), options.speed)
+    if not 0.0 < options.time <= LONGEST_TIME:
+        raise usage(f"--time {options.time:g} is not in (0, 3600]")
+    timing = Timing.TIME_OPTIMAL if options.time_optimal else Timing.JERK_LIMITED
+    return replace(request, motion=motion_of(options), allowed_time=options.time, timing=timing)
+
+
+def goal_of(arm: Arm, to: Sequence[float] | None, joints: Sequence[str], named: str | None) -> Goal:
+    """The goal: exactly one of a tool position (3,) [m], joint assignments, and a named state."""
+    given = [bool(to), bool(joints), named is not None]
+    if sum(given) != 1:
+        raise usage("say where to: one of --to X Y Z, --joints name=30deg ..., --named state")
+    if to:
+        return PoseGoal(position=tuple(to))
+    if joints:
+        values = parse_joints(joints, arm.joints)
+        return JointGoal(name=tuple(values), position=tuple(values.values()))
+    assert named is not None
+    if named not in arm.state_names:
+        raise unknown("named state", named, arm.state_names)
+    return NamedGoal(name=named)
+
+
+def request_of(goal: Goal, speed: float) -> PlanRequest:
+    """A request at `speed`, the share of the velocity limits in (0, 1]."""
+    if not 0.0 < speed <= 1.0:
+        raise usage(f"--speed {speed:g} is not in (0, 1]")
+    return PlanRequest(goal=goal, velocity_scaling=speed)
+
+
+def motion_of(options: Options) -> Motion:
+    """The kind of motion that the options name; raises `CommandError` for an option of another kind."""
+    is_arc = options.arc is not None or options.center is not None
+    is_tool = options.line or is_arc
+    _require(is_tool, options, TOOL_MOTION, "--line, --arc or --center")
+    _require(not is_tool and not options.ptp, options, ("planner", "seed"), "a free motion")
+    if is_tool:
+        line = LinearMotion(
+            speed=_metres(options, "tool_speed"),
+            acceleration=_metres(options, "tool_acceleration"),
+            max_step=_metres(options, "max_step"),
+            jump_threshold=options.jump or 0.0,
+            least_fraction=1.0 if options.fraction is None else options.fraction,
+        )
+        if options.line:
+            return line
+        return CircularMotion(interim=tuple(options.arc or ()), center=tuple(options.center or ()), **asdict(line))
+    if options.ptp:
+        return PointToPoint()
+    return FreeMotion(planner_id=options.planner or "", seed=options.seed or 0)
+
+
+def _with_orientation(goal: Goal, options: Options) -> Goal:
+    _require(isinstance(goal, PoseGoal), options, ORIENTATION, "--to")
+    if not isinstance(goal, PoseGoal):
+        return goal
+    orientation = tuple(options.quaternion or ())
+    if options.rpy is not None:
+        orientation = from_rpy(*options.rpy)
+    axis = tuple(options.axis or ((0.0, 0.0, 1.0) if options.along else ()))
+    return replace(
+        goal,
+        orientation=orientation,
+        frame=options.frame,
+        free_axis=tuple(options.free_axis or ()),
+        tool_axis=axis,
+        direction=tuple(options.along or ()),
+    )
+
+
+def _with_waypoints(goal: Goal, options: Options) -> Goal:
+    """The goal after the points of --via, which get its orientation."""
+    _require(bool(options.via), options, ("blend",), "--via")
+    if not options.via:
+        return goal
+    if options.arc is not None or options.center is not None:
+        raise usage("--via does not go with --arc or --center: an arc has one goal")
+    assert not isinstance(goal, WaypointGoal)
+    like: PoseGoal = goal if isinstance(goal, PoseGoal) else PoseGoal()
+    points = tuple(replace(like, position=tuple(point)) for point in options.via)
+    return WaypointGoal(points=(*points, goal), blend=_metres(options, "blend"))
+
+
+def _metres(options: Options, name: str) -> float:
+    """From [mm]; 0 where it is not given, and refused where it is not above 0."""
+    value: float | None = getattr(options, name)
+    if value is None:
+        return 0.0
+    if value <= 0.0:
+        raise usage(f"--{name.replace('_', '-')} {value:g} is not above 0")
+    return value / 1000.0
+
+
+def _require(holds: bool, options: Options, names: tuple[str, ...], needed: str) -> None:
+    for name in names:
+        if not holds and getattr(options, name) is not None:
+            raise usage(f"--{name.replace('_', '-')} goes with {needed} only")
+
+
+def refusal_text(refusal: Refusal, goal: Goal, arm: Arm) -> str:
+    """One sentence: the reason, and the nearest goal that can be reached as options, else the remedy."""
+    text = f"refused ({refusal.check}): {refusal.message}" if refusal.check else f"refused: {refusal.message}"
+    if refusal.nearest:
+        return f"{text}; nearest that can: {as_typed(goal, refusal.nearest, arm)}"
+    return f"{text}; {refusal.remedy}" if refusal.remedy else text
+
+
+def as_typed(goal: Goal, values: Sequence[float], arm: Arm) -> str:
+    """`values` [m, rad] in the form of `goal`, as options of `gemelo move`."""
+    if isinstance(goal, PoseGoal):
+        turn = f" {'--along' if goal.tool_axis else '--quaternion'} {_numbers(values[3:], 6)}" if values[3:] else ""
+        return f"--to {_numbers(values[:3], 4)}{turn}"
+    names = goal.name if isinstance(goal, JointGoal) and len(goal.name) == len(values) else arm.joint_names
+    return "--joints " + " ".join(_assignment(arm, name, value) for name, value in zip(names, values, strict=False))
+
+
+def _numbers(values: Sequence[float], digits: int) -> str:
+    return " ".join(f"{value:.{digits}f}" for value in values)
+
+
+def _assignment(arm: Arm, name: str, value: float) -> str:
+    shown, factor = SHOWN[arm.joint(name).unit]
+    return f"{name}={value * factor:.6g}{shown}"

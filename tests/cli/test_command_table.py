@@ -1,0 +1,85 @@
+"""The table of commands: every name in it resolves, nothing else is loaded, and the arm's files are read once."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+
+import pytest
+
+from services.arm import description
+from services.cli.commands import COMMANDS, GROUPS
+from services.cli.errors import ExitCode
+from services.cli.main import parse, run
+
+SPEAKING = (
+    "move --named ready", "state", "hold", "reference --joints brazo_joint=0", "home brazo_joint", "output avanzar on",
+    "sensors", "speed 0", "jog --joint brazo_joint=0 --for 1", "ik --to 0.2 0.1 0.1", "fk brazo_joint=0",
+    "device status", "device monitor", "device config", "device arm", "device press estop", "topic echo log",
+    "topic hz log", "request call plan", "scene list", "node list", "param list", "log",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: " ".join(command.words))
+def test_every_function_of_the_table_takes_one_argument(command):
+    for name in ("run", "add_options", "choices"):
+        if getattr(command, name):
+            assert len(inspect.signature(command.load(name)).parameters) == 1, getattr(command, name)
+
+
+def test_every_group_of_the_table_has_its_line_of_help():
+    assert {command.words[0] for command in COMMANDS if len(command.words) > 1} == set(GROUPS)
+
+
+@pytest.mark.parametrize("command", [each for each in COMMANDS if each.example], ids=lambda each: each.example)
+def test_every_example_of_the_table_can_be_typed(command):
+    options = parse(command.example.split()[1:])
+    assert options.command is command
+
+
+@pytest.mark.parametrize("line", SPEAKING)
+def test_the_arms_files_are_read_once_for_a_command(line, monkeypatch, capsys):
+    read = []
+    load_arm = description.load_arm
+    monkeypatch.setattr(description, "load_arm", lambda folder: read.append(folder) or load_arm(folder))
+    monkeypatch.setenv("GEMELO_ROUTER_PORT", "1")
+    assert run(line.split()) is ExitCode.NO_STACK
+    assert len(read) == 1
+    assert "no router" in capsys.readouterr().err
+
+
+def test_completion_reads_the_arms_files_once_and_knows_its_names(monkeypatch, capsys):
+    read = []
+    load_arm = description.load_arm
+    monkeypatch.setattr(description, "load_arm", lambda folder: read.append(folder) or load_arm(folder))
+    assert run(["completion"]) is ExitCode.OK
+    assert len(read) == 1
+    assert '"output avanzar") words="on off"' in capsys.readouterr().out
+
+
+def test_a_robot_that_cannot_be_read_still_completes_the_commands(monkeypatch, capsys):
+    monkeypatch.setenv("GEMELO_ROBOT", "urdf/nobody")
+    assert run(["completion"]) is ExitCode.OK
+    printed = capsys.readouterr().out
+    assert '"device press") words="estop release' in printed
+    assert '"move") words="--to --joints' in printed
+    assert "brazo_joint" not in printed
+
+
+@pytest.mark.parametrize(
+    ("line", "absent"),
+    [
+        (["--help"], ("msgspec", "numpy", "zenoh", "services.cli.move", "services.cli.topic")),
+        (["topic", "list"], ("numpy", "zenoh", "services.arm.description", "services.cli.move")),
+        (["move", "--help"], ("numpy", "zenoh", "rich", "services.cli.jog")),
+    ],
+)
+def test_a_command_loads_nothing_that_it_does_not_use(line, absent):
+    program = (
+        "import sys\nfrom services.cli.main import run\n"
+        f"try:\n    run({line!r})\nexcept SystemExit:\n    pass\nprint(*sys.modules, file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True)
+    assert done.stdout.strip()
+    assert not set(absent) & set(done.stderr.split())
