@@ -32,7 +32,7 @@ COMMANDS = (
             "device:run_output", "device:output_options", "gemelo output avanzar on", "device:output_choices"),
     Command(("sensors",), "what the device's sensors read", "device_status:run_sensors", JSON, "gemelo sensors --json"),
     Command(("speed",), "how fast the device plays every path from now on; 0 lets it stand on it",
-            "device:run_speed", "device:speed_options", "gemelo speed 50"),
+            "device:run_speed", "device:speed_options", "gemelo speed 50%"),
     Command(("jog",), "move by hand, with keys or for a given time; letting go stops the arm",
             "jog:run", "jog:add_options", choices="jog:choices"),
     Command(("ik",), "joint values for a tool pose; nothing moves",

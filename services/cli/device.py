@@ -20,10 +20,10 @@ from schemas.device import (
 )
 from schemas.topics import DEVICE_COMMAND, DEVICE_STOP
 from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.parser import Choices, Options, Parser, finite_number
+from services.cli.parser import Choices, Options, Parser
 from services.cli.robot_names import require_name
 from services.cli.session import Robot, Session, connect, load_robot
-from services.cli.units import parse_joints, show
+from services.cli.units import parse_joints, share, show
 
 if TYPE_CHECKING:
     from services.arm.description import Arm
@@ -87,20 +87,16 @@ def output_choices(robot: Robot | None) -> Choices:
     return {"": names, **dict.fromkeys(names, ("on", "off"))}
 
 
-def percent(text: str) -> float:
-    return finite_number(text.removesuffix("%"))
-
-
 def speed_options(parser: Parser) -> None:
     """Adds the speed."""
-    parser.add_argument("percent", metavar="PERCENT", type=percent, help="of the planned speed, 0 to 100")
+    parser.add_argument("share", metavar="SHARE", type=share, help="of the planned speed, 0%% to 100%%")
 
 
 def run_speed(options: Options) -> ExitCode:
     """Sets the speed; one that is out of range is refused before the stack is asked."""
-    share_of(options.percent)
+    require_share(options.share)
     with connect() as session:
-        return speed(session, options.percent)
+        return speed(session, options.share)
 
 
 def command(session: Session, name: str) -> ExitCode:
@@ -139,17 +135,16 @@ def output(session: Session, name: str, is_on: bool) -> ExitCode:
     )
 
 
-def speed(session: Session, percent: float) -> ExitCode:
-    """Sets how fast the device plays every path from now on [%]."""
-    request = SpeedCommand(scale=share_of(percent))
-    return _send(session, request, f"speed {percent:g} %")
+def speed(session: Session, scale: float) -> ExitCode:
+    """Sets how fast the device plays every path from now on: the time scale, 0 to 1."""
+    return _send(session, SpeedCommand(scale=require_share(scale)), f"speed {100.0 * scale:g} %")
 
 
-def share_of(percent: float) -> float:
-    """The time scale, 0 to 1; raises `CommandError` outside of 0 to 100 %."""
-    if not 0.0 <= percent <= 100.0:
-        raise usage(f"a speed of {percent:g} % is not in 0 to 100: the planner's own speed is 100")
-    return percent / 100.0
+def require_share(scale: float) -> float:
+    """Returns the time scale; raises `CommandError` outside of 0 to 1."""
+    if not 0.0 <= scale <= 1.0:
+        raise usage(f"a speed of {100.0 * scale:g}% is not in 0% to 100%: the planner's own speed is 100%")
+    return scale
 
 
 def ask(session: Session, wanted: DeviceCommand | StopKind, what: str = "") -> DeviceCommandResponse:

@@ -14,6 +14,7 @@ from services.cli.errors import CommandError, ExitCode, unknown, usage
 from services.cli.parser import Choices, Options, Parser
 from services.cli.robot_names import joint_of, require_name
 from services.cli.session import Robot, Session, connect, load_robot
+from services.cli.units import TIME, parse_quantity
 
 if TYPE_CHECKING:
     from services.arm.description import Arm
@@ -100,7 +101,7 @@ def number(text: str, what: str) -> float:
 
 def seconds(text: str) -> float:
     """A time [s] that is not negative; raises `CommandError` otherwise."""
-    value = number(text, "s")
+    value = parse_quantity(text, TIME)
     if value < 0.0:
         raise usage(f"{text} s is negative")
     return value
@@ -139,8 +140,8 @@ PRESSES = {
     "switch": Press(("INPUT", "on|off|auto"), "hold a switch pressed, or open, or leave it to the arm", _switch),
     "sensor": Press(("SENSOR", "VALUE"), "give a sensor its reading", _sensor),
     "reboot": Press((), "restart the device", lambda arm, rest: PressRequest(press=PressKind.REBOOT)),
-    "offline": Press(("SECONDS",), "take its network away for so long", _timed(PressKind.OFFLINE)),
-    "freeze": Press(("SECONDS",), "let its path task hang for so long", _timed(PressKind.FREEZE)),
+    "offline": Press(("TIME",), "take its network away for so long", _timed(PressKind.OFFLINE)),
+    "freeze": Press(("TIME",), "let its path task hang for so long", _timed(PressKind.FREEZE)),
     "drift": Press(
         ("PPM",),
         "make its clock fast by so many parts per million",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -14,10 +13,11 @@ from schemas.planning import JogCommand, JogLimit, JogStatus
 from schemas.topics import JOG, JOG_STATUS, JOINT_STATES
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.jog_keys import JogKeys, keyboard, require_terminal
-from services.cli.parser import Choices, Options, Parser, finite_number, positive_number
+from services.cli.parser import Choices, Options, Parser
+from services.cli.request_text import degrees, joints_text, millimetres
 from services.cli.session import Robot, Session, connect, load_robot
 from services.cli.terminal import LiveBlock, two_stage_interrupt
-from services.cli.units import parse_joints, show
+from services.cli.units import SPEED_OF, angular_speed, parse_joints, positive_seconds, show, speed
 
 if TYPE_CHECKING:
     from services.arm.description import Arm
@@ -39,7 +39,8 @@ It slows down before joint limits, singularities and obstacles, and says which.
 examples:
   gemelo jog                                              # with the keys
   gemelo jog --joint brazo_joint=10deg/s --for 0.5
-  gemelo jog --twist 0.05 0 0 --frame tool --for 1        # 50 mm/s along the tool's x"""
+  gemelo jog --twist 50mm/s 0 0 --frame tool --for 1      # along the tool's x
+  gemelo jog --turn 0 0 10deg/s --for 500ms"""
 
 
 def add_options(parser: Parser) -> None:
@@ -48,17 +49,9 @@ def add_options(parser: Parser) -> None:
     parser.add_argument(
         "--joint", nargs="+", default=[], metavar="JOINT=SPEED", help="10deg/s, 0.2rad/s, 5mm/s; several move together"
     )
-    parser.add_argument(
-        "--twist", nargs=3, type=finite_number, default=[], metavar=("VX", "VY", "VZ"), help="speed of the tool [m/s]"
-    )
-    parser.add_argument(
-        "--turn",
-        nargs=3,
-        type=finite_number,
-        default=[],
-        metavar=("WX", "WY", "WZ"),
-        help="at which the tool turns [deg/s]",
-    )
+    twist, turn = "of the tool, as 50mm/s or 0.05", "at which the tool turns, as 10deg/s or 0.2rad/s"
+    parser.add_argument("--twist", nargs=3, type=speed, default=[], metavar=("VX", "VY", "VZ"), help=twist)
+    parser.add_argument("--turn", nargs=3, type=angular_speed, default=[], metavar=("WX", "WY", "WZ"), help=turn)
     parser.add_argument(
         "--frame",
         choices=("base", "tool"),
@@ -68,9 +61,9 @@ def add_options(parser: Parser) -> None:
     parser.add_argument(
         "--for",
         dest="seconds",
-        type=positive_number,
-        metavar="SECONDS",
-        help="how long it moves with --joint, --twist or --turn",
+        type=positive_seconds,
+        metavar="TIME",
+        help="how long it moves with --joint, --twist or --turn, as 1 or 500ms",
     )
 
 
@@ -85,6 +78,7 @@ def run(options: Options) -> ExitCode:
         raise usage("give --joint or --twist and --for so many seconds, or none of them to move with the keys")
     robot = load_robot()
     command = command_of(robot.arm, options.joint, options.twist, options.turn, options.frame == "tool")
+    print(f"understood: {command_text(command, robot.arm)} for {options.seconds:g} s", flush=True)
     with connect(robot) as session:
         return jog_for(session, command, options.seconds)
 
@@ -97,14 +91,25 @@ def choices(robot: Robot | None) -> Choices:
 def command_of(
     arm: Arm, joints: Sequence[str], twist: Sequence[float], turn: Sequence[float], in_tool: bool
 ) -> JogCommand:
-    """The command in SI units: speeds of joints, or a twist of the tool in its own frame if `in_tool`."""
+    """The command for joint speeds as text, or for a twist of the tool along its own axes if `in_tool`.
+
+    `twist` (3,) is in [m/s], `turn` (3,) in [rad/s]. Raises `CommandError` if both forms are given.
+    """
     if joints and (twist or turn):
         raise usage("--joint and a twist exclude one another")
     if joints:
-        speeds = parse_joints([text.removesuffix("/s") for text in joints], arm.joints)
+        speeds = parse_joints(joints, arm.joints, SPEED_OF)
         return JogCommand(name=tuple(speeds), velocity=tuple(speeds.values()))
-    angular = tuple(math.radians(value) for value in turn)
-    return JogCommand(linear=tuple(twist), angular=angular, frame=arm.tool_frame if in_tool else "")
+    return JogCommand(linear=tuple(twist), angular=tuple(turn), frame=arm.tool_frame if in_tool else "")
+
+
+def command_text(command: JogCommand, arm: Arm) -> str:
+    """The command as a line, in degrees and millimetres a second."""
+    if command.name:
+        return joints_text(command.name, command.velocity, arm, "/s")
+    parts = [f"tool at {millimetres(command.linear, '/s')}"] if command.linear else []
+    parts += [f"turning at {degrees(command.angular, '/s')}"] if command.angular else []
+    return f"{', '.join(parts)}, along the axes of {command.frame or 'the base'}"
 
 
 class Jogging:

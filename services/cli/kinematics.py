@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -12,11 +11,11 @@ from schemas.planning import FkRequest, FkResponse, IkRequest, IkResponse, PoseG
 from schemas.topics import FK, IK
 from services.arm.transforms import from_rpy
 from services.cli.errors import CommandError, ExitCode
-from services.cli.move_request import refusal_text
 from services.cli.parser import Choices, Options, Parser, finite_number, json_option, positive_integer
+from services.cli.request_text import goal_text, joints_text, refusal_text
 from services.cli.session import Robot, Session, connect, load_robot
 from services.cli.text_table import table
-from services.cli.units import SHOWN, length, parse_joints, turn
+from services.cli.units import SHOWN, angle, length, parse_joints, rotation
 
 if TYPE_CHECKING:
     from services.arm.description import Arm
@@ -26,7 +25,7 @@ XYZ = ("X", "Y", "Z")
 IK_EXAMPLES = """examples:
   gemelo ik --to 0.25 0.15 0.10
   gemelo ik --to 0.25 0.15 0.10 --axis 0 0 1 --along 0 0 -1
-  gemelo ik --to 0.25 0.15 0.10 --quaternion 1 0 0 0 --turn-tolerance 5 --solutions 8"""
+  gemelo ik --to 0.25 0.15 0.10 --quaternion 1 0 0 0 --turn-tolerance 5deg --solutions 8"""
 
 
 def ik_options(parser: Parser) -> None:
@@ -37,27 +36,23 @@ def ik_options(parser: Parser) -> None:
     turned.add_argument(
         "--quaternion", nargs=4, type=finite_number, metavar=(*XYZ, "W"), default=(), help="orientation of the tool"
     )
-    turned.add_argument(
-        "--rpy",
-        nargs=3,
-        type=turn,
-        metavar=("R", "P", "Y"),
-        help="the same as roll, pitch, yaw: 90deg, 1.57rad or 90",
-    )
+    turned.add_argument("--rpy", nargs=3, type=rotation, metavar=("R", "P", "Y"), help="the same, as 90deg or 1.57rad")
     turned.add_argument(
         "--axis", nargs=3, type=finite_number, metavar=XYZ, default=(), help="of the tool, to point --along"
     )
     _vector(parser, "--along", "direction in which --axis is to point")
     _vector(parser, "--free-axis", "of the tool: turning about it does not matter")
     parser.add_argument("--frame", default="", metavar="LINK", help="in which all this is given; the base, if none")
-    parser.add_argument("--tolerance", type=finite_number, default=0.0, metavar="MM", help="of the position")
-    parser.add_argument("--turn-tolerance", type=finite_number, default=0.0, metavar="DEG", help="of the orientation")
+    parser.add_argument("--tolerance", type=length, default=0.0, metavar="DISTANCE", help="of the position, as 2mm")
+    parser.add_argument(
+        "--turn-tolerance", type=angle, default=0.0, metavar="ANGLE", help="of the orientation, as 5deg"
+    )
     parser.add_argument(
         "--near",
         nargs="+",
         default=[],
         metavar="JOINT=VALUE",
-        help="the posture to be near to; where the arm is, if none",
+        help="the configuration to be near to, as 30deg or 40mm; where the arm is, if none",
     )
     parser.add_argument("--solutions", type=positive_integer, default=1, help="at most so many, the nearest first")
     parser.add_argument("--touching", action="store_true", help="those at which links touch as well")
@@ -72,6 +67,9 @@ def run_ik(options: Options) -> ExitCode:
     """Asks the planner for configurations and prints them."""
     robot = load_robot()
     request = ik_request(options, robot.arm)
+    if not options.json:
+        near = f"; near {joints_text(request.near.name, request.near.position, robot.arm)}" if request.near else ""
+        print(f"understood: {goal_text(request.goal, robot.arm)}{near}", flush=True)
     with connect(robot) as session:
         return ik(session, request, options.json)
 
@@ -96,8 +94,8 @@ def ik_request(options: Options, arm: Arm) -> IkRequest:
         free_axis=tuple(options.free_axis),
         tool_axis=tuple(options.axis),
         direction=tuple(options.along),
-        position_tolerance=options.tolerance / 1000.0,
-        orientation_tolerance=math.radians(options.turn_tolerance),
+        position_tolerance=options.tolerance,
+        orientation_tolerance=options.turn_tolerance,
     )
     return IkRequest(
         goal=goal,
@@ -121,6 +119,8 @@ def run_fk(options: Options) -> ExitCode:
     robot = load_robot()
     values = parse_joints(options.joints, robot.arm.joints)
     request = FkRequest(name=tuple(values), position=tuple(values.values()), links=tuple(options.links))
+    if values and not options.json:
+        print(f"understood: {joints_text(request.name, request.position, robot.arm)}", flush=True)
     with connect(robot) as session:
         return fk(session, request, options.json)
 

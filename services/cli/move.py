@@ -14,9 +14,10 @@ from services.cli.move_report import MoveReport, report_of, summary
 from services.cli.move_request import request_from
 from services.cli.parser import Choices, Options, Parser, finite_number
 from services.cli.planning import make_plan
+from services.cli.request_text import request_text
 from services.cli.session import Robot, Session, connect, load_robot
 from services.cli.terminal import Interrupt, motion_progress, two_stage_interrupt
-from services.cli.units import length, turn
+from services.cli.units import acceleration, angle, length, rotation, seconds, share, speed
 from services.runtime.errors import GoalRefused
 
 if TYPE_CHECKING:
@@ -29,36 +30,36 @@ XYZ = ("X", "Y", "Z")
 EXAMPLES = """examples:
   gemelo move --to 0.25 0.15 0.10
   gemelo move --joints brazo_joint=30deg antebrazo_joint=-45deg efector_joint=40mm
-  gemelo move --named ready --speed 0.5
-  gemelo move --to 0.18 0.05 0.17 --rpy 180 0 0 --line --tool-speed 50
+  gemelo move --named ready --speed 50%
+  gemelo move --to 0.18 0.05 0.17 --rpy 180deg 0 0 --line --tool-speed 50mm/s
   gemelo move --to 0.18 -0.05 0.17 --arc 0.20 0 0.17
-  gemelo move --via 0.25 0.05 0.15 --via 0.25 0.10 0.15 --to 0.25 0.15 0.10 --line --blend 10
-  gemelo move --named left --planner RRTstar --time 3"""
+  gemelo move --via 0.25 0.05 0.15 --via 0.25 0.10 0.15 --to 0.25 0.15 0.10 --line --blend 10mm
+  gemelo move --named left --planner RRTstar --time 3
+
+A length without a unit is in m, a speed in m/s; an angle needs deg or rad, a share %."""
 
 
 def add_options(parser: Parser) -> None:
     """Adds goal, motion, speed and output options."""
     parser.epilog = EXAMPLES
     _goal_options(parser.add_argument_group("where to"))
-    _motion_options(parser.add_argument_group("on which way (any that is free, if nothing is said)"))
-    parser.add_argument("--speed", type=finite_number, default=1.0, help="share of the velocity limits, in (0, 1]")
-    parser.add_argument("--time", type=finite_number, default=1.0, metavar="S", help="that planning may take")
+    _motion_options(parser.add_argument_group("on which path (any that is free, if nothing is said)"))
+    parser.add_argument("--speed", type=share, default=1.0, metavar="SHARE", help="of the velocity limits, as 50%%")
+    parser.add_argument("--time", type=seconds, metavar="TIME", default=1.0, help="that planning may take, as 3 or 3s")
     parser.add_argument("--plan-only", action="store_true", help="plan, and do not move")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of a line")
+    parser.add_argument("--json", action="store_true", help="one JSON object in SI units instead of a line")
 
 
 def _goal_options(group: Group) -> None:
     goal = group.add_mutually_exclusive_group(required=True)
     goal.add_argument("--to", nargs=3, type=length, metavar=XYZ, help="the tool in the base frame, as 300mm or 0.3")
-    goal.add_argument(
-        "--joints", nargs="+", metavar="JOINT=VALUE", help="30deg, 0.5rad, 40mm, 0.04m; a bare number is rad or m"
-    )
+    goal.add_argument("--joints", nargs="+", metavar="JOINT=VALUE", help="30deg or 0.5rad; 40mm or 0.04")
     goal.add_argument("--named", metavar="STATE", help="a named state of the SRDF")
     turned = group.add_mutually_exclusive_group()
     turned.add_argument(
         "--quaternion", "--quat", nargs=4, type=finite_number, metavar=(*XYZ, "W"), help="orientation of the tool"
     )
-    turned.add_argument("--rpy", nargs=3, type=turn, metavar=("R", "P", "Y"), help="the same, as 90deg, 1.57rad or 90")
+    turned.add_argument("--rpy", nargs=3, type=rotation, metavar=("R", "P", "Y"), help="the same, as 90deg or 1.57rad")
     turned.add_argument("--axis", nargs=3, type=finite_number, metavar=XYZ, help="of the tool, to point --along")
     group.add_argument("--along", nargs=3, type=finite_number, metavar=XYZ, help="where --axis is to point; it is z")
     group.add_argument(
@@ -68,28 +69,26 @@ def _goal_options(group: Group) -> None:
 
 
 def _motion_options(group: Group) -> None:
-    way = group.add_mutually_exclusive_group()
-    way.add_argument("--line", action="store_true", help="the tool on a straight line")
-    way.add_argument("--arc", nargs=3, type=length, metavar=XYZ, help="the tool on an arc through this point")
-    way.add_argument("--center", nargs=3, type=length, metavar=XYZ, help="on the shorter arc about this point")
-    way.add_argument("--ptp", action="store_true", help="the joints on a straight line")
+    path = group.add_mutually_exclusive_group()
+    path.add_argument("--line", action="store_true", help="the tool on a straight line")
+    path.add_argument("--arc", nargs=3, type=length, metavar=XYZ, help="the tool on an arc through this point")
+    path.add_argument("--center", nargs=3, type=length, metavar=XYZ, help="on the shorter arc about this point")
+    path.add_argument("--ptp", action="store_true", help="the joints on a straight line")
     group.add_argument(
-        "--via",
-        nargs=3,
-        type=length,
-        metavar=XYZ,
-        action="append",
-        default=[],
-        help="a point before; repeatable",
+        "--via", nargs=3, type=length, metavar=XYZ, action="append", default=[], help="a point before; repeatable"
     )
-    group.add_argument("--blend", type=finite_number, metavar="MM", help="around --via within which corners are cut")
-    group.add_argument("--tool-speed", type=finite_number, metavar="MM/S", help="at most, on a line or an arc")
-    group.add_argument("--tool-acceleration", type=finite_number, metavar="MM/S2", help="at most, on a line or an arc")
-    group.add_argument("--fraction", type=finite_number, metavar="F", help="of a line or an arc that will do")
-    group.add_argument("--max-step", type=finite_number, metavar="MM", help="between two looks, on a line or an arc")
     group.add_argument(
-        "--jump", type=finite_number, metavar="RAD", help="that a joint may move between them [rad] or [m]"
+        "--blend", type=length, metavar="DISTANCE", help="around --via within which corners are cut, as 10mm"
     )
+    tool_speed, tool_acceleration = "at most, on a line or an arc, as 50mm/s or 0.05", "the same, as 200mm/s2 or 0.2"
+    group.add_argument("--tool-speed", type=speed, metavar="SPEED", help=tool_speed)
+    group.add_argument("--tool-acceleration", type=acceleration, metavar="ACCELERATION", help=tool_acceleration)
+    group.add_argument("--fraction", type=share, metavar="SHARE", help="of a line or an arc that will do, as 80%%")
+    group.add_argument(
+        "--max-step", type=length, metavar="DISTANCE", help="between two checks, on a line or an arc, as 2mm"
+    )
+    jump = "that a joint may turn between them, as 30deg; a sliding one as many metres as radians"
+    group.add_argument("--jump", type=angle, metavar="ANGLE", help=jump)
     group.add_argument("--time-optimal", action="store_true", help="as fast as can be, without a limit of the jerk")
     group.add_argument("--planner", metavar="ID", help="native, RRTConnect, RRTstar, BITstar or PRM")
     group.add_argument("--seed", type=int, help="the same seed, the same plan")
@@ -99,6 +98,8 @@ def run(options: Options) -> ExitCode:
     """Plans and, without --plan-only, executes."""
     robot = load_robot()
     request = request_from(options, robot.arm)
+    if not options.json:
+        print(f"understood: {request_text(request, robot.arm)}", flush=True)
     with connect(robot) as session:
         return move(session, request, options.plan_only, options.json)
 
@@ -114,12 +115,12 @@ def move(session: Session, request: PlanRequest, plan_only: bool, as_json: bool)
     """Plans and, unless `plan_only`, executes; prints one line or one JSON object at the end."""
     plan = make_plan(session, request, quiet=as_json)
     if plan_only:
-        report = MoveReport(robot=session.arm.name, planned_ms=plan.planning_time * 1e3, duration_s=plan.duration)
+        report = MoveReport(robot=session.arm.name, planned_s=plan.planning_time, duration_s=plan.duration)
     else:
         report = follow(session, plan, quiet=as_json)
     if plan.stopped_by is not None:
         report = replace(report, fraction=plan.fraction, stopped_by=plan.stopped_by.message)
-    print(report.as_json() if as_json else summary(report, plan_only))
+    print(report.as_json() if as_json else summary(report, session.arm, plan_only))
     return report.exit_code
 
 

@@ -27,13 +27,13 @@ class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
     succeeded: bool = True
     interrupted: bool = False
     reason: str = ""
-    planned_ms: float
+    planned_s: float
     duration_s: float
     took_s: float = 0.0
-    final_error_mm: float | None = None  # of the tool, when it has arrived
+    final_error_m: float | None = None  # of the tool, if it has arrived
     final_error_steps: dict[str, float] = {}
     max_following_error_steps: dict[str, float] = {}
-    stopped_at: dict[str, str] = {}
+    stopped_at: dict[str, float] = {}  # [rad] or [m]
     fraction: float = 1.0  # of a line, of which less will do
     stopped_by: str = ""  # why it is no more
 
@@ -59,7 +59,7 @@ def report_of(
     result = result or FollowJointTrajectoryResult()
     errors = dict(zip(result.joint_names, result.final_error, strict=False))
     stopped_at = {
-        name: show(arm.joint(name).steps.to_position(steps), arm.joint(name).unit)
+        name: arm.joint(name).steps.to_position(steps)
         for name, steps in zip(result.joint_names, result.executed_steps, strict=False)
     }
     succeeded = status is GoalStatusCode.SUCCEEDED
@@ -69,36 +69,36 @@ def report_of(
         succeeded=succeeded,
         interrupted=interrupted,
         reason=result.error_string,
-        planned_ms=plan.planning_time * 1e3,
+        planned_s=plan.planning_time,
         duration_s=plan.duration,
         took_s=result.duration,
-        final_error_mm=tool_error_mm(arm, plan.trajectory, errors) if succeeded else None,
+        final_error_m=tool_error(arm, plan.trajectory, errors) if succeeded else None,
         final_error_steps=errors,
         max_following_error_steps=dict(zip(result.joint_names, result.max_following_error, strict=False)),
         stopped_at=stopped_at,
     )
 
 
-def summary(report: MoveReport, plan_only: bool = False) -> str:
+def summary(report: MoveReport, arm: Arm, plan_only: bool = False) -> str:
     """The report as one line for a person."""
-    planned = f"planned in {report.planned_ms:.1f} ms"
+    planned = f"planned in {1e3 * report.planned_s:.1f} ms"
     if report.stopped_by:
         planned = f"{planned} {report.fraction:.1%} of the way ({report.stopped_by})"
     if plan_only:
         return f"{planned}, would take {report.duration_s:.2f} s"
-    where = ", ".join(f"{name} {position}" for name, position in report.stopped_at.items())
+    where = ", ".join(f"{name} {show(position, arm.joint(name).unit)}" for name, position in report.stopped_at.items())
     if report.status == "CANCELED":
         return f"cancelled after {report.took_s:.2f} s: stopped at {where or 'an unknown place'}"
     if not report.succeeded:
         reason = report.reason or "no reason was given"
         return f"{report.status.lower()} after {report.took_s:.2f} s: {reason}" + (f"; now at {where}" if where else "")
     steps = ", ".join(f"{name} {error:+z.2f}" for name, error in report.final_error_steps.items())
-    millimetres = "unknown" if report.final_error_mm is None else f"{report.final_error_mm:.3f} mm"
+    millimetres = "unknown" if report.final_error_m is None else f"{1e3 * report.final_error_m:.3f} mm"
     return f"{planned}, took {report.took_s:.2f} s, final error {millimetres}, steps: {steps}"
 
 
-def tool_error_mm(arm: Arm, trajectory: JointTrajectory, errors: Mapping[str, float]) -> float:
-    """The tool's distance from the end of the trajectory [mm], from the joints' final `errors` [steps].
+def tool_error(arm: Arm, trajectory: JointTrajectory, errors: Mapping[str, float]) -> float:
+    """The tool's distance from the end of the trajectory [m], from the joints' final `errors` [steps].
 
     Forward kinematics of both: the goal, and the goal minus the error.
     """
@@ -111,4 +111,4 @@ def tool_error_mm(arm: Arm, trajectory: JointTrajectory, errors: Mapping[str, fl
         if joint.name in goals
     }
     wanted_at, reached_at = (link_transforms(arm.model, each)[arm.tool_frame][0] for each in (goals, reached))
-    return math.dist(wanted_at, reached_at) * 1e3
+    return math.dist(wanted_at, reached_at)

@@ -1,4 +1,4 @@
-"""The options of `gemelo move` turned into the planner's request, and a refusal turned back into options."""
+"""The options of `gemelo move` turned into the planner's request, in SI units."""
 
 from __future__ import annotations
 
@@ -18,14 +18,13 @@ from schemas.planning import (
     PlanRequest,
     PointToPoint,
     PoseGoal,
-    Refusal,
     Timing,
     WaypointGoal,
 )
 from services.arm.transforms import from_rpy
 from services.cli.errors import unknown, usage
 from services.cli.parser import Options
-from services.cli.units import SHOWN, parse_joints
+from services.cli.units import parse_joints
 
 if TYPE_CHECKING:
     from services.arm.description import Arm
@@ -40,7 +39,7 @@ def request_from(options: Options, arm: Arm) -> PlanRequest:
     goal = goal_of(arm, options.to, options.joints or (), options.named)
     request = request_of(_with_waypoints(_with_orientation(goal, options), options), options.speed)
     if not 0.0 < options.time <= LONGEST_TIME:
-        raise usage(f"--time {options.time:g} is not in (0, 3600]")
+        raise usage(f"--time {options.time:g} is not in (0, {LONGEST_TIME:g}] s")
     timing = Timing.TIME_OPTIMAL if options.time_optimal else Timing.JERK_LIMITED
     return replace(request, motion=motion_of(options), allowed_time=options.time, timing=timing)
 
@@ -64,7 +63,7 @@ def goal_of(arm: Arm, to: Sequence[float] | None, joints: Sequence[str], named: 
 def request_of(goal: Goal, speed: float) -> PlanRequest:
     """A request at `speed`, the share of the velocity limits in (0, 1]."""
     if not 0.0 < speed <= 1.0:
-        raise usage(f"--speed {speed:g} is not in (0, 1]")
+        raise usage(f"--speed {100.0 * speed:g}% is not above 0% and at most 100%")
     return PlanRequest(goal=goal, velocity_scaling=speed)
 
 
@@ -76,11 +75,11 @@ def motion_of(options: Options) -> Motion:
     _require(not is_tool and not options.ptp, options, ("planner", "seed"), "a free motion")
     if is_tool:
         line = LinearMotion(
-            speed=_metres(options, "tool_speed"),
-            acceleration=_metres(options, "tool_acceleration"),
-            max_step=_metres(options, "max_step"),
-            jump_threshold=options.jump or 0.0,
-            least_fraction=1.0 if options.fraction is None else options.fraction,
+            speed=_positive(options, "tool_speed"),
+            acceleration=_positive(options, "tool_acceleration"),
+            max_step=_positive(options, "max_step"),
+            jump_threshold=_positive(options, "jump"),
+            least_fraction=1.0 if options.fraction is None else _positive(options, "fraction"),
         )
         if options.line:
             return line
@@ -118,46 +117,20 @@ def _with_waypoints(goal: Goal, options: Options) -> Goal:
     assert not isinstance(goal, WaypointGoal)
     like: PoseGoal = goal if isinstance(goal, PoseGoal) else PoseGoal()
     points = tuple(replace(like, position=tuple(point)) for point in options.via)
-    return WaypointGoal(points=(*points, goal), blend=_metres(options, "blend"))
+    return WaypointGoal(points=(*points, goal), blend=_positive(options, "blend"))
 
 
-def _metres(options: Options, name: str) -> float:
-    """From [mm]; 0 where it is not given, and refused where it is not above 0."""
+def _positive(options: Options, name: str) -> float:
+    """The option's value; 0 if it is not given. Raises `CommandError` if it is not above 0."""
     value: float | None = getattr(options, name)
     if value is None:
         return 0.0
     if value <= 0.0:
         raise usage(f"--{name.replace('_', '-')} {value:g} is not above 0")
-    return value / 1000.0
+    return value
 
 
 def _require(holds: bool, options: Options, names: tuple[str, ...], needed: str) -> None:
     for name in names:
         if not holds and getattr(options, name) is not None:
             raise usage(f"--{name.replace('_', '-')} goes with {needed} only")
-
-
-def refusal_text(refusal: Refusal, goal: Goal, arm: Arm) -> str:
-    """One sentence: the reason, and the nearest goal that can be reached as options, else the remedy."""
-    text = f"refused ({refusal.check}): {refusal.message}" if refusal.check else f"refused: {refusal.message}"
-    if refusal.nearest:
-        return f"{text}; nearest that can: {as_typed(goal, refusal.nearest, arm)}"
-    return f"{text}; {refusal.remedy}" if refusal.remedy else text
-
-
-def as_typed(goal: Goal, values: Sequence[float], arm: Arm) -> str:
-    """`values` [m, rad] in the form of `goal`, as options of `gemelo move`."""
-    if isinstance(goal, PoseGoal):
-        turn = f" {'--along' if goal.tool_axis else '--quaternion'} {_numbers(values[3:], 6)}" if values[3:] else ""
-        return f"--to {_numbers(values[:3], 4)}{turn}"
-    names = goal.name if isinstance(goal, JointGoal) and len(goal.name) == len(values) else arm.joint_names
-    return "--joints " + " ".join(_assignment(arm, name, value) for name, value in zip(names, values, strict=False))
-
-
-def _numbers(values: Sequence[float], digits: int) -> str:
-    return " ".join(f"{value:.{digits}f}" for value in values)
-
-
-def _assignment(arm: Arm, name: str, value: float) -> str:
-    shown, factor = SHOWN[arm.joint(name).unit]
-    return f"{name}={value * factor:.6g}{shown}"

@@ -59,7 +59,12 @@ class Parser(argparse.ArgumentParser):
 def build(
     commands: Iterable[Command], groups: Mapping[str, str], about: str, epilog: str, arguments: Sequence[str]
 ) -> Parser:
-    """The parser of `gemelo` for `arguments`; what it parses carries its `Command` as `command`."""
+    """The parser of `gemelo` for `arguments`; what it parses carries its `Command` as `command`.
+
+    A parser for each of 50 commands takes longer than anything else at a start, so only the typed command or group gets
+    one where there is such.
+    """
+    commands = typed(list(commands), arguments)
     root = Parser(prog="gemelo", description=about, epilog=epilog, allow_abbrev=False)
     top = root.add_subparsers(metavar="COMMAND", title="commands", required=True)
     parents = {}
@@ -73,6 +78,13 @@ def build(
         if command.words == tuple(arguments[: len(command.words)]):
             complete(leaf, command)
     return root
+
+
+def typed(commands: list[Command], arguments: Sequence[str]) -> list[Command]:
+    """The command that `arguments` begin with, else all of the group that they begin with, else all commands."""
+    exact = [each for each in commands if each.words == tuple(arguments[: len(each.words)])]
+    group = [each for each in commands if len(each.words) > 1 and list(each.words[:1]) == list(arguments[:1])]
+    return exact or group or commands
 
 
 def complete(leaf: Parser, command: Command) -> None:
@@ -105,8 +117,11 @@ def positive_number(text: str) -> float:
 
 
 def finite_number(text: str) -> float:
-    """An argument's type: a finite number."""
-    value = float(text)
+    """An argument's type: a finite number without a unit, as of a direction."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a number: directions and quaternions have no unit') from None
     if not abs(value) < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not finite")
     return value

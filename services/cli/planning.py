@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from schemas.planning import PlanCancel, PlanProgress, PlanRequest, PlanResponse
 from schemas.topics import PLAN, PLAN_CANCEL, PLAN_PROGRESS
 from services.cli.errors import CommandError, ExitCode
-from services.cli.move_request import refusal_text
+from services.cli.request_text import refusal_text
 from services.cli.session import Session
 from services.cli.terminal import Interrupt, LiveBlock, two_stage_interrupt
 from services.runtime.errors import NoAnswer, Refused

@@ -9,13 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.parser import Options, Parser, positive_integer, positive_number
+from services.cli.parser import Options, Parser, positive_integer
 from services.cli.text_table import table
+from services.cli.units import positive_length
 
 if TYPE_CHECKING:
     from services.arm.collision_matrix import Verdict
 
 FIT = "services.collision_fitting.main"  # in a process of its own: the command line loads no planner
+BULGE = 0.005  # [m] that a sphere may reach beyond its link
 FIT_EXAMPLES = """examples:
   gemelo collision fit urdf/parol6
   gemelo collision fit urdf/my_arm --meshes
@@ -50,7 +52,7 @@ def fit_options(parser: Parser) -> None:
     parser.epilog = FIT_EXAMPLES
     folder_option(parser)
     parser.add_argument(
-        "--bulge", type=positive_number, default=5.0, metavar="MM", help="that a sphere may reach beyond its link"
+        "--bulge", type=positive_length, default=BULGE, metavar="DISTANCE", help="of a sphere beyond its link, as 5mm"
     )
     parser.add_argument("--meshes", action="store_true", help="fit boxes, cylinders, plates, capsules and balls")
     parser.add_argument(
@@ -81,8 +83,8 @@ def run_matrix(options: Options) -> ExitCode:
 
 
 def spheres(folder: Path, bulge: float) -> ExitCode:
-    """Prints a line for each link; `bulge` [mm] is how far a sphere may reach beyond it."""
-    return _fitted(folder, "--bulge", f"{bulge:g}")
+    """Prints a line for each link; `bulge` [m] is how far a sphere may reach beyond it."""
+    return _fitted(folder, "--bulge", f"{1000.0 * bulge:g}")
 
 
 def shapes(folder: Path, most: int, links: Sequence[str], write: bool) -> ExitCode:

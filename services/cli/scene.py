@@ -25,8 +25,9 @@ from schemas.scene import (
 from schemas.topics import SCENE, SCENE_EDIT
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Choices, Options, Parser, positive_number
+from services.cli.request_text import millimetres
 from services.cli.scene_object import object_of, pose_of, shape_of
-from services.cli.scene_text import listing, read_scene, write_scene
+from services.cli.scene_text import listing, place_text, read_scene, sized_text, write_scene
 from services.cli.session import Robot, Session, connect
 
 PATIENCE = 10.0  # [s] the planner takes that long for a mesh of many triangles
@@ -83,7 +84,12 @@ def add_options(parser: Parser) -> None:
 
 def add(options: Options) -> ExitCode:
     """Adds an object, or replaces the one of its name."""
-    return ask(SceneRequest(edit=SceneAdd(object=object_of(options))))
+    item = object_of(options)
+    padding = f", {millimetres([item.padding])} kept around it" if item.padding else ""
+    print(
+        f"understood: {item.name}, {sized_text(item.shape)}, {place_text(item.pose, item.frame)}{padding}", flush=True
+    )
+    return ask(SceneRequest(edit=SceneAdd(object=item)))
 
 
 def ask(request: SceneRequest) -> ExitCode:
@@ -106,6 +112,7 @@ def move_options(parser: Parser) -> None:
 def move(options: Options) -> ExitCode:
     """Moves an object."""
     pose = pose_of(options.at, options.rpy)
+    print(f"understood: {options.name} {place_text(pose, options.frame)}", flush=True)
     return ask(SceneRequest(edit=SceneMove(name=options.name, pose=pose, frame=options.frame)))
 
 
@@ -118,6 +125,7 @@ def resize_options(parser: Parser) -> None:
 def resize(options: Options) -> ExitCode:
     """Gives an object another shape."""
     shape = shape_of(options)
+    print(f"understood: {options.name}, {sized_text(shape)}", flush=True)
     return ask(SceneRequest(edit=SceneResize(name=options.name, shape=shape)))
 
 

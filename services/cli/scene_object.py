@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,10 +10,9 @@ from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, SceneO
 from services.arm.transforms import from_rpy
 from services.cli.errors import usage
 from services.cli.parser import Options
-from services.cli.units import parse_value
+from services.cli.units import LENGTH, parse_quantity, parse_rotation
 from services.runtime.deployment import project_root
 
-LARGEST_TURN = 2.0 * math.pi  # [rad]
 LARGEST_MESH = 10.0  # [m]; what is larger was drawn in mm
 
 
@@ -79,24 +77,14 @@ def _require_size(path: Path, scale: float) -> None:
 def pose_of(at: Sequence[str], rpy: Sequence[str]) -> Transform:
     """The pose of a position and of roll, pitch, yaw about the frame's fixed axes."""
     x, y, z = lengths(at, "--at")
-    return Transform(translation=(x, y, z), rotation=from_rpy(*(angle(text) for text in rpy)))
+    return Transform(translation=(x, y, z), rotation=from_rpy(*(parse_rotation(text, "--rpy") for text in rpy)))
 
 
 def lengths(texts: Sequence[str], owner: str) -> tuple[float, ...]:
-    """[m]."""
+    """Lengths [m]; raises `CommandError` naming the option `owner`."""
     return tuple(length(text, owner) for text in texts)
 
 
 def length(text: str, owner: str) -> float:
-    """[m]."""
-    return parse_value(text, "m", owner)
-
-
-def angle(text: str) -> float:
-    """[rad]; a bare number would be degrees elsewhere, and radians where joints are given."""
-    value = parse_value(text, "rad", "--rpy")
-    if value and text[-1].isdecimal():
-        raise usage(f"--rpy {text} has no unit: write {text}deg for degrees, or {text}rad for radians")
-    if abs(value) > LARGEST_TURN and "deg" not in text and "°" not in text:
-        raise usage(f"--rpy {text} is {value:g} rad, more than a turn: write {text.removesuffix('rad')}deg for degrees")
-    return value
+    """A length [m]; raises `CommandError` naming the option `owner`."""
+    return parse_quantity(text, LENGTH, owner)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import msgspec
 
-from schemas.message import Vector
+from schemas.frames import Transform
 from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, PlanningScene, SceneObject, Shape, SphereShape
 from services.cli.errors import CommandError, usage
+from services.cli.request_text import millimetres, rotation_text
 from services.cli.text_table import table
 
 
@@ -56,13 +56,16 @@ def _row(item: SceneObject) -> tuple[str, ...]:
     )
 
 
-def rotation_text(rotation: Vector) -> str:
-    """Angle [deg] and axis of a rotation (x, y, z, w) as text."""
-    sine = math.hypot(*rotation[:3])
-    angle = math.degrees(2.0 * math.atan2(sine, rotation[3]))
-    if abs(angle) < 0.05:
-        return "-"
-    return f"{angle:.1f} deg about {' '.join(f'{value / sine:z.2f}' for value in rotation[:3])}"
+def place_text(pose: Transform, frame: str) -> str:
+    """A pose in `frame` (empty: the base) as text, lengths in [mm]."""
+    rotation = rotation_text(pose.rotation)
+    turned = f", turned {rotation}" if rotation != "-" else ""
+    return f"at {millimetres(pose.translation)}{turned}, in {frame or 'the base'}"
+
+
+def sized_text(shape: Shape) -> str:
+    """The shape as text with its unit."""
+    return f"{shape_text(shape)}{'' if isinstance(shape, PlaneShape | MeshShape) else ' mm'}"
 
 
 def shape_text(shape: Shape) -> str:

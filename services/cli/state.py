@@ -61,7 +61,7 @@ class Snapshot(msgspec.Struct, frozen=True):
     reason: str
     time_scale: float | None
     buffered: float | None  # [s]
-    round_trip_ms: float | None
+    round_trip: float | None  # [s]
 
 
 def snapshot(
@@ -97,7 +97,7 @@ def snapshot(
         reason=status.reason if status else "nothing heard from stepper_gateway",
         time_scale=device.time_scale if device else None,
         buffered=device.buffered if device else None,
-        round_trip_ms=device.round_trip * 1e3 if device else None,
+        round_trip=device.round_trip if device else None,
     )
 
 
@@ -110,8 +110,8 @@ def text_of(view: Snapshot) -> str:
         "unknown" if view.tool is None else "x {:z.2f}  y {:z.2f}  z {:z.2f} mm".format(*(v * 1e3 for v in view.tool))
     )
     link = "online" if view.online else f"offline: {view.reason}"
-    if view.online and view.round_trip_ms is not None:
-        link += f", round trip {view.round_trip_ms:.1f} ms"
+    if view.online and view.round_trip is not None:
+        link += f", round trip {1e3 * view.round_trip:.1f} ms"
     device = f"{view.device or 'unknown'}: {view.mode}"
     if view.time_scale is not None and view.buffered is not None:
         device += f", time scale {view.time_scale:.2f}, {view.buffered:.2f} s of path buffered"

@@ -50,7 +50,7 @@ def test_what_is_missing_or_wrong_is_said_and_written_only_when_asked(
 
 
 def test_fit_says_spheres_and_bulge_of_every_link(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert run(["collision", "fit", str(folder), "--bulge", "8"]) is ExitCode.OK
+    assert run(["collision", "fit", str(folder), "--bulge", "8mm"]) is ExitCode.OK
     heading, *rows, last = capfd.readouterr().out.splitlines()
     assert heading.split() == ["link", "shapes", "spheres", "bulge", "[mm]"]
     assert [row.split()[0] for row in rows] == ["base_link", "brazo_link", "antebrazo_link", "efector_link"]

@@ -181,10 +181,10 @@ def test_an_output_is_switched_by_its_name(session, rm1_device, capsys):
 
 
 def test_a_speed_is_a_share_of_the_planned_one(session, rm1_device):
-    assert device.speed(session, 50.0) is ExitCode.OK
+    assert device.speed(session, 0.5) is ExitCode.OK
     assert rm1_device.asked[-1].scale == 0.5
-    with pytest.raises(CommandError, match="not in 0 to 100"):
-        device.speed(session, 101.0)
+    with pytest.raises(CommandError, match="not in 0% to 100%"):
+        device.speed(session, 1.01)
 
 
 def test_arming_and_disarming_say_what_follows(session, rm1_device, capsys):
@@ -317,7 +317,7 @@ def test_a_real_device_is_not_pressed_over_the_bus(session, rm1_device):
     [
         (["home", "braso_joint"], 'did you mean "brazo_joint"'),
         (["output", "avansar", "on"], 'did you mean "avanzar"'),
-        (["speed", "150"], "not in 0 to 100"),
+        (["speed", "150%"], "not in 0% to 100%"),
         (["device", "press", "block", "nobody"], "no joint"),
     ],
 )

@@ -14,8 +14,9 @@ from services.arm.description import load_arm
 from services.cli.device import reference_request
 from services.cli.errors import CommandError, ExitCode
 from services.cli.main import parse
-from services.cli.move_report import MoveReport, summary, tool_error_mm
-from services.cli.move_request import as_typed, goal_of, refusal_text, request_of
+from services.cli.move_report import MoveReport, summary, tool_error
+from services.cli.move_request import goal_of, request_of
+from services.cli.request_text import as_typed, refusal_text
 from services.cli.units import parse_joints
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
@@ -58,7 +59,7 @@ def test_what_cannot_be_understood_ends_with_two(words):
 
 @pytest.mark.parametrize("speed", [0.0, -0.1, 1.01])
 def test_a_speed_outside_its_range_is_refused(speed):
-    with pytest.raises(CommandError, match=r"not in \(0, 1\]"):
+    with pytest.raises(CommandError, match="not above 0% and at most 100%"):
         request_of(NamedGoal(name="ready"), speed)
 
 
@@ -89,16 +90,16 @@ def test_the_tool_error_of_one_step_of_the_lift_is_one_step_of_the_rack():
     trajectory = JointTrajectory(
         joint_names=ARM.joint_names, points=(TrajectoryPoint(positions=(0.6, -1.2, 0.08), time_from_start=1.0),)
     )
-    assert tool_error_mm(ARM, trajectory, {"efector_joint": 1.0}) == pytest.approx(math.tau * 22.5 / 400, rel=1e-6)
-    assert tool_error_mm(ARM, trajectory, {}) == 0.0
+    assert tool_error(ARM, trajectory, {"efector_joint": 1.0}) == pytest.approx(math.tau * 0.0225 / 400, rel=1e-6)
+    assert tool_error(ARM, trajectory, {}) == 0.0
 
 
 def test_the_last_line_of_a_move():
     report = MoveReport(
-        robot="rm1", status="SUCCEEDED", planned_ms=1.84, duration_s=3.2, took_s=3.214, final_error_mm=0.0042,
+        robot="rm1", status="SUCCEEDED", planned_s=0.00184, duration_s=3.2, took_s=3.214, final_error_m=4.2e-6,
         final_error_steps={"brazo_joint": 0.12, "efector_joint": -0.4},
     )  # fmt: skip
-    assert summary(report) == (
+    assert summary(report, ARM) == (
         "planned in 1.8 ms, took 3.21 s, final error 0.004 mm, steps: brazo_joint +0.12, efector_joint -0.40"
     )
     assert report.exit_code is ExitCode.OK
@@ -110,11 +111,11 @@ def test_the_last_line_of_a_move():
 )
 def test_how_a_move_that_did_not_arrive_ends(status, interrupted, code):
     report = MoveReport(
-        robot="rm1", status=status, succeeded=False, interrupted=interrupted, reason="boot id changed", planned_ms=1.0,
-        duration_s=1.0, stopped_at={"brazo_joint": "12.000 deg"},
+        robot="rm1", status=status, succeeded=False, interrupted=interrupted, reason="boot id changed", planned_s=0.001,
+        duration_s=1.0, stopped_at={"brazo_joint": math.radians(12.0)},
     )  # fmt: skip
     assert report.exit_code is code
-    assert "brazo_joint 12.000 deg" in summary(report)
+    assert "brazo_joint 12.000 deg" in summary(report, ARM)
 
 
 def test_a_reference_names_every_joint():

@@ -77,11 +77,11 @@ def test_speeds_are_written_with_their_units(arm):
     command = command_of(arm, ["brazo_joint=10deg/s", "q3=5mm/s"], [], [], False)
     assert command.name == ("brazo_joint", "efector_joint")
     assert command.velocity == pytest.approx((math.radians(10.0), 0.005))
-    twist = command_of(arm, [], [0.1, 0.0, 0.0], [0.0, 0.0, 90.0], True)
+    twist = command_of(arm, [], [0.1, 0.0, 0.0], [0.0, 0.0, math.pi / 2], True)
     assert twist.angular == pytest.approx((0.0, 0.0, math.pi / 2))
     assert twist.frame == arm.tool_frame
     with pytest.raises(CommandError, match='did you mean "brazo_joint"'):
-        command_of(arm, ["braso_joint=1"], [], [], False)
+        command_of(arm, ["braso_joint=1deg/s"], [], [], False)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_speeds_are_written_with_their_units(arm):
     [
         (["jog"], "no terminal to read keys from: give --joint or --twist"),
         (["jog", "--joint", "brazo_joint=10deg/s"], "--for so many seconds"),
-        (["jog", "--joint", "brazo_joint=1", "--twist", "1", "0", "0", "--for", "1"], "exclude one another"),
+        (["jog", "--joint", "brazo_joint=1deg/s", "--twist", "1", "0", "0", "--for", "1"], "exclude one another"),
     ],
 )
 def test_what_cannot_be_done_is_refused_with_the_remedy(words, said, monkeypatch, capsys):

@@ -58,7 +58,8 @@ def said(line: str) -> ExitCode:
 
 def test_configurations_are_printed_the_nearest_first(asked, capsys):
     assert said("ik --to 0.25 0.15 0.10 --solutions 4") is ExitCode.OK
-    heading, _, *rows = capsys.readouterr().out.splitlines()
+    understood, heading, _, *rows = capsys.readouterr().out.splitlines()
+    assert understood == "understood: tool to 250, 150, 100 mm"
     assert heading.split("  ")[0].strip() == "brazo_joint [deg]"
     assert heading.endswith("away [s]")
     away = [float(row.split()[-1]) for row in rows]
@@ -68,7 +69,8 @@ def test_configurations_are_printed_the_nearest_first(asked, capsys):
 
 def test_every_option_reaches_the_goal(asked):
     said(
-        "ik --to 0.25 0.15 0.1 --axis 0 0 1 --along 0 0 -1 --tolerance 2 --turn-tolerance 90 --near q1=90deg --touching"
+        "ik --to 0.25 0.15 0.1 --axis 0 0 1 --along 0 0 -1 --tolerance 2mm --turn-tolerance 90deg "
+        "--near q1=90deg --touching"
     )
     goal = PoseGoal(
         position=(0.25, 0.15, 0.1), tool_axis=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0),
@@ -78,8 +80,8 @@ def test_every_option_reaches_the_goal(asked):
     assert asked == [IkRequest(goal=goal, near=near, avoid_collisions=False)]
 
 
-def test_roll_pitch_yaw_are_degrees(asked):
-    said("ik --to 0.25 0.15 0.1 --rpy 180 0 90 --frame base_link")
+def test_roll_pitch_yaw_become_a_quaternion(asked):
+    said("ik --to 0.25 0.15 0.1 --rpy 180deg 0 90deg --frame base_link")
     [request] = asked
     half = math.sqrt(0.5)
     assert request.goal.orientation == pytest.approx((half, half, 0.0, 0.0))
@@ -103,9 +105,12 @@ def test_a_tilt_that_rm1_cannot_do_is_refused_with_what_can_be_typed(asked, caps
 def test_fk_of_what_ik_says_is_the_point(asked, capsys):
     said("ik --to 0.25 0.15 0.1 --json")
     values = json.loads(capsys.readouterr().out)["solutions"][0]["position"]
-    joints = " ".join(f"q{index + 1}={value!r}" for index, value in enumerate(values))
+    joints = " ".join(
+        f"q{index + 1}={value!r}{unit}"
+        for index, (value, unit) in enumerate(zip(values, ("rad", "rad", "m"), strict=True))
+    )
     assert said(f"fk {joints} --links efector_link base_link") is ExitCode.OK
-    _, _, tool, base = capsys.readouterr().out.splitlines()
+    _, _, _, tool, base = capsys.readouterr().out.splitlines()
     assert [float(cell) for cell in tool.split()[1:4]] == pytest.approx([0.25, 0.15, 0.1], abs=2e-6)
     assert base.split()[0] == "base_link"
 

@@ -47,7 +47,7 @@ def test_a_move_as_json_is_one_object(session, stack, capsys):
     assert move(session, READY, plan_only=False, as_json=True) is ExitCode.OK
     report = json.loads(capsys.readouterr().out)
     assert report["succeeded"] is True
-    assert report["final_error_mm"] > 0.0
+    assert report["final_error_m"] > 0.0
 
 
 def test_plan_only_moves_nothing(session, stack, capsys):

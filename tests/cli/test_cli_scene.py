@@ -186,9 +186,10 @@ def test_an_empty_scene_is_said_to_be_empty(scene, capsys):
     [
         ("scene remove tabel", ExitCode.FAILED, 'refused: there is no object "tabel"; did you mean "table"?'),
         ("scene add ball --sphere 0", ExitCode.FAILED, 'refused: object "ball": radius of the sphere is 0 m'),
-        ("scene add ball --sphere 3deg", ExitCode.USAGE, "--sphere slides: 3deg must be in m or mm"),
-        ("scene add ball --sphere 1 --rpy 0 0 90", ExitCode.USAGE, "write 90deg for degrees"),
-        ("scene add ball --sphere 1 --rpy 0 0 1.5", ExitCode.USAGE, "write 1.5deg for degrees, or 1.5rad for radians"),
+        ("scene add ball --sphere 3deg", ExitCode.USAGE, "--sphere: 3deg must be in m or mm"),
+        ("scene add ball --sphere 1 --rpy 0 0 90", ExitCode.USAGE, "--rpy: 90 what: 90deg or 90rad?"),
+        ("scene add ball --sphere 1 --rpy 0 0 1.5", ExitCode.USAGE, "--rpy: 1.5 what: 1.5deg or 1.5rad?"),
+        ("scene add ball --sphere 1 --rpy 0 0 90rad", ExitCode.USAGE, "more than a turn: write 90deg for degrees"),
         ("scene add ball --mesh nowhere.stl", ExitCode.USAGE, 'there is no file "nowhere.stl"'),
         ("scene load nowhere.json", ExitCode.USAGE, "nowhere.json cannot be read"),
         ("scene attach table efector_link", ExitCode.FAILED, 'refused: object "table" is a plane'),

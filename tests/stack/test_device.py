@@ -15,7 +15,11 @@ from schemas.topics import DEVICE_SHAFT
 from services.cli.errors import ExitCode
 from tests.stack import gemelo as command
 
-NEAR_ITS_SWITCHES = ("brazo_joint=-2.9", "antebrazo_joint=-2.9", "efector_joint=0.19")  # a homing is short from there
+NEAR_ITS_SWITCHES = (
+    "brazo_joint=-2.9rad",
+    "antebrazo_joint=-2.9rad",
+    "efector_joint=0.19",
+)  # a homing is short from there
 
 
 @pytest.fixture
@@ -111,13 +115,13 @@ def test_an_output_is_switched_and_a_sensor_is_read(operator, gemelo):
 
 
 def test_half_the_speed_takes_twice_the_time(ready, gemelo):
-    there, back = ("--joints", "brazo_joint=-1.5"), ("--joints", "brazo_joint=-2.9")
+    there, back = ("--joints", "brazo_joint=-1.5rad"), ("--joints", "brazo_joint=-2.9rad")
     try:
         whole = json.loads(gemelo("move", *there, "--json"))
-        gemelo("speed", "50")
+        gemelo("speed", "50%")
         half = json.loads(gemelo("move", *back, "--json"))
     finally:
-        gemelo("speed", "100")
+        gemelo("speed", "100%")
     assert half["duration_s"] == pytest.approx(whole["duration_s"], rel=0.05)
     assert 1.7 < half["took_s"] / whole["took_s"] < 2.4
     assert max(map(abs, half["final_error_steps"].values())) <= 0.5

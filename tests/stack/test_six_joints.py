@@ -54,7 +54,7 @@ def test_the_tool_is_jogged_on_a_line_and_turned_and_stops_without_a_jump(parol6
     parol6.node.subscribe(STEP_ERRORS, lambda message: worst.append(max(map(abs, message.error))))
     parol6.seen.clear()
     places = []
-    for words in (["--joint", "joint_6=30deg/s"], ["--twist", "0.04", "0.03", "0"], ["--turn", "0", "0", "20"]):
+    for words in (["--joint", "joint_6=30deg/s"], ["--twist", "0.04", "0.03", "0"], ["--turn", "0", "0", "20deg/s"]):
         gemelo(parol6.stack, "jog", *words, "--for", "1")
         ended = time.time_ns()
         assert parol6.wait_for(lambda ended=ended: parol6.seen and parol6.seen[-1].stamp > ended, 10.0)
