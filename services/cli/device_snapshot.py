@@ -12,7 +12,7 @@ from schemas.device_faults import Explanation, explain
 from schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATE, DEVICE_STATUS, SENSORS
 from services.cli.errors import CommandError, ExitCode
 from services.cli.robot_names import joint_name
-from services.cli.session import Session
+from services.cli.session import Session, other_robots
 
 if TYPE_CHECKING:
     from services.arm.description import Arm
@@ -46,10 +46,8 @@ class DeviceView:
         """Waits for the first message of the device; raises `CommandError` if there is none."""
         self.wait_for(lambda: self._is_settled)
         if self.status.message is None and self.state.message is None:
-            raise CommandError(
-                f"nothing heard of the device in {PATIENCE:g} s: is stepper_gateway running? `gemelo node list`",
-                ExitCode.NO_STACK,
-            )
+            silence = f"nothing heard of the device in {PATIENCE:g} s: is stepper_gateway running? `gemelo node list`"
+            raise CommandError(other_robots(self.session.deployment, self.session.arm) or silence, ExitCode.NO_STACK)
 
     def require_state(self) -> DeviceState:
         """The device's state; raises `CommandError` with the reason if it is offline or silent."""

@@ -10,9 +10,10 @@ from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryG
 from schemas.planning import PlanRequest, PlanResponse
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY
 from services.cli.errors import CommandError, ExitCode
-from services.cli.move_report import MoveReport, report_of, summary
-from services.cli.move_request import request_from
+from services.cli.move_report import MoveReport, PlanReport, report_of, summary
+from services.cli.move_request import request_from, require_alone
 from services.cli.parser import Choices, Options, Parser, finite_number
+from services.cli.plan_file import read_plan
 from services.cli.planning import make_plan
 from services.cli.request_text import request_text
 from services.cli.session import Robot, Session, connect, load_robot
@@ -23,6 +24,7 @@ from services.runtime.errors import GoalRefused
 if TYPE_CHECKING:
     from argparse import _ArgumentGroup as Group
 
+    from services.arm.description import Arm
     from services.runtime.actions import GoalHandle
 
 LONGEST_HOLD = 3600.0  # [s] that a person may hold the arm on its way
@@ -35,6 +37,8 @@ EXAMPLES = """examples:
   gemelo move --to 0.18 -0.05 0.17 --arc 0.20 0 0.17
   gemelo move --via 0.25 0.05 0.15 --via 0.25 0.10 0.15 --to 0.25 0.15 0.10 --line --blend 10mm
   gemelo move --named left --planner RRTstar --time 3
+  gemelo move --named left --plan-only --json > plan.json
+  gemelo move --execute plan.json
 
 A length without a unit is in m, a speed in m/s; an angle needs deg or rad, a share %."""
 
@@ -44,8 +48,8 @@ def add_options(parser: Parser) -> None:
     parser.epilog = EXAMPLES
     _goal_options(parser.add_argument_group("where to"))
     _motion_options(parser.add_argument_group("on which path (any that is free, if nothing is said)"))
-    parser.add_argument("--speed", type=share, default=1.0, metavar="SHARE", help="of the velocity limits, as 50%%")
-    parser.add_argument("--time", type=seconds, metavar="TIME", default=1.0, help="that planning may take, as 3 or 3s")
+    parser.add_argument("--speed", type=share, metavar="SHARE", help="of the velocity limits, as 50%%")
+    parser.add_argument("--time", type=seconds, metavar="TIME", help="that planning may take, as 3 or 3s")
     parser.add_argument("--plan-only", action="store_true", help="plan, and do not move")
     parser.add_argument("--json", action="store_true", help="one JSON object in SI units instead of a line")
 
@@ -55,6 +59,9 @@ def _goal_options(group: Group) -> None:
     goal.add_argument("--to", nargs=3, type=length, metavar=XYZ, help="the tool in the base frame, as 300mm or 0.3")
     goal.add_argument("--joints", nargs="+", metavar="JOINT=VALUE", help="30deg or 0.5rad; 40mm or 0.04")
     goal.add_argument("--named", metavar="STATE", help="a named state of the SRDF")
+    goal.add_argument(
+        "--execute", metavar="FILE", help="the plan that --plan-only --json has written; - is standard input"
+    )
     turned = group.add_mutually_exclusive_group()
     turned.add_argument(
         "--quaternion", "--quat", nargs=4, type=finite_number, metavar=(*XYZ, "W"), help="orientation of the tool"
@@ -95,8 +102,13 @@ def _motion_options(group: Group) -> None:
 
 
 def run(options: Options) -> ExitCode:
-    """Plans and, without --plan-only, executes."""
+    """Plans and, without --plan-only, executes; or executes a plan of before."""
     robot = load_robot()
+    if options.execute is not None:
+        require_alone(options)
+        plan = read_plan(options.execute, robot.arm)
+        with connect(robot) as session:
+            return execute(session, plan, options.json)
     request = request_from(options, robot.arm)
     if not options.json:
         print(f"understood: {request_text(request, robot.arm)}", flush=True)
@@ -114,13 +126,21 @@ def choices(robot: Robot | None) -> Choices:
 def move(session: Session, request: PlanRequest, plan_only: bool, as_json: bool) -> ExitCode:
     """Plans and, unless `plan_only`, executes; prints one line or one JSON object at the end."""
     plan = make_plan(session, request, quiet=as_json)
-    if plan_only:
-        report = MoveReport(robot=session.arm.name, planned_s=plan.planning_time, duration_s=plan.duration)
-    else:
-        report = follow(session, plan, quiet=as_json)
+    if not plan_only:
+        return execute(session, plan, as_json)
+    report = PlanReport(robot=session.arm.name, planned_s=plan.planning_time, duration_s=plan.duration, response=plan)
+    return _print(report, plan, session.arm, as_json)
+
+
+def execute(session: Session, plan: PlanResponse, as_json: bool) -> ExitCode:
+    """Executes a plan and prints one line or one JSON object at the end; raises `CommandError` if it is refused."""
+    return _print(follow(session, plan, quiet=as_json), plan, session.arm, as_json)
+
+
+def _print(report: MoveReport, plan: PlanResponse, arm: Arm, as_json: bool) -> ExitCode:
     if plan.stopped_by is not None:
         report = replace(report, fraction=plan.fraction, stopped_by=plan.stopped_by.message)
-    print(report.as_json() if as_json else summary(report, session.arm, plan_only))
+    print(report.as_json() if as_json else summary(report, arm, isinstance(report, PlanReport)))
     return report.exit_code
 
 

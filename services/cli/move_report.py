@@ -47,6 +47,13 @@ class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
         return msgspec.json.encode(self).decode()
 
 
+class PlanReport(MoveReport, frozen=True, kw_only=True):
+    """A plan that was not executed: also the file of `gemelo move --execute`."""
+
+    target: dict[str, object] = {}  # the arguments of `gemelo.Plan`, which can load the file too
+    response: PlanResponse
+
+
 def report_of(
     session: Session,
     plan: PlanResponse,

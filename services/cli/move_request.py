@@ -29,19 +29,27 @@ from services.cli.units import parse_joints
 if TYPE_CHECKING:
     from services.arm.description import Arm
 
+DEFAULT_TIME = 1.0  # [s] that planning may take if nothing is said
 LONGEST_TIME = 3600.0  # [s] that planning may be allowed
 ORIENTATION = ("quaternion", "rpy", "axis", "along", "free_axis")
+GOAL_OPTIONS = (
+    "quaternion", "rpy", "axis", "along", "free_axis", "frame", "line", "arc", "center", "ptp", "via", "blend",
+    "tool_speed", "tool_acceleration", "fraction", "max_step", "jump", "time_optimal", "planner", "seed", "speed",
+    "time", "plan_only",
+)  # fmt: skip
 TOOL_MOTION = ("tool_speed", "tool_acceleration", "fraction", "max_step", "jump")
 
 
 def request_from(options: Options, arm: Arm) -> PlanRequest:
     """The request in SI units; raises `CommandError` naming options that do not go together."""
     goal = goal_of(arm, options.to, options.joints or (), options.named)
-    request = request_of(_with_waypoints(_with_orientation(goal, options), options), options.speed)
-    if not 0.0 < options.time <= LONGEST_TIME:
-        raise usage(f"--time {options.time:g} is not in (0, {LONGEST_TIME:g}] s")
+    speed = 1.0 if options.speed is None else options.speed
+    request = request_of(_with_waypoints(_with_orientation(goal, options), options), speed)
+    time = DEFAULT_TIME if options.time is None else options.time
+    if not 0.0 < time <= LONGEST_TIME:
+        raise usage(f"--time {time:g} is not in (0, {LONGEST_TIME:g}] s")
     timing = Timing.TIME_OPTIMAL if options.time_optimal else Timing.JERK_LIMITED
-    return replace(request, motion=motion_of(options), allowed_time=options.time, timing=timing)
+    return replace(request, motion=motion_of(options), allowed_time=time, timing=timing)
 
 
 def goal_of(arm: Arm, to: Sequence[float] | None, joints: Sequence[str], named: str | None) -> Goal:
@@ -128,6 +136,14 @@ def _positive(options: Options, name: str) -> float:
     if value <= 0.0:
         raise usage(f"--{name.replace('_', '-')} {value:g} is not above 0")
     return value
+
+
+def require_alone(options: Options) -> None:
+    """Raises `CommandError` for an option that goes with a goal only: a plan of before has its own path and speed."""
+    values = {name: getattr(options, name) for name in GOAL_OPTIONS}
+    given = [name for name, value in values.items() if value or (value == 0 and value is not False)]
+    if given:
+        raise usage(f"--{given[0].replace('_', '-')} does not go with --execute: the plan has its own path and speed")
 
 
 def _require(holds: bool, options: Options, names: tuple[str, ...], needed: str) -> None:

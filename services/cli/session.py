@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from services.runtime.node import Node
 
 CONNECT_TIMEOUT = 1.0  # [s]
+GATEWAY = "stepper_gateway"
 
 
 class Robot(NamedTuple):
@@ -55,6 +56,20 @@ def require_router(deployment: Deployment) -> None:
         raise CommandError(f"no router at {where}: start the twin with `make up`", ExitCode.NO_STACK) from None
 
 
+def other_robots(deployment: Deployment, arm: Arm) -> str:
+    """A sentence that names the robots on the router if `arm`'s own gateway is not there; else empty."""
+    from services.runtime.robots import robots_on
+
+    robots = robots_on(deployment.router, GATEWAY)
+    if not robots or arm.name in robots:
+        return ""
+    router = f"{deployment.router.host}:{deployment.router.port}"
+    return (
+        f"the router at {router} has no {arm.name}, but {', '.join(robots)}: "
+        f"GEMELO_ROBOT=urdf/{robots[0]} gemelo ... speaks with it"
+    )
+
+
 @contextmanager
 def connect(robot: Robot | None = None) -> Iterator[Session]:
     """Yields a session with `robot`, by default the deployment's own.
@@ -69,7 +84,9 @@ def connect(robot: Robot | None = None) -> Iterator[Session]:
     try:
         with Node(f"cli-{os.getpid()}", deployment, robot=arm.name) as node:
             yield Session(deployment, arm, node)
-    except (NoAnswer, BusError) as error:
+    except NoAnswer as error:
+        raise CommandError(other_robots(deployment, arm) or str(error), ExitCode.NO_STACK) from error
+    except BusError as error:
         raise CommandError(str(error), ExitCode.NO_STACK) from error
     except (Refused, ServerLost) as error:
         raise CommandError(str(error)) from error

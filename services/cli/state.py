@@ -13,7 +13,7 @@ from schemas.topics import DEVICE_STATE, DEVICE_STATUS, FRAMES, JOINT_STATES, ST
 from services.arm.frames import FrameBuffer, FrameError
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options, Parser
-from services.cli.session import Session, connect
+from services.cli.session import Session, connect, other_robots
 from services.cli.text_table import table
 from services.cli.units import SHOWN
 
@@ -192,10 +192,8 @@ def wait_for(session: Session, view: StateView) -> None:
     while not view.is_complete and session.node.monotonic() < deadline:
         session.node.wait(0.02)
     if view.is_empty:
-        raise CommandError(
-            f"nothing heard of the arm in {PATIENCE:g} s: is stepper_gateway running? `gemelo node list`",
-            ExitCode.NO_STACK,
-        )
+        silence = f"nothing heard of the arm in {PATIENCE:g} s: is stepper_gateway running? `gemelo node list`"
+        raise CommandError(other_robots(session.deployment, session.arm) or silence, ExitCode.NO_STACK)
 
 
 def _render(view: StateView, as_json: bool) -> str:

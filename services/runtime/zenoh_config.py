@@ -14,11 +14,12 @@ LONGEST_BLOCK_US = 500_000
 MAX_MESSAGE_BYTES = 16 * 1024 * 1024
 
 
-def client_config(host: str, port: int, robot: str) -> zenoh.Config:
-    """A client of the router that sees only `robot`'s keys; reconnects within half a second."""
+def client_config(host: str, port: int, robot: str = "") -> zenoh.Config:
+    """A client of the router that sees only `robot`'s keys, all if it is empty; reconnects within half a second."""
+    namespace = {"namespace": robot} if robot else {}
     return _config(
         mode="client",
-        namespace=robot,
+        **namespace,
         connect={
             "endpoints": [f"tcp/{host}:{port}"],
             "timeout_ms": 2000,

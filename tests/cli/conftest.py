@@ -53,6 +53,7 @@ class PretendGateway:
         self.ends_as = GoalStatusCode.SUCCEEDED
         self.reason = ""
         self.refusal = ""
+        self.goals: list[FollowJointTrajectoryGoal] = []
         self.commands: list[DeviceCommandRequest | DeviceStopRequest] = []
         self.mode = DeviceMode.IDLE
         self.command_refusal = "the arm moves"  # in Run
@@ -79,6 +80,7 @@ class PretendGateway:
                 self._finish(self.ends_as, self.reason)
 
     def _on_goal(self, goal_id: str, goal: FollowJointTrajectoryGoal):
+        self.goals.append(goal)
         if self.refusal:
             return refuse(FollowErrorCode.INVALID_GOAL, self.refusal)
         self._goal = (goal_id, self._node.monotonic())

@@ -1,0 +1,26 @@
+"""The robots that have living nodes on a router, whichever robot this process is for."""
+
+from __future__ import annotations
+
+from schemas.deployment import RouterSection
+from services.runtime.identity import ALIVE
+
+TO_ANSWER = 1.0  # [s] for the router to list the liveliness tokens
+
+
+def robots_on(router: RouterSection, node: str = "*") -> tuple[str, ...]:
+    """The names of the robots of which `node` (or any node) is alive on `router`, sorted; none if it cannot be asked.
+
+    A session for one robot has its name as Zenoh's namespace and cannot see another's tokens, so this one has none.
+    """
+    import zenoh
+
+    from services.runtime.zenoh_config import client_config
+
+    try:
+        with zenoh.open(client_config(router.host, router.port)) as session:
+            replies = session.liveliness().get(f"*/{ALIVE}/{node}", timeout=TO_ANSWER)
+            keys = [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+    except zenoh.ZError:
+        return ()
+    return tuple(sorted({key.split("/", 1)[0] for key in keys}))

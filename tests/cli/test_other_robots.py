@@ -1,0 +1,53 @@
+"""A command for a robot that is not on the router names those that are: on a router and nodes of its own."""
+
+from __future__ import annotations
+
+import pytest
+
+from services.cli import state
+from services.cli.errors import ExitCode
+from services.cli.main import run
+from services.runtime.node import Node
+from services.runtime.robots import robots_on
+from services.runtime.stopping import StopRequest
+from tests.runtime.support import RouterProcess
+
+
+@pytest.fixture
+def router(tmp_path, monkeypatch):
+    process = RouterProcess(tmp_path)
+    monkeypatch.setenv("GEMELO_ROUTER_PORT", str(process.port))
+    yield process
+    process.kill()
+
+
+@pytest.fixture
+def parol6(router):
+    """A gateway of another robot."""
+    with Node("stepper_gateway", router.deployment, robot="parol6", stop=StopRequest()) as node:
+        yield node
+
+
+def test_the_robots_of_a_router_are_those_with_the_node_asked_for(router, parol6):
+    with Node("planner", router.deployment, robot="other", stop=StopRequest()):
+        assert robots_on(router.deployment.router) == ("other", "parol6")
+        assert robots_on(router.deployment.router, "stepper_gateway") == ("parol6",)
+
+
+def test_a_router_without_nodes_has_no_robots(router):
+    assert robots_on(router.deployment.router) == ()
+
+
+@pytest.mark.parametrize("words", [["state"], ["request", "call", "fk"], ["hold"], ["device", "status"]])
+def test_a_command_for_a_robot_that_is_not_there_names_the_one_that_is(router, parol6, words, monkeypatch, capsys):
+    monkeypatch.setattr(state, "PATIENCE", 0.2)
+    assert run(words) is ExitCode.NO_STACK
+    error = capsys.readouterr().err
+    assert f"the router at 127.0.0.1:{router.port} has no rm1, but parol6" in error
+    assert "GEMELO_ROBOT=urdf/parol6" in error
+
+
+def test_a_router_with_nobody_says_what_does_not_run(router, monkeypatch, capsys):
+    monkeypatch.setattr(state, "PATIENCE", 0.2)
+    assert run(["state"]) is ExitCode.NO_STACK
+    assert "is stepper_gateway running?" in capsys.readouterr().err
