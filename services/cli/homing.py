@@ -44,6 +44,7 @@ class Homing:
 
     @property
     def homed(self) -> tuple[str, ...]:
+        """The joints that have found their switches."""
         return tuple(name for name, phase in self.phases.items() if phase == HOME)
 
     @property
@@ -53,6 +54,7 @@ class Homing:
 
     @property
     def is_done(self) -> bool:
+        """True if all joints are home."""
         return len(self.homed) == len(self.phases)
 
     def on_event(self, event: DeviceEvent) -> None:

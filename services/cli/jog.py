@@ -127,6 +127,7 @@ class Jogging:
         self.node.subscribe(JOG_STATUS, self._on_status)
 
     def send(self, command: JogCommand) -> None:
+        """Publishes `command`, stamped with the present time."""
         self._commands.put(msgspec.structs.replace(command, stamp=self.node.now()))
 
     @property

@@ -39,11 +39,13 @@ class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def exit_code(self) -> ExitCode:
+        """OK, CANCELLED by Ctrl-C, or FAILED."""
         if self.succeeded:
             return ExitCode.OK
         return ExitCode.CANCELLED if self.interrupted and self.status == "CANCELED" else ExitCode.FAILED
 
     def as_json(self) -> str:
+        """The report as one JSON object, in SI units."""
         return msgspec.json.encode(self).decode()
 
 

@@ -88,7 +88,7 @@ def run_log(options: Options) -> ExitCode:
 
 
 def information_of(session: Session, name: str) -> NodeInfo:
-    """What a node publishes, subscribes to and serves; raises `CommandError` if no such node is alive."""
+    """The keys that a node publishes, subscribes to and serves; raises `CommandError` if no such node is alive."""
     require_alive(session, name)
     return session.node.call(Request(f"@node/{name}/info", Empty, NodeInfo, name, ""), Empty(), timeout=TIMEOUT)
 

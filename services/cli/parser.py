@@ -44,6 +44,7 @@ class Parser(argparse.ArgumentParser):
         self._negative_number_matcher = _NEGATIVE_NUMBER
 
     def error(self, message: str) -> NoReturn:
+        """Ends the process with code 2 and one sentence."""
         if message.endswith("required: COMMAND"):
             self.print_help()
             self.exit(ExitCode.USAGE)
