@@ -9,8 +9,8 @@ import msgspec
 from schemas.joints import JointState
 from schemas.planning import FkRequest, FkResponse, IkRequest, IkResponse, PoseGoal
 from schemas.topics import FK, IK
-from services.arm.transforms import from_rpy
 from services.cli.errors import CommandError, ExitCode
+from services.cli.move_request import oriented
 from services.cli.parser import Choices, Options, Parser, finite_number, json_option, positive_integer
 from services.cli.request_text import goal_text, joints_text, refusal_text
 from services.cli.session import Robot, Session, connect, load_robot
@@ -40,7 +40,7 @@ def ik_options(parser: Parser) -> None:
     turned.add_argument(
         "--axis", nargs=3, type=finite_number, metavar=XYZ, default=(), help="of the tool, to point --along"
     )
-    _vector(parser, "--along", "direction in which --axis is to point")
+    _vector(parser, "--along", "direction in which --axis is to point; it is z")
     _vector(parser, "--free-axis", "of the tool: turning about it does not matter")
     parser.add_argument("--frame", default="", metavar="LINK", help="in which all this is given; the base, if none")
     parser.add_argument("--tolerance", type=length, default=0.0, metavar="DISTANCE", help="of the position, as 2mm")
@@ -84,21 +84,13 @@ def ik_choices(robot: Robot | None) -> Choices:
 def ik_request(options: Options, arm: Arm) -> IkRequest:
     """The request in SI units."""
     near = parse_joints(options.near, arm.joints)
-    orientation = options.quaternion
-    if options.rpy is not None:
-        orientation = from_rpy(*options.rpy)
     goal = PoseGoal(
         position=tuple(options.to),
-        orientation=tuple(orientation),
-        frame=options.frame,
-        free_axis=tuple(options.free_axis),
-        tool_axis=tuple(options.axis),
-        direction=tuple(options.along),
         position_tolerance=options.tolerance,
         orientation_tolerance=options.turn_tolerance,
     )
     return IkRequest(
-        goal=goal,
+        goal=oriented(goal, options),
         near=JointState(name=tuple(near), position=tuple(near.values())) if near else None,
         solutions=options.solutions,
         avoid_collisions=not options.touching,

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 DEFAULT_TIME = 1.0  # [s] that planning may take if nothing is said
 LONGEST_TIME = 3600.0  # [s] that planning may be allowed
+TOOL_Z = (0.0, 0.0, 1.0)
 ORIENTATION = ("quaternion", "rpy", "axis", "along", "free_axis")
 GOAL_OPTIONS = (
     "quaternion", "rpy", "axis", "along", "free_axis", "frame", "line", "arc", "center", "ptp", "via", "blend",
@@ -99,18 +100,18 @@ def motion_of(options: Options) -> Motion:
 
 def _with_orientation(goal: Goal, options: Options) -> Goal:
     _require(isinstance(goal, PoseGoal), options, ORIENTATION, "--to")
-    if not isinstance(goal, PoseGoal):
-        return goal
-    orientation = tuple(options.quaternion or ())
-    if options.rpy is not None:
-        orientation = from_rpy(*options.rpy)
-    axis = tuple(options.axis or ((0.0, 0.0, 1.0) if options.along else ()))
+    return oriented(goal, options) if isinstance(goal, PoseGoal) else goal
+
+
+def oriented(goal: PoseGoal, options: Options) -> PoseGoal:
+    """`goal` with the frame and the orientation that the options give; --along alone points the tool's z."""
+    orientation = from_rpy(*options.rpy) if options.rpy is not None else tuple(options.quaternion or ())
     return replace(
         goal,
         orientation=orientation,
         frame=options.frame,
         free_axis=tuple(options.free_axis or ()),
-        tool_axis=axis,
+        tool_axis=tuple(options.axis or (TOOL_Z if options.along else ())),
         direction=tuple(options.along or ()),
     )
 
