@@ -10,6 +10,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+import gemelo
 from schemas.planning import PlanResponse
 from services.cli import move
 from services.cli.errors import ExitCode
@@ -125,3 +126,12 @@ def test_a_plan_and_a_goal_exclude_one_another(capsys):
     with pytest.raises(SystemExit):
         run(["move", "--execute", "plan.json", "--named", "ready"])
     assert "not allowed with argument --execute" in capsys.readouterr().err
+
+
+def test_the_python_api_reads_and_writes_the_same_file(stack, plan, tmp_path):
+    loaded = gemelo.Plan.load(str(plan))
+    saved = msgspec.convert(json.loads(plan.read_text())["response"], PlanResponse)
+    assert loaded.response == saved
+    loaded.save(str(tmp_path / "again.json"))
+    assert run(["move", "--execute", str(tmp_path / "again.json")]) is ExitCode.OK
+    assert stack.goals[-1].trajectory == saved.trajectory
