@@ -53,7 +53,7 @@ def sample(kind: type[Message]) -> Message:
 
 
 def golden() -> dict[str, dict[str, Any]]:
-    """Name of the message -> {"hex": what `sample` gave when it was added, "fields": the same for eyes}."""
+    """Name of the message -> {"fields": those of `sample` when it was added, "hex": their msgpack bytes}."""
     return json.loads(GOLDEN.read_text(encoding="utf-8")) if GOLDEN.exists() else {}
 
 
@@ -64,7 +64,13 @@ def golden_codes() -> dict[str, dict[str, int | str]]:
 
 def record(kind: type[Message]) -> dict[str, Any]:
     payload = encode(sample(kind))
-    return {"hex": payload.hex(), "fields": json.loads(msgspec.json.encode(msgspec.msgpack.decode(payload)))}
+    return {"fields": json.loads(msgspec.json.encode(msgspec.msgpack.decode(payload))), "hex": payload.hex()}
+
+
+def one_a_line(records: dict[str, dict[str, Any]]) -> str:
+    """JSON with one record on each line."""
+    lines = (f"{json.dumps(name)}: {json.dumps(record)}" for name, record in records.items())
+    return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
 def _import_all() -> None:
@@ -125,10 +131,10 @@ def main() -> int:
         return 1
     for kind in messages():
         kept.setdefault(kind.__name__, record(kind))
-    GOLDEN.write_text(json.dumps(kept, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    GOLDEN.write_text(one_a_line(dict(sorted(kept.items()))), encoding="utf-8")
     old = golden_codes()
     merged = {name: now | old.get(name, {}) for name, now in codes().items()}
-    GOLDEN_CODES.write_text(json.dumps(old | merged, indent=1) + "\n", encoding="utf-8")
+    GOLDEN_CODES.write_text(one_a_line(old | merged), encoding="utf-8")
     print(f"{len(kept)} messages in {GOLDEN.name}, {len(merged)} enumerations in {GOLDEN_CODES.name}")
     return 0
 

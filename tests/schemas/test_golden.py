@@ -14,7 +14,16 @@ import pytest
 
 from schemas.joints import JointState
 from schemas.message import Message, decode, encode
-from tests.schemas.samples import codes, golden, golden_codes, messages, sample
+from tests.schemas.samples import (
+    GOLDEN,
+    GOLDEN_CODES,
+    codes,
+    golden,
+    golden_codes,
+    messages,
+    one_a_line,
+    sample,
+)
 
 RECORDED = golden()
 
@@ -35,6 +44,11 @@ def test_what_is_said_now_has_every_recorded_field_under_its_name_and_type(kind:
 
 def test_no_recorded_message_is_gone() -> None:
     assert set(RECORDED) == {kind.__name__ for kind in messages()}
+
+
+def test_the_files_have_one_record_on_each_line() -> None:
+    assert GOLDEN.read_text(encoding="utf-8") == one_a_line(dict(sorted(golden().items())))
+    assert GOLDEN_CODES.read_text(encoding="utf-8") == one_a_line(golden_codes())
 
 
 @pytest.mark.parametrize("name", sorted(codes().keys() | golden_codes().keys()))
