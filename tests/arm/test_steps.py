@@ -1,4 +1,4 @@
-"""Steps are exact: defects 3 and 4 of the seed."""
+"""Steps are exact over many revolutions; a rack counts in metres, and needs the radius of its pinion."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_a_step_of_the_rack_is_a_third_of_a_millimetre(rm1: Arm):
     assert rm1.joint("efector_joint").steps.resolution == pytest.approx(0.3534e-3, abs=5e-8)
 
 
-def test_defect_3_a_position_is_never_off_by_more_than_half_a_step_over_many_revolutions():
+def test_a_position_is_never_off_by_more_than_half_a_step_over_many_revolutions():
     for turns in (0, 1, 1000, 100_000):
         for degrees in (0, 0.9, 13.25, 90, 359.99):
             position = math.radians(turns * 360 + degrees)
@@ -43,26 +43,26 @@ def test_defect_3_a_position_is_never_off_by_more_than_half_a_step_over_many_rev
             assert abs(round(Q1.to_steps(position)) - exact) <= Fraction(1, 2) + Fraction(1, 10**6)
 
 
-def test_defect_3_a_revolution_repeated_does_not_drift():
+def test_a_revolution_repeated_does_not_drift():
     per_revolution = [Q1.to_q8(math.tau * turn) for turn in range(0, 1001, 5)]
     assert {b - a for a, b in pairwise(per_revolution)} == {93312 * 256}
 
 
-def test_defect_3_small_moves_add_up_because_targets_are_absolute():
+def test_small_moves_add_up_because_targets_are_absolute():
     """Rounding deltas to two decimals of a degree drifted up to 13.25 degrees a revolution."""
     parts = 7777
     steps = [round(Q1.to_steps(math.tau * part / parts)) for part in range(parts + 1)]
     assert sum(b - a for a, b in pairwise(steps)) == round(float(Q1.steps_per_turn))
 
 
-def test_defect_4_metres_are_not_radians(rm1: Arm):
+def test_metres_of_a_rack_are_not_radians(rm1: Arm):
     joint = rm1.joint("efector_joint")
     assert joint.unit == "m"
     assert joint.steps.to_steps(0.040) == pytest.approx(0.040 / (math.tau * 0.0225) * 400)
     assert joint.steps.to_steps(0.040) != pytest.approx(0.040 / math.tau * 400)
 
 
-def test_defect_4_a_rack_without_a_radius_is_refused():
+def test_a_rack_without_a_radius_is_refused():
     drive = StepperJoint(
         name="lift",
         wire_name="q3",

@@ -98,7 +98,7 @@ def steps_of_the_seed(acceleration: float, period: float = 0.1) -> int:
     return 2 * n
 
 
-def test_defect_1_a_90_degree_move_streamed_at_10_hz_arrives_whole_where_the_seed_lost_99_percent():
+def test_a_90_degree_move_streamed_at_10_hz_arrives_whole_where_the_seed_lost_99_percent():
     assert steps_of_the_seed(acceleration=3110) == 48  # q1: 0.926 of the 90 degrees
     assert steps_of_the_seed(acceleration=100) == 4  # q2: 3.6 degrees
 
@@ -121,7 +121,7 @@ def test_defect_1_a_90_degree_move_streamed_at_10_hz_arrives_whole_where_the_see
     assert bench.device.max_slot_error <= HALF_A_STEP
 
 
-def test_defect_2_a_chunk_carries_every_joint_and_one_that_does_not_is_refused():
+def test_a_chunk_carries_every_joint_and_one_that_does_not_is_refused():
     bench = Bench(rm1_config())
     two_of_three = traj(1, 0, [((0, 0), (0, 0))], FIRST)
     ack = bench.send(two_of_three)

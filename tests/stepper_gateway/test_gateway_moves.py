@@ -92,7 +92,7 @@ def test_a_lossy_wire_loses_nothing() -> None:
     assert {(ack.stream, ack.seq) for ack in rig.messages(COMMAND_ACKS)} <= sent
 
 
-def test_defect_1_a_streamed_move_keeps_what_is_left_of_the_last_command() -> None:
+def test_a_streamed_move_keeps_what_is_left_of_the_last_command() -> None:
     """The seed's relative `move()` ended a 90 degree command after 48 and 4 steps; absolute knots end on the target."""
     rig = Rig().ready()
     quarter = 1.5707963267948966
@@ -103,7 +103,7 @@ def test_defect_1_a_streamed_move_keeps_what_is_left_of_the_last_command() -> No
     assert rig.messages(STEP_ERRORS)[-1].executed == rig.device.steps
 
 
-def test_defect_2_a_goal_without_all_joints_is_refused_by_name_and_a_target_moves_what_it_names() -> None:
+def test_a_goal_without_all_joints_is_refused_by_name_and_a_target_moves_what_it_names() -> None:
     """The seed's firmware ignored every message that lacked q3, silently."""
     rig = Rig().ready()
     whole = move(HOME, READY)
@@ -134,7 +134,7 @@ def slow_points(count: int, spacing: float) -> JointTrajectory:
     )
 
 
-def test_defect_6_points_100_ms_apart_take_their_own_time() -> None:
+def test_points_100_ms_apart_take_their_own_time() -> None:
     rig = Rig().ready()
     trajectory = slow_points(31, 0.1)
     begun = rig.now
@@ -147,7 +147,7 @@ def test_defect_6_points_100_ms_apart_take_their_own_time() -> None:
     assert_within_limits(rig)
 
 
-def test_defect_6_success_is_never_said_before_the_device_has_executed_the_steps() -> None:
+def test_success_is_never_said_before_the_device_has_executed_the_steps() -> None:
     rig = Rig().ready()
     rig.goal(move(HOME, READY))
     while "g" not in rig.finished:
@@ -158,7 +158,7 @@ def test_defect_6_success_is_never_said_before_the_device_has_executed_the_steps
     assert rig.core.controller.stream.acked == rig.core.controller.stream.next_seq
 
 
-def test_defect_6_without_a_device_a_goal_is_refused_not_simulated() -> None:
+def test_without_a_device_a_goal_is_refused_not_simulated() -> None:
     rig = Rig()
     rig.device_is_on = False
     rig._flying.clear()
