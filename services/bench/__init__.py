@@ -1,1 +1,1 @@
-"""Measures what the project promises, each figure against a reference taken in the same run."""
+"""Measures the figures of `make bench`, each beside a reference taken in the same run."""

@@ -1,7 +1,7 @@
-"""`make bench`: every figure that the project promises, measured here and now, into out/bench.json and a table.
+"""`make bench`: measures every figure here and now; writes out/bench.json and prints a table.
 
-A figure that cannot be measured says why; nothing is estimated. Exit code 1 if one is missing; a goal that is not met
-is said, and is not an error.
+A figure that cannot be measured says why; nothing is estimated. The exit code is 1 if a figure is missing; a goal that
+is not met is reported and is no error.
 """
 
 from __future__ import annotations
@@ -12,63 +12,80 @@ import sys
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
-from types import ModuleType
+from typing import NamedTuple
 
 import msgspec
 
-from services.bench.figure import Figure, guarded
-from services.bench.report import report_of, text_of
-from services.bench.stacks import Stacks
+from services.bench.figures import Figure, guarded, report_of, text_of
+from services.bench.stack import Stacks
 from services.runtime.deployment import project_root
 
-ALONE = (
-    "frame_lookup_us",
-    "state_check_us",
-    "collision_checks_per_s",
-    "ik_ms",
-    "ik_success",
-    "plan_ms",
-    "plan_success",
-    "path_length_ratio",
-    "duration_ratio",
-    "plan_python_ms",
-    "plan_mesh_ms",
-    "lin_ms",
-    "jog_tick_us",
-    "lost_of_45000_at_25hz",
-    "seed_move_percent",
-    "clock_sync_error_us",
-    "hold_reaction_ms",
-    "max_step_rate_hz",
-    "parse_mb_per_s",
-    "step_time_error_us",
-    "estop_reaction_ticks",
-    "cli_start_ms",
-)  # before any stack disturbs them
-ON_A_STACK = ("stack_idle_cpu_percent", "stack_rss_mb", "state_to_frame_ms", "move_accept_to_first_step_ms", "stop_ms")
-BROKERS = {"chunk_ack_ms": "mosquitto", "chunk_ack_ms_amqtt": "amqtt"}
-CHIP = ("tick_instructions", "slot_instructions", "core_text_bytes", "core_ram_bytes")
-LAST = ("ready_s",)
-NAMES = (*ALONE, *CHIP, *ON_A_STACK, *BROKERS, *LAST)
+
+class Row(NamedTuple):
+    """One figure."""
+
+    function: str  # module:function of services.bench
+    unit: str
+    on_a_stack: bool = False
+    broker: str = ""  # of that stack, if the figure depends on it
+
+
+# In the order of measuring: first those that a running stack would disturb.
+FIGURES = {
+    "frame_lookup_us": Row("frames:frame_lookup_us", "us"),
+    "state_check_us": Row("collision:state_check_us", "us"),
+    "collision_checks_per_s": Row("collision:collision_checks_per_s", "1/s"),
+    "ik_ms": Row("kinematics:ik_ms", "ms"),
+    "ik_success": Row("kinematics:ik_success", "%"),
+    "plan_ms": Row("planning:plan_ms", "ms"),
+    "plan_success": Row("planning:plan_success", "%"),
+    "path_length_ratio": Row("path_quality:path_length_ratio", "ratio"),
+    "duration_ratio": Row("path_quality:duration_ratio", "ratio"),
+    "plan_python_ms": Row("planning:plan_python_ms", "ms"),
+    "plan_mesh_ms": Row("mesh_planning:plan_mesh_ms", "ms"),
+    "lin_ms": Row("tool_motion:lin_ms", "ms"),
+    "jog_tick_us": Row("tool_motion:jog_tick_us", "us"),
+    "lost_of_45000_at_25hz": Row("virtual_time:lost_of_45000_at_25hz", "chunks"),
+    "seed_move_percent": Row("seed_move:seed_move_percent", "%"),
+    "clock_sync_error_us": Row("virtual_time:clock_sync_error_us", "us"),
+    "hold_reaction_ms": Row("virtual_time:hold_reaction_ms", "ms"),
+    "max_step_rate_hz": Row("pulses:max_step_rate_hz", "steps/s"),
+    "parse_mb_per_s": Row("firmware_cost:parse_mb_per_s", "MB/s"),
+    "step_time_error_us": Row("pulses:step_time_error_us", "us"),
+    "estop_reaction_ticks": Row("pulses:estop_reaction_ticks", "ticks"),
+    "cli_start_ms": Row("stack:cli_start_ms", "ms"),
+    "tick_instructions": Row("firmware_cost:tick_instructions", "instr"),
+    "slot_instructions": Row("firmware_cost:slot_instructions", "instr"),
+    "core_text_bytes": Row("firmware_cost:core_text_bytes", "bytes"),
+    "core_ram_bytes": Row("firmware_cost:core_ram_bytes", "bytes"),
+    "stack_idle_cpu_percent": Row("stack:stack_idle_cpu_percent", "% of one core", True),
+    "stack_rss_mb": Row("stack:stack_rss_mb", "MB per process", True),
+    "state_to_frame_ms": Row("frames:state_to_frame_ms", "ms", True),
+    "move_accept_to_first_step_ms": Row("latency:move_accept_to_first_step_ms", "ms", True),
+    "stop_ms": Row("stops:stop_ms", "ms", True),
+    "chunk_ack_ms": Row("latency:chunk_ack_ms", "ms", True, "mosquitto"),
+    "chunk_ack_ms_amqtt": Row("latency:chunk_ack_ms", "ms", True, "amqtt"),
+    "ready_s": Row("stack:ready_s", "s", True),
+}
 
 
 def main() -> None:
     """The command."""
-    parser = argparse.ArgumentParser(prog="make bench", description="Measure the figures that the project promises.")
-    parser.add_argument("--only", nargs="+", choices=NAMES, metavar="NAME", help=", ".join(NAMES))
+    parser = argparse.ArgumentParser(prog="make bench", description="Measure the figures of this machine.")
+    parser.add_argument("--only", nargs="+", choices=FIGURES, metavar="NAME", help=", ".join(FIGURES))
     parser.add_argument("--out", type=Path, default=project_root() / "out/bench.json")
     options = parser.parse_args()
-    sys.exit(bench(options.only or NAMES, options.out))
+    sys.exit(bench(options.only or FIGURES, options.out))
 
 
 def bench(names: Iterable[str], out: Path) -> int:
-    """Measures, writes, prints; the exit code."""
-    names = [name for name in NAMES if name in set(names)]
+    """Measures the figures `names`, writes `out` and prints the table; returns the exit code."""
+    wanted = set(names)
     figures: dict[str, Figure] = {}
     with Stacks() as stacks:
-        for name in names:
+        for name in (name for name in FIGURES if name in wanted):
             print(f"bench: {name} ...", flush=True)
-            figures[name] = measured(name, stacks)
+            figures[name] = measured(FIGURES[name], stacks)
     report = report_of(figures, project_root())
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
@@ -76,18 +93,17 @@ def bench(names: Iterable[str], out: Path) -> int:
     return 1 if any(figure.median is None for figure in figures.values()) else 0
 
 
-def measured(name: str, stacks: Stacks) -> Figure:
-    """One figure, by the module that bears its name."""
-    module = module_of(name)
-    measure: Callable[..., Figure] = module.measure
-    if name in BROKERS:
-        return guarded(partial(measure, stacks, BROKERS[name]), module.UNIT)
-    return guarded(partial(measure, *(() if name in (*ALONE, *CHIP) else (stacks,))), module.UNIT)
+def measured(row: Row, stacks: Stacks) -> Figure:
+    """The figure of one row of the table; it says why if it could not be measured."""
+    arguments = [stacks] if row.on_a_stack else []
+    return guarded(partial(function_of(row), *arguments, *filter(None, [row.broker])), row.unit)
 
 
-def module_of(name: str) -> ModuleType:
-    """Imported only when asked for: pinocchio and yourdfpy are slow to import."""
-    return importlib.import_module(f"services.bench.{name.removesuffix('_amqtt')}")
+def function_of(row: Row) -> Callable[..., Figure]:
+    """The function that measures; its module is imported now, because pinocchio and yourdfpy are slow to load."""
+    module, name = row.function.split(":")
+    function: Callable[..., Figure] = getattr(importlib.import_module(f"services.bench.{module}"), name)
+    return function
 
 
 if __name__ == "__main__":

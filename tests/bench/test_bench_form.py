@@ -1,14 +1,15 @@
 """The form of out/bench.json, and figures that say why they are missing."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import msgspec
 import pytest
 
-from services.bench.figure import Figure, Goal, NotMeasured, guarded, of_samples, quantile
-from services.bench.main import BROKERS, NAMES, module_of
-from services.bench.report import report_of, text_of
+from services.bench.figures import Figure, Goal, NotMeasured, guarded, of_samples, quantile, report_of, text_of
+from services.bench.main import FIGURES, function_of
 
 ISSUE = (
     "chunk_ack_ms", "state_to_frame_ms", "move_accept_to_first_step_ms", "frame_lookup_us", "plan_ms",
@@ -22,20 +23,31 @@ ISSUE = (
 
 
 @pytest.mark.parametrize("name", ISSUE)
-def test_every_figure_of_the_issue_has_a_module_of_its_name(name):
-    assert name in NAMES
-    module = module_of(name)
-    assert callable(module.measure)
-    assert module.UNIT
-    assert module.__doc__
+def test_every_figure_of_the_issue_has_a_function_of_its_name(name):
+    function = function_of(FIGURES[name])
+    assert callable(function)
+    assert function.__name__ == name
+    assert FIGURES[name].unit
+    assert function.__doc__
 
 
 def test_both_brokers_are_measured():
-    assert set(BROKERS.values()) == {"mosquitto", "amqtt"}
+    assert {row.broker for name, row in FIGURES.items() if name.startswith("chunk_ack_ms")} == {"mosquitto", "amqtt"}
+
+
+@pytest.mark.parametrize("name", ["clock_sync_error_us", "frame_lookup_us", "tick_instructions", "stop_ms", "ready_s"])
+def test_a_figure_without_planning_loads_no_planning_library(name):
+    slow = {"pinocchio", "coal", "ompl", "toppra", "yourdfpy"}
+    program = (
+        "import sys; from services.bench.main import FIGURES, function_of; "
+        f"function_of(FIGURES[{name!r}]); print({slow} & set(sys.modules))"
+    )
+    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+    assert loaded.strip() == "set()"
 
 
 def test_the_json_has_the_form_of_the_architecture():
-    figure = of_samples([1.0, 2.0, 3.0], "ms", Goal(median=2.5, p99=10.0), {"echo": 0.123456}, "three")
+    figure = guarded(lambda: of_samples([1.0, 2.0, 3.0], Goal(median=2.5, p99=10.0), {"echo": 0.123456}, "three"), "ms")
     report = json.loads(msgspec.json.encode(report_of({"plan_ms": figure}, Path(__file__).parents[2])))
     assert set(report) == {"commit", "machine", "figures"}
     assert report["figures"]["plan_ms"] == {
@@ -45,7 +57,7 @@ def test_the_json_has_the_form_of_the_architecture():
 
 
 def test_a_goal_that_is_not_met_is_said():
-    figure = of_samples([1.0, 20.0], "ms", Goal(p99=10.0))
+    figure = of_samples([1.0, 20.0], Goal(p99=10.0))
     assert figure.met is False
     assert "p99 <= 10  NO" in text_of(report_of({"plan_ms": figure}, Path(__file__).parents[2]))
 

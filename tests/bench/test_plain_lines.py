@@ -1,13 +1,12 @@
-"""What lines of the tool are held against."""
+"""The reference of straight tool lines."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from services.bench.arms import parol6, rm1
-from services.bench.lin_ms import problems
-from services.bench.plain_lines import STEP, PlainLines
+from services.bench.scenes import parol6, rm1
+from services.bench.tool_motion import STEP, PlainLines, line_requests
 from services.planner.core import Planner
 
 
@@ -15,7 +14,7 @@ from services.planner.core import Planner
 def test_the_plain_way_is_on_the_line_as_far_as_it_goes(arm):
     planner, plain = Planner(arm), PlainLines(arm)
     whole = 0
-    for request in problems(arm, planner)[:10]:
+    for request in line_requests(arm, planner)[:10]:
         rows = plain.rows(request)
         places = np.array([planner.kinematics.tool(row).position for row in rows])
         start, goal = places[0], np.array(request.goal.position)

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from schemas.planning import PlanCode, Refusal
-from services.bench import duration_ratio, path_length_ratio, plan_ms, plan_success
-from services.bench.arms import parol6
-from services.bench.duration_ratio import joints_time
-from services.bench.figure import NotMeasured
-from services.bench.path_bound import least_time
-from services.bench.plan_python_ms import in_python_alone
-from services.bench.plan_trials import PHASES, Trial, trials
+from services.bench import path_quality, planning
+from services.bench.figures import NotMeasured
+from services.bench.path_quality import joints_time, least_time
+from services.bench.planning import runs_without_core
+from services.bench.scenes import parol6
+from services.bench.trials import PHASES, Trial, trials
 from services.planner.core import Planner
 from services.planner.timing.profile import joint_limits
 
@@ -30,8 +29,8 @@ def some() -> dict[str, list[Trial]]:
 
 @pytest.fixture(autouse=True)
 def measured(monkeypatch: pytest.MonkeyPatch, some: dict[str, list[Trial]]) -> None:
-    for figure in (plan_ms, plan_success, path_length_ratio, duration_ratio):
-        monkeypatch.setattr(figure, "every_trial", lambda: some)
+    for module in (planning, path_quality):
+        monkeypatch.setattr(module, "every_trial", lambda: some)
 
 
 def test_a_trial_is_a_whole_plan(some: dict[str, list[Trial]]):
@@ -41,8 +40,8 @@ def test_a_trial_is_a_whole_plan(some: dict[str, list[Trial]]):
         assert trial.took >= sum(map(trial.phase, PHASES)) > 0.0
 
 
-def test_ways_are_not_shorter_than_the_best_known_by_more_than_it_may_be_missed(some: dict[str, list[Trial]]):
-    figure = path_length_ratio.measure()
+def test_paths_are_not_shorter_than_the_best_known_by_more_than_it_may_be_missed(some: dict[str, list[Trial]]):
+    figure = path_quality.path_length_ratio()
     assert 0.97 < figure.median <= figure.p99
     assert figure.reference["straight lines too, p50"] <= figure.median
 
@@ -51,7 +50,7 @@ def test_no_trajectory_is_faster_than_its_bounds(some: dict[str, list[Trial]]):
     for trial in (each for row in some.values() for each in row):
         assert trial.response.duration > 0.999 * least_time(trial.path, LIMITS)
         assert trial.response.duration > 0.999 * joints_time(trial.path, LIMITS)
-    assert duration_ratio.measure().median > 1.0
+    assert path_quality.duration_ratio().median > 1.0
 
 
 def test_the_bound_of_a_straight_line_is_the_trapezoid_of_its_slowest_joint():
@@ -66,31 +65,31 @@ def test_the_bound_of_a_straight_line_is_the_trapezoid_of_its_slowest_joint():
 def test_a_problem_that_is_not_solved_is_named_and_counts_in_the_time(
     monkeypatch: pytest.MonkeyPatch, some: dict[str, list[Trial]]
 ):
-    assert plan_success.measure().met
+    assert planning.plan_success().met
     [first, *rest] = some["parol6 cage"]
     response = msgspec.structs.replace(first.response, code=PlanCode.TIMED_OUT, refusal=Refusal(message="too late"))
     failed = dataclasses.replace(first, took=1000.0, response=response)
-    monkeypatch.setattr(plan_success, "every_trial", lambda: {"parol6 cage": [failed, *rest]})
-    figure = plan_success.measure()
+    monkeypatch.setattr(planning, "every_trial", lambda: {"parol6 cage": [failed, *rest]})
+    figure = planning.plan_success()
     assert (figure.met, figure.median) == (False, 83.33)
     assert "parol6 cage 0 (TIMED_OUT)" in figure.note
-    monkeypatch.setattr(plan_ms, "every_trial", lambda: {"parol6 cage": [failed, *rest]})
-    monkeypatch.setattr(plan_ms, "REFERENCES", ())
-    assert plan_ms.measure().p99 == 1000.0
+    monkeypatch.setattr(planning, "every_trial", lambda: {"parol6 cage": [failed, *rest]})
+    monkeypatch.setattr(planning, "REFERENCES", ())
+    assert planning.plan_ms().p99 == 1000.0
 
 
 def test_a_reference_that_cannot_be_had_is_said(monkeypatch: pytest.MonkeyPatch):
     def missing(*_: object) -> None:
         raise NotMeasured("no such wheel")
 
-    monkeypatch.setattr(plan_ms, "REFERENCES", (("roboplan", missing),))
-    figure = plan_ms.measure()
+    monkeypatch.setattr(planning, "REFERENCES", (("roboplan", missing),))
+    figure = planning.plan_ms()
     assert "roboplan: not measured: no such wheel" in figure.note
     assert not any("roboplan" in name for name in figure.reference)
 
 
 def test_python_alone_has_no_compiled_core_and_solves_too():
-    runs = in_python_alone(count=3)
+    runs = runs_without_core(count=3)
     assert len(runs) == 2 * 4 * 3
     assert all(run.is_solved for run in runs)
     assert {run.planner_id for run in runs} <= {"straight", "RRTConnect"}

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 from services.arm.kinematics import Kinematics
-from services.bench import plan_references
-from services.bench.arms import parol6, rm1
-from services.bench.figure import NotMeasured
-from services.bench.plan_references import PlainOmpl, Roboplan
-from services.bench.plan_scenes import SCENES
-from services.bench.postures import CoalChecker, random_postures
-from services.bench.problem_sets import problem_set
+from services.bench import references
+from services.bench.figures import NotMeasured
+from services.bench.problems.problem_sets import problem_set
+from services.bench.references import CoalChecker, PlainOmpl, Roboplan
+from services.bench.scenes import SCENES, parol6, random_configurations, rm1
 from services.planner.collision.world import World
 
 ARMS = {arm.name: arm for arm in (rm1(), parol6())}
@@ -27,17 +25,17 @@ def test_all_are_asked_about_the_same_arm_in_the_same_scene(name: str, scene: st
     ours = World(arm, Kinematics(arm), SCENES[scene])
     coal, roboplan = CoalChecker(arm, SCENES[scene]), Roboplan(arm, SCENES[scene])
     free = 0
-    for posture in random_postures(arm, 300):
-        is_free = ours.distance(posture) > 0.0
-        assert coal.is_free(posture) is is_free
-        assert roboplan.is_free(posture) is is_free
+    for configuration in random_configurations(arm, 300):
+        is_free = ours.distance(configuration) > 0.0
+        assert coal.is_free(configuration) is is_free
+        assert roboplan.is_free(configuration) is is_free
         free += is_free
     assert 0 < free < 300
 
 
 @pytest.mark.parametrize("kind", [PlainOmpl, Roboplan])
 def test_a_reference_solves_what_can_be_solved(kind, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(plan_references, "ALLOWED", 20.0)
+    monkeypatch.setattr(references, "ALLOWED", 20.0)
     planner = kind(ARMS["rm1"], SCENES["cage"])
     problems = [problem for problem in problem_set("rm1", "cage").problems if problem.found_by != "straight"]
     assert all((planner.solving_ms(each.start, each.goal, seed=1) or 0.0) > 0.0 for each in problems[:3])
@@ -45,10 +43,10 @@ def test_a_reference_solves_what_can_be_solved(kind, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("kind", [PlainOmpl, Roboplan])
 def test_a_reference_says_where_it_finds_nothing(kind, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(plan_references, "ALLOWED", 0.05)
+    monkeypatch.setattr(references, "ALLOWED", 0.05)
     arm = ARMS["rm1"]
     planner, world = kind(arm, SCENES["cage"]), World(arm, Kinematics(arm), SCENES["cage"])
-    touching = next(row for row in random_postures(arm, 300) if world.distance(row) <= 0.0)
+    touching = next(row for row in random_configurations(arm, 300) if world.distance(row) <= 0.0)
     start = problem_set("rm1", "cage").problems[0].start
     assert planner.solving_ms(start, tuple(touching.tolist()), seed=1) is None
 
@@ -60,9 +58,9 @@ def test_a_missing_reference_is_said_with_its_remedy(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("name", list(ARMS))
-def test_postures_are_drawn_from_the_whole_of_every_joint(name: str):
+def test_configurations_are_drawn_from_the_whole_of_every_joint(name: str):
     joints = ARMS[name].joints
-    rows = random_postures(ARMS[name], 2000)
+    rows = random_configurations(ARMS[name], 2000)
     travel = np.array([joint.upper - joint.lower for joint in joints])
     assert ((rows >= [joint.lower for joint in joints]) & (rows <= [joint.upper for joint in joints])).all()
     assert (np.ptp(rows, axis=0) > 0.99 * travel).all()

@@ -7,19 +7,18 @@ import numpy as np
 import pytest
 
 from services.arm.kinematics import Kinematics
-from services.bench.arms import parol6, rm1
-from services.bench.plan_scenes import SCENES
-from services.bench.problem_sets import (
+from services.bench.problems.problem_sets import (
     COUNT,
     FILE,
     Problem,
     ProblemSet,
+    path_length,
     problem_set,
     problem_sets,
     request_of,
     text_of,
-    way_length,
 )
+from services.bench.scenes import SCENES, parol6, rm1
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.world import World
 
@@ -43,15 +42,15 @@ def test_both_ends_are_within_limits_and_free(each: ProblemSet):
     arm = ARMS[each.arm]
     world = World(arm, KINEMATICS[each.arm], SCENES[each.scene])
     for problem in each.problems:
-        for posture in (problem.start, problem.goal):
-            assert all(joint.is_within(value) for joint, value in zip(arm.joints, posture, strict=True))
-            assert world.distance(posture) > CLEARANCE
+        for configuration in (problem.start, problem.goal):
+            assert all(joint.is_within(value) for joint, value in zip(arm.joints, configuration, strict=True))
+            assert world.distance(configuration) > CLEARANCE
 
 
-def test_no_way_is_known_that_is_shorter_than_the_straight_line(each: ProblemSet):
+def test_no_known_path_is_shorter_than_the_straight_line(each: ProblemSet):
     speeds = np.array([joint.velocity for joint in ARMS[each.arm].joints])
     for problem in each.problems:
-        straight = way_length(np.array([problem.start, problem.goal]), speeds)
+        straight = path_length(np.array([problem.start, problem.goal]), speeds)
         if not problem.is_pose:
             assert problem.length >= straight - 1e-4
             if problem.found_by == "straight":
@@ -81,4 +80,4 @@ def test_a_pose_is_asked_for_where_the_arm_can_choose_it():
 
 def test_a_length_is_the_time_at_full_speed():
     rows = np.array([[0.0, 0.0], [3.0, 8.0], [3.0, 10.0]])
-    assert way_length(rows, np.array([1.0, 2.0])) == pytest.approx(5.0 + 1.0)
+    assert path_length(rows, np.array([1.0, 2.0])) == pytest.approx(5.0 + 1.0)

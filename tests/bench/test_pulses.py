@@ -3,9 +3,9 @@
 import pytest
 
 from firmware.bindings.words import PinChange
-from services.bench import estop_reaction_ticks, max_step_rate_hz, step_time_error_us
-from services.bench.figure import NotMeasured
-from services.bench.pulses import Knot, Pulse, pulses_of
+from services.bench import pulses
+from services.bench.figures import NotMeasured
+from services.bench.probe import Knot, Pulse, pulses_of
 
 
 def test_pulses_are_counted_by_dir():
@@ -16,29 +16,29 @@ def test_pulses_are_counted_by_dir():
 
 @pytest.mark.parametrize(("rate", "is_exact"), [(24_950, True), (25_100, False)])
 def test_a_rate_of_more_than_a_pulse_in_two_ticks_is_not_exact(rate, is_exact):
-    assert max_step_rate_hz.is_exact(rate, 50_000) is is_exact
+    assert pulses.is_exact(rate, 50_000) is is_exact
 
 
 def test_a_crossing_is_found_where_the_path_is():
     a, b = Knot((0,), (0,)), Knot((2560,), (128_000,))
-    time = step_time_error_us.crossing(a, b, 0, 3.5)
-    assert step_time_error_us.hermite(a, b, 0, time / step_time_error_us.DT) == pytest.approx(3.5, abs=1e-3)
+    time = pulses.crossing(a, b, 0, 3.5)
+    assert pulses.hermite(a, b, 0, time / pulses.DT) == pytest.approx(3.5, abs=1e-3)
 
 
 def test_the_last_rise_is_not_the_last_fall():
-    assert estop_reaction_ticks.last_rise([PinChange(5, 1, 0), PinChange(6, 0, 0), PinChange(8, 2, 0)]) == 8
-    assert estop_reaction_ticks.last_rise([PinChange(5, 1, 0), PinChange(6, 0, 0)]) == 5
+    assert pulses.last_rise([PinChange(5, 1, 0), PinChange(6, 0, 0), PinChange(8, 2, 0)]) == 8
+    assert pulses.last_rise([PinChange(5, 1, 0), PinChange(6, 0, 0)]) == 5
 
 
 def test_an_estop_is_silent_within_one_tick(monkeypatch):
-    monkeypatch.setattr(estop_reaction_ticks, "PRESSES", 200)
-    figure = estop_reaction_ticks.measure()
+    monkeypatch.setattr(pulses, "PRESSES", 200)
+    figure = pulses.estop_reaction_ticks()
     assert figure.met
     assert figure.reference["most"] <= 1
 
 
 def test_a_press_that_does_nothing_is_no_figure(monkeypatch):
-    monkeypatch.setattr(estop_reaction_ticks.Device, "press_input", lambda *_: None)
-    monkeypatch.setattr(estop_reaction_ticks, "PRESSES", 1)
+    monkeypatch.setattr(pulses.Device, "press_input", lambda *_: None)
+    monkeypatch.setattr(pulses, "PRESSES", 1)
     with pytest.raises(NotMeasured, match="after the e-stop"):
-        estop_reaction_ticks.measure()
+        pulses.estop_reaction_ticks()

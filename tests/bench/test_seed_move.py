@@ -6,21 +6,20 @@ from itertools import pairwise
 
 import pytest
 
-from services.bench.seed_move_percent import measure
-from services.bench.seed_sketch import Message, SeedStepper, relative_moves
+from services.bench.seed_move import RelativeMove, SeedStepper, relative_moves, seed_move_percent
 
 
-def end_of(stepper: SeedStepper, messages: list[Message], until: float = 30.0) -> int:
+def end_of(stepper: SeedStepper, messages: list[RelativeMove], until: float = 30.0) -> int:
     return sum(direction for _, direction in stepper.pulses(messages, until))
 
 
 def test_a_move_that_is_sent_once_arrives_whole():
-    assert end_of(SeedStepper(4665.6, 3110.0), [Message(0.0, 4665)]) == 4665
-    assert end_of(SeedStepper(4665.6, 3110.0), [Message(0.0, -4665)]) == -4665
+    assert end_of(SeedStepper(4665.6, 3110.0), [RelativeMove(0.0, 4665)]) == 4665
+    assert end_of(SeedStepper(4665.6, 3110.0), [RelativeMove(0.0, -4665)]) == -4665
 
 
 def test_a_ramp_takes_as_long_as_its_acceleration_says():
-    times = [time for time, _ in SeedStepper(1000.0, 500.0).pulses([Message(0.0, 4000)], 60.0)]
+    times = [time for time, _ in SeedStepper(1000.0, 500.0).pulses([RelativeMove(0.0, 4000)], 60.0)]
     assert times[-1] == pytest.approx(4000 / 1000 + 1000 / 500, rel=0.03)
     assert min(b - a for a, b in pairwise(times)) == pytest.approx(1 / 1000, rel=1e-6)
 
@@ -31,7 +30,7 @@ def test_a_message_throws_away_what_is_left_of_the_last_one():
 
 
 def test_a_90_degree_move_arrives_whole_where_the_seed_lost_97_percent_and_more():
-    figure = measure()
+    figure = seed_move_percent()
     assert figure.median == 100.0
     assert figure.met
     assert sorted(figure.reference) == ["seed: antebrazo_joint", "seed: brazo_joint"]

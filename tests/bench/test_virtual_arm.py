@@ -9,8 +9,8 @@ from schemas.joints import JointState, StepErrors
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.planning import JointGoal, PlanRequest
 from services.arm.description import load_arm
-from services.bench.lost_of_45000_at_25hz import Tally, swinging
 from services.bench.virtual_arm import VirtualArm
+from services.bench.virtual_time import Tally, swinging
 from services.planner.core import Planner
 from services.stepper_gateway.outputs import GoalFinished
 

@@ -12,7 +12,7 @@ from ruckig import InputParameter, Result, Ruckig, Trajectory
 
 from services.arm.description import load_arm
 from services.arm.kinematics import Kinematics
-from services.bench.plan_scenes import SCENES
+from services.bench.scenes import SCENES
 from services.planner.collision.world import World
 from services.planner.path.curve import smooth_runs
 from services.planner.path.smoothing import smooth, stopping

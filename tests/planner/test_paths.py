@@ -17,7 +17,7 @@ from schemas.joints import JointState
 from schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, Timing
 from schemas.scene import MeshShape, PlanningScene, SceneObject
 from services.arm.description import load_arm
-from services.bench.plan_scenes import SCENES, box
+from services.bench.scenes import SCENES, box
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.native_scene import native_scene
 from services.planner.collision.world import World

@@ -1,0 +1,99 @@
+"""The figure of plans around an obstacle whose mesh has a hundred thousand triangles."""
+
+from __future__ import annotations
+
+import random
+import struct
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.frames import Transform
+from schemas.joints import JointState
+from schemas.planning import JointGoal, PlanRequest, PlanResponse
+from schemas.scene import MeshShape, PlanningScene, SceneObject
+from services.arm.description import Arm
+from services.bench.figures import Figure, of_samples
+from services.bench.problems.problem_sets import ALLOWED
+from services.bench.scenes import TABLE, parol6
+from services.bench.trials import spread
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.world import World
+from services.planner.core import Planner
+
+Array = NDArray[np.float64]
+
+RINGS, SECTORS = 225, 225  # 100,800 triangles
+RADIUS, DENTS = 0.08, 0.02  # [m]
+PLACE = (0.28, 0.12, 0.16)  # [m] in front of the arm
+PROBLEMS, WARMING, SEED = 40, 2, 4
+
+
+def plan_mesh_ms() -> Figure:
+    """Time of one plan [ms] around a dented ball of 100,800 triangles; some problems may have no solution."""
+    scene = PlanningScene(version=1, objects=(TABLE, dented_ball()))
+    planner = Planner(parol6())
+    planner.prepare()
+    began = time.perf_counter()
+    world = World(planner.arm, planner.kinematics, scene)
+    loaded = (time.perf_counter() - began) * 1e3
+    planner.set_world(world)
+    done = [timed_plan(planner, request) for request in random_requests(planner.arm, world)]
+    answers = done[WARMING:]
+    searched = [took for took, answer in answers if answer.refusal is None and answer.planner_id != "straight"]
+    reference = {"the scene taken in": loaded, "the first plan in it": done[0][0]}
+    reference |= spread("searched", searched, 0.5, 0.99)
+    reference["solved %"] = 100.0 * sum(answer.refusal is None for _, answer in answers) / len(answers)
+    note = (
+        f"parol6, a table and a rock of {triangles()} triangles, {PROBLEMS} random problems, {len(searched)} searched"
+    )
+    return of_samples([took for took, _ in answers], None, reference, note)
+
+
+def timed_plan(planner: Planner, request: PlanRequest) -> tuple[float, PlanResponse]:
+    """The time of one plan [ms] and its response."""
+    began = time.perf_counter()
+    response = planner.plan(request, None, clock=time.perf_counter)
+    return (time.perf_counter() - began) * 1e3, response
+
+
+def random_requests(arm: Arm, world: World) -> list[PlanRequest]:
+    """Requests from one free configuration to another; the same ones in every run."""
+    generator, free = random.Random(SEED), list[tuple[float, ...]]()
+    while len(free) < 2 * (PROBLEMS + WARMING):
+        configuration = tuple(generator.uniform(joint.lower, joint.upper) for joint in arm.joints)
+        if world.distance(configuration) > CLEARANCE:
+            free.append(configuration)
+    return [
+        PlanRequest(
+            start=JointState(name=arm.joint_names, position=start),
+            goal=JointGoal(name=arm.joint_names, position=goal),
+            allowed_time=ALLOWED,
+        )
+        for start, goal in zip(free[::2], free[1::2], strict=True)
+    ]
+
+
+def triangles() -> int:
+    """Number of triangles of `dented_ball`."""
+    return 2 * SECTORS * (RINGS - 1)
+
+
+def dented_ball() -> SceneObject:
+    """A dented ball as a binary STL [m]."""
+    polar = np.linspace(0.0, np.pi, RINGS + 1)[:, None]
+    around = np.linspace(0.0, 2.0 * np.pi, SECTORS + 1)[None, :]
+    radius = RADIUS + DENTS * np.sin(7.0 * polar) * np.sin(9.0 * around)
+    height = np.cos(polar) * np.ones_like(around)
+    points = radius[..., None] * np.stack((np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), height), -1)
+    points[:, -1] = points[:, 0]
+    points[[0, -1], :, :2] = 0.0
+    a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
+    corners = np.concatenate(
+        (np.stack((a, b, c), -2)[:-1].reshape(-1, 3, 3), np.stack((a, c, d), -2)[1:].reshape(-1, 3, 3))
+    )
+    facets = np.zeros(len(corners), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+    facets["corners"] = corners
+    content = bytes(80) + struct.pack("<I", len(facets)) + facets.tobytes()
+    return SceneObject(name="rock", shape=MeshShape(data=content), pose=Transform(translation=PLACE))

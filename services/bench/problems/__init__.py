@@ -1,0 +1,1 @@
+"""The fixed random planning problems: data, loader, and the program that made them."""

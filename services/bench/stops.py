@@ -1,0 +1,183 @@
+"""The figure of a stop: from the client's call to the command frame on the wire, and to rest, under load.
+
+An MQTT client beside the device watches the wire, so the broker's own time is part of the figure.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from queue import Empty, SimpleQueue
+
+from paho.mqtt.client import Client, MQTTMessage
+
+from schemas.device import (
+    ConfigureRequest,
+    DeviceStopRequest,
+    PressKind,
+    PressRequest,
+    StopKind,
+)
+from schemas.joints import JointState
+from schemas.message import encode
+from schemas.motion import FollowJointTrajectoryGoal
+from schemas.topics import DEVICE_CONFIGURE, DEVICE_PRESS, DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES
+from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile, rounded
+from services.bench.latency import sharp_start
+from services.bench.stack import Running, Stacks
+from services.bench.traffic import connected, flood
+from services.runtime.zenoh_bus import ZenohBus
+
+GOAL = Goal(p99=20.0)  # [ms]
+CALLS = 200  # for each condition in which the device answers
+CALLS_TO_A_FROZEN_DEVICE = 20  # each call waits until the one before was given up
+MOVES = 5  # stopped in each condition in which the arm can move
+RAMP = 0.8  # [s] of acceleration: the arm is stopped during it
+SPEED = 0.01  # [rad/s] below which the arm stands
+PATIENCE = 3.0  # [s]
+FLOOD_SECONDS = 60.0  # at the most
+
+
+class Wire:
+    """Receives every command frame, with the number that its sender gave it."""
+
+    def __init__(self, port: int, device: str) -> None:
+        self._frames: SimpleQueue[tuple[int, float]] = SimpleQueue()
+        self._seen: set[int] = set()
+        self._client = connected(port, f"gemelo/v1/{device}/cmd", "wire")
+        self._client.on_message = self._on_message
+
+    def _on_message(self, client: Client, userdata: object, message: MQTTMessage) -> None:
+        self._frames.put((int.from_bytes(message.payload[8:12], "little"), time.monotonic()))
+
+    def next(self) -> float:
+        """Time [s monotonic] of the next frame with a new number; raises NotMeasured after PATIENCE."""
+        while True:
+            try:
+                number, at = self._frames.get(timeout=PATIENCE)
+            except Empty:
+                raise NotMeasured("a stop did not reach the wire") from None
+            if number not in self._seen:
+                self._seen.add(number)
+                return at
+
+    def close(self) -> None:
+        self._client.disconnect()
+        self._client.loop_stop()
+
+
+class Caller:
+    """A client that calls for stops, and for what may delay them."""
+
+    def __init__(self, running: Running) -> None:
+        router = running.deployment.router
+        self._running = running
+        self.bus = ZenohBus(router.host, router.port, running.arm.name)
+        self.wire = Wire(running.deployment.mqtt.port, running.arm.device.name)
+        self.states = running.node.latest(JOINT_STATES)
+
+    def stop(self) -> float:
+        """Time [ms] from one call to the wire."""
+        answers: SimpleQueue[object] = SimpleQueue()
+        payload = encode(DeviceStopRequest(kind=StopKind.STOP))
+        called = time.monotonic()
+        self.bus.ask(DEVICE_STOP.key, DeviceStopRequest.__name__, payload, PATIENCE, answers.put, True)
+        seen = self.wire.next()
+        answers.get(timeout=2 * PATIENCE)  # a stop that is not answered yet would absorb the next one
+        return (seen - called) * 1e3
+
+    def stops(self, count: int) -> list[float]:
+        """Times [ms] of `count` calls, one after the other."""
+        return [self.stop() for _ in range(count)]
+
+    def stops_of_moves(self) -> list[float]:
+        """Times [ms] from a call during a move to the first state at rest, for MOVES moves."""
+        return [self._stop_of_a_move() for _ in range(MOVES)]
+
+    def _stop_of_a_move(self) -> float:
+        node = self._running.node
+        here = self._until(lambda state: abs(state.velocity[0]) < SPEED).position
+        trajectory = sharp_start(self._running.arm, here, -math.copysign(1.0, here[0]), RAMP)
+        goal = FollowJointTrajectoryGoal(trajectory=trajectory)
+        handle = node.action(FOLLOW_JOINT_TRAJECTORY).send(goal)
+        self._until(lambda state: abs(state.velocity[0]) > SPEED)
+        called = time.time_ns()
+        self.stop()
+        stood = self._until(lambda state: state.stamp > called and abs(state.velocity[0]) < SPEED)
+        handle.wait(PATIENCE)
+        return (stood.stamp - called) * 1e-6
+
+    def _until(self, holds: Callable[[JointState], bool]) -> JointState:
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
+            self._running.node.wait(0.005)
+            if self.states.message is not None and holds(self.states.message):
+                return self.states.message
+        raise NotMeasured("the arm neither moved nor stood in time")
+
+    def leave_unanswered(self) -> None:
+        """Sends a configuration and twenty presses, which a frozen device does not answer."""
+        for request in (ConfigureRequest(), *(PressRequest(press=PressKind.SENSOR) for _ in range(20))):
+            key = (DEVICE_CONFIGURE if isinstance(request, ConfigureRequest) else DEVICE_PRESS).key
+            self.bus.ask(key, type(request).__name__, encode(request), PATIENCE, lambda answer: None)
+
+    def close(self) -> None:
+        self.wire.close()
+        self.bus.close()
+
+
+def stop_ms(stacks: Stacks) -> Figure:
+    """Time [ms] from the call of a stop to its frame on the wire, in the worst of all conditions."""
+    running = stacks.with_broker("mosquitto")
+    router, broker, robot = running.deployment.router.port, running.deployment.mqtt.port, running.arm.name
+    caller = Caller(running)
+    under: dict[str, AbstractContextManager[None]] = {
+        "idle": nullcontext(),
+        **{f"flood of {what}": flood(what, router, robot, FLOOD_SECONDS) for what in ("requests", "commands", "holds")},
+        "flood of targets": flood("targets", router, robot, FLOOD_SECONDS),
+        "flood of MQTT": flood("mqtt", broker, running.arm.device.name, FLOOD_SECONDS),
+        "planner frozen": _frozen(running, "planner"),
+    }
+    wire: dict[str, list[float]] = {}
+    rest: dict[str, list[float]] = {}
+    try:
+        for name, condition in under.items():
+            with condition:
+                wire[name] = caller.stops(CALLS)
+                if name not in ("planner frozen", "flood of holds"):
+                    rest[name] = caller.stops_of_moves()
+        wire["device frozen, configure and 20 presses unanswered"] = _to_a_frozen_device(running, caller)
+    finally:
+        caller.close()
+    worst = max(wire, key=lambda name: quantile(wire[name], 0.99))
+    reference = {f"{name} p99": quantile(samples, 0.99) for name, samples in wire.items()}
+    reference |= {f"to rest, {name}, median": quantile(samples, 0.5) for name, samples in rest.items()}
+    note = (
+        f"the worst condition is given: {worst}; {CALLS} calls each, broker mosquitto, floods of 5,000 a second from a "
+        f"process on the same cores; p99 is {rounded(quantile(wire[worst], 0.99) / quantile(wire['idle'], 0.99)):g} "
+        "times that of the idle stack"
+    )
+    return of_samples(wire[worst], GOAL, reference, note)
+
+
+def _to_a_frozen_device(running: Running, caller: Caller) -> list[float]:
+    with _frozen(running, "virtual_esp32"):
+        took = []
+        for _ in range(CALLS_TO_A_FROZEN_DEVICE):
+            caller.leave_unanswered()
+            took.append(caller.stop())
+        return took
+
+
+@contextmanager
+def _frozen(running: Running, name: str) -> Iterator[None]:
+    pid = running.stack.pid(name)
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)
