@@ -1,11 +1,11 @@
-"""What was asked of the device and what it did, counted from the messages on the bus.
+"""Counts the steps and chunks that were commanded and executed, from the messages on the bus.
 
-Two independent sources are held against each other: `commands` says which knots were sent, and `device/state` says
-how many steps the device itself has emitted. Nothing is taken from what the demonstration wanted.
+Two independent sources are compared: `commands` has the knots that were sent, and `device/state` the steps that the
+device has emitted. Nothing is taken from the goals of the demonstration.
 
 - following error: `step_errors`, which compares both sides at the same moment of the device's path.
-- lost steps: when the device stands and says that it has played a stream to its end, the last knot that was sent for
-  it, rounded to the nearest step, minus the device's count. Every step lost on the way would still be missing there.
+- lost steps: when the device stands and reports that it has played a stream to its end, the last knot sent for it,
+  rounded to the nearest step, minus the device's count. Every step lost during the stream is still missing there.
   A stream that was stopped before its end has no such knot; its move has failed anyway.
 - chunks lost: chunks for which no `command_acks` ever said OK (or DUPLICATE, which is OK said twice).
 """
@@ -20,7 +20,7 @@ SAME_TIME = 1e-4  # [s]
 
 
 class Ledger:
-    """Feed it every message; read the totals when the arm stands."""
+    """Totals of all messages so far; complete when the arm stands."""
 
     def __init__(self) -> None:
         self.following: dict[str, float] = {}  # [steps] largest |commanded - executed|
@@ -69,7 +69,7 @@ class Ledger:
 
     @property
     def commanded(self) -> dict[str, int]:
-        """[steps] where the newest stream was to end."""
+        """Last commanded position [steps] of the newest stream, by joint."""
         if not self._streams:
             return dict(self.executed)
         return {name: nearest_step(q8) for name, q8 in self._last_knot.get(self._streams[-1], {}).items()}
@@ -84,15 +84,15 @@ class Ledger:
 
     @property
     def is_settled(self) -> bool:
-        """Whether the device was seen at rest at the end of the newest stream, so that its steps are accounted for."""
+        """True if the device was seen at rest at the end of the newest stream, so that its steps are accounted for."""
         return all(stream in self._differences for stream in self._streams[-1:])
 
     @property
     def lost_steps(self) -> int:
-        """Sum over all joints and all streams that came to rest."""
+        """Lost steps, summed over all joints and all streams that came to rest."""
         return sum(abs(lost) for differences in self._differences.values() for lost in differences.values())
 
 
 def nearest_step(position: int) -> int:
-    """floor(p + 0.5) of a position in [1/256 step], as the firmware rounds."""
+    """The position [1/256 step] rounded to whole steps as the firmware does: floor(p + 0.5)."""
     return (position + 128) >> 8

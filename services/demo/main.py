@@ -38,12 +38,12 @@ def main() -> None:
 
 
 def best_broker() -> str:
-    """mosquitto where it is installed: real arms use it; else the embedded one."""
+    """mosquitto if it is installed, as real arms use it; else the embedded amqtt."""
     return "mosquitto" if any(MOSQUITTO) else "amqtt"
 
 
 def demonstrate(out: Path, broker: str, with_picture: bool) -> int:
-    """Everything; the exit code."""
+    """Runs the demonstration on a stack of its own and writes the results into `out`; returns the exit code."""
     folder, recording = out / "demo", out / "demo.rrd"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -88,7 +88,7 @@ def _toml(text: str) -> str:
 
 
 def missing_files(folder: Path, recording: Path) -> list[str]:
-    """What the logger and the visualizer should have left."""
+    """Recordings that logger and visualizer have not left, one sentence each."""
     missing = [f"there is no {pattern[2:]} recording in {folder}" for pattern in ("*.mcap", "*.csv")
                if not any(folder.rglob(pattern))]  # fmt: skip
     if not recording.exists():
@@ -97,7 +97,7 @@ def missing_files(folder: Path, recording: Path) -> list[str]:
 
 
 def take_picture(recording: Path, png: Path) -> list[str]:
-    """A picture of the viewer; what went wrong, if anything."""
+    """Takes a picture of the viewer; returns what went wrong, empty if nothing did."""
     from services.visualizer.picture import picture
 
     try:

@@ -37,7 +37,7 @@ class Performance:
         time.sleep(SETTLE)
 
     def sine(self) -> Move:
-        """The seed's demonstration: targets 10 times a second, here on all joints at once."""
+        """Streams targets on all joints at 10 Hz, as the seed did on one."""
         start = self._arm.joints
         sines = [sine_of(joint, start[joint.name]) for joint in self._arm.description.joints]
         travel = {sine.joint: (sine.centre, sine.centre) for sine in sines}
@@ -57,7 +57,7 @@ class Performance:
         return Move(name="sine, streamed at 10 Hz", succeeded=not reason, reason=reason, took_s=took)
 
     def go(self, stop: Stop) -> Move:
-        """Plans and follows one goal."""
+        """Plans and follows one goal; the move has the reason if it failed."""
         try:
             motion = self._arm.move(**stop.target)
         except gemelo.Error as error:
@@ -83,7 +83,7 @@ class Performance:
 
 
 def was_followed(sine: Sine, low: float, high: float) -> bool:
-    """Whether the joint went most of the way to both sides."""
+    """True if the joint's extremes `low` and `high` [rad] or [m] reach SINE_REACHED of the amplitude on both sides."""
     reach = SINE_REACHED * sine.amplitude
     return low <= sine.centre - reach and high >= sine.centre + reach
 

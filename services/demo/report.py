@@ -1,4 +1,4 @@
-"""`out/demo.json`, the table a person reads, and the verdict."""
+"""The figures of a demonstration as `out/demo.json` and as tables, and the bounds that they must keep."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Move(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class JointTotals(msgspec.Struct, frozen=True):
-    """One joint at the end of everything."""
+    """One joint after the last move."""
 
     commanded_steps: int  # absolute, where the last stream was to end
     executed_steps: int  # absolute, the device's own count
@@ -35,14 +35,14 @@ class JointTotals(msgspec.Struct, frozen=True):
 
 
 class PlanTimes(msgspec.Struct, frozen=True):
-    """[ms]"""
+    """Quantiles of the planning times [ms]."""
 
     p50: float
     p99: float
 
 
 class DemoReport(msgspec.Struct, frozen=True):
-    """Exactly what `out/demo.json` holds."""
+    """The content of `out/demo.json`."""
 
     robot: str
     moves: int
@@ -78,13 +78,13 @@ def report_of(robot: str, moves: Sequence[Move], ledger: Ledger) -> DemoReport:
 
 
 def quantile(values: Sequence[float], share: float) -> float:
-    """The smallest value that at least `share` of all do not exceed; 0 of nothing."""
+    """The smallest value that at least `share` (0 to 1) of all values do not exceed; 0 without values."""
     ordered = sorted(values)
     return ordered[max(0, math.ceil(share * len(ordered)) - 1)] if ordered else 0.0
 
 
 def complaints(report: DemoReport, ledger: Ledger) -> list[str]:
-    """What does not hold; empty where the demonstration succeeded."""
+    """Every bound that is not kept, one sentence each; empty if the demonstration succeeded."""
     found = []
     if report.succeeded < report.moves or report.moves == 0:
         found.append(f"{report.moves - report.succeeded} of {report.moves} moves failed")
@@ -104,7 +104,7 @@ def complaints(report: DemoReport, ledger: Ledger) -> list[str]:
 
 
 def text_of(report: DemoReport, moves: Sequence[Move]) -> str:
-    """Two tables and a line."""
+    """Tables of moves and joints, and a closing line."""
     rows = [
         (
             move.name,

@@ -1,4 +1,4 @@
-"""What the demonstration does: the seed's sine on the streaming topic, then a tour of planned poses."""
+"""The motions of the demonstration: the seed's sine on the streaming topic, then a tour of planned goals."""
 
 from __future__ import annotations
 
@@ -37,11 +37,12 @@ class Sine:
     amplitude: float
 
     def at(self, time: float) -> float:
+        """The target [rad] or [m] at `time` [s]."""
         return self.centre + self.amplitude * math.sin(math.tau * time / SINE_PERIOD)
 
 
 def sine_of(joint: Joint, start: float) -> Sine:
-    """A sine around where the joint is, as large as its speed and travel allow."""
+    """A sine around `start` [rad] or [m], as large as the joint's limits and travel allow."""
     lower, upper = (joint.lower, joint.upper) if math.isfinite(joint.lower) else (start - math.pi, start + math.pi)
     fastest = SPEED_SHARE * joint.velocity * SINE_PERIOD / math.tau
     sharpest = SPEED_SHARE * joint.acceleration * (SINE_PERIOD / math.tau) ** 2
@@ -51,7 +52,7 @@ def sine_of(joint: Joint, start: float) -> Sine:
 
 
 def tour(arm: Arm) -> tuple[Stop, ...]:
-    """Every named state, home, some joint goals, some tool positions; it ends where the step counts are not zero."""
+    """Every named state, home, some joint goals and tool positions; the last goal has step counts other than zero."""
     named = [Stop(f"named {name}", Target(named=name)) for name in arm.named_states if name != "home"]
     joints = [
         Stop(f"joints {number}", Target(joints=positions_at(arm, shares)))
@@ -74,6 +75,6 @@ def positions_at(arm: Arm, shares: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def tool_at(arm: Arm, positions: tuple[float, ...]) -> tuple[float, ...]:
-    """Where the tool is in the base frame [m]."""
+    """Position [m] of the tool in the base frame at these joint values."""
     links = link_transforms(arm.model, dict(zip(arm.joint_names, positions, strict=True)))
     return tuple(compose(inverse(links[arm.base_frame]), links[arm.tool_frame])[0])
