@@ -16,7 +16,7 @@ from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, Trajector
 from services.arm.description import Arm
 from services.bench.figures import Figure, NotMeasured, rounded
 from services.bench.scenes import rm1
-from services.bench.virtual_arm import VirtualArm
+from services.virtual_arm.virtual_arm import VirtualArm, tcp_wire
 
 TURN = math.pi / 2  # [rad]
 DURATION = 5.0  # [s] of our move
@@ -42,11 +42,10 @@ def seed_move_percent() -> Figure:
 def our_share(arm: Arm, name: str) -> float:
     """Share [%] of the turn, to the nearest step, that the shaft makes through gateway and firmware."""
     index = arm.joint_names.index(name)
-    world = VirtualArm(arm, lambda _: None, motors=[joint.drive.motor for joint in arm.joints])
+    world = VirtualArm(tcp_wire(), arm=arm, motors=[joint.drive.motor for joint in arm.joints])
     world.run(1.0)
     goal = FollowJointTrajectoryGoal(trajectory=turn(arm, index))
-    verdict, outputs = world.gateway.on_goal("turn", goal, world.moment)
-    world.carry_out(outputs)
+    verdict = world.goal(goal)
     if not verdict.accepted:
         raise NotMeasured(f"the move was refused: {verdict.reason}")
     world.run(DURATION + 2.0)

@@ -12,12 +12,12 @@ from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, Trajector
 from services.arm.description import Arm
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile
 from services.bench.scenes import rm1
-from services.bench.virtual_arm import DELAY, VirtualArm
 from services.stepper_gateway.device.clock import ClockSync
+from services.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire
 
 CHUNKS = 45_000
 SECONDS = 60.0  # of one goal; one after another until all chunks are sent
-PERIOD, POINT = 6.0, 0.1  # [s] of the swing, [s] between points
+SWING, POINT = 6.0, 0.1  # [s] of the swing, [s] between points
 SPEED_SHARE = 0.5  # of the limits
 
 
@@ -48,23 +48,22 @@ def lost_of_45000_at_25hz() -> Figure:
     The wire delays and delivers in order, as TCP does. The step counts are compared as well.
     """
     arm, tally = rm1(), Tally()
-    world = VirtualArm(arm, tally.on_message)
+    world = VirtualArm(tcp_wire(), arm=arm, on_message=tally.on_message, step_us=PERIOD)
     world.run(1.0)
     trajectory = swinging(arm, SECONDS)
     goals = 0
     while len(tally.sent) < CHUNKS:
         goals += 1
         goal = FollowJointTrajectoryGoal(trajectory=trajectory)
-        verdict, outputs = world.gateway.on_goal(f"goal-{goals}", goal, world.moment)
-        world.carry_out(outputs)
+        verdict = world.goal(goal, f"goal-{goals}")
         if not verdict.accepted:
             raise NotMeasured(f"goal {goals} was refused: {verdict.reason}")
         world.run(SECONDS + 1.0)
     missing = [abs(((q8 + 128) >> 8) - made) for q8, made in zip(tally.last, world.device.steps, strict=True)]
     lost = len(tally.sent - tally.acknowledged)
     note = (
-        f"virtual time: {world.now * 1e-6:.0f} s, {len(tally.sent)} chunks in {goals} goals, {tally.refused} refused "
-        f"and sent again, a wire of {DELAY[0] / 1e3:g} to {DELAY[1] / 1e3:g} ms; {sum(missing)} steps missing at the "
+        f"virtual time: {world.now:.0f} s, {len(tally.sent)} chunks in {goals} goals, {tally.refused} refused "
+        f"and sent again, a wire of 1 to 8 ms; {sum(missing)} steps missing at the "
         f"end, largest |commanded - executed| at any slot end {world.device.max_slot_error / 256:.3f} steps"
     )
     return Figure(
@@ -76,7 +75,7 @@ def lost_of_45000_at_25hz() -> Figure:
 def swinging(arm: Arm, seconds: float) -> JointTrajectory:
     """All joints from zero to both sides and back to zero, at rest at both ends; points with velocities."""
     amplitudes = [amplitude_of(arm, index) for index in range(len(arm.joints))]
-    rate = math.tau / PERIOD
+    rate = math.tau / SWING
     points = []
     for index in range(round(seconds / POINT) + 1):
         time = index * POINT
@@ -92,7 +91,7 @@ def swinging(arm: Arm, seconds: float) -> JointTrajectory:
 
 def amplitude_of(arm: Arm, index: int) -> float:
     """Amplitude [rad] or [m] at half of the joint's limits."""
-    joint, rate = arm.joints[index], math.tau / PERIOD
+    joint, rate = arm.joints[index], math.tau / SWING
     fastest = SPEED_SHARE * min(joint.velocity / rate, joint.acceleration / rate**2)
     return min(fastest, 0.45 * joint.upper)
 
@@ -108,8 +107,8 @@ def hold_reaction_ms() -> Figure:
     """Time [ms] from the last heartbeat that the device receives until it slows down."""
     reactions, stops = zip(*(reaction(FIRST + LATER * index, index) for index in range(TRIES)), strict=True)
     note = (
-        f"virtual time, the gateway's loop hangs in the middle of a swing, {TRIES} times; a wire of {DELAY[0] / 1e3:g} "
-        f"to {DELAY[1] / 1e3:g} ms; until it stands: median {quantile(stops, 0.5):.0f} ms"
+        f"virtual time, the gateway's loop hangs in the middle of a swing, {TRIES} times; a wire of 1 "
+        f"to 8 ms; until it stands: median {quantile(stops, 0.5):.0f} ms"
     )
     return of_samples(reactions, HOLD_GOAL, {"until it stands": max(stops)}, note)
 
@@ -117,27 +116,27 @@ def hold_reaction_ms() -> Figure:
 def reaction(silent_at: float, seed: int) -> tuple[float, float]:
     """Times [ms] from the last heartbeat until the device slows down, and until it stands."""
     arm = rm1()
-    world = VirtualArm(arm, lambda _: None, seed)
+    world = VirtualArm(tcp_wire(), seed, arm=arm)
     world.run(1.0)
     goal = FollowJointTrajectoryGoal(trajectory=swinging(arm, 12.0))
-    verdict, outputs = world.gateway.on_goal("swing", goal, world.moment)
-    world.carry_out(outputs)
+    verdict = world.goal(goal)
     if not verdict.accepted:
         raise NotMeasured(f"the goal was refused: {verdict.reason}")
     world.run(silent_at)
+    world.loop_is_on = False
     slowed = until(world, lambda: world.device.mode == DeviceMode.HOLD)
     stood = until(world, lambda: not world.device.moving)
-    return (slowed - world.last_beat) * 1e-3, (stood - world.last_beat) * 1e-3
+    return (slowed - world.heartbeat_us) * 1e-3, (stood - world.heartbeat_us) * 1e-3
 
 
 def until(world: VirtualArm, is_so: Callable[[], bool]) -> int:
     """Virtual time [us] at which `is_so` becomes true, to a slot."""
-    end = world.now + round(LONGEST * 1e6)
+    end = world.now + LONGEST
     while not is_so():
         if world.now > end:
             raise NotMeasured(f"the device went on for {LONGEST:g} s without a heartbeat")
-        world.idle(SLOT)
-    return world.now
+        world.run(SLOT)
+    return world.now_us
 
 
 DRIFT = 100e-6  # of the device's clock

@@ -9,10 +9,9 @@ from schemas.joints import JointState, StepErrors
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.planning import JointGoal, PlanRequest
 from services.arm.description import load_arm
-from services.bench.virtual_arm import VirtualArm
 from services.bench.virtual_time import Tally, swinging
 from services.planner.core import Planner
-from services.stepper_gateway.outputs import GoalFinished
+from services.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf/rm1")
 PLANNER = Planner(ARM)
@@ -32,44 +31,36 @@ class Watch:
             self.joints = message
 
 
-def go(world: VirtualArm, watch: Watch, goal_id: str, target: tuple[float, ...]) -> GoalFinished:
-    """Plans from where the arm is, follows, and returns the moment the goal has ended."""
+def go(world: VirtualArm, watch: Watch, goal_id: str, target: tuple[float, ...]) -> tuple[GoalStatusCode, str]:
+    """Plans from where the arm is and follows; returns status and reason at the moment at which the goal has ended."""
     start = JointState(name=ARM.joint_names, position=watch.joints.position)
     plan = PLANNER.plan(PlanRequest(goal=JointGoal(name=ARM.joint_names, position=target), start=start), None)
     assert plan.refusal is None, plan.refusal
-    verdict, outputs = world.gateway.on_goal(
-        goal_id, FollowJointTrajectoryGoal(trajectory=plan.trajectory), world.moment
-    )
+    verdict = world.goal(plan.trajectory, goal_id)
     assert verdict.accepted, verdict.reason
-    world.carry_out(outputs)
-    for _ in range(1000):
-        world.run(0.02)
-        ended = [each for each in world.outcomes if isinstance(each, GoalFinished) and each.goal_id == goal_id]
-        if ended:
-            return ended[0]
-    pytest.fail("the goal has not ended within 20 s")
+    status, result = world.finish(goal_id, 20.0)
+    return status, result.error_string
 
 
 @pytest.mark.parametrize("phase", range(0, 20_000, 2_500))
 def test_goals_that_follow_one_another_at_once_all_succeed(phase):
     """Whenever the new stream's first chunk meets the device's report of the old one."""
     watch = Watch()
-    world = VirtualArm(ARM, watch.on_message, phase=phase)
+    world = VirtualArm(tcp_wire(), arm=ARM, on_message=watch.on_message, step_us=PERIOD, phase_us=phase)
     world.run(1.0)
     for number, name in enumerate(("ready", "left", "right", "lifted", "folded", "home")):
-        ended = go(world, watch, f"goal-{number}", ARM.named_states[name])
-        assert ended.status is GoalStatusCode.SUCCEEDED, ended.result.error_string
+        status, reason = go(world, watch, f"goal-{number}", ARM.named_states[name])
+        assert status is GoalStatusCode.SUCCEEDED, reason
         assert watch.largest <= 0.5 + 1 / 256
 
 
 def test_no_chunk_and_no_step_is_lost_in_two_minutes_of_motion():
     tally = Tally()
-    world = VirtualArm(ARM, tally.on_message)
+    world = VirtualArm(tcp_wire(), arm=ARM, on_message=tally.on_message, step_us=PERIOD)
     world.run(1.0)
     goal = FollowJointTrajectoryGoal(trajectory=swinging(ARM, 120.0))
-    verdict, outputs = world.gateway.on_goal("swing", goal, world.moment)
+    verdict = world.goal(goal)
     assert verdict.accepted, verdict.reason
-    world.carry_out(outputs)
     world.run(122.0)
     assert len(tally.sent) > 2900
     assert tally.sent == tally.acknowledged

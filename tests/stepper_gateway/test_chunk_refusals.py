@@ -6,7 +6,7 @@ import pytest
 
 from services.stepper_gateway.links.frames import NO_JOINT, Ack, Code
 from services.stepper_gateway.motion.stream import refusal
-from tests.stepper_gateway.harness import rm1
+from services.virtual_arm.virtual_arm import rm1
 
 
 def refused(code: int, joint: int = 1) -> str:

@@ -13,7 +13,8 @@ from schemas.motion import FollowErrorCode
 from schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATUS
 from services.arm.device_config import device_config
 from services.stepper_gateway.links.link import Kind
-from tests.stepper_gateway.harness import Rig, move, rm1
+from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from tests.stepper_gateway.harness import move
 
 HOME = (0.0, 0.0, 0.0)
 NEAR = (0.1, -0.2, 0.01)
@@ -22,12 +23,12 @@ SLOWER = replace(WANTED, joints=(replace(WANTED.joints[0], max_velocity_q8=400_0
 TWO_JOINTS = replace(WANTED, joints=WANTED.joints[:2], inputs=WANTED.inputs[:3])
 
 
-def told(rig: Rig) -> DeviceConfiguration:
+def told(rig: VirtualArm) -> DeviceConfiguration:
     message: DeviceConfiguration = rig.messages(DEVICE_CONFIGURATION)[-1]
     return message
 
 
-def works(rig: Rig) -> None:
+def works(rig: VirtualArm) -> None:
     """Armed and referenced again, it moves."""
     rig.run(0.1)
     rig.ready()
@@ -40,7 +41,7 @@ def works(rig: Rig) -> None:
 
 
 def test_a_device_with_the_right_configuration_is_left_alone_and_said_to_have_it() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.run(2.0)
     assert not [kind for _, kind, _ in rig.sent if kind == Kind.CONFIG]
     status = rig.messages(DEVICE_STATUS)[-1]
@@ -52,7 +53,7 @@ def test_a_device_with_the_right_configuration_is_left_alone_and_said_to_have_it
 
 @pytest.mark.parametrize("other", [SLOWER, TWO_JOINTS])
 def test_an_armed_device_with_another_configuration_moves_nothing_and_says_what_to_do(other: object) -> None:
-    rig = Rig(config=other)  # type: ignore[arg-type]
+    rig = VirtualArm(config=other)  # type: ignore[arg-type]
     rig.run(1.0)
     assert not [kind for _, kind, _ in rig.sent if kind == Kind.CONFIG]
     verdict = rig.goal(move(HOME, NEAR))
@@ -80,7 +81,7 @@ def test_an_armed_device_with_another_configuration_moves_nothing_and_says_what_
 
 
 def test_a_disarmed_device_is_configured_at_once() -> None:
-    rig = Rig(config=replace(SLOWER, armed_at_boot=False))
+    rig = VirtualArm(config=replace(SLOWER, armed_at_boot=False))
     assert rig.run(1.0, lambda: rig.device.config == WANTED)
     assert rig.device.mode == DeviceMode.UNREFERENCED
     rig.run(0.2)
@@ -89,7 +90,7 @@ def test_a_disarmed_device_is_configured_at_once() -> None:
 
 
 def test_a_device_that_has_nothing_yet_is_configured_at_once() -> None:
-    rig = Rig()
+    rig = VirtualArm()
     rig.unconfigure()
     assert rig.run(2.0, lambda: rig.device.config == WANTED)
     works(rig)
@@ -98,7 +99,7 @@ def test_a_device_that_has_nothing_yet_is_configured_at_once() -> None:
 def test_a_configuration_that_the_device_refuses_is_said_with_its_words_and_not_pushed_again_and_again() -> None:
     arm = rm1()
     impossible = with_(arm, device=replace(arm.device, enable_pin=25))  # which is q1's STEP
-    rig = Rig(arm=impossible, config=replace(WANTED, armed_at_boot=False))
+    rig = VirtualArm(arm=impossible, config=replace(WANTED, armed_at_boot=False))
     rig.run(5.0)
     assert len([kind for _, kind, _ in rig.sent if kind == Kind.CONFIG]) == 1
     assert "refuses the configuration" in told(rig).reason
@@ -108,7 +109,7 @@ def test_a_configuration_that_the_device_refuses_is_said_with_its_words_and_not_
 
 
 def test_somebody_elses_retained_configuration_is_replaced_and_moves_nothing() -> None:
-    rig = Rig(config=replace(WANTED, armed_at_boot=False))
+    rig = VirtualArm(config=replace(WANTED, armed_at_boot=False))
     assert rig.run(1.0, lambda: rig.device.config == WANTED)
     rig.run(1.5)
     rig.device.receive_config(config_text(SLOWER), retained=True)
@@ -118,7 +119,7 @@ def test_somebody_elses_retained_configuration_is_replaced_and_moves_nothing() -
 
 
 def test_an_armed_device_that_meets_a_stale_retained_one_works_on_and_the_stale_one_is_overwritten() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.device.receive_config(config_text(SLOWER), retained=True)
     rig.run(1.5)
     assert rig.device.config == WANTED
@@ -128,7 +129,7 @@ def test_an_armed_device_that_meets_a_stale_retained_one_works_on_and_the_stale_
 
 
 def test_a_lost_configuration_is_sent_again() -> None:
-    rig = Rig(config=replace(SLOWER, armed_at_boot=False))
+    rig = VirtualArm(config=replace(SLOWER, armed_at_boot=False))
     rig.run(0.02)
     rig.lost.add(Kind.CONFIG)
     rig.run(2.5)
@@ -138,7 +139,7 @@ def test_a_lost_configuration_is_sent_again() -> None:
 
 
 def test_a_request_for_the_configuration_of_an_absent_device_says_that_it_is_absent() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.wire.is_cut = True
     rig.run(1.0)
     assert "silent" in rig.configure().reason

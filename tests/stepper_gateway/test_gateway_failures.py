@@ -12,21 +12,22 @@ from schemas.motion import FollowErrorCode
 from schemas.topics import DEVICE_STATUS, JOINT_STATES
 from services.stepper_gateway.links.frames import Ack, CommandReply, State, SyncReply, encode
 from services.stepper_gateway.links.link import Kind
-from tests.stepper_gateway.harness import Rig, Wire, assert_within_limits, move
+from services.virtual_arm.virtual_arm import VirtualArm, Wire
+from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)
 READY = (0.6, -1.2, 0.08)
 
 
-def moving_rig(**wire: float) -> Rig:
-    rig = Rig(Wire(**wire)).ready()  # type: ignore[arg-type]
+def moving_rig(**wire: float) -> VirtualArm:
+    rig = VirtualArm(Wire(**wire)).ready()  # type: ignore[arg-type]
     assert rig.goal(move(HOME, READY)).accepted
     rig.run(1.2)
     assert rig.device.moving
     return rig
 
 
-def assert_works_again(rig: Rig, since: int = 0) -> None:
+def assert_works_again(rig: VirtualArm, since: int = 0) -> None:
     """A next goal from here succeeds."""
     assert rig.run(5.0, lambda: not rig.core.not_ready(rig.moment) and rig.device.mode == DeviceMode.IDLE)
     rig.run(0.1)
@@ -96,7 +97,7 @@ def test_a_reboot_while_moving_aborts_and_asks_for_a_reference() -> None:
 
 
 def test_a_late_frame_of_the_old_boot_is_no_reboot() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.reboot(78)
     rig.run(0.5)
     rig.receive(Kind.STATE, encode(State(boot_id=77, t_us=99_000_000, mode=3, steps=(1, 2, 3), velocity=(0, 0, 0))))
@@ -107,7 +108,7 @@ def test_a_late_frame_of_the_old_boot_is_no_reboot() -> None:
 
 
 def test_a_forged_boot_a_forged_time_and_a_stale_last_will_are_survived() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     forged = State(boot_id=5, t_us=2**60, mode=3, steps=(1, 2, 3), velocity=(0, 0, 0))
     rig.receive(Kind.STATUS, b'{"online": false, "device": "rm1", "boot_id": 77}', retained=True)
     rig.receive(Kind.STATUS, b'{"online": true, "device": "rm1", "boot_id": 5, "joints": 9}')
@@ -180,7 +181,7 @@ def test_a_stop_command_decelerates_and_aborts_the_goal() -> None:
 
 
 def test_stop_during_streaming_ends_it_until_the_targets_have_paused() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     for index in range(30):
         rig.target(brazo_joint=1.0)
         if index == 10:
@@ -197,7 +198,7 @@ def test_stop_during_streaming_ends_it_until_the_targets_have_paused() -> None:
 
 
 def test_a_command_to_an_absent_device_is_answered_with_the_reason() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.wire.is_cut = True
     rig.command(DeviceCommandKind.HOLD, 1)
     rig.run(3.0)
@@ -207,7 +208,7 @@ def test_a_command_to_an_absent_device_is_answered_with_the_reason() -> None:
 
 
 def test_a_refused_command_says_why() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.command(DeviceCommandKind.RESUME, 1)
     rig.command(DeviceCommandKind.REFERENCE, 2, brazo_joint=9.0, antebrazo_joint=0.0, efector_joint=0.0)
     rig.command(DeviceCommandKind.REFERENCE, 3, antebraso_joint=0.0)
@@ -219,7 +220,7 @@ def test_a_refused_command_says_why() -> None:
 
 
 def test_reference_declares_where_the_joints_stand() -> None:
-    rig = Rig(referenced=False).ready()
+    rig = VirtualArm(referenced=False).ready()
     rig.command(DeviceCommandKind.REFERENCE, 1, efector_joint=0.1, brazo_joint=0.5, antebrazo_joint=-0.5)
     rig.run(0.2)
     assert rig.answers[1].accepted
@@ -229,7 +230,7 @@ def test_reference_declares_where_the_joints_stand() -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_cancel_works_over_a_wire_that_loses_and_reorders(seed: int) -> None:
-    rig = Rig(Wire(delay=0.004, jitter=0.01, loss=0.15, duplicates=0.2), seed=seed).ready()
+    rig = VirtualArm(Wire(delay=0.004, jitter=0.01, loss=0.15, duplicates=0.2), seed=seed).ready()
     rig.goal(move(HOME, READY))
     rig.run(0.05 + 0.4 * seed)
     assert rig.cancel() == ""
@@ -240,7 +241,7 @@ def test_cancel_works_over_a_wire_that_loses_and_reorders(seed: int) -> None:
 
 
 def test_a_goal_needs_a_device_that_can_move() -> None:
-    rig = Rig(referenced=False).ready()
+    rig = VirtualArm(referenced=False).ready()
     verdict = rig.goal(move(HOME, READY))
     assert verdict.code == FollowErrorCode.DEVICE_FAILED
     assert "gemelo reference" in verdict.reason
@@ -271,7 +272,7 @@ junk = st.one_of(
 @settings(max_examples=60)
 @given(st.lists(st.tuples(st.sampled_from([k for k in Kind if k != Kind.STATUS]), junk, st.booleans()), max_size=20))
 def test_junk_from_the_wire_is_counted_and_nothing_moves(items: list[tuple[Kind, bytes, bool]]) -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.run(0.2)
     wrong = 0
     for kind, payload, retained in items:
@@ -289,7 +290,7 @@ def test_junk_from_the_wire_is_counted_and_nothing_moves(items: list[tuple[Kind,
 @settings(max_examples=40)
 @given(st.lists(st.tuples(st.sampled_from(list(Kind)), st.binary(max_size=80)), max_size=20))
 def test_random_bytes_while_moving_change_nothing(items: list[tuple[Kind, bytes]]) -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.goal(move(HOME, (0.1, -0.1, 0.01)))
     for kind, payload in items:
         rig.receive(kind, payload)

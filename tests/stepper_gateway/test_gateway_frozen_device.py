@@ -7,7 +7,8 @@ import pytest
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceMode
 from schemas.topics import JOINT_STATES
-from tests.stepper_gateway.harness import Rig, assert_within_limits, move
+from services.virtual_arm.virtual_arm import VirtualArm
+from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)
 READY = (0.6, -1.2, 0.08)
@@ -20,7 +21,7 @@ def most(before: tuple[int, ...], after: tuple[int, ...]) -> int:
 
 @pytest.mark.parametrize("seconds", [0.7, 2.9, 20.0])
 def test_a_device_that_was_frozen_in_a_move_stands_when_it_wakes_up(seconds: float) -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     assert rig.goal(move(HOME, READY)).accepted
     rig.run(1.2)
     before = rig.device.steps
@@ -40,7 +41,7 @@ def test_a_device_that_was_frozen_in_a_move_stands_when_it_wakes_up(seconds: flo
 
 
 def test_a_short_freeze_pauses_the_move_on_its_path() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     assert rig.goal(move(HOME, READY)).accepted
     rig.run(1.2)
     rig.freeze(0.2)
@@ -52,7 +53,7 @@ def test_a_short_freeze_pauses_the_move_on_its_path() -> None:
 
 
 def test_a_goal_that_was_aborted_before_the_frozen_device_read_it_moves_nothing() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.device_is_frozen = True
     rig.run(0.3)
     assert rig.goal(move(HOME, READY)).accepted

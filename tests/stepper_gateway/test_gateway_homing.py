@@ -24,7 +24,9 @@ from schemas.topics import JOINT_STATES
 from services.arm.description import load_arm
 from services.arm.device_config import device_config
 from services.stepper_gateway.links.link import Kind
-from tests.stepper_gateway.harness import ROOT, Rig, asked, assert_within_limits, move, rm1
+from services.virtual_arm.gateway_driver import asked
+from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from tests.stepper_gateway.harness import ROOT, assert_within_limits, move
 
 ARM, DISARM, HOME = DeviceCommandKind.ARM, DeviceCommandKind.DISARM, DeviceCommandKind.HOME
 OUTPUT, SPEED, RESET, STOP = (
@@ -35,23 +37,25 @@ NEAR = (0.1, -0.2, 0.01)
 FAR = (0.6, -1.2, 0.08)
 
 
-def ask(rig: Rig, kind: DeviceCommandKind, *names: str, output: str = "", value: float = 0.0) -> DeviceCommandResponse:
+def ask(
+    rig: VirtualArm, kind: DeviceCommandKind, *names: str, output: str = "", value: float = 0.0
+) -> DeviceCommandResponse:
     return rig.answer(asked(kind, name=names, output=output, on=value > 0.0, scale=value))
 
 
-def done(rig: Rig, kind: DeviceCommandKind, *names: str, output: str = "", value: float = 0.0) -> None:
+def done(rig: VirtualArm, kind: DeviceCommandKind, *names: str, output: str = "", value: float = 0.0) -> None:
     answer = ask(rig, kind, *names, output=output, value=value)
     assert answer.accepted, answer.reason
 
 
-def reason_of(rig: Rig, goal_id: str) -> str:
+def reason_of(rig: VirtualArm, goal_id: str) -> str:
     verdict = rig.goal(move(ZERO, NEAR), goal_id)
     assert not verdict.accepted
     return verdict.reason
 
 
 def test_an_arm_that_starts_disarmed_is_armed_homed_and_moves() -> None:
-    rig = Rig(config=replace(device_config(rm1()), armed_at_boot=True), referenced=False).ready()
+    rig = VirtualArm(config=replace(device_config(rm1()), armed_at_boot=True), referenced=False).ready()
     assert "gemelo home" in reason_of(rig, "unreferenced")
     assert "brazo_joint, antebrazo_joint, efector_joint" in reason_of(rig, "which")
     done(rig, DISARM)
@@ -78,7 +82,7 @@ def test_an_arm_that_starts_disarmed_is_armed_homed_and_moves() -> None:
 
 
 def test_homing_one_joint_leaves_the_others_where_they_are() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     done(rig, HOME, "efector_joint")
     assert rig.run(60.0, lambda: rig.device.mode == DeviceMode.IDLE)
     assert rig.device.steps[:2] == (0, 0)
@@ -86,7 +90,7 @@ def test_homing_one_joint_leaves_the_others_where_they_are() -> None:
 
 
 def test_homing_tells_how_many_steps_a_joint_was_off() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.device.slip(2, 40)
     done(rig, HOME, "efector_joint")
     assert rig.run(60.0, lambda: rig.device.mode == DeviceMode.IDLE)
@@ -98,7 +102,7 @@ def test_homing_tells_how_many_steps_a_joint_was_off() -> None:
 
 
 def test_a_lost_heartbeat_stops_the_homing() -> None:
-    rig = Rig(referenced=False).ready()
+    rig = VirtualArm(referenced=False).ready()
     done(rig, HOME)
     rig.run(3.0)
     rig.lost.add(Kind.HB)
@@ -109,7 +113,7 @@ def test_a_lost_heartbeat_stops_the_homing() -> None:
 
 
 def test_a_beating_gateway_lets_a_long_homing_end() -> None:
-    rig = Rig(referenced=False).ready()
+    rig = VirtualArm(referenced=False).ready()
     begun = rig.now
     done(rig, HOME)
     assert rig.run(90.0, lambda: rig.device.mode == DeviceMode.IDLE)
@@ -117,7 +121,7 @@ def test_a_beating_gateway_lets_a_long_homing_end() -> None:
 
 
 def test_a_person_stops_a_homing() -> None:
-    rig = Rig(referenced=False).ready()
+    rig = VirtualArm(referenced=False).ready()
     done(rig, HOME)
     rig.run(2.0)
     done(rig, STOP)
@@ -125,7 +129,7 @@ def test_a_person_stops_a_homing() -> None:
 
 
 def test_a_running_goal_is_not_disturbed_by_what_wants_a_resting_arm() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     assert rig.goal(move(ZERO, FAR)).accepted
     rig.run(1.0)
     for kind in (HOME, DISARM, DeviceCommandKind.REFERENCE):
@@ -136,7 +140,7 @@ def test_a_running_goal_is_not_disturbed_by_what_wants_a_resting_arm() -> None:
 
 
 def test_an_estop_ends_the_goal_and_says_the_way_back() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     assert rig.goal(move(ZERO, FAR)).accepted
     rig.run(1.0)
     rig.device.press_input(0, True)
@@ -159,7 +163,7 @@ def test_an_estop_ends_the_goal_and_says_the_way_back() -> None:
 
 
 def test_a_limit_switch_outside_homing_is_a_fault_that_names_the_joint() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     assert rig.goal(move(ZERO, FAR)).accepted
     rig.run(1.0)
     rig.device.press_input(2, True)
@@ -172,7 +176,7 @@ def test_a_limit_switch_outside_homing_is_a_fault_that_names_the_joint() -> None
 
 
 def test_an_output_goes_on_and_off_by_its_name() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     done(rig, OUTPUT, output="avanzar", value=1.0)
     assert rig.state.outputs == rig.device.outputs == ("avanzar",)
     done(rig, OUTPUT, output="avanzar", value=0.0)
@@ -184,7 +188,7 @@ def test_an_output_goes_on_and_off_by_its_name() -> None:
 
 
 def test_an_output_does_not_disturb_a_goal() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     assert rig.goal(move(ZERO, FAR)).accepted
     rig.run(1.0)
     done(rig, OUTPUT, output="avanzar", value=1.0)
@@ -202,7 +206,7 @@ def test_an_output_does_not_disturb_a_goal() -> None:
 def test_a_command_that_names_or_asks_what_is_not_there_is_refused(
     request_: DeviceCommand, words: tuple[str, ...]
 ) -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     reason = rig.answer(request_).reason
     assert all(word in reason for word in words)
     assert not [kind for _, kind, _ in rig.sent if kind == Kind.CMD]
@@ -211,7 +215,7 @@ def test_a_command_that_names_or_asks_what_is_not_there_is_refused(
 def test_a_joint_without_a_home_switch_is_named() -> None:
     arm = rm1()
     first = with_(arm.joints[0], drive=replace(arm.joints[0].drive, homing=None))
-    rig = Rig(arm=with_(arm, joints=(first, *arm.joints[1:]))).ready()
+    rig = VirtualArm(arm=with_(arm, joints=(first, *arm.joints[1:]))).ready()
     reason = ask(rig, HOME, "brazo_joint").reason
     assert "brazo_joint" in reason
     assert "gemelo reference" in reason
@@ -222,7 +226,7 @@ def test_a_joint_without_a_home_switch_is_named() -> None:
 
 @pytest.mark.parametrize("speed", [0.05, 0.3, 0.7])
 def test_a_slow_goal_takes_its_time_and_succeeds_to_the_step(speed: float) -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     done(rig, SPEED, value=speed)
     assert rig.state.speed == speed
     begun = rig.now
@@ -236,7 +240,7 @@ def test_a_slow_goal_takes_its_time_and_succeeds_to_the_step(speed: float) -> No
 
 
 def test_a_speed_of_zero_stands_on_the_path_for_any_time() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     assert rig.goal(move(ZERO, FAR)).accepted
     rig.run(1.2)
     done(rig, SPEED, value=0.0)
@@ -251,7 +255,7 @@ def test_a_speed_of_zero_stands_on_the_path_for_any_time() -> None:
 
 
 def test_the_speed_may_change_again_and_again_on_the_way() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     assert rig.goal(move(ZERO, FAR)).accepted
     for index, speed in enumerate((0.2, 0.9, 0.1, 0.5, 1.0, 0.4)):
         rig.run(0.7)
@@ -262,7 +266,7 @@ def test_the_speed_may_change_again_and_again_on_the_way() -> None:
 
 
 def test_starving_at_a_low_speed_is_no_excuse() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     done(rig, SPEED, value=0.5)
     assert rig.goal(move(ZERO, FAR)).accepted
     rig.run(1.0)
@@ -272,7 +276,7 @@ def test_starving_at_a_low_speed_is_no_excuse() -> None:
 
 
 def test_a_goal_right_after_arming_waits_for_the_drivers() -> None:
-    rig = Rig()
+    rig = VirtualArm()
     assert rig.run(1.0, lambda: not rig.core.not_ready(rig.moment))
     assert rig.now < 0.2, "the drivers need 0.2 s"
     assert rig.goal(move(ZERO, NEAR)).accepted
@@ -281,7 +285,7 @@ def test_a_goal_right_after_arming_waits_for_the_drivers() -> None:
 
 
 def test_parol6_lifts_its_forearm_before_it_turns() -> None:
-    rig = Rig(arm=load_arm(ROOT / "urdf" / "parol6"), referenced=False).ready()
+    rig = VirtualArm(arm=load_arm(ROOT / "urdf" / "parol6"), referenced=False).ready()
     done(rig, HOME)
     assert rig.run(90.0, lambda: rig.device.mode == DeviceMode.IDLE)
     rig.run(0.1)

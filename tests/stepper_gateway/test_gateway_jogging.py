@@ -13,7 +13,8 @@ from services.arm.kinematics import Kinematics
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.world import World
 from services.planner.jog.jog import PERIOD, Jog
-from tests.stepper_gateway.harness import Rig, assert_within_limits, move, rm1
+from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from tests.stepper_gateway.harness import assert_within_limits, move
 
 CALM = ("boot", "armed", "hold", "connected", "accepted", "started", "finished", "stopped")
 TURN = JogCommand(name=("brazo_joint", "antebrazo_joint"), velocity=(0.6, -0.4))
@@ -23,7 +24,7 @@ class JoggedRig:
     """A planner's jog beside the gateway."""
 
     def __init__(self, start: tuple[float, ...] = (0.6, -1.2, 0.08)) -> None:
-        self.rig = Rig(start=start).ready()
+        self.rig = VirtualArm(start=start).ready()
         kinematics = Kinematics(rm1())
         self.world = World(rm1(), kinematics)
         self.jog = Jog(rm1(), kinematics, self.world)
@@ -39,7 +40,7 @@ class JoggedRig:
             state = self.rig.messages(JOINT_STATES)[-1]
             output = self.jog.step(self.rig.now, 0, state, 0.02, self.goal_is_active)
             if output.targets is not None:
-                self.rig._do(self.rig.core.on_targets(output.targets, self.rig.moment))
+                self.rig.stream(output.targets)
             if self.jog.commanded is not None:
                 self.led = tuple(self.jog.commanded[0].tolist())
             if output.status is not None:

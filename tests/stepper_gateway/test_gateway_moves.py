@@ -13,7 +13,8 @@ from services.stepper_gateway.goals.goal_validator import GoalValidator
 from services.stepper_gateway.links.frames import State
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.parameters import GatewayParameters
-from tests.stepper_gateway.harness import Rig, Wire, assert_within_limits, move, rm1
+from services.virtual_arm.virtual_arm import VirtualArm, Wire, rm1
+from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)
 READY = (0.6, -1.2, 0.08)
@@ -33,7 +34,7 @@ def execution_near_its_end(bound: JointTolerance) -> tuple[ActiveGoal, State]:
 
 
 def test_a_move_ends_on_the_exact_steps() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     assert rig.goal(move(HOME, READY)).accepted
     status, result = rig.finish()
     assert status == GoalStatusCode.SUCCEEDED
@@ -45,7 +46,7 @@ def test_a_move_ends_on_the_exact_steps() -> None:
 
 
 def test_the_log_says_what_moved_where_how_long_and_with_what_error() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.goal(move(HOME, READY))
     result = rig.finish()[1]
     (line,) = [line for line in rig.log if line.startswith("goal g ")]
@@ -62,7 +63,7 @@ def test_the_log_says_what_moved_where_how_long_and_with_what_error() -> None:
 
 
 def test_every_state_is_within_half_a_step_of_the_command() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.goal(move(HOME, READY))
     rig.finish()
     errors = rig.messages(STEP_ERRORS)
@@ -71,14 +72,14 @@ def test_every_state_is_within_half_a_step_of_the_command() -> None:
 
 
 def test_the_first_chunk_leaves_with_the_acceptance() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     before = len(rig.sent)
     rig.goal(move(HOME, READY))
     assert rig.sent[before][1] == "traj"
 
 
 def test_a_lossy_wire_loses_nothing() -> None:
-    rig = Rig(Wire(delay=0.003, jitter=0.008, loss=0.1, duplicates=0.2), seed=5).ready()
+    rig = VirtualArm(Wire(delay=0.003, jitter=0.008, loss=0.1, duplicates=0.2), seed=5).ready()
     places = [READY, (-0.5, 0.8, 0.02), (1.0, 0.0, 0.15), HOME]
     here = HOME
     for index, place in enumerate(places):
@@ -94,7 +95,7 @@ def test_a_lossy_wire_loses_nothing() -> None:
 
 def test_a_streamed_move_keeps_what_is_left_of_the_last_command() -> None:
     """The seed's relative `move()` ended a 90 degree command after 48 and 4 steps; absolute knots end on the target."""
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     quarter = 1.5707963267948966
     for index in range(60):
         rig.target(brazo_joint=quarter * min(1.0, index / 20), antebrazo_joint=quarter * min(1.0, index / 20))
@@ -105,7 +106,7 @@ def test_a_streamed_move_keeps_what_is_left_of_the_last_command() -> None:
 
 def test_a_goal_without_all_joints_is_refused_by_name_and_a_target_moves_what_it_names() -> None:
     """The seed's firmware ignored every message that lacked q3, silently."""
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     whole = move(HOME, READY)
     partial = JointTrajectory(
         joint_names=whole.joint_names[:2],
@@ -135,7 +136,7 @@ def slow_points(count: int, spacing: float) -> JointTrajectory:
 
 
 def test_points_100_ms_apart_take_their_own_time() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     trajectory = slow_points(31, 0.1)
     begun = rig.now
     assert rig.goal(trajectory).accepted
@@ -148,7 +149,7 @@ def test_points_100_ms_apart_take_their_own_time() -> None:
 
 
 def test_success_is_never_said_before_the_device_has_executed_the_steps() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.goal(move(HOME, READY))
     while "g" not in rig.finished:
         executed = rig.device.steps
@@ -159,9 +160,9 @@ def test_success_is_never_said_before_the_device_has_executed_the_steps() -> Non
 
 
 def test_without_a_device_a_goal_is_refused_not_simulated() -> None:
-    rig = Rig()
+    rig = VirtualArm()
     rig.device_is_on = False
-    rig._flying.clear()
+    rig.drop()
     rig.run(1.0)
     verdict = rig.goal(move(HOME, READY))
     assert not verdict.accepted
@@ -170,7 +171,7 @@ def test_without_a_device_a_goal_is_refused_not_simulated() -> None:
 
 
 def test_cancel_decelerates_on_the_path_within_the_limits() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.goal(move(HOME, READY))
     rig.run(1.5)
     assert rig.cancel() == ""
@@ -187,7 +188,7 @@ def test_cancel_decelerates_on_the_path_within_the_limits() -> None:
 
 
 def test_a_cancel_at_once_and_one_at_the_end_both_end_the_goal() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.goal(move(HOME, READY), "early")
     assert rig.cancel("early") == ""
     assert rig.finish("early", 5.0)[0] == GoalStatusCode.CANCELED
@@ -203,7 +204,7 @@ def test_a_cancel_at_once_and_one_at_the_end_both_end_the_goal() -> None:
 
 
 def test_a_new_goal_is_spliced_continuously_in_velocity() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.goal(move(HOME, (1.2, -1.2, 0.08)), "first")
     rig.run(1.5)
     speed = abs(rig.path[-1][0] - rig.path[-2][0])
@@ -221,7 +222,7 @@ def test_a_new_goal_is_spliced_continuously_in_velocity() -> None:
 
 
 def test_many_goals_after_another_keep_the_limits() -> None:
-    rig = Rig(seed=9).ready()
+    rig = VirtualArm(seed=9).ready()
     for index in range(12):
         here = rig.messages(JOINT_STATES)[-1].position
         goal = (rig.rng.uniform(-1, 1), rig.rng.uniform(-1, 1), rig.rng.uniform(0.0, 0.15))
@@ -235,7 +236,7 @@ def test_many_goals_after_another_keep_the_limits() -> None:
 
 
 def test_a_goal_that_arrives_while_the_last_knots_are_played_starts_after_them() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.goal(move(HOME, (0.2, -0.2, 0.02)), "first")
     stream = rig.core.controller.stream
     assert stream is not None
@@ -248,7 +249,7 @@ def test_a_goal_that_arrives_while_the_last_knots_are_played_starts_after_them()
 
 
 def test_a_goal_that_starts_elsewhere_while_moving_is_refused_and_the_move_goes_on() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.goal(move(HOME, READY), "first")
     rig.run(1.0)
     verdict = rig.goal(move((-0.5, 0.0, 0.0), HOME), "second")
@@ -258,7 +259,7 @@ def test_a_goal_that_starts_elsewhere_while_moving_is_refused_and_the_move_goes_
 
 
 def test_a_single_point_is_reached_in_the_time_given() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     point = TrajectoryPoint(positions=(0.5, 0.2, 0.01), time_from_start=3.0)
     begun = rig.now
     assert rig.goal(JointTrajectory(joint_names=rm1().joint_names, points=(point,))).accepted
@@ -269,7 +270,7 @@ def test_a_single_point_is_reached_in_the_time_given() -> None:
 
 
 def test_a_stamp_in_the_future_starts_then() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     plan = move(HOME, READY)
     later = JointTrajectory(stamp=rig.moment.unix + 1_000_000_000, joint_names=plan.joint_names, points=plan.points)
     assert rig.goal(later).accepted
@@ -280,14 +281,14 @@ def test_a_stamp_in_the_future_starts_then() -> None:
 
 
 def test_a_goal_where_the_arm_already_is_succeeds() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     point = TrajectoryPoint(positions=HOME, velocities=HOME, time_from_start=0.0)
     assert rig.goal(JointTrajectory(joint_names=rm1().joint_names, points=(point,))).accepted
     assert rig.finish()[0] == GoalStatusCode.SUCCEEDED
 
 
 def test_feedback_comes_20_times_a_second_and_names_the_point() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     plan = move(HOME, READY)
     rig.goal(plan)
     rig.finish()
@@ -299,7 +300,7 @@ def test_feedback_comes_20_times_a_second_and_names_the_point() -> None:
 
 
 def test_a_goal_tolerance_below_what_steps_can_do_is_violated_by_name_and_number() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     goal = FollowJointTrajectoryGoal(
         trajectory=move(HOME, (0.6001, -1.203, 0.0801)),
         goal_tolerance=(JointTolerance(name="antebrazo_joint", position=1e-6),),
@@ -314,7 +315,7 @@ def test_a_goal_tolerance_below_what_steps_can_do_is_violated_by_name_and_number
 
 @pytest.mark.parametrize("velocity", [0.0, -1.0, 0.05])
 def test_a_velocity_tolerance_that_the_arm_keeps_or_that_is_none_changes_nothing(velocity: float) -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     bound = (JointTolerance(name="brazo_joint", velocity=velocity, acceleration=min(velocity, 0.0)),)
     goal = FollowJointTrajectoryGoal(trajectory=move(HOME, READY), path_tolerance=bound, goal_tolerance=bound)
     assert rig.goal(goal).accepted
@@ -322,7 +323,7 @@ def test_a_velocity_tolerance_that_the_arm_keeps_or_that_is_none_changes_nothing
 
 
 def test_a_velocity_off_its_path_tolerance_names_joint_error_and_time_and_decelerates() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     goal = FollowJointTrajectoryGoal(
         trajectory=move(HOME, READY), path_tolerance=(JointTolerance(name="brazo_joint", velocity=1e-9),)
     )
@@ -346,7 +347,7 @@ def test_a_goal_whose_joint_still_moves_is_not_reached_within_a_velocity_toleran
 
 
 def test_a_path_tolerance_violation_names_joint_error_and_time_and_decelerates() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     goal = FollowJointTrajectoryGoal(
         trajectory=move(HOME, READY), path_tolerance=(JointTolerance(name="brazo_joint", position=1e-5),)
     )

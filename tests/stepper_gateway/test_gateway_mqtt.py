@@ -17,18 +17,18 @@ from schemas.motion import FollowErrorCode
 from services.arm.device_config import device_config
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.links.mqtt import MqttLink
-from tests.stepper_gateway.harness import rm1
+from services.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.processes import BROKER, DEVICE, Processes, free_port
-from tests.stepper_gateway.wired import Gateway
+from tests.stepper_gateway.wired import WiredGateway
 
 HOME = (0.0, 0.0, 0.0)
 NEAR = (0.1, -0.2, 0.01)
 
 
 def test_a_move_over_a_real_broker_and_what_strangers_publish_moves_nothing(processes: Processes) -> None:
-    with closing(Gateway(processes.port)) as gateway:
+    with closing(WiredGateway(processes.port)) as gateway:
         gateway.ready()
-        assert gateway.goal(NEAR).accepted
+        assert gateway.move_to(NEAR).accepted
         assert gateway.finish()[0] == GoalStatusCode.SUCCEEDED
         steps = gateway.finished["g"][1].executed_steps
         for topic in ("state", "traj/ack", "event", "cmd/ack", "sync/r", "traj", "cmd", "hb", "sync"):
@@ -43,16 +43,16 @@ def test_a_move_over_a_real_broker_and_what_strangers_publish_moves_nothing(proc
         gateway.run(0.5)
         assert gateway.core.bad_frames >= 10
         assert gateway.published["joint_states"][-1].position == gateway.core.device.reporter.positions(steps)
-        assert gateway.goal(HOME, "back").accepted
+        assert gateway.move_to(HOME, "back").accepted
         assert gateway.finish("back")[0] == GoalStatusCode.SUCCEEDED
         trips = sorted(ack.round_trip for ack in gateway.published["command_acks"])
         assert trips[len(trips) // 2] < 0.05
 
 
 def test_a_killed_broker_aborts_the_goal_and_nothing_stale_is_sent_after_it_returns(processes: Processes) -> None:
-    with closing(Gateway(processes.port)) as gateway:
+    with closing(WiredGateway(processes.port)) as gateway:
         gateway.ready()
-        assert gateway.goal((1.0, -1.0, 0.1)).accepted
+        assert gateway.move_to((1.0, -1.0, 0.1)).accepted
         gateway.run(1.0)
         processes.kill(BROKER)
         status, result = gateway.finish()
@@ -64,13 +64,13 @@ def test_a_killed_broker_aborts_the_goal_and_nothing_stale_is_sent_after_it_retu
         gateway.ready()
         gateway.run(2.0)
         refused = gateway.published["device/state"][-1].refused
-        assert gateway.goal(NEAR, "next").accepted
+        assert gateway.move_to(NEAR, "next").accepted
         assert gateway.finish("next")[0] == GoalStatusCode.SUCCEEDED
         assert gateway.published["device/state"][-1].refused == refused
 
 
 def test_a_restarted_device_is_met_again(processes: Processes) -> None:
-    with closing(Gateway(processes.port)) as gateway:
+    with closing(WiredGateway(processes.port)) as gateway:
         gateway.ready()
         boot = gateway.core.device.session.boot_id
         processes.kill(DEVICE)
@@ -78,7 +78,7 @@ def test_a_restarted_device_is_met_again(processes: Processes) -> None:
         processes.start(DEVICE)
         gateway.ready()
         assert gateway.core.device.session.boot_id != boot
-        assert gateway.goal(NEAR).accepted
+        assert gateway.move_to(NEAR).accepted
         assert gateway.finish()[0] == GoalStatusCode.SUCCEEDED
 
 
@@ -95,19 +95,19 @@ def test_a_link_without_a_broker_says_so_and_costs_nothing() -> None:
         assert not link.send(Kind.HB, b"")
 
 
-def said(gateway: Gateway) -> DeviceStatus:
+def said(gateway: WiredGateway) -> DeviceStatus:
     status: DeviceStatus = gateway.published["device/status"][-1]
     return status
 
 
 def test_a_dead_device_is_said_dead_to_every_gateway_that_comes_after(processes: Processes) -> None:
-    with closing(Gateway(processes.port)) as gateway:
+    with closing(WiredGateway(processes.port)) as gateway:
         gateway.ready()
         assert said(gateway).online
         processes.kill(DEVICE)
         assert gateway.run(3.0, lambda: not said(gateway).online)
         assert gateway.run(10.0, lambda: "offline" in said(gateway).reason), "its last will has come"
-    with closing(Gateway(processes.port)) as late:
+    with closing(WiredGateway(processes.port)) as late:
         late.run(1.5)
         assert not said(late).online
         assert said(late).boot_id == 0
@@ -130,7 +130,7 @@ def test_a_retained_status_of_long_ago_is_no_sign_of_life(processes: Processes) 
     publish.single(
         "gemelo/v1/rm1/status", json.dumps(alive), qos=1, retain=True, hostname="127.0.0.1", port=processes.port
     )
-    with closing(Gateway(processes.port)) as gateway:
+    with closing(WiredGateway(processes.port)) as gateway:
         gateway.run(1.0)
         assert not said(gateway).online
         assert "silent" in said(gateway).reason
@@ -143,9 +143,9 @@ def test_a_retained_status_of_long_ago_is_no_sign_of_life(processes: Processes) 
 def test_a_retained_configuration_of_another_robot_is_replaced_and_nothing_moves_by_it(processes: Processes) -> None:
     wanted = device_config(rm1())
     stale = replace(wanted, joints=(replace(wanted.joints[0], max_velocity_q8=400_000), *wanted.joints[1:]))
-    with closing(Gateway(processes.port)) as gateway:
+    with closing(WiredGateway(processes.port)) as gateway:
         gateway.ready()
-        assert gateway.command(StopKind.DISARM).accepted
+        assert gateway.answer(StopKind.DISARM, seconds=8.0).accepted
         publish.single(
             "gemelo/v1/rm1/config", config_text(stale), qos=1, retain=True, hostname="127.0.0.1", port=processes.port
         )
@@ -157,19 +157,19 @@ def test_a_retained_configuration_of_another_robot_is_replaced_and_nothing_moves
         assert said(gateway).config_crc32 == config_crc(config_text(wanted))
         for kind in (ArmCommand(), ReferenceCommand()):
             gateway.run(0.4)
-            assert gateway.command(kind).accepted
+            assert gateway.answer(kind, seconds=8.0).accepted
         gateway.run(0.4)
-        assert gateway.goal(NEAR).accepted
+        assert gateway.move_to(NEAR).accepted
         assert gateway.finish()[0] == GoalStatusCode.SUCCEEDED
     processes.kill(DEVICE)
     processes.start(DEVICE)  # it meets what the broker has retained now
-    with closing(Gateway(processes.port)) as gateway:
+    with closing(WiredGateway(processes.port)) as gateway:
         gateway.ready()
         gateway.run(0.5)
         assert gateway.published["device/configuration"][-1].accepted
 
 
 def test_a_gateway_gives_the_configuration_when_it_is_asked_for(processes: Processes) -> None:
-    with closing(Gateway(processes.port)) as gateway:
+    with closing(WiredGateway(processes.port)) as gateway:
         gateway.ready()
         assert gateway.configure().accepted, "the one it has already"

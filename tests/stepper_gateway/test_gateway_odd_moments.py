@@ -7,33 +7,34 @@ from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
 from schemas.topics import JOINT_STATES
 from services.stepper_gateway.device.clock import ENOUGH, ClockSync
-from tests.stepper_gateway.harness import Rig, assert_within_limits, move, rm1
+from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)
 READY = (0.6, -1.2, 0.08)
 
 
-def moving_rig() -> Rig:
-    rig = Rig().ready()
+def moving_rig() -> VirtualArm:
+    rig = VirtualArm().ready()
     assert rig.goal(move(HOME, READY)).accepted
     rig.run(1.2)
     assert rig.device.moving
     return rig
 
 
-def here(rig: Rig) -> tuple[float, ...]:
+def here(rig: VirtualArm) -> tuple[float, ...]:
     position: tuple[float, ...] = rig.messages(JOINT_STATES)[-1].position
     return position
 
 
-def later(rig: Rig, plan: JointTrajectory, seconds: float) -> JointTrajectory:
+def later(rig: VirtualArm, plan: JointTrajectory, seconds: float) -> JointTrajectory:
     stamp = rig.moment.unix + round(seconds * 1e9)
     return JointTrajectory(stamp=stamp, joint_names=plan.joint_names, points=plan.points)
 
 
-def rig_with_a_goal_that_waits() -> Rig:
+def rig_with_a_goal_that_waits() -> VirtualArm:
     """The first goal's last knots are under way, so the second one has to wait for their end."""
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.goal(move(HOME, (0.2, -0.2, 0.02)), "first")
     stream = rig.core.controller.stream
     assert stream is not None
@@ -43,7 +44,7 @@ def rig_with_a_goal_that_waits() -> Rig:
     return rig
 
 
-def assert_next_goal_succeeds(rig: Rig) -> None:
+def assert_next_goal_succeeds(rig: VirtualArm) -> None:
     assert rig.run(5.0, lambda: rig.device.mode == DeviceMode.IDLE)
     rig.run(0.1)
     verdict = rig.goal(move(here(rig), (0.1, 0.1, 0.05)), "next")
@@ -67,7 +68,7 @@ def test_a_heartbeat_lost_after_a_resume_still_ends_the_goal() -> None:
 
 
 def test_a_goal_with_little_time_to_spare_survives_hold_and_resume() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     goal = FollowJointTrajectoryGoal(trajectory=move(HOME, READY), goal_time_tolerance=0.15)
     assert rig.goal(goal).accepted
     rig.run(1.2)
@@ -83,7 +84,7 @@ def test_a_hold_whose_answer_is_lost_is_still_a_persons_hold() -> None:
     rig.command(DeviceCommandKind.HOLD, 1)
     for _ in range(100):
         rig.run(0.02)
-        rig._flying = [item for item in rig._flying if item[3] != "cmd/ack"]
+        rig.drop("cmd/ack")
     rig.run(2.0)
     assert rig.device.mode == DeviceMode.HOLD
     assert not rig.finished
@@ -135,7 +136,7 @@ def test_a_canceled_goal_stays_canceled_when_a_stamped_one_comes_due_meanwhile()
 
 
 def test_a_stamped_goal_that_is_canceled_leaves_streaming_as_it_was() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     for _ in range(10):
         rig.target(brazo_joint=0.3)
         rig.run(0.1)
@@ -151,7 +152,7 @@ def test_a_stamped_goal_that_is_canceled_leaves_streaming_as_it_was() -> None:
 
 
 def test_a_goal_spliced_into_a_stream_that_stands_begins_where_that_stands() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     for _ in range(40):
         rig.target(brazo_joint=0.2, antebrazo_joint=0.2066)
         rig.run(0.1)
@@ -165,24 +166,23 @@ def test_a_goal_spliced_into_a_stream_that_stands_begins_where_that_stands() -> 
 
 
 def test_a_late_chunk_of_a_stopped_stream_ends_the_goal_that_it_disturbs() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.goal(move(HOME, READY), "old")
-    late = [payload for _, _, _, kind, payload in rig._flying if kind == "traj"]
-    rig._flying = [item for item in rig._flying if item[3] != "traj"]
+    late = rig.drop("traj")
     assert rig.cancel("old") == ""
     assert rig.finish("old", 2.0)[0] == GoalStatusCode.CANCELED
     rig.device.receive(late[0])
     goal = FollowJointTrajectoryGoal(trajectory=move(HOME, READY), goal_time_tolerance=-1.0)
     assert rig.goal(goal, "new").accepted
-    rig._flying = [item for item in rig._flying if item[3] != "traj"]
+    rig.drop("traj")
     assert rig.finish("new", 5.0)[0] == GoalStatusCode.ABORTED
     assert_next_goal_succeeds(rig)
 
 
 def test_a_goal_does_not_overtake_a_persons_stop() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.command(DeviceCommandKind.STOP, 1)
-    rig._flying = [item for item in rig._flying if item[3] != "cmd"]  # lost; it will be sent again
+    rig.drop("cmd")  # lost; it will be sent again
     verdict = rig.goal(move(HOME, READY))
     assert not verdict.accepted
     assert "STOP" in verdict.reason
@@ -192,7 +192,7 @@ def test_a_goal_does_not_overtake_a_persons_stop() -> None:
 
 
 def test_a_goal_right_after_the_answer_to_a_stop_waits_until_the_arm_stands() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     for _ in range(10):
         rig.target(brazo_joint=1.0)
         rig.run(0.1)
@@ -205,7 +205,7 @@ def test_a_goal_right_after_the_answer_to_a_stop_waits_until_the_arm_stands() ->
 
 
 def test_an_arm_on_its_limit_is_within_its_limits() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     joint = rm1().joints[1]
     assert joint.steps.to_position(rig_steps := round(joint.steps.to_steps(joint.upper))) > joint.upper
     assert rig.goal(move(HOME, (0.0, joint.upper, 0.0))).accepted
@@ -218,7 +218,7 @@ def test_an_arm_on_its_limit_is_within_its_limits() -> None:
 
 
 def test_a_goal_without_a_bound_in_time_does_not_wait_for_steps_that_will_not_come() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     goal = FollowJointTrajectoryGoal(
         trajectory=move(HOME, (0.6001, -1.203, 0.0801)),
         goal_tolerance=(JointTolerance(name="antebrazo_joint", position=1e-6),),

@@ -20,7 +20,8 @@ from services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot, w
 from services.stepper_gateway.motion.limits import Limits
 from services.stepper_gateway.motion.path_joining import JoinedPath, join_path
 from services.stepper_gateway.motion.paths import Path, RoundedPath, SampledPath, profile
-from tests.stepper_gateway.harness import ROOT, move, rm1
+from services.virtual_arm.virtual_arm import rm1
+from tests.stepper_gateway.harness import ROOT, move
 
 JOINTS = rm1().joints
 LIMITS = Limits.of(JOINTS)

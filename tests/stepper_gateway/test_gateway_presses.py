@@ -11,14 +11,14 @@ from schemas.device import DeviceMode, PressKind, PressRequest
 from services.stepper_gateway.device.press_handler import target_of
 from services.stepper_gateway.goals.rejections import GoalRejected
 from services.stepper_gateway.links.link import Kind
-from tests.stepper_gateway.harness import Rig, rm1
+from services.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.processes import Processes
-from tests.stepper_gateway.wired import Gateway
+from tests.stepper_gateway.wired import WiredGateway
 
 ESTOP = PressRequest(press=PressKind.ESTOP)
 
 
-def virtual(rig: Rig) -> Rig:
+def virtual(rig: VirtualArm) -> VirtualArm:
     """What this device says of itself from now on."""
     rig.ready()
     status = {"online": True, "device": "rm1", "boot_id": 77, "joints": 3, "tick_hz": 50_000, "queue_capacity": 128}
@@ -27,16 +27,16 @@ def virtual(rig: Rig) -> Rig:
     return rig
 
 
-def say(rig: Rig, event: str, detail: str = "") -> None:
+def say(rig: VirtualArm, event: str, detail: str = "") -> None:
     rig.receive(Kind.EVENT, json.dumps({"event": event, "t_us": 1, "detail": detail}).encode())
 
 
-def presses(rig: Rig) -> list[str]:
+def presses(rig: VirtualArm) -> list[str]:
     return [json.loads(payload)["press"] for _, kind, payload in rig.sent if kind == Kind.PRESS]
 
 
 def test_a_real_device_is_not_pressed_by_a_request() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     status = {"online": True, "boot_id": 77, "joints": 3, "config_crc32": rig.core.device.configuration.crc32}
     rig.receive(Kind.STATUS, json.dumps(status).encode())
     rig.press(ESTOP)
@@ -46,7 +46,7 @@ def test_a_real_device_is_not_pressed_by_a_request() -> None:
 
 
 def test_presses_go_out_one_at_a_time_and_each_gets_its_own_answer() -> None:
-    rig = virtual(Rig())
+    rig = virtual(VirtualArm())
     rig.press(ESTOP, 1)
     rig.press(PressRequest(press=PressKind.SWITCH, target="limit_q1"), 2)
     assert presses(rig) == ["estop"]
@@ -58,7 +58,7 @@ def test_presses_go_out_one_at_a_time_and_each_gets_its_own_answer() -> None:
 
 
 def test_a_press_that_is_not_answered_is_given_up_and_the_next_one_goes_out() -> None:
-    rig = virtual(Rig())
+    rig = virtual(VirtualArm())
     rig.press(ESTOP, 1)
     rig.press(ESTOP, 2)
     rig.run(2.5)
@@ -67,7 +67,7 @@ def test_a_press_that_is_not_answered_is_given_up_and_the_next_one_goes_out() ->
 
 
 def test_an_absent_device_is_not_pressed() -> None:
-    rig = virtual(Rig())
+    rig = virtual(VirtualArm())
     rig.wire.is_cut = True
     rig.run(1.0)
     rig.press(ESTOP)
@@ -102,15 +102,15 @@ def test_a_target_that_is_not_there_is_refused_with_the_nearest(press: PressKind
 
 
 def test_the_virtual_devices_own_process_is_pressed_released_and_blocked(processes: Processes) -> None:
-    with closing(Gateway(processes.port)) as gateway:
+    with closing(WiredGateway(processes.port)) as gateway:
         gateway.ready()
-        assert gateway.press(ESTOP).accepted
+        assert gateway.answer_to_press(ESTOP).accepted
         assert gateway.run(2.0, lambda: gateway.state.mode == DeviceMode.ESTOP)
         assert gateway.state.inputs == ("estop",)
-        assert gateway.press(PressRequest(press=PressKind.ESTOP, value=0.0)).accepted
+        assert gateway.answer_to_press(PressRequest(press=PressKind.ESTOP, value=0.0)).accepted
         assert gateway.run(2.0, lambda: gateway.state.inputs == ())
-        assert gateway.press(PressRequest(press=PressKind.SLIP, target="brazo_joint", value=25.0)).accepted
+        assert gateway.answer_to_press(PressRequest(press=PressKind.SLIP, target="brazo_joint", value=25.0)).accepted
         assert gateway.run(2.0, lambda: gateway.published["device/shaft"][-1].shaft[0] == 25)
-        refused = gateway.press(PressRequest(press=PressKind.DRIFT, value=1e9))
+        refused = gateway.answer_to_press(PressRequest(press=PressKind.DRIFT, value=1e9))
         assert not refused.accepted
         assert refused.reason

@@ -9,13 +9,14 @@ from schemas.actions import GoalStatusCode
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from schemas.scene import PlanningScene
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
-from tests.stepper_gateway.harness import Rig, move
+from services.virtual_arm.virtual_arm import VirtualArm
+from tests.stepper_gateway.harness import move
 
 HOME, THERE = (0.0, 0.0, 0.0), (0.1, -0.2, 0.01)
 
 
 def goal(
-    version: int | None, delay: float = 0.0, rig: Rig | None = None, epoch: int | None = None
+    version: int | None, delay: float = 0.0, rig: VirtualArm | None = None, epoch: int | None = None
 ) -> FollowJointTrajectoryGoal:
     """To be begun `delay` [s] from now on."""
     trajectory = move(HOME, THERE)
@@ -24,13 +25,13 @@ def goal(
     return FollowJointTrajectoryGoal(trajectory=trajectory, scene_version=version, scene_epoch=epoch)
 
 
-def heard(*versions: int) -> Rig:
+def heard(*versions: int) -> VirtualArm:
     """A gateway that has been told these versions of a scene, in this order."""
     return told(*(PlanningScene(version=version) for version in versions))
 
 
-def told(*scenes: PlanningScene) -> Rig:
-    rig = Rig().ready()
+def told(*scenes: PlanningScene) -> VirtualArm:
+    rig = VirtualArm().ready()
     for scene in scenes:
         rig.core.on_scene(scene)
     return rig

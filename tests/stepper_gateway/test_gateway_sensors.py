@@ -8,15 +8,15 @@ import pytest
 
 from schemas.topics import DEVICE_SHAFT, SENSORS
 from services.stepper_gateway.links.link import Kind
-from tests.stepper_gateway.harness import Rig
+from services.virtual_arm.virtual_arm import VirtualArm
 
 
-def warnings(rig: Rig) -> list[str]:
+def warnings(rig: VirtualArm) -> list[str]:
     return [event for event in rig.events() if event.startswith("sensors")]
 
 
 def test_readings_come_ten_times_a_second_with_names_values_and_units() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.device.set_sensor(0, 12.5)
     rig.device.set_sensor(1, 7.412)
     rig.run(0.5)
@@ -33,7 +33,7 @@ def test_readings_come_ten_times_a_second_with_names_values_and_units() -> None:
 
 
 def test_two_seconds_of_silence_are_said_once_and_end_the_republishing_until_readings_return() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.device.set_sensor(1, 7.4)
     rig.run(1.0)
     rig.lost.add(Kind.SENSORS)
@@ -52,7 +52,7 @@ def test_two_seconds_of_silence_are_said_once_and_end_the_republishing_until_rea
 
 
 def test_a_device_that_never_reads_its_sensors_is_told_of_once() -> None:
-    rig = Rig()
+    rig = VirtualArm()
     rig.lost.add(Kind.SENSORS)
     rig.ready()
     rig.run(5.0)
@@ -61,14 +61,14 @@ def test_a_device_that_never_reads_its_sensors_is_told_of_once() -> None:
 
 
 def test_readings_that_robot_toml_does_not_know_are_passed_over() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.receive(Kind.SENSORS, b'{"t_us": 5, "boot_id": 77, "smell": 3.0, "bateria": 7.0}')
     rig.run(0.2)
     assert all("smell" not in message.name for message in rig.messages(SENSORS))
 
 
 def test_the_true_shafts_stand_beside_the_counters() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.device.slip(0, 100)
     rig.receive(Kind.SHAFT, rig.device.shaft_report())
     shaft = rig.messages(DEVICE_SHAFT)[-1]

@@ -14,7 +14,9 @@ from schemas.joints import JointTargets
 from schemas.message import Vector
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
 from schemas.topics import JOINT_STATES
-from tests.stepper_gateway.harness import Rig, Wire, asked, assert_within_limits, move, rm1
+from services.virtual_arm.gateway_driver import asked
+from services.virtual_arm.virtual_arm import VirtualArm, Wire, rm1
+from tests.stepper_gateway.harness import assert_within_limits, move
 
 JOINTS = rm1().joints
 LONGEST_GOAL = 12.0  # [s] of path and bridge
@@ -25,7 +27,7 @@ class Play:
     """A rig, what was done to it, and what must hold meanwhile."""
 
     def __init__(self, wire: Wire, seed: int) -> None:
-        self.rig = Rig(wire, seed=seed).ready()
+        self.rig = VirtualArm(wire, seed=seed).ready()
         self.accepted: dict[str, float] = {}  # [s] when
         self.tickets = 0
         self.boot = 77
@@ -164,7 +166,7 @@ def stream(share: Vector, reach: float, count: int, period: float) -> Action:
     def act(play: Play) -> None:
         for _ in range(count):
             target = JointTargets(name=rm1().joint_names, position=near(play, share, reach))
-            play.rig._do(play.rig.core.on_targets(target, play.rig.moment))
+            play.rig.stream(target)
             play.wait(period)
 
     return act

@@ -13,7 +13,7 @@ from schemas.deployment import Deployment, DeviceKind, SerialSection, Wire
 from schemas.device import DeviceMode, PressKind, PressRequest
 from services.stepper_gateway.main import open_link, serial_device
 from tests.stepper_gateway.processes import DEVICE, Processes
-from tests.stepper_gateway.wired import Gateway
+from tests.stepper_gateway.wired import WiredGateway
 
 HOME = (0.0, 0.0, 0.0)
 NEAR = (0.1, -0.2, 0.01)
@@ -26,19 +26,19 @@ def cabled(tmp_path: Path) -> Iterator[Processes]:
         yield found
 
 
-def gateway_of(processes: Processes) -> Gateway:
-    return Gateway(processes.port, lambda wake: open_link(processes.deployment, "rm1", wake))
+def gateway_of(processes: Processes) -> WiredGateway:
+    return WiredGateway(processes.port, lambda wake: open_link(processes.deployment, "rm1", wake))
 
 
 def test_a_move_and_everything_that_is_json_over_a_cable(cabled: Processes) -> None:
     with closing(gateway_of(cabled)) as gateway:
         gateway.ready()
-        assert gateway.goal(NEAR).accepted
+        assert gateway.move_to(NEAR).accepted
         assert gateway.finish()[0] == GoalStatusCode.SUCCEEDED
         assert gateway.configure().accepted
-        assert gateway.press(PressRequest(press=PressKind.SENSOR, target="bateria", value=7.5)).accepted
+        assert gateway.answer_to_press(PressRequest(press=PressKind.SENSOR, target="bateria", value=7.5)).accepted
         assert gateway.run(3.0, lambda: bool(gateway.published["sensors"] and gateway.published["device/shaft"]))
-        assert gateway.press(PressRequest(press=PressKind.ESTOP)).accepted
+        assert gateway.answer_to_press(PressRequest(press=PressKind.ESTOP)).accepted
         assert gateway.run(2.0, lambda: gateway.state.mode == DeviceMode.ESTOP)
         assert gateway.core.bad_frames == 0
         trips = sorted(ack.round_trip for ack in gateway.published["command_acks"])
@@ -48,7 +48,7 @@ def test_a_move_and_everything_that_is_json_over_a_cable(cabled: Processes) -> N
 def test_a_device_that_dies_on_the_cable_aborts_the_goal_and_is_met_again(cabled: Processes) -> None:
     with closing(gateway_of(cabled)) as gateway:
         gateway.ready()
-        assert gateway.goal((1.0, -1.0, 0.1)).accepted
+        assert gateway.move_to((1.0, -1.0, 0.1)).accepted
         gateway.run(1.0)
         cabled.kill(DEVICE)
         assert gateway.finish()[0] == GoalStatusCode.ABORTED

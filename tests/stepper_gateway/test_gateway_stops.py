@@ -8,22 +8,23 @@ from schemas.actions import GoalStatusCode
 from schemas.device import DeviceMode, PressKind, PressRequest, StopKind
 from services.stepper_gateway.links.frames import Command, decode
 from services.stepper_gateway.links.link import Kind
-from tests.stepper_gateway.harness import Rig, assert_within_limits, move
+from services.virtual_arm.virtual_arm import VirtualArm
+from tests.stepper_gateway.harness import assert_within_limits, move
 
 ZERO = (0.0, 0.0, 0.0)
 FAR = (1.2, -1.2, 0.08)
 
 
-def moving() -> Rig:
+def moving() -> VirtualArm:
     """A rig whose arm is in the middle of a goal."""
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     assert rig.goal(move(ZERO, FAR)).accepted
     rig.run(1.0)
     assert rig.device.mode == DeviceMode.RUN
     return rig
 
 
-def restarted(*lost: Kind) -> Rig:
+def restarted(*lost: Kind) -> VirtualArm:
     """A rig whose gateway has restarted in the middle of a move, and hears nothing of these kinds."""
     rig = moving()
     rig.lost = set(lost)
@@ -33,12 +34,12 @@ def restarted(*lost: Kind) -> Rig:
     return rig
 
 
-def commands(rig: Rig) -> list[Command]:
+def commands(rig: VirtualArm) -> list[Command]:
     frames = [decode(payload) for _, kind, payload in rig.sent if kind == Kind.CMD]
     return [frame for frame in frames if isinstance(frame, Command)]
 
 
-def stands(rig: Rig) -> bool:
+def stands(rig: VirtualArm) -> bool:
     return rig.device.mode not in (DeviceMode.RUN, DeviceMode.HOLD)
 
 

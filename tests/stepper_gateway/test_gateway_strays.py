@@ -21,7 +21,8 @@ from services.stepper_gateway.links.frames import (
     encode,
 )
 from services.stepper_gateway.links.link import Kind
-from tests.stepper_gateway.harness import Rig, move, rm1
+from services.virtual_arm.virtual_arm import VirtualArm, rm1
+from tests.stepper_gateway.harness import move
 
 HOME = (0.0, 0.0, 0.0)
 READY = (0.6, -1.2, 0.08)
@@ -29,20 +30,20 @@ STATUS = 11
 NEVER = 2**63  # [us]
 
 
-def moving_rig() -> Rig:
-    rig = Rig().ready()
+def moving_rig() -> VirtualArm:
+    rig = VirtualArm().ready()
     assert rig.goal(move(HOME, READY)).accepted
     rig.run(1.2)
     return rig
 
 
-def last_beat(rig: Rig) -> Heartbeat:
+def last_beat(rig: VirtualArm) -> Heartbeat:
     beat = decode(next(payload for _, kind, payload in reversed(rig.sent) if kind == Kind.HB))
     assert isinstance(beat, Heartbeat)
     return beat
 
 
-def commands(rig: Rig) -> list[Command]:
+def commands(rig: VirtualArm) -> list[Command]:
     frames = [decode(payload) for _, kind, payload in rig.sent if kind == Kind.CMD]
     return [frame for frame in frames if isinstance(frame, Command)]
 
@@ -80,7 +81,7 @@ def test_a_gateway_that_was_frozen_itself_blames_nobody() -> None:
 
 
 def test_a_lost_status_is_asked_for() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.lost.add("status")
     rig.new_gateway()
     rig.run(1.0)
@@ -94,7 +95,7 @@ def test_a_lost_status_is_asked_for() -> None:
 
 
 def test_a_device_that_cannot_be_asked_is_left_alone_and_heard_when_it_speaks() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.lost.update(("status", "cmd"))
     rig.new_gateway()
     assert rig.run(1.0, lambda: bool(commands(rig)))
@@ -120,7 +121,7 @@ def test_a_device_says_its_status_over_its_serial_line_too() -> None:
 
 
 def test_an_empty_status_is_counted_and_changes_nothing() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     before = rig.core.bad_frames
     rig.receive(Kind.STATUS, b"", retained=True)
     assert rig.core.bad_frames == before + 1

@@ -16,11 +16,12 @@ from schemas.topics import DEVICE_EVENTS, JOINT_STATES
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits
 from services.stepper_gateway.motion.target_tracker import TargetTracker
-from tests.stepper_gateway.harness import UNIX, Rig, assert_within_limits, move, rm1
+from services.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
+from tests.stepper_gateway.harness import assert_within_limits, move
 
 
 def test_a_10_hz_sine_is_tracked_within_the_limits() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     begun = rig.now
     sine = {
         "brazo_joint": (0.3, 0.2),
@@ -44,7 +45,7 @@ def test_a_10_hz_sine_is_tracked_within_the_limits() -> None:
 
 
 def test_a_target_is_reached_exactly_while_the_stream_lasts() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     for _ in range(40):
         rig.target(brazo_joint=0.5)
         rig.run(0.1)
@@ -56,7 +57,7 @@ def test_a_target_is_reached_exactly_while_the_stream_lasts() -> None:
 
 
 def test_a_stream_that_falls_silent_brakes_to_rest_and_does_not_go_on_to_the_stale_target() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     rig.target(brazo_joint=2.5)
     assert rig.run(2.0, lambda: rig.device.mode == DeviceMode.RUN)
     assert rig.run(1.6, lambda: rig.device.mode == DeviceMode.IDLE)
@@ -67,7 +68,7 @@ def test_a_stream_that_falls_silent_brakes_to_rest_and_does_not_go_on_to_the_sta
 
 
 def test_the_stream_begins_again_after_silence() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     for place in (0.3, -0.2):
         for _ in range(30):
             rig.target(brazo_joint=place)
@@ -77,7 +78,7 @@ def test_the_stream_begins_again_after_silence() -> None:
 
 
 def test_a_target_beyond_a_limit_is_refused_by_name_and_the_one_before_stays() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     for index in range(40):
         rig.target(brazo_joint=0.2)
         if index > 3:
@@ -103,15 +104,15 @@ def test_a_malformed_target_is_refused_and_nothing_moves(
 ) -> None:
     from schemas.joints import JointTargets
 
-    rig = Rig().ready()
-    rig._do(rig.core.on_targets(JointTargets(name=names, position=positions), rig.moment))
+    rig = VirtualArm().ready()
+    rig.stream(JointTargets(name=names, position=positions))
     rig.run(1.0)
     assert said in rig.messages(DEVICE_EVENTS)[-1].detail
     assert rig.device.steps == (0, 0, 0)
 
 
 def test_targets_are_refused_while_a_goal_runs_and_a_goal_takes_over_from_targets() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     for _ in range(15):
         rig.target(brazo_joint=1.0, antebrazo_joint=-0.5)
         rig.run(0.1)

@@ -15,7 +15,8 @@ from services.stepper_gateway.goals.goal_validator import GoalValidator, MotionS
 from services.stepper_gateway.goals.rejections import GoalRejected
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.parameters import GatewayParameters
-from tests.stepper_gateway.harness import UNIX, Rig, assert_within_limits, move, rm1
+from services.virtual_arm.virtual_arm import UNIX, VirtualArm, rm1
+from tests.stepper_gateway.harness import assert_within_limits, move
 
 HOME = (0.0, 0.0, 0.0)
 READY = (0.6, -1.2, 0.08)
@@ -169,7 +170,7 @@ def test_more_steps_a_second_than_the_tick_allows_are_refused() -> None:
 
 
 def test_the_order_of_the_names_is_kept() -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     plan = move(HOME, READY)
     turned = JointTrajectory(
         joint_names=plan.joint_names[::-1],
@@ -237,7 +238,7 @@ places = st.tuples(st.floats(-2.9, 2.9), st.floats(-2.9, 2.9), st.floats(0.0, 0.
 @settings(max_examples=15)
 @given(st.lists(st.tuples(places, st.floats(0.02, 2.0)), min_size=1, max_size=4))
 def test_an_accepted_goal_never_leaves_the_limits_whenever_it_comes(program: list[tuple[Vector, float]]) -> None:
-    rig = Rig().ready()
+    rig = VirtualArm().ready()
     for index, (place, pause) in enumerate(program):
         here = rig.published["joint_states"][-1].position
         verdict = rig.goal(move(here, place), f"g{index}")
