@@ -4,7 +4,7 @@ from gemelo import Node
 from schemas.actions import GoalFeedback
 from schemas.message import decode
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from services.runtime.action_keys import feedback_topic, status_topic
+from services.runtime.actions.keys import feedback_topic, status_topic
 
 
 def show(message: GoalFeedback) -> None:

@@ -20,8 +20,8 @@ from gemelo.units import Pose
 from schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
 from schemas.planning import JogStatus
 from schemas.topics import JOINT_STATES, SENSORS, STEP_ERRORS
-from services.arm.description import Arm as Description
 from services.arm.errors import suggestion
+from services.arm.model.description import Arm as Description
 from services.runtime.node import Node
 
 OnProgress = Callable[[Motion], object]

@@ -12,8 +12,8 @@ from gemelo.arm import Arm
 from gemelo.errors import BadArgument, Error, Lost
 from gemelo.session import Session
 from schemas.deployment import Deployment
-from services.arm.description import load_arm
 from services.arm.errors import suggestion
+from services.arm.model.description import load_arm
 from services.runtime.deployment import load_deployment, project_root
 
 GATEWAY = "stepper_gateway"

@@ -8,8 +8,8 @@ from gemelo.units import Pose
 from schemas.frames import Transform
 from schemas.topics import FRAMES, STATIC_FRAMES
 from services.arm.errors import suggestion
-from services.arm.frames import FrameBuffer, FrameError
-from services.arm.transforms import from_message
+from services.arm.frames.frame_buffer import FrameBuffer, FrameError
+from services.arm.frames.transforms import from_message
 
 
 class Frames:

@@ -14,9 +14,9 @@ from schemas.device import DeviceCommand, DeviceEvent, DeviceMode, DeviceState, 
 from schemas.device_faults import fault_text
 from schemas.robot import HomingDirection
 from schemas.topics import DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
-from services.arm.description import Arm as Description
-from services.arm.description import Joint
 from services.arm.errors import suggestion
+from services.arm.model.description import Arm as Description
+from services.arm.model.description import Joint
 
 WAITS, TO, OFF, HOME = "waits", "to its switch", "off its switch", "home"
 TO_BEGIN = 3.0  # [s] from the device's yes to its first word of homing

@@ -15,7 +15,7 @@ from schemas.device import DeviceEvent
 from schemas.joints import JointTargets
 from schemas.planning import JogCommand, JogStatus
 from schemas.topics import DEVICE_EVENTS, JOG, JOG_STATUS, JOINT_TARGETS
-from services.arm.description import Arm as Description
+from services.arm.model.description import Arm as Description
 
 PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
 ANSWER = 3.0  # [s] of jogging without a word of the planner, after which it counts as lost

@@ -31,7 +31,7 @@ from schemas.planning import (
     StepMargin,
 )
 from schemas.topics import FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS
-from services.arm.description import Arm as Description
+from services.arm.model.description import Arm as Description
 
 MARGIN = 2.0  # [s] that a planner may take beyond its allowed time before it counts as gone
 TO_CANCEL = 0.5  # [s] for its answer to a cancel

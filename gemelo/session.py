@@ -15,7 +15,7 @@ from gemelo.errors import Error, Lost, Refused
 from schemas.deployment import Deployment
 from schemas.message import Message
 from schemas.topics import Request, Topic
-from services.arm.description import Arm as Description
+from services.arm.model.description import Arm as Description
 from services.runtime import errors as runtime
 from services.runtime.node import Node
 from services.runtime.topics import Latest

@@ -26,9 +26,9 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from services.arm.description import Arm as Description
 from services.arm.errors import suggestion
-from services.arm.transforms import from_rpy
+from services.arm.frames.transforms import from_rpy
+from services.arm.model.description import Arm as Description
 
 Joints = Mapping[str, float] | Sequence[float]
 Vector = Sequence[float]

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import msgspec
 
+from firmware.bindings.frames import OUTPUTS, Levels, OutFrame, PinChange, Request
 from firmware.bindings.library import MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
 from firmware.bindings.motor import MotorError, motor_record
-from firmware.bindings.words import OUTPUTS, Levels, OutFrame, PinChange, Request
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, config_text
 from schemas.robot import Motor

@@ -12,10 +12,10 @@ from paho.mqtt.enums import CallbackAPIVersion
 from schemas.device import DeviceState
 from schemas.frames import FrameTransform, FrameTransforms
 from schemas.topics import DEVICE_STATE, FRAMES
-from services.arm.chain import joint_transform
-from services.arm.description import Arm
-from services.arm.frames import FrameBuffer
-from services.arm.transforms import to_message
+from services.arm.frames.frame_buffer import FrameBuffer
+from services.arm.frames.transforms import to_message
+from services.arm.kinematics.chain import joint_transform
+from services.arm.model.description import Arm
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile
 from services.bench.scenes import rm1
 from services.bench.stack import Running, Stacks

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.chain import link_transforms
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
-from services.arm.transforms import inverse, multiply
+from services.arm.frames.transforms import inverse, multiply
+from services.arm.kinematics.chain import link_transforms
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile, rounded
 from services.bench.scenes import parol6, random_configurations, rm1
 from services.planner.kinematics.ik import InverseKinematics

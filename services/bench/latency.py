@@ -24,8 +24,8 @@ from schemas.topics import (
     JOINT_TARGETS,
     PLAN,
 )
-from services.arm.description import Arm
 from services.arm.interpolation import TrajectorySampler
+from services.arm.model.description import Arm
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile, rounded
 from services.bench.stack import Running, Stacks
 

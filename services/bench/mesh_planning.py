@@ -13,7 +13,7 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import JointGoal, PlanRequest, PlanResponse
 from schemas.scene import MeshShape, PlanningScene, SceneObject
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.bench.figures import Figure, of_samples
 from services.bench.problems.problem_sets import ALLOWED
 from services.bench.scenes import TABLE, parol6

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import msgspec
 
 from firmware.bindings.device import Device
-from firmware.bindings.words import PinChange
+from firmware.bindings.frames import PinChange
 from schemas.device_config import DeviceConfig, JointConfig
 from services.bench.figures import NotMeasured
 from services.stepper_gateway.links.frames import Chunk, ChunkFlag, Code, Heartbeat, encode

@@ -10,10 +10,10 @@ from itertools import pairwise
 import msgspec
 
 from firmware.bindings.device import Device
-from firmware.bindings.words import PinChange
+from firmware.bindings.frames import PinChange
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, InputConfig, InputRole
-from services.arm.device_config import device_config
+from services.arm.device.device_config import device_config
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples
 from services.bench.probe import BOOT, FINE, Knot, bench_config, chunk_of, joint_of, play, pulses_of
 from services.bench.scenes import parol6, rm1

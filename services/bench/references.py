@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from schemas.frames import Transform
 from schemas.scene import BoxShape, CylinderShape, PlanningScene, Shape
-from services.arm.configuration import Configuration
-from services.arm.description import Arm
+from services.arm.kinematics.joint_mapping import Configuration
+from services.arm.model.description import Arm
 from services.bench.figures import NotMeasured
 from services.bench.problems.problem_sets import ALLOWED
 

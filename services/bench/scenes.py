@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from schemas.frames import Transform
 from schemas.message import Vector
 from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject
-from services.arm.description import Arm, load_arm
+from services.arm.model.description import Arm, load_arm
 from services.runtime.deployment import project_root
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from firmware.bindings.motor import VirtualMotor
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.bench.figures import Figure, NotMeasured, rounded
 from services.bench.scenes import rm1
 from services.virtual_arm.virtual_arm import VirtualArm, tcp_wire

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import psutil
 
 from schemas.deployment import Deployment
-from services.arm.description import Arm, load_arm
+from services.arm.model.description import Arm, load_arm
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples, rounded
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.node import Node

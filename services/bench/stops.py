@@ -30,7 +30,7 @@ from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quanti
 from services.bench.latency import sharp_start
 from services.bench.stack import Running, Stacks
 from services.bench.traffic import connected, flood
-from services.runtime.zenoh_bus import ZenohBus
+from services.runtime.bus.zenoh_bus import ZenohBus
 
 GOAL = Goal(p99=20.0)  # [ms]
 CALLS = 200  # for each condition in which the device answers

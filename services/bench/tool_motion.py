@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from schemas.joints import JointState
 from schemas.planning import JogCommand, LinearMotion, PlanCode, PlanRequest, PoseGoal
 from schemas.scene import PlanningScene
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.bench.figures import Figure, Goal, of_samples, quantile
 from services.bench.path_quality import least_time
 from services.bench.scenes import CHECK_SCENE, parol6, rm1

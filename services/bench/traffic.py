@@ -48,7 +48,7 @@ from schemas.topics import (
     JOINT_TARGETS,
     PLAN,
 )
-from services.runtime.zenoh_bus import ZenohBus
+from services.runtime.bus.zenoh_bus import ZenohBus
 
 THERE, BACK = "gemelo-bench/there", "gemelo-bench/back"
 PATIENCE = 5.0  # [s] for a connection

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from schemas.device import CommandAck, CommandChunk, DeviceMode
 from schemas.message import Message
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile
 from services.bench.scenes import rm1
 from services.stepper_gateway.device.clock import ClockSync

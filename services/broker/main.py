@@ -11,9 +11,9 @@ from pathlib import Path
 from schemas.deployment import Broker, Deployment
 from services.broker import mosquitto
 from services.runtime.deployment import DeploymentError, load_deployment
-from services.runtime.logs import LEVELS, line_logger
-from services.runtime.ports import PortTaken, require_free
-from services.runtime.readiness import Readiness
+from services.runtime.process.logs import LEVELS, line_logger
+from services.runtime.process.ports import PortTaken, require_free
+from services.runtime.process.readiness import Readiness
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

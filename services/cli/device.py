@@ -26,7 +26,7 @@ from services.cli.session import Robot, Session, connect, load_robot
 from services.cli.units import parse_joints, share, show
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
 
 TIMEOUT = 3.0  # [s]
 BY_NAME: dict[str, DeviceCommand | StopKind] = {

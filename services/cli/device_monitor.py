@@ -21,7 +21,7 @@ from services.cli.terminal import LiveBlock
 from services.cli.units import positive_seconds
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
 
 REFRESH = 5.0  # [Hz]
 

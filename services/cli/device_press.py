@@ -17,7 +17,7 @@ from services.cli.session import Robot, Session, connect, load_robot
 from services.cli.units import TIME, parse_quantity
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
 
 TIMEOUT = 3.0  # [s]
 HELD = {"on": 1.0, "off": 0.0, "auto": -1.0}

@@ -15,7 +15,7 @@ from services.cli.robot_names import joint_name
 from services.cli.session import Session, other_robots
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
 
 PATIENCE = 2.0  # [s] for the first messages
 POLL = 0.02  # [s]

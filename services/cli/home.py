@@ -20,7 +20,7 @@ from services.cli.session import Robot, Session, connect, load_robot
 from services.cli.terminal import Interrupt, LiveBlock, two_stage_interrupt
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm, Joint
+    from services.arm.model.description import Arm, Joint
 
 TO_BEGIN = 3.0  # [s] from the device's yes to its first word of homing
 LAST_WORDS = 0.5  # [s] for events that come after the state

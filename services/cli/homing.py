@@ -15,7 +15,7 @@ from schemas.robot import HomingDirection
 from services.cli.robot_names import joint_name
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm, Joint
+    from services.arm.model.description import Arm, Joint
 
 WAITS, TO, OFF, HOME = "waits", "to its switch", "off its switch", "home"
 

@@ -20,7 +20,7 @@ from services.cli.terminal import LiveBlock, two_stage_interrupt
 from services.cli.units import SPEED_OF, angular_speed, parse_joints, positive_seconds, show, speed
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
 
 PERIOD = 0.02  # [s] between two commands
 ANSWER = 3.0  # [s] that the planner may take to its first answer
@@ -121,7 +121,7 @@ class Jogging:
         self._states = self.node.latest(JOINT_STATES)
         self.status: JogStatus | None = None
         self.limits: dict[tuple[str, str], JogLimit] = {}  # by check and subject, the newest of each
-        from services.arm.kinematics import Kinematics  # loads numpy
+        from services.arm.kinematics.kinematics import Kinematics  # loads numpy
 
         self._kinematics = Kinematics(self.arm)
         self.node.subscribe(JOG_STATUS, self._on_status)

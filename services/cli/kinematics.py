@@ -18,7 +18,7 @@ from services.cli.text_table import table
 from services.cli.units import SHOWN, angle, length, parse_joints, rotation
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
 
 PATIENCE = 10.0  # [s] that the planner may search
 XYZ = ("X", "Y", "Z")

@@ -24,7 +24,7 @@ from services.runtime.errors import GoalRefused
 if TYPE_CHECKING:
     from argparse import _ArgumentGroup as Group
 
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
     from services.runtime.actions import GoalHandle
 
 LONGEST_HOLD = 3600.0  # [s] that a person may hold the arm on its way

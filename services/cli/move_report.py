@@ -15,7 +15,7 @@ from services.cli.errors import ExitCode
 from services.cli.units import show
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
     from services.cli.session import Session
 
 
@@ -111,7 +111,7 @@ def tool_error(arm: Arm, trajectory: JointTrajectory, errors: Mapping[str, float
 
     Forward kinematics of both: the goal, and the goal minus the error.
     """
-    from services.arm.chain import link_transforms
+    from services.arm.kinematics.chain import link_transforms
 
     goals = dict(zip(trajectory.joint_names, trajectory.points[-1].positions, strict=True))
     reached = {

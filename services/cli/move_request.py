@@ -21,13 +21,13 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from services.arm.transforms import from_rpy
+from services.arm.frames.transforms import from_rpy
 from services.cli.errors import unknown, usage
 from services.cli.parser import Options
 from services.cli.units import parse_joints
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
 
 DEFAULT_TIME = 1.0  # [s] that planning may take if nothing is said
 LONGEST_TIME = 3600.0  # [s] that planning may be allowed

@@ -12,7 +12,7 @@ from schemas.planning import PlanResponse
 from services.cli.errors import CommandError, usage
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
 
 STANDARD_INPUT = "-"
 LARGEST_FILE = 100_000_000  # [bytes] a trajectory of an hour has a tenth of it

@@ -24,7 +24,7 @@ from schemas.planning import (
 from services.cli.units import DEGREE, SHOWN
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
 
 
 def request_text(request: PlanRequest, arm: Arm) -> str:

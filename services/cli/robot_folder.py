@@ -14,7 +14,7 @@ from services.cli.text_table import table
 from services.cli.units import positive_length
 
 if TYPE_CHECKING:
-    from services.arm.collision_matrix import Verdict
+    from services.arm.kinematics.collision_matrix import Verdict
 
 FIT = "services.collision_fitting.main"  # in a process of its own: the command line loads no planner
 BULGE = 0.005  # [m] that a sphere may reach beyond its link
@@ -36,8 +36,8 @@ def run_check(options: Options) -> ExitCode:
 
 def print_findings(folder: Path) -> ExitCode:
     """Prints every finding; FAILED if one of them is an error."""
-    from services.arm.check import Severity
-    from services.arm.check import check as findings_in
+    from services.arm.checks.check import Severity
+    from services.arm.checks.check import check as findings_in
 
     findings = findings_in(folder)
     for finding in findings:
@@ -100,9 +100,9 @@ def _fitted(folder: Path, *options: str) -> ExitCode:
 
 def print_matrix(folder: Path, write: bool) -> ExitCode:
     """Prints the pairs that sampling finds and the changes of the SRDF; changes it if `write`."""
-    from services.arm.collision_matrix import collision_matrix
-    from services.arm.description import load_arm
-    from services.arm.srdf_edit import with_pairs
+    from services.arm.kinematics.collision_matrix import collision_matrix
+    from services.arm.model.description import load_arm
+    from services.arm.model.srdf_edit import with_pairs
 
     try:
         arm = load_arm(folder)
@@ -123,8 +123,8 @@ def print_matrix(folder: Path, write: bool) -> ExitCode:
 
 def plan_of(text: str, verdicts: list[Verdict]) -> tuple[dict[tuple[str, str], str], list[str]]:
     """The pairs that the SRDF is to have with their reasons, and each change as a line; a person's reasons stay."""
-    from services.arm.collision_matrix import Reason
-    from services.arm.srdf_edit import entries
+    from services.arm.kinematics.collision_matrix import Reason
+    from services.arm.model.srdf_edit import entries
 
     present = {entry.pair: entry.reason for entry in entries(text)}
     ours = {str(reason) for reason in Reason}

@@ -9,7 +9,7 @@ from services.cli.errors import unknown, usage
 
 if TYPE_CHECKING:
     from schemas.robot import Input, Output, Sensor
-    from services.arm.description import Arm, Joint
+    from services.arm.model.description import Arm, Joint
 
 
 def joint_of(arm: Arm, name: str) -> Joint:

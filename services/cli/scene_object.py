@@ -7,7 +7,7 @@ from pathlib import Path
 
 from schemas.frames import Transform
 from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, Shape, SphereShape
-from services.arm.transforms import from_rpy
+from services.arm.frames.transforms import from_rpy
 from services.cli.errors import usage
 from services.cli.parser import Options
 from services.cli.units import LENGTH, parse_quantity, parse_rotation

@@ -12,7 +12,7 @@ from services.cli.errors import CommandError, ExitCode, usage
 
 if TYPE_CHECKING:
     from schemas.deployment import Deployment
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
     from services.runtime.node import Node
 
 CONNECT_TIMEOUT = 1.0  # [s]
@@ -36,7 +36,7 @@ class Session(NamedTuple):
 
 def load_robot() -> Robot:
     """Reads the deployment and the arm's files; raises `CommandError` with one sentence if they are wrong."""
-    from services.arm.description import load_arm
+    from services.arm.model.description import load_arm
     from services.runtime.deployment import load_deployment, project_root
 
     try:

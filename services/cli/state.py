@@ -10,7 +10,7 @@ import msgspec
 from schemas.device import DeviceState, DeviceStatus
 from schemas.joints import JointState, StepErrors
 from schemas.topics import DEVICE_STATE, DEVICE_STATUS, FRAMES, JOINT_STATES, STATIC_FRAMES, STEP_ERRORS
-from services.arm.frames import FrameBuffer, FrameError
+from services.arm.frames.frame_buffer import FrameBuffer, FrameError
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options, Parser
 from services.cli.session import Session, connect, other_robots
@@ -18,7 +18,7 @@ from services.cli.text_table import table
 from services.cli.units import SHOWN
 
 if TYPE_CHECKING:
-    from services.arm.description import Arm
+    from services.arm.model.description import Arm
 
 PATIENCE = 2.0  # [s] for the first messages
 REFRESH = 0.2  # [s] of --watch

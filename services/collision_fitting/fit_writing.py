@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from services.arm.description import Arm, load_arm
 from services.arm.errors import DescriptionError
-from services.arm.kinematics import Kinematics
-from services.arm.urdf import Triple
-from services.arm.urdf_edit import with_collisions
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm, load_arm
+from services.arm.model.urdf import Triple
+from services.arm.model.urdf_edit import with_collisions
 from services.collision_fitting.fitted_shape import Fitted
 from services.collision_fitting.mesh_fit import LinkFit, depths
 from services.planner.collision_geometry.link_shapes import link_shapes

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from services.arm.transforms import compose, from_rpy
-from services.arm.urdf import Origin, Triple
+from services.arm.frames.transforms import compose, from_rpy
+from services.arm.model.urdf import Origin, Triple
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 

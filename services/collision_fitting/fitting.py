@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.transforms import from_rpy
-from services.arm.urdf import Origin, Triple
+from services.arm.frames.transforms import from_rpy
+from services.arm.model.urdf import Origin, Triple
 from services.collision_fitting.fitted_shape import Fitted, Kind
 from services.collision_fitting.hull import corners_and_sides, smallest_ball, smallest_rectangle
 from services.planner.collision_geometry.shapes import matrix_of

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.errors import DescriptionError
-from services.arm.transforms import from_rpy
-from services.arm.urdf import Geometry, UrdfLink
+from services.arm.frames.transforms import from_rpy
+from services.arm.model.urdf import Geometry, UrdfLink
 from services.planner.collision_geometry.shapes import TriangleMesh, matrix_of
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from schemas.errors import ConfigurationError
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.native.sphere_cover import BULGE, cover_shapes
 

@@ -10,8 +10,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
 from services.arm.errors import DescriptionError, suggestion
+from services.arm.model.description import Arm
 from services.collision_fitting.fitted_shape import Fitted
 from services.collision_fitting.link_meshes import visual_mesh
 from services.collision_fitting.parts import shapes_around

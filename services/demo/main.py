@@ -98,7 +98,7 @@ def missing_files(folder: Path, recording: Path) -> list[str]:
 
 def take_picture(recording: Path, png: Path) -> list[str]:
     """Takes a picture of the viewer; returns what went wrong, empty if nothing did."""
-    from services.visualizer.picture import picture
+    from services.visualizer.program.screenshot import picture
 
     try:
         picture(recording, png)

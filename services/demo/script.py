@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 from gemelo import Target
-from services.arm.chain import link_transforms
-from services.arm.description import Arm, Joint
-from services.arm.transforms import compose, inverse
+from services.arm.frames.transforms import compose, inverse
+from services.arm.kinematics.chain import link_transforms
+from services.arm.model.description import Arm, Joint
 
 SINE_RATE = 10.0  # [Hz] of the targets
 SINE_TIME = 10.0  # [s]

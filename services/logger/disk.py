@@ -6,11 +6,25 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
 
 from services.logger.core import Batch, Logger
 from services.logger.files import is_due, prune, stem_of
-from services.logger.parameters import LoggerParameters
 from services.logger.recording import Recording
+
+
+class LoggerParameters(msgspec.Struct, frozen=True, kw_only=True):
+    """Where to record, how large and how old a file may become, and how many are kept."""
+
+    enable_logging: Annotated[bool, Meta(description="record at all")] = True
+    log_dir: Annotated[str, Meta(description="folder of the recordings; empty: <paths.out>/recordings")] = ""
+    max_file_mb: Annotated[float, Meta(description="[MB] a larger file is followed by a new one", gt=0)] = 256.0
+    max_age_minutes: Annotated[float, Meta(description="[min] an older file is followed by a new one", gt=0)] = 60.0
+    keep_files: Annotated[int, Meta(description="how many recordings are kept; 0: all", ge=0)] = 48
+
 
 RETRY = 2_000_000_000  # [ns] between two attempts on a disk that refuses
 

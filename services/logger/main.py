@@ -9,9 +9,8 @@ from schemas.message import Message
 from schemas.topics import Topic
 from services.logger.channels import recorded_topics
 from services.logger.core import Batch, Logger
-from services.logger.disk import Disk
+from services.logger.disk import Disk, LoggerParameters
 from services.logger.origin import origin
-from services.logger.parameters import LoggerParameters
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node

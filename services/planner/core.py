@@ -20,8 +20,8 @@ from schemas.planning import (
     PlanResponse,
     WaypointGoal,
 )
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.cartesian.tool_motions import ToolMotions
 from services.planner.collision.checker import CollisionChecker
 from services.planner.collision.clearance import CLEARANCE, first_collision

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from schemas.joints import JointState
 from schemas.planning import JogCommand
 from schemas.topics import DEVICE_STATUS, FOLLOW_JOINT_TRAJECTORY, JOG, JOG_STATUS, JOINT_TARGETS
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.collision.world import World
 from services.planner.jog.jog import PERIOD, Jog
-from services.runtime.action_keys import status_topic
+from services.runtime.actions.keys import status_topic
 from services.runtime.node import Node
 from services.runtime.topics import Latest
 

@@ -6,7 +6,7 @@ from contextlib import closing
 
 from schemas.deployment import Deployment
 from schemas.topics import FK, IK, JOINT_STATES
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.planner.core import Planner
 from services.planner.jog_service import JogService
 from services.planner.kinematics.kinematic_requests import KinematicRequests

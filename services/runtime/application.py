@@ -11,9 +11,9 @@ from schemas.deployment import Deployment
 from schemas.errors import ConfigurationError
 from services.runtime.deployment import load_deployment
 from services.runtime.errors import BusError, Refused
-from services.runtime.logs import LEVELS, line_logger
 from services.runtime.node import Node
-from services.runtime.stopping import StopRequest, end_soon, stop_on_signals
+from services.runtime.process.logs import LEVELS, line_logger
+from services.runtime.process.shutdown import StopRequest, end_soon, stop_on_signals
 
 Run = Callable[[Node, Deployment], None]
 EXPECTED = (ConfigurationError, BusError, Refused)  # a sentence says all; anything else shows where it happened

@@ -16,24 +16,23 @@ from schemas.deployment import Deployment
 from schemas.message import Message
 from schemas.system import Empty, NodeInfo, Parameter, ParameterValue, SetParameter
 from schemas.topics import LOG, STATISTICS, Action, Request, Topic
-from services.runtime import identity, requests
-from services.runtime.action_client import ActionClient
-from services.runtime.action_server import ActionServer, OnCancel, OnGoal
-from services.runtime.bus import Bus, Declaration
+from services.runtime.actions.client import ActionClient
+from services.runtime.actions.server import ActionServer, OnCancel, OnGoal
+from services.runtime.bus import identity
+from services.runtime.bus.connection import connect
+from services.runtime.bus.interface import Bus, Declaration
 from services.runtime.client_watch import ClientWatch
-from services.runtime.connection import connect
-from services.runtime.declared import Declared
 from services.runtime.deployment import load_deployment, project_root, robot_name
-from services.runtime.logs import BusHandler, line_logger
-from services.runtime.loop import Loop
-from services.runtime.parameter_registry import ParameterRegistry
-from services.runtime.parameters import ParameterSet
-from services.runtime.readiness import Readiness
-from services.runtime.request_server import Pending, RequestServer, UrgentServer
-from services.runtime.statistics import LoopStatistics
-from services.runtime.stopping import StopRequest, stop_on_signals
+from services.runtime.endpoints import Declared, LoopStatistics
+from services.runtime.loop.loop import Loop
+from services.runtime.loop.task_queue import Worker
+from services.runtime.parameters import ParameterRegistry, ParameterSet
+from services.runtime.process.logs import BusHandler, line_logger
+from services.runtime.process.readiness import Readiness
+from services.runtime.process.shutdown import StopRequest, stop_on_signals
+from services.runtime.requests import client as requests
+from services.runtime.requests.server import Pending, RequestServer, UrgentServer
 from services.runtime.topics import Latest, Publisher, Subscription
-from services.runtime.worker import Worker
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from schemas.deployment import RouterSection
-from services.runtime.identity import ALIVE
+from services.runtime.bus.identity import ALIVE
 
 TO_ANSWER = 1.0  # [s] for the router to list the liveliness tokens
 
@@ -15,7 +15,7 @@ def robots_on(router: RouterSection, node: str = "*") -> tuple[str, ...]:
     """
     import zenoh
 
-    from services.runtime.zenoh_config import client_config
+    from services.runtime.bus.zenoh_config import client_config
 
     try:
         with zenoh.open(client_config(router.host, router.port)) as session:

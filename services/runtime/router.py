@@ -9,12 +9,12 @@ from pathlib import Path
 
 import zenoh
 
+from services.runtime.bus.zenoh_config import router_config
 from services.runtime.deployment import DeploymentError, load_deployment
-from services.runtime.logs import LEVELS, line_logger
-from services.runtime.ports import PortTaken, require_free
-from services.runtime.readiness import Readiness
-from services.runtime.stopping import StopRequest, stop_on_signals
-from services.runtime.zenoh_config import router_config
+from services.runtime.process.logs import LEVELS, line_logger
+from services.runtime.process.ports import PortTaken, require_free
+from services.runtime.process.readiness import Readiness
+from services.runtime.process.shutdown import StopRequest, stop_on_signals
 
 BEAT = 1.0  # [s]
 

@@ -9,10 +9,10 @@ from typing import Generic, Protocol, TypeVar
 from schemas.message import BadMessage, Message
 from schemas.system import TopicStatistics
 from schemas.topics import ANY, Delivery, Topic
-from services.runtime.bus import Arrival, Bus
-from services.runtime.inbox import Box, EveryBox, LatestBox
-from services.runtime.loop import Loop
-from services.runtime.wire import from_arrival, schema_of, to_payload
+from services.runtime.bus.interface import Arrival, Bus
+from services.runtime.bus.wire import from_arrival, schema_of, to_payload
+from services.runtime.loop.loop import Loop
+from services.runtime.loop.task_queue import Box, EveryBox, LatestBox
 
 M = TypeVar("M", bound=Message)
 

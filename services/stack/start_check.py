@@ -6,9 +6,9 @@ import sys
 
 from schemas.deployment import Deployment, ViewerMode
 from schemas.errors import ConfigurationError
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.runtime.deployment import load_deployment, project_root
-from services.runtime.ports import PortTaken, require_free
+from services.runtime.process.ports import PortTaken, require_free
 
 
 def start_problems(deployment: Deployment) -> list[str]:

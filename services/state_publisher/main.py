@@ -10,7 +10,7 @@ from schemas.deployment import Deployment
 from schemas.frames import RobotDescription
 from schemas.joints import JointState
 from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
-from services.arm.description import Arm, load_arm
+from services.arm.model.description import Arm, load_arm
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node

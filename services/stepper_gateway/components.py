@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.stepper_gateway.device.command_handler import CommandHandler
 from services.stepper_gateway.device.gateway_device import GatewayDevice
 from services.stepper_gateway.device.press_handler import PressHandler

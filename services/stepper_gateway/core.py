@@ -13,7 +13,7 @@ from schemas.motion import FollowJointTrajectoryGoal
 from schemas.scene import PlanningScene
 from schemas.system import LogLevel
 from schemas.topics import DEVICE_STATUS
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.stepper_gateway.components import Components
 from services.stepper_gateway.device.command_arguments import STOPS, kind_of
 from services.stepper_gateway.device.frame_handler import FrameHandler

@@ -8,7 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 from schemas.deployment import Deployment, DeviceKind, Wire
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node

@@ -30,10 +30,10 @@ from schemas.topics import (
     JOINT_TARGETS,
     SCENE,
 )
-from services.runtime.action_server import ActionServer, GoalDecision, accept, refuse
+from services.runtime.actions.server import ActionServer, GoalDecision, accept, refuse
 from services.runtime.node import Node
 from services.runtime.parameters import ParameterSet
-from services.runtime.request_server import Pending
+from services.runtime.requests.server import Pending
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.moment import Moment

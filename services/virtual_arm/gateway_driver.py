@@ -32,7 +32,7 @@ from schemas.motion import (
     JointTrajectory,
 )
 from schemas.topics import Topic
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.device.command_arguments import KINDS
 from services.stepper_gateway.goals.goal_executor import GoalVerdict

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from functools import cache
 
 from firmware.bindings.device import Device
-from firmware.platform.host.clock import DeviceClock
+from firmware.platform.host.board import DeviceClock
 from schemas.device_config import DeviceConfig
 from schemas.message import Message, Vector
 from schemas.robot import Motor
-from services.arm.description import Arm, load_arm
-from services.arm.device_config import device_config, reference_steps
+from services.arm.device.device_config import device_config, reference_steps
+from services.arm.model.description import Arm, load_arm
 from services.runtime.deployment import project_root
 from services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Kind, Moment
 

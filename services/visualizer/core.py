@@ -14,16 +14,16 @@ import numpy as np
 from schemas.device import DeviceState, DeviceStatus, SensorReadings, ShaftPositions
 from schemas.joints import JointState, StepErrors
 from schemas.planning import PlannedPath
-from services.visualizer import entities
-from services.visualizer.arm_poses import arm_poses
-from services.visualizer.journal import Journal, bounded
-from services.visualizer.model import Joint, Model
-from services.visualizer.panel import Facts, is_lost, panel, shaft_errors
-from services.visualizer.preview import MOVING, Preview
-from services.visualizer.rotations import Array
-from services.visualizer.scene import Loader, SceneView, no_mesh
-from services.visualizer.thinning import Thinned
-from services.visualizer.updates import Panel, Scalars, State, Strip, Times, Tint, Update
+from services.visualizer.content import entities
+from services.visualizer.content.arm_poses import arm_poses
+from services.visualizer.content.event_log import Journal, bounded
+from services.visualizer.content.panel import Facts, is_lost, panel, shaft_errors
+from services.visualizer.content.preview import MOVING, Preview
+from services.visualizer.content.scene import Loader, SceneView, no_mesh
+from services.visualizer.content.thinning import Thinned
+from services.visualizer.content.updates import Panel, Scalars, State, Strip, Times, Tint, Update
+from services.visualizer.model.rotations import Array
+from services.visualizer.model.visual_model import Joint, Model
 
 PANEL_PERIOD = 500_000_000  # [ns]
 AHEAD = 60_000_000_000  # [ns] chosen: a stamp further in the future is false, and the view would follow it there

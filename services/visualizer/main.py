@@ -26,13 +26,10 @@ from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.visualizer.core import Visualizer
-from services.visualizer.meshes import missing_meshes
-from services.visualizer.outputs import Outputs
-from services.visualizer.parameters import VisualizerParameters
-from services.visualizer.scene_meshes import scene_mesh
-from services.visualizer.shapes import Mesh
-from services.visualizer.tool import tool_link
-from services.visualizer.urdf import parse_urdf
+from services.visualizer.model.mesh_files import missing_meshes, scene_mesh
+from services.visualizer.model.triangle_meshes import Mesh
+from services.visualizer.model.urdf import parse_urdf, tool_link
+from services.visualizer.render.outputs import Outputs, VisualizerParameters
 
 BATCH_RATE = 10.0  # [Hz]
 

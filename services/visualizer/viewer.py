@@ -19,11 +19,10 @@ from urllib.parse import quote
 
 from schemas.deployment import Deployment, ViewerMode, ViewerSection
 from services.runtime.deployment import load_deployment, project_root
-from services.runtime.ports import PortTaken, require_free
-from services.runtime.readiness import Readiness
-from services.visualizer.binary import rerun_binary
-from services.visualizer.child import start, stop
-from services.visualizer.connection import Watch
+from services.runtime.process.ports import PortTaken, require_free
+from services.runtime.process.readiness import Readiness
+from services.visualizer.program.rerun_program import rerun_binary, start, stop
+from services.visualizer.program.viewer_connection import Watch
 
 PERIOD = 0.5  # [s] between two looks at the child
 CUT_OFF = "viewer: a sender ended or was cut off in the midst of a message; a visualizer comes back by itself"

@@ -9,8 +9,8 @@ from pathlib import Path
 import pinocchio as pin
 import pytest
 
-from services.arm.description import Arm, load_arm
 from services.arm.errors import DescriptionError
+from services.arm.model.description import Arm, load_arm
 from tests.arm.editing import edit
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.collision_matrix import Reason, are_adjacent, collision_matrix
-from services.arm.collisions import SelfCollisions
-from services.arm.description import load_arm
-from services.arm.kinematics import Kinematics
-from services.arm.srdf_edit import entries, with_pairs
+from services.arm.kinematics.collision_matrix import Reason, are_adjacent, collision_matrix
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.kinematics.self_collisions import SelfCollisions
+from services.arm.model.description import load_arm
+from services.arm.model.srdf_edit import entries, with_pairs
 
 TEXT = """<robot name="r">
   <!-- <disable_collisions link1="a" link2="z" reason="Never"/> is what a person thought once -->

@@ -16,10 +16,10 @@ from msgspec.structs import replace
 
 from schemas.device_config import NOTHING, DeviceConfig, InputRole, Pull, SensorKind, config_crc, config_text
 from schemas.robot import Sensor
-from services.arm.description import Arm, load_arm
-from services.arm.device_config import HEADROOM, device_config, reference_steps
-from services.arm.device_parts import sensor_config
+from services.arm.device.device_config import HEADROOM, device_config, reference_steps
+from services.arm.device.device_parts import sensor_config
 from services.arm.errors import DescriptionError
+from services.arm.model.description import Arm, load_arm
 
 TABLES = """
 [[input]]

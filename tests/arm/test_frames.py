@@ -9,7 +9,7 @@ import time
 import pytest
 
 from schemas.frames import FrameTransform, FrameTransforms, Transform
-from services.arm.frames import (
+from services.arm.frames.frame_buffer import (
     FrameBuffer,
     FutureError,
     PastError,

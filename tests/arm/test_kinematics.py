@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.arm.chain import link_transforms
-from services.arm.description import Arm, load_arm
 from services.arm.errors import DescriptionError
-from services.arm.kinematics import Kinematics
-from services.arm.transforms import from_message
+from services.arm.frames.transforms import from_message
+from services.arm.kinematics.chain import link_transforms
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm, load_arm
 
 RM1 = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
 KINEMATICS = Kinematics(RM1)

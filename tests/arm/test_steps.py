@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.robot import Motor, StepperJoint, Transmission
-from services.arm.description import Arm
 from services.arm.errors import DescriptionError
-from services.arm.steps import StepScale, step_scale
+from services.arm.model.description import Arm
+from services.arm.motors.steps import StepScale, step_scale
 
 Q1 = StepScale(Fraction(93312, 5), math.tau)
 RACK = StepScale(Fraction(400), math.tau * 0.0225)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from schemas.frames import Transform
-from services.arm.transforms import (
+from services.arm.frames.transforms import (
     IDENTITY,
     Rigid,
     compose,

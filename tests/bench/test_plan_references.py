@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
 from services.bench import references
 from services.bench.figures import NotMeasured
 from services.bench.problems.problem_sets import problem_set

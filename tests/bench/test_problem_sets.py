@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
 from services.bench.problems.problem_sets import (
     COUNT,
     FILE,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from firmware.bindings.words import PinChange
+from firmware.bindings.frames import PinChange
 from services.bench import pulses
 from services.bench.figures import NotMeasured
 from services.bench.probe import Knot, Pulse, pulses_of

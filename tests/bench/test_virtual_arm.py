@@ -8,7 +8,7 @@ from schemas.actions import GoalStatusCode
 from schemas.joints import JointState, StepErrors
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.planning import JointGoal, PlanRequest
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.bench.virtual_time import Tally, swinging
 from services.planner.core import Planner
 from services.virtual_arm.virtual_arm import PERIOD, VirtualArm, tcp_wire

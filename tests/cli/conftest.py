@@ -35,11 +35,11 @@ from schemas.topics import (
     PLAN,
     STEP_ERRORS,
 )
-from services.arm.description import Arm, load_arm
+from services.arm.model.description import Arm, load_arm
 from services.cli.session import Session
 from services.planner.core import Planner
 from services.runtime.actions import accept, refuse
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
 from tests.runtime.support import spinning
 

@@ -37,7 +37,7 @@ from schemas.topics import (
     DEVICE_STOP,
     SENSORS,
 )
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.runtime.node import Node
 
 TO_HOME = 0.15  # [s] for every joint

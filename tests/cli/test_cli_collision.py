@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.srdf_edit import entries
-from services.arm.urdf import read_urdf
+from services.arm.model.srdf_edit import entries
+from services.arm.model.urdf import read_urdf
 from services.cli.errors import ExitCode
 from services.cli.main import run
 

@@ -26,7 +26,7 @@ from services.cli.device_press import PRESSES, press, request_of
 from services.cli.errors import CommandError, ExitCode
 from services.cli.home import home
 from services.cli.main import run
-from services.runtime.memory_bus import MemoryBus
+from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
 from tests.cli.pretend_device import PretendDevice
 from tests.runtime.support import spinning

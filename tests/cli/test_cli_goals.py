@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from schemas.device import ReferenceCommand
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.planning import JointGoal, NamedGoal, PoseGoal, Refusal
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.cli.device import reference_request
 from services.cli.errors import CommandError, ExitCode
 from services.cli.main import parse

@@ -18,7 +18,7 @@ from services.cli.errors import CommandError, ExitCode
 from services.cli.jog import command_of, jog_by_hand, jog_for
 from services.cli.jog_keys import FASTER, FIRST_SPEED, HELD, TOOL_SPEED, JogKeys, keyboard
 from services.cli.main import run
-from services.runtime.memory_bus import MemoryBus
+from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
 
 TURN = JogCommand(name=("brazo_joint",), velocity=(0.2,))

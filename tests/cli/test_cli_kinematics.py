@@ -18,7 +18,7 @@ from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.cli.session import load_robot
 from services.planner.kinematics.kinematic_requests import KinematicRequests
-from services.runtime.memory_bus import MemoryBus
+from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
 
 

@@ -149,7 +149,7 @@ def test_only_the_writer_of_a_topic_may_publish_on_it(session):
 
 
 def test_pub_stamps_what_has_no_stamp(session, network, deployment, capsys):
-    from services.runtime.memory_bus import MemoryBus
+    from services.runtime.bus.memory_bus import MemoryBus
     from services.runtime.node import Node
 
     heard = []

@@ -18,10 +18,10 @@ from services.cli.errors import CommandError, ExitCode
 from services.cli.move import move
 from services.cli.terminal import LiveBlock
 from services.planner.main import run
+from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.errors import NoAnswer
-from services.runtime.memory_bus import MemoryBus
 from services.runtime.node import Node
-from services.runtime.stopping import StopRequest
+from services.runtime.process.shutdown import StopRequest
 from tests.planner.walled import WALLED, past_the_wall
 
 PATIENCE = 60.0  # [s]

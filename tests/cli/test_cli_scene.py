@@ -29,7 +29,7 @@ from services.cli.main import run
 from services.cli.scene import attach_choices, pair_choices
 from services.cli.session import load_robot
 from services.planner.scene.scene_keeper import SceneKeeper
-from services.runtime.memory_bus import MemoryBus
+from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
 
 Said = Callable[[str], ExitCode]

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from services.arm import description
+from services.arm.model import description
 from services.cli.commands import COMMANDS, GROUPS
 from services.cli.errors import ExitCode
 from services.cli.main import parse, run
@@ -71,7 +71,7 @@ def test_a_robot_that_cannot_be_read_still_completes_the_commands(monkeypatch, c
     ("line", "absent"),
     [
         (["--help"], ("msgspec", "numpy", "zenoh", "services.cli.move", "services.cli.topic")),
-        (["topic", "list"], ("numpy", "zenoh", "services.arm.description", "services.cli.move")),
+        (["topic", "list"], ("numpy", "zenoh", "services.arm.model.description", "services.cli.move")),
         (["move", "--help"], ("numpy", "zenoh", "rich", "services.cli.jog")),
     ],
 )

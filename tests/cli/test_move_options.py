@@ -16,8 +16,8 @@ from schemas.planning import (
     PoseGoal,
     WaypointGoal,
 )
-from services.arm.description import load_arm
-from services.arm.transforms import from_rpy
+from services.arm.frames.transforms import from_rpy
+from services.arm.model.description import load_arm
 from services.cli.errors import CommandError
 from services.cli.main import parse
 from services.cli.move import EXAMPLES

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pytest
 
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.cli import units
 from services.cli.commands import COMMANDS
 from services.cli.device import reference_request

@@ -8,8 +8,8 @@ from services.cli import state
 from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.runtime.node import Node
+from services.runtime.process.shutdown import StopRequest
 from services.runtime.robots import robots_on
-from services.runtime.stopping import StopRequest
 from tests.runtime.support import RouterProcess
 
 

@@ -6,7 +6,7 @@ import tomllib
 
 import msgspec
 
-from services.logger.parameters import LoggerParameters
+from services.logger.disk import LoggerParameters
 from services.runtime.deployment import load_deployment, project_root
 
 

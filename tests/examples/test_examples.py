@@ -15,7 +15,7 @@ from schemas.joints import JointState
 from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
 from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, PLAN, STATIC_FRAMES
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.runtime.actions import ActionServer, GoalDecision, accept
 from services.runtime.node import Node
 from tests.runtime.support import ROOT, RouterProcess, programs, spinning, until

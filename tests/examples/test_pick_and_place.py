@@ -15,7 +15,7 @@ from schemas.device import ShaftPositions
 from schemas.frames import Transform
 from schemas.scene import BoxShape, PlanningScene, SceneAdd, SceneObject, SceneRequest
 from schemas.topics import DEVICE_SHAFT, SCENE, SCENE_EDIT, STEP_ERRORS
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
 from services.stack.stack import Stack
 from tests.gemelo.conftest import BROKER
 from tests.stack.person import Operator, jumps

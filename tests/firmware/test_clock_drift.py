@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from firmware.platform.host.clock import DeviceClock
+from firmware.platform.host.board import DeviceClock
 from schemas.actions import GoalStatusCode
 from services.virtual_arm.virtual_arm import BOOTED, VirtualArm, Wire
 from tests.stepper_gateway.harness import move

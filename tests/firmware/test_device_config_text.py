@@ -12,10 +12,10 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from firmware.bindings.config_text import Refused, read_config
+from firmware.bindings.parsers import Refused, read_config
 from schemas.device_config import DeviceConfig, JointConfig, config_text
-from services.arm.description import load_arm
-from services.arm.device_config import device_config
+from services.arm.device.device_config import device_config
+from services.arm.model.description import load_arm
 
 LARGEST = 8220  # [bytes] kMaxConfigText of core/config_text.h
 ANY_NUMBER = st.integers(-(2**65), 2**65) | st.integers(-300, 300) | I32

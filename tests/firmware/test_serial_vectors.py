@@ -9,8 +9,8 @@ from typing import Any
 import msgspec
 import pytest
 
-from firmware.bindings.config_text import Refused, read_config
 from firmware.bindings.device import Device
+from firmware.bindings.parsers import Refused, read_config
 from schemas.device_config import DeviceConfig
 from services.runtime.serial_frames import Packets
 

@@ -20,8 +20,8 @@ from bench_firmware import FIRST, LAST, Bench, Row, traj
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig
 from schemas.robot import Motor, PullOut
-from services.arm.description import Arm, load_arm
-from services.arm.device_config import device_config, reference_steps
+from services.arm.device.device_config import device_config, reference_steps
+from services.arm.model.description import Arm, load_arm
 
 SECONDS = 600
 REAL_SECONDS = int(os.environ.get("GEMELO_SIX_JOINTS_SECONDS", "10"))

@@ -13,8 +13,8 @@ from bed_firmware import Bed, wait_for
 
 from schemas.device import DeviceCommandKind, DeviceMode, PressKind
 from schemas.device_config import DeviceConfig, config_text
-from services.arm.description import Arm
-from services.arm.device_config import device_config
+from services.arm.device.device_config import device_config
+from services.arm.model.description import Arm
 
 OK = 0
 

@@ -18,8 +18,8 @@ from bench_firmware import BOOT, FIRST, LAST, command, heartbeat, seal, smooth, 
 from firmware.bindings.device import Device
 from schemas.device import DeviceCommandKind, DeviceMode, PressKind
 from schemas.device_config import DeviceConfig, config_text
-from services.arm.description import Arm
-from services.arm.device_config import device_config
+from services.arm.device.device_config import device_config
+from services.arm.model.description import Arm
 from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
 
 ACK, CMD_ACK, SYNC_R, STATE = 2, 4, 7, 8

@@ -10,8 +10,8 @@ from bench_firmware import Bench
 from firmware.bindings.press import PressRefused
 from schemas.device import DeviceCommandKind, DeviceMode, PressKind
 from schemas.device_config import DeviceConfig, HomingConfig, InputConfig, InputRole, JointConfig
-from services.arm.description import Arm
-from services.arm.device_config import device_config
+from services.arm.device.device_config import device_config
+from services.arm.model.description import Arm
 
 OK, NOT_READY, NOT_ARMED, ESTOP_PRESSED = 0, 12, 17, 18
 CYCLE = 8  # [steps] by which a motor of rm1 slips

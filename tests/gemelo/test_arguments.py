@@ -27,7 +27,7 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
-from services.arm.description import Arm as Description
+from services.arm.model.description import Arm as Description
 
 HERE = gemelo.Pose((0.2, 0.1, 0.15), (1.0, 0.0, 0.0, 0.0))
 

@@ -15,7 +15,7 @@ from schemas.topics import TOPICS
 from services.logger.core import Entry, Logger
 from services.logger.recording import Recording
 from services.visualizer.core import Visualizer
-from services.visualizer.urdf import parse_urdf
+from services.visualizer.model.urdf import parse_urdf
 
 START = 1_795_000_000_000_000_000
 SECOND = 1_000_000_000

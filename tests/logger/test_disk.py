@@ -11,9 +11,8 @@ from schemas.joints import JointState
 from schemas.system import LogRecord
 from schemas.topics import COMMAND_ACKS, COMMANDS, DESCRIPTION, JOINT_STATES, LOG
 from services.logger.core import Logger
-from services.logger.disk import RETRY, Disk
+from services.logger.disk import RETRY, Disk, LoggerParameters
 from services.logger.files import is_due, stem_of, surplus
-from services.logger.parameters import LoggerParameters
 
 START = 1_795_000_000_000_000_000
 SECOND = 1_000_000_000

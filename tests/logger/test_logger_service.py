@@ -25,9 +25,9 @@ from schemas.joints import JointState
 from schemas.system import LogRecord, Parameter, SetParameter
 from schemas.topics import COMMAND_ACKS, COMMANDS, DESCRIPTION, DEVICE_EVENTS, JOINT_STATES, LOG, Request
 from services.logger.main import run
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.deployment import load_deployment
 from services.runtime.errors import Refused
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from schemas.joints import JointState
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.core import Planner
 
 

@@ -13,7 +13,7 @@ from scipy.interpolate import BPoly
 
 from schemas.motion import JointTrajectory
 from schemas.scene import PlanningScene
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from tests.planner.mujoco_arm import MujocoArm
 
 Array = NDArray[np.float64]

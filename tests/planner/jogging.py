@@ -12,8 +12,8 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import JogCommand, JogStatus
 from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.description import Arm, load_arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm, load_arm
 from services.planner.collision.world import World
 from services.planner.jog.jog import PERIOD, Jog
 from services.stepper_gateway.motion.knots import Knot

@@ -22,7 +22,7 @@ from schemas.planning import (
     WaypointGoal,
 )
 from schemas.scene import PlanningScene
-from services.arm.description import Arm, load_arm
+from services.arm.model.description import Arm, load_arm
 from services.planner.collision.world import World
 from services.planner.core import Planner
 from services.planner.verification.verify import DENSITY, LOOSE_JERK

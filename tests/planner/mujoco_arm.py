@@ -17,7 +17,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, PlanningScene, SceneObject, SphereShape
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 
 Array = NDArray[np.float64]
 Numbers = list[float]

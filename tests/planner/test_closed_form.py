@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.arm.description import Arm, load_arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm, load_arm
 from services.planner.kinematics.closed_form import closed_form, turns_about
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.targets import Target

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
-from services.arm.description import load_arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import load_arm
 from services.bench.scenes import SCENES
 from services.planner.collision.world import World
 from services.planner.path.curve import smooth_runs

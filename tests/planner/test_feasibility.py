@@ -16,8 +16,8 @@ from firmware.bindings.device import Device
 from schemas.motion import JointTrajectory
 from schemas.planning import StepMargin
 from schemas.robot import PullOut
-from services.arm.description import Arm
-from services.arm.device_config import device_config
+from services.arm.device.device_config import device_config
+from services.arm.model.description import Arm
 from services.planner.request.refusals import PlanRefused
 from services.planner.timing.profile import joint_limits, straight_line
 from services.planner.verification.feasibility import (

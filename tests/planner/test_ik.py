@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.arm.description import load_arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import load_arm
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.targets import Target
 from services.planner.request.deadline import NEVER, Deadline

@@ -23,9 +23,9 @@ from schemas.scene import (
     Shape,
     SphereShape,
 )
-from services.arm.description import Arm, load_arm
 from services.arm.interpolation import TrajectorySampler
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm, load_arm
 from services.planner.collision.world import World
 from services.planner.core import Planner
 from tests.planner.independent import Judge, resampled

@@ -12,11 +12,11 @@ from schemas.deployment import Deployment, PathsSection
 from schemas.joints import JointState
 from schemas.planning import JogCommand, NamedGoal, PlanCode, PlanRequest, PlanResponse
 from schemas.topics import JOG, JOG_STATUS, JOINT_STATES, JOINT_TARGETS, PLAN
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.main import run
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.stopping import StopRequest
+from services.runtime.process.shutdown import StopRequest
 
 TURN = JogCommand(name=("brazo_joint",), velocity=(0.3,))
 PATIENCE = 20.0  # [s]

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from schemas.joints import JointState
 from schemas.planning import FkRequest, IkRequest, IkResponse, PlanCode, PoseGoal
-from services.arm.description import load_arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import load_arm
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.kinematic_requests import KinematicRequests

@@ -11,12 +11,12 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.arm.collision_matrix import collision_matrix
-from services.arm.description import Arm, load_arm
 from services.arm.errors import DescriptionError
-from services.arm.kinematics import Kinematics
-from services.arm.srdf_edit import with_pairs
-from services.arm.urdf_edit import with_collisions
+from services.arm.kinematics.collision_matrix import collision_matrix
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm, load_arm
+from services.arm.model.srdf_edit import with_pairs
+from services.arm.model.urdf_edit import with_collisions
 from services.cli.robot_folder import plan_of
 from services.collision_fitting.fit_writing import touching_states, write_fits
 from services.collision_fitting.fitted_shape import Fitted, Kind

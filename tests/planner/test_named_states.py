@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from schemas.planning import LinearMotion, NamedGoal, PlanCode, PointToPoint, WaypointGoal
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.planner.core import Planner
 from tests.planner.judging import asked
 

@@ -13,7 +13,7 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import FreeMotion, JogCommand, LinearMotion, PointToPoint, PoseGoal, Timing
 from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, SphereShape
-from services.arm.check import check
+from services.arm.checks.check import check
 from services.planner.collision.sphere_check import show_scene
 from services.planner.collision.world import World
 from services.planner.core import Planner

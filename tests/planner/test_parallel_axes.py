@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from services.arm.description import Arm, load_arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm, load_arm
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.parallel_axes import parallel_axes
 from services.planner.kinematics.targets import Target

@@ -16,7 +16,7 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint, Timing
 from schemas.scene import MeshShape, PlanningScene, SceneObject
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.bench.scenes import SCENES, box
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.native_scene import native_scene

@@ -17,10 +17,10 @@ from schemas.planning import NamedGoal, PlanCancel, PlanCode, PlanPhase, PlanPro
 from schemas.scene import SceneClear, SceneReplace, SceneRequest
 from schemas.topics import PLAN, PLAN_CANCEL, PLAN_PROGRESS, SCENE_EDIT
 from services.planner.main import run
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.errors import NoAnswer
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.stopping import StopRequest
+from services.runtime.process.shutdown import StopRequest
 from tests.planner.walled import WALLED, past_the_wall
 
 PATIENCE = 60.0  # [s]

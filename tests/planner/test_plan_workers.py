@@ -20,7 +20,7 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Timing
 from schemas.scene import BoxShape, MeshShape, PlanningScene, SceneObject
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.planner.core import Planner
 from services.planner.workers import worker
 from services.planner.workers import workers as module

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from schemas.joints import JointState
 from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
-from services.arm.description import Arm, load_arm
+from services.arm.model.description import Arm, load_arm
 from services.planner.core import Planner
 from services.planner.timing.profile import joint_limits
 from services.planner.verification.verify import require_within_limits, sample

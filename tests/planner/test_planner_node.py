@@ -12,11 +12,11 @@ from schemas.deployment import Deployment, PathsSection
 from schemas.joints import JointState
 from schemas.planning import FkRequest, IkRequest, NamedGoal, PlanCode, PlanRequest, PoseGoal
 from schemas.topics import FK, IK, JOINT_STATES, PLAN, PLANNED_PATH
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.main import run
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.stopping import StopRequest
+from services.runtime.process.shutdown import StopRequest
 
 
 @pytest.fixture

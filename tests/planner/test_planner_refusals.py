@@ -25,7 +25,7 @@ from schemas.planning import (
     Refusal,
 )
 from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.description import Arm, load_arm
+from services.arm.model.description import Arm, load_arm
 from services.planner.collision.world import World
 from services.planner.core import Planner
 

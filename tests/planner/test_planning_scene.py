@@ -8,7 +8,7 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import JointGoal, PlanCode, PlanRequest, PointToPoint, PoseGoal
 from schemas.scene import AllowedPair, BoxShape, PlanningScene, SceneObject, SphereShape
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.collision.world import World
 from services.planner.core import Planner
 

@@ -14,8 +14,8 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from schemas.planning import PlanCode, PoseGoal, Refusal
-from services.arm.description import Arm, load_arm
-from services.arm.kinematics import Kinematics, Pose
+from services.arm.kinematics.kinematics import Kinematics, Pose
+from services.arm.model.description import Arm, load_arm
 from services.planner.kinematics.goals import Goals, Start
 from services.planner.request.deadline import NEVER
 from services.planner.request.refusals import PlanRefused

@@ -17,7 +17,7 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import FreeMotion, JointGoal, PlanRequest
 from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.planner.core import Planner
 from services.planner.collision.world import World
 

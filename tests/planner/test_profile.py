@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
 from schemas.motion import JointTrajectory
-from services.arm.description import load_arm
 from services.arm.interpolation import TrajectorySampler
+from services.arm.model.description import load_arm
 from services.planner.timing import profile
 from services.planner.timing.profile import joint_limits, straight_line
 from services.planner.verification.verify import require_ends, require_within_limits, sample

@@ -29,13 +29,13 @@ from schemas.scene import (
     SphereShape,
 )
 from schemas.topics import CONTACTS, JOINT_STATES, PLAN, SCENE, SCENE_EDIT
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.main import run
 from services.planner.scene.scene_file import load_scene, save_scene
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.stopping import StopRequest
+from services.runtime.process.shutdown import StopRequest
 
 WAIT = 5.0  # [s]
 LONG_WAIT = 60.0  # [s]

@@ -35,9 +35,9 @@ from schemas.scene import (
     Shape,
     SphereShape,
 )
-from services.arm.chain import link_transforms
-from services.arm.description import load_arm
-from services.arm.transforms import compose, from_message, to_message
+from services.arm.frames.transforms import compose, from_message, to_message
+from services.arm.kinematics.chain import link_transforms
+from services.arm.model.description import load_arm
 from services.planner.scene.scene_check import require_scene
 from services.planner.scene.scene_file import DamagedScene, load_scene, put_aside, save_scene
 from services.planner.scene.scene_store import SceneStore

@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 from schemas.planning import PoseGoal
-from services.arm.description import Arm, load_arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm, load_arm
 from services.planner.kinematics.goals import Goals
 from services.planner.kinematics.targets import Pointing, Target
 from services.planner.kinematics.task_space import TaskSpace, task_space

@@ -28,8 +28,8 @@ from schemas.planning import (
     WaypointGoal,
 )
 from schemas.scene import BoxShape, PlanningScene, SceneObject
-from services.arm.description import load_arm
 from services.arm.interpolation import TrajectorySampler
+from services.arm.model.description import load_arm
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.world import World
 from services.planner.core import Planner

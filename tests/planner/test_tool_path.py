@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from services.arm.kinematics import Pose
+from services.arm.kinematics.kinematics import Pose
 from services.planner.cartesian.arcs import arc_about, arc_through
 from services.planner.cartesian.tool_path import ToolPath, polyline
 from services.planner.path.path_curve import NO_LENGTH, CubicSpline, rounded_runs

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from schemas.motion import JointTrajectory
-from services.arm.description import Arm
 from services.arm.interpolation import TrajectorySampler
+from services.arm.model.description import Arm
 from services.planner.collision.clearance import first_collision
 from services.planner.core import Planner
 from services.planner.timing.profile import joint_limits, straight_line

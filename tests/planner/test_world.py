@@ -20,8 +20,8 @@ from schemas.scene import (
     Shape,
     SphereShape,
 )
-from services.arm.description import Arm, load_arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm, load_arm
 from services.planner.collision.scene_shapes import SceneError
 from services.planner.collision.world import World
 

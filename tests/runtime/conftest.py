@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from schemas.deployment import Deployment, PathsSection
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
-from services.runtime.zenoh_bus import ZenohBus
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.bus.zenoh_bus import ZenohBus
 from tests.runtime.support import Buses, RouterProcess
 
 

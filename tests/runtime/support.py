@@ -14,9 +14,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from schemas.deployment import Deployment, PathsSection, RouterSection
-from services.runtime.bus import Bus
+from services.runtime.bus.interface import Bus
+from services.runtime.bus.zenoh_bus import router_answers
 from services.runtime.node import Node
-from services.runtime.zenoh_bus import router_answers
 
 ROOT = Path(__file__).parents[2]
 

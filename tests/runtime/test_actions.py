@@ -17,8 +17,8 @@ from schemas.motion import (
     JointTrajectory,
 )
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from services.runtime import action_keys as keys
 from services.runtime.actions import ActionServer, GoalDecision, accept, refuse
+from services.runtime.actions import keys as keys
 from services.runtime.errors import GoalRefused, NoAnswer, Refused, ServerLost
 from services.runtime.node import Node
 from tests.runtime.support import Buses, hear, spinning, until
@@ -187,7 +187,7 @@ def test_the_answer_to_a_result_request_can_be_held_back(buses: Buses) -> None:
 
 def test_the_same_goal_sent_twice_is_accepted_once(buses: Buses) -> None:
     from schemas.actions import GoalRequest
-    from services.runtime.action_client import _raw
+    from services.runtime.actions.client import _raw
 
     with moving(buses) as arm:
         node = buses.node("client")
@@ -223,7 +223,7 @@ def test_a_restarted_server_does_not_know_the_goal(buses: Buses) -> None:
 
 
 def test_a_client_that_was_busy_itself_does_not_give_up(buses: Buses, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.runtime.goal_handle.SERVER_PATIENCE", 0.8)
+    monkeypatch.setattr("services.runtime.actions.goal_handle.SERVER_PATIENCE", 0.8)
     with moving(buses):
         node = buses.node("client")
         handle = node.action(FOLLOW).send(goal_of(110))

@@ -7,8 +7,8 @@ import time
 from queue import SimpleQueue
 
 from schemas.topics import EVERY, LATCHED, LATEST
-from services.runtime.bus import Answer, Arrival, Query
-from services.runtime.zenoh_bus import HEARTBEAT
+from services.runtime.bus.interface import Answer, Arrival, Query
+from services.runtime.bus.zenoh_bus import HEARTBEAT
 from tests.runtime.support import Buses, until
 
 

@@ -15,11 +15,11 @@ from schemas.message import decode
 from schemas.system import Failure
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY, PLAN, TOPICS
 from services.runtime.actions import accept
-from services.runtime.bus import Answer
+from services.runtime.bus.interface import Answer
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.errors import NoAnswer, Refused
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.requests import response_in
+from services.runtime.requests.client import response_in
 from tests.runtime.support import hear
 
 KEYS = st.sampled_from([topic.key for topic in TOPICS])

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from schemas.topics import EVERY, LATCHED, LATEST
-from services.runtime.bus import Arrival
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.bus.interface import Arrival
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 
 
 def test_a_network_that_is_away_loses_the_latest_and_keeps_the_rest() -> None:

@@ -17,12 +17,12 @@ from schemas.message import BadMessage, encode
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
 from schemas.system import Empty, LogRecord, NodeStatistics, Parameter, Parameters, SetParameter
 from schemas.topics import COMMAND_ACKS, DESCRIPTION, JOINT_STATES, LOG, PLAN, STATISTICS, Request
-from services.runtime.bus import Answer
+from services.runtime.bus.interface import Answer
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.errors import NoAnswer, NodeNameTaken, Refused
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.request_server import Pending
-from services.runtime.requests import call
+from services.runtime.requests.client import call
+from services.runtime.requests.server import Pending
 from tests.runtime.support import Buses, hear, spinning, until
 
 

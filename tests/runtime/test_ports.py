@@ -7,7 +7,7 @@ import socket
 
 import pytest
 
-from services.runtime.ports import PortTaken, require_free
+from services.runtime.process.ports import PortTaken, require_free
 from tests.runtime.support import free_port
 
 

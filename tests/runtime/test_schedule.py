@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.runtime.schedule import Schedule
+from services.runtime.loop.loop import Schedule
 
 RATES = st.sampled_from([1.0, 2.0, 10.0, 25.0, 50.0, 100.0, 1000.0])
 DURATIONS = st.lists(st.floats(0.0, 0.2), min_size=1, max_size=50)

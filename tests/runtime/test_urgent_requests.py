@@ -12,10 +12,10 @@ from schemas.planning import PlanCode, PlanRequest, PlanResponse
 from schemas.system import Failure
 from schemas.topics import DEVICE_STOP, PLAN
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from services.runtime import action_keys as keys
-from services.runtime.action_server import accept
-from services.runtime.bus import Answer, Bus
-from services.runtime.request_server import MOST_OF_A_CLIENT, MOST_UNANSWERED, MOST_WAITING, Pending
+from services.runtime.actions import keys as keys
+from services.runtime.actions.server import accept
+from services.runtime.bus.interface import Answer, Bus
+from services.runtime.requests.server import MOST_OF_A_CLIENT, MOST_UNANSWERED, MOST_WAITING, Pending
 from tests.runtime.support import Buses, hear, spinning, until
 
 Answers = list[Answer | None]

@@ -18,11 +18,11 @@ from schemas.topics import (
     JOINT_STATES,
     PLAN,
 )
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.errors import GoalRefused, NoAnswer, Refused
 from services.runtime.node import Node
-from services.runtime.stopping import StopRequest
+from services.runtime.process.shutdown import StopRequest
 
 HERE_OR_THERE = (0.45, -0.35)  # of the way from a joint's middle to its limits: two poses to go between
 SETTLE = 10.0  # [s] for a stack to accept a goal again

@@ -22,9 +22,9 @@ from schemas.topics import (
     STATISTICS,
     TOPICS,
 )
-from services.runtime.action_keys import cancel_request, goal_request, result_request
+from services.runtime.actions.keys import cancel_request, goal_request, result_request
+from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.errors import GoalRefused
-from services.runtime.zenoh_bus import ZenohBus
 from services.stepper_gateway.links.frames import Chunk, ChunkFlag, Command, Heartbeat
 from services.stepper_gateway.links.frames import encode as to_frame
 from tests.schemas.samples import sample

@@ -10,7 +10,7 @@ from schemas.actions import GoalStatusCode
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.planning import NamedGoal, PlanCode, PlanRequest
 from schemas.topics import PLAN, STEP_ERRORS
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
 from services.stack.stack import Stack
 from tests.optional import need
 from tests.stack.gemelo import gemelo

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from schemas.joints import JointState
-from services.arm.description import Arm, load_arm
-from services.arm.frames import FrameBuffer
-from services.arm.kinematics import Kinematics
+from services.arm.frames.frame_buffer import FrameBuffer
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm, load_arm
 from services.state_publisher.core import StatePublisher
 
 STAMP = 1_700_000_000_123_456_789

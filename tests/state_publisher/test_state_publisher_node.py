@@ -11,10 +11,10 @@ import pytest
 from schemas.deployment import Deployment, PathsSection
 from schemas.joints import JointState
 from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
-from services.arm.description import Arm
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.arm.model.description import Arm
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.stopping import StopRequest
+from services.runtime.process.shutdown import StopRequest
 from services.state_publisher.main import run
 
 

@@ -11,7 +11,7 @@ from schemas.device import ConfigureResponse, DeviceCommandKind, DeviceConfigura
 from schemas.device_config import config_crc, config_text
 from schemas.motion import FollowErrorCode
 from schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATUS
-from services.arm.device_config import device_config
+from services.arm.device.device_config import device_config
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import move

@@ -21,8 +21,8 @@ from schemas.device import (
 )
 from schemas.message import BadMessage, decode
 from schemas.topics import JOINT_STATES
-from services.arm.description import load_arm
-from services.arm.device_config import device_config
+from services.arm.device.device_config import device_config
+from services.arm.model.description import load_arm
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.gateway_driver import asked
 from services.virtual_arm.virtual_arm import VirtualArm, rm1

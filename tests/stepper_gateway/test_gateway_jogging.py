@@ -9,7 +9,7 @@ import pytest
 from schemas.device import DeviceMode
 from schemas.planning import JogCommand, JogStatus
 from schemas.topics import DEVICE_EVENTS, JOINT_STATES
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.world import World
 from services.planner.jog.jog import PERIOD, Jog

@@ -14,7 +14,7 @@ from schemas.actions import GoalStatusCode
 from schemas.device import ArmCommand, DeviceStatus, ReferenceCommand, StopKind
 from schemas.device_config import config_crc, config_text
 from schemas.motion import FollowErrorCode
-from services.arm.device_config import device_config
+from services.arm.device.device_config import device_config
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.links.mqtt import MqttLink
 from services.virtual_arm.virtual_arm import rm1

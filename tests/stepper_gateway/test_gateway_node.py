@@ -33,10 +33,10 @@ from schemas.topics import (
     JOINT_TARGETS,
     SCENE,
 )
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.errors import GoalRefused
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.stopping import StopRequest
+from services.runtime.process.shutdown import StopRequest
 from services.stepper_gateway.main import run
 from tests.stepper_gateway.harness import move
 from tests.stepper_gateway.processes import DEVICE, Processes

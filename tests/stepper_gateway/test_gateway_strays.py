@@ -8,7 +8,7 @@ from firmware.bindings.device import Device
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.topics import JOINT_STATES
-from services.arm.device_config import device_config
+from services.arm.device.device_config import device_config
 from services.runtime.serial_frames import packet
 from services.stepper_gateway.links.frames import (
     Code,

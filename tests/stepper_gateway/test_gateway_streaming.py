@@ -156,11 +156,11 @@ def test_whatever_the_targets_the_tracker_keeps_every_limit(
 
 
 ENDS = """
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.runtime.deployment import project_root
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.stopping import StopRequest
+from services.runtime.process.shutdown import StopRequest
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 import pinocchio as pin
 
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 
 
 def nearest_distances(arm: Arm, configurations: Iterable[np.ndarray]) -> dict[frozenset[str], float]:

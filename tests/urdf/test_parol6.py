@@ -15,11 +15,11 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from services.arm.chain import link_transforms
-from services.arm.check import check
-from services.arm.description import load_arm
-from services.arm.kinematics import Kinematics
-from services.arm.speed import speed_limits
+from services.arm.checks.check import check
+from services.arm.kinematics.chain import link_transforms
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import load_arm
+from services.arm.motors.speed import speed_limits
 from tests.urdf.nearness import nearest_distances
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")

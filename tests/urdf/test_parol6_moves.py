@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from schemas.joints import JointState
 from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest, PoseGoal
-from services.arm.description import Joint, load_arm
+from services.arm.model.description import Joint, load_arm
 from services.planner.core import Planner
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.targets import Target

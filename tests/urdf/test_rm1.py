@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import ShapeKind

@@ -14,8 +14,8 @@ from schemas.joints import JointState, StepErrors
 from schemas.planning import PlannedPath
 from schemas.system import LogLevel, LogRecord
 from services.visualizer.core import Visualizer
-from services.visualizer.sink import APPLICATION, Sink
-from services.visualizer.urdf import parse_urdf
+from services.visualizer.model.urdf import parse_urdf
+from services.visualizer.render.sink import APPLICATION, Sink
 
 START = 1_795_000_000_000_000_000
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

@@ -19,10 +19,10 @@ from schemas.device import (
 from schemas.joints import JointState, StepErrors
 from schemas.planning import PlannedPath
 from schemas.system import LogLevel, LogRecord
-from services.visualizer import entities
+from services.visualizer.content import entities
+from services.visualizer.content.thinning import KEEP_ALIVE, Thinned
+from services.visualizer.content.updates import LogLines, Panel, Poses, Scalars, State, Strip, Tint
 from services.visualizer.core import AHEAD
-from services.visualizer.thinning import KEEP_ALIVE, Thinned
-from services.visualizer.updates import LogLines, Panel, Poses, Scalars, State, Strip, Tint
 
 START = 1_795_000_000_000_000_000
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

@@ -10,11 +10,11 @@ import pytest
 import rerun as rr
 import rerun.blueprint as rrb
 
-from services.visualizer import entities
-from services.visualizer.layout import blueprint
-from services.visualizer.sink import Sink
-from services.visualizer.updates import Tint
-from services.visualizer.urdf import parse_urdf
+from services.visualizer.content import entities
+from services.visualizer.content.updates import Tint
+from services.visualizer.model.urdf import parse_urdf
+from services.visualizer.render.layout import blueprint
+from services.visualizer.render.sink import Sink
 
 
 class Listener:

@@ -9,12 +9,11 @@ import yourdfpy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.visualizer.meshes import mesh_path, missing_meshes
-from services.visualizer.model import Shape
-from services.visualizer.rotations import multiply, quaternion, rotate
-from services.visualizer.shapes import mesh_of
-from services.visualizer.tool import tool_link
-from services.visualizer.urdf import parse_urdf
+from services.visualizer.model.mesh_files import mesh_path, missing_meshes
+from services.visualizer.model.rotations import multiply, quaternion, rotate
+from services.visualizer.model.triangle_meshes import mesh_of
+from services.visualizer.model.urdf import parse_urdf, tool_link
+from services.visualizer.model.visual_model import Shape
 
 
 def joint(parent, child, more=""):

@@ -10,11 +10,10 @@ from rerun.experimental import ViewerClient
 
 from schemas.deployment import ViewerMode, ViewerSection
 from schemas.joints import JointState
-from services.visualizer import entities
-from services.visualizer.binary import environment, rerun_binary
-from services.visualizer.outputs import Outputs
-from services.visualizer.parameters import VisualizerParameters
-from services.visualizer.picture import free_port
+from services.visualizer.content import entities
+from services.visualizer.program.rerun_program import environment, rerun_binary
+from services.visualizer.program.screenshot import free_port
+from services.visualizer.render.outputs import Outputs, VisualizerParameters
 
 START = 1_795_000_000_000_000_000
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

@@ -9,10 +9,10 @@ import pytest
 from schemas.joints import JointState
 from schemas.planning import PlannedPath
 from schemas.scene import PlanningScene, SceneObject, SphereShape
-from services.visualizer import entities
+from services.visualizer.content import entities
+from services.visualizer.content.preview import REST, TIMES, Preview
+from services.visualizer.content.updates import Gone, Poses, Shadow, Thing
 from services.visualizer.core import Visualizer
-from services.visualizer.preview import REST, TIMES, Preview
-from services.visualizer.updates import Gone, Poses, Shadow, Thing
 
 NOW = 1_795_000_000_000_000_000
 SECOND = 1_000_000_000

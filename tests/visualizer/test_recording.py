@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from services.visualizer import entities
-from services.visualizer.binary import rerun_binary
-from services.visualizer.picture import picture
+from services.visualizer.content import entities
+from services.visualizer.program.rerun_program import rerun_binary
+from services.visualizer.program.screenshot import picture
 from tests.optional import need
 
 

@@ -24,14 +24,14 @@ from schemas.scene import (
     Shape,
     SphereShape,
 )
-from services.visualizer import entities, palette
-from services.visualizer.binary import rerun_binary
+from services.visualizer.content import entities, palette
+from services.visualizer.content.scene import SceneView
+from services.visualizer.content.updates import Gone, Labels, Poses, Shadow, Thing
 from services.visualizer.core import Visualizer
-from services.visualizer.model import Model
-from services.visualizer.scene import SceneView
-from services.visualizer.scene_meshes import scene_mesh
-from services.visualizer.sink import APPLICATION, Sink
-from services.visualizer.updates import Gone, Labels, Poses, Shadow, Thing
+from services.visualizer.model.mesh_files import scene_mesh
+from services.visualizer.model.visual_model import Model
+from services.visualizer.program.rerun_program import rerun_binary
+from services.visualizer.render.sink import APPLICATION, Sink
 
 NOW = 1_795_000_000_000_000_000
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")

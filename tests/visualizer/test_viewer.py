@@ -13,9 +13,9 @@ import pytest
 import rerun as rr
 
 from schemas.deployment import ViewerMode, ViewerSection
-from services.visualizer.binary import environment, rerun_binary
-from services.visualizer.connection import Watch
-from services.visualizer.picture import free_port
+from services.visualizer.program.rerun_program import environment, rerun_binary
+from services.visualizer.program.screenshot import free_port
+from services.visualizer.program.viewer_connection import Watch
 from services.visualizer.viewer import CUT_OFF, address, command, resolved
 
 

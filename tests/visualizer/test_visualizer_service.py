@@ -9,12 +9,12 @@ import pytest
 from schemas.frames import RobotDescription
 from schemas.joints import JointState
 from schemas.topics import DESCRIPTION, JOINT_STATES
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.deployment import load_deployment
-from services.runtime.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.visualizer import entities
-from services.visualizer.binary import rerun_binary
+from services.visualizer.content import entities
 from services.visualizer.main import run
+from services.visualizer.program.rerun_program import rerun_binary
 
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")
 

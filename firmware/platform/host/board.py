@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import secrets
 from pathlib import Path
@@ -9,11 +10,35 @@ from pathlib import Path
 import msgspec
 
 from firmware.bindings.device import ConfigError, Device, joint_count
+from firmware.bindings.parsers import ProvisionRefused, asks_for_factory_reset
 from firmware.platform.host.flash import Credentials, Flash
 from firmware.platform.host.memory import Awakening, Memory, PoseMemory
 from schemas.device_config import config_text
-from services.arm.description import Arm
-from services.arm.device_config import device_config, reference_steps
+from services.arm.device.device_config import device_config, reference_steps
+from services.arm.model.description import Arm
+
+
+class DeviceClock:
+    """Device time [us], continuous, of real time [s]; exact until somebody lets it drift."""
+
+    def __init__(self, real: float, device_us: int = 0) -> None:
+        self._real, self._device_us, self._ppm = real, float(device_us), 0.0
+
+    def at(self, real: float) -> int:
+        """Device time at that real time; never below zero."""
+        return max(0, int(self._exact(real)))
+
+    def drift(self, real: float, ppm: float) -> None:
+        """From now on the clock is fast by `ppm`."""
+        self._device_us, self._real, self._ppm = self._exact(real), real, ppm
+
+    def restart(self, real: float) -> None:
+        """Count from zero again; the quartz is the same."""
+        self._real, self._device_us = real, 0.0
+
+    def _exact(self, real: float) -> float:
+        return self._device_us + (real - self._real) * (1e6 + self._ppm)
+
 
 log = logging.getLogger("virtual_esp32")
 
@@ -103,3 +128,22 @@ class Board:
 
 def _cause(awakening: Awakening, reset_cause: str) -> str:
     return reset_cause if reset_cause and awakening.reset_cause == "power_on" else awakening.reset_cause
+
+
+def provision(board: Board, device: Device, text: bytes) -> str:
+    """Do what `text` asks for; why the device now starts anew. Raises ProvisionRefused."""
+    is_reset = asks_for_factory_reset(text)
+    if not device.still:
+        raise ProvisionRefused("the device moves: stop it first")
+    if is_reset:
+        board.factory_reset()
+        return "factory_reset"
+    said = msgspec.json.decode(text, type=dict[str, str | bool])
+    said.pop("factory_reset", None)
+    board.provision({key: str(value) for key, value in said.items()})
+    return "provisioned"
+
+
+def provision_answer(refusal: str = "") -> bytes:
+    """The JSON of `provision/ack`."""
+    return json.dumps({"accepted": not refusal, "reason": refusal}).encode()

@@ -20,11 +20,11 @@ from firmware.platform.host.pty import SerialLine
 from firmware.platform.host.virtual_esp32 import VirtualEsp32
 from firmware.platform.host.wires import Wires
 from schemas.deployment import Deployment, DeviceKind, Wire
-from services.arm.description import load_arm
 from services.arm.errors import DescriptionError
+from services.arm.model.description import load_arm
 from services.runtime.deployment import DeploymentError, load_deployment, project_root
-from services.runtime.logs import LEVELS, line_logger
-from services.runtime.readiness import Readiness
+from services.runtime.process.logs import LEVELS, line_logger
+from services.runtime.process.readiness import Readiness
 
 NAME = "virtual_esp32"
 BEAT = 1.0  # [s] between two touches of the readiness file

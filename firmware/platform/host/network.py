@@ -10,7 +10,7 @@ import time
 from urllib.parse import urlsplit
 
 from firmware.bindings.device import Device
-from firmware.bindings.words import OutFrame
+from firmware.bindings.frames import OutFrame
 from firmware.platform.host.flash import Credentials
 from firmware.platform.host.link import REPORTS, BrokerAddress, DeviceLink, Item
 

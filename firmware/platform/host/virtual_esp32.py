@@ -9,16 +9,14 @@ from collections.abc import Callable
 from functools import partial
 
 from firmware.bindings.device import Device
+from firmware.bindings.frames import Request
+from firmware.bindings.parsers import ProvisionRefused
 from firmware.bindings.press import PressRefused, press, read_press, within
-from firmware.bindings.provision import ProvisionRefused
-from firmware.bindings.words import Request
-from firmware.platform.host.board import Board
-from firmware.platform.host.clock import DeviceClock
+from firmware.platform.host.board import Board, DeviceClock, provision, provision_answer
 from firmware.platform.host.link import Arrived, Connected, Disconnected, Item, SerialBytes, Stop
-from firmware.platform.host.provisioning import provision, provision_answer
 from firmware.platform.host.wires import Wires, say_event
 from schemas.device import PressKind, PressRequest
-from services.runtime.readiness import Readiness
+from services.runtime.process.readiness import Readiness
 from services.runtime.serial_frames import JsonFrame
 
 log = logging.getLogger("virtual_esp32")

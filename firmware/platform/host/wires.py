@@ -6,7 +6,7 @@ import json
 import logging
 
 from firmware.bindings.device import Device
-from firmware.bindings.words import OutFrame
+from firmware.bindings.frames import OutFrame
 from firmware.platform.host.network import Network
 from firmware.platform.host.pty import SerialLine
 from services.runtime.serial_frames import JsonFrame

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.path.validity import ValidityChecker
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.bench.problems.problem_sets import path_length
 from services.planner.collision.checker import CollisionChecker
 from services.planner.collision.clearance import CLEARANCE

@@ -14,8 +14,8 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.bench.problems.joint_grid import JointGrid
 from services.bench.problems.known_paths import shortest
 from services.bench.problems.problem_sets import (

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from schemas.joints import JointState
 from schemas.planning import FreeMotion, JointGoal, PlanRequest, PoseGoal
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 
 Array = NDArray[np.float64]
 

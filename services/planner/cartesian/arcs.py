@@ -9,7 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from schemas.planning import PlanCode, Refusal
-from services.arm.kinematics import Pose
+from services.arm.kinematics.kinematics import Pose
 from services.planner.cartesian.tool_path import Arc
 from services.planner.request.refusals import PlanRefused
 

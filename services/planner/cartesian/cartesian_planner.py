@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory
 from schemas.planning import PlanCode, Refusal, Timing
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.cartesian.continuation import FINEST, Continuation, FollowedPath, StopReason, is_same
 from services.planner.cartesian.path_points import Run, between, states_of_runs
 from services.planner.cartesian.tool_limits import ToolLimits

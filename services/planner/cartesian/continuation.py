@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics, Pose
+from services.arm.kinematics.kinematics import Kinematics, Pose
+from services.arm.model.description import Arm
 from services.planner.cartesian.tool_path import ToolPath
 from services.planner.cartesian.tool_solver import ToolSolver
 from services.planner.path.path_curve import CubicSpline

@@ -17,9 +17,9 @@ from schemas.planning import (
     Refusal,
     WaypointGoal,
 )
-from services.arm.description import Arm, Joint
-from services.arm.kinematics import Kinematics, Pose
-from services.arm.transforms import IDENTITY, compose
+from services.arm.frames.transforms import IDENTITY, compose
+from services.arm.kinematics.kinematics import Kinematics, Pose
+from services.arm.model.description import Arm, Joint
 from services.planner.cartesian.arcs import arc_about, arc_through
 from services.planner.cartesian.cartesian_planner import CartesianPath, CartesianPlanner, CartesianTerms
 from services.planner.cartesian.tool_limits import ToolLimits, require_tool_limits

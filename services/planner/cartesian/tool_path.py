@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.kinematics import Pose
+from services.arm.kinematics.kinematics import Pose
 from services.planner.path.path_curve import NO_LENGTH, blending, cut
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.kinematics import Kinematics, Pose
+from services.arm.kinematics.kinematics import Kinematics, Pose
 from services.planner.cartesian.tool_path import METRES_PER_RADIAN
 
 Array = NDArray[np.float64]

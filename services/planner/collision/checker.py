@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.scene import Contact
-from services.arm.collisions import LinkPair
+from services.arm.kinematics.self_collisions import LinkPair
 from services.planner.collision.sphere_check import sphere_check
 from services.planner.collision.world import Positions, World
 

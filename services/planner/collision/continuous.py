@@ -13,9 +13,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.collisions import driver_of, shape_reach
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.kinematics.self_collisions import driver_of, shape_reach
+from services.arm.model.description import Arm
 from services.planner.collision.world_geometry import WorldGeometry
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from schemas.scene import PlanningScene, SceneObject
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.collision.scene_shapes import allows, shape_of
 from services.planner.collision_geometry.shapes import Attachment, CollisionShape
 

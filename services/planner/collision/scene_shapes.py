@@ -10,8 +10,8 @@ import numpy as np
 
 from schemas.message import Vector
 from schemas.scene import AllowedPair, BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, SphereShape
+from services.arm.frames.transforms import Rigid, from_message
 from services.arm.stl import BadMesh, read_stl
-from services.arm.transforms import Rigid, from_message
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 Folders = Sequence[Path]

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.collision.native_scene import native_scene
 from services.planner.collision.world import Positions, World
 from services.planner.request.deadline import CancelFlag

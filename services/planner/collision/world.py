@@ -15,9 +15,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from schemas.scene import Contact, PlanningScene
-from services.arm.collisions import LinkPair
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.kinematics.self_collisions import LinkPair
+from services.arm.model.description import Arm
 from services.planner.collision.continuous import ContinuousCheck
 from services.planner.collision.world_geometry import LowerBounds, WorldGeometry
 from services.planner.collision_geometry.coal_shapes import is_inside

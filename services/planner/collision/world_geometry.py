@@ -11,9 +11,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from schemas.scene import PlanningScene, SceneObject
-from services.arm.collisions import LinkPair, load_shapes, reach_of
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.kinematics.self_collisions import LinkPair, load_shapes, reach_of
+from services.arm.model.description import Arm
 from services.planner.collision.scene_shapes import SceneError, allows, shape_of
 from services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
 from services.planner.collision_geometry.shapes import CollisionShape, matrix_of

@@ -7,9 +7,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.collisions import load_shapes
-from services.arm.description import Arm
 from services.arm.errors import DescriptionError
+from services.arm.kinematics.self_collisions import load_shapes
+from services.arm.model.description import Arm
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from services.planner.collision_geometry.solids import Box, Capsule, Cylinder, Solid
 

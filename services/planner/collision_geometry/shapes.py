@@ -9,7 +9,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.transforms import IDENTITY, Rigid
+from services.arm.frames.transforms import IDENTITY, Rigid
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from schemas.joints import JointState, JointTargets
 from schemas.planning import JogCommand, JogLimit, JogStatus
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.collision.world import World
 from services.planner.jog.braking import Braking
 from services.planner.jog.jog_command import BadJog, JogInterpreter, JogRefused, Wanted, standing_position

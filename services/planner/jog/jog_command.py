@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from schemas.joints import JointState
 from schemas.planning import JogCommand, JogLimit
-from services.arm.description import Arm
 from services.arm.errors import suggestion
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.jog.jog_limits import no_command, singularity, speed_limit
 from services.planner.jog.twist import TwistSolver
 from services.planner.request.refusals import PlanRefused

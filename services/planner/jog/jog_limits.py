@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from schemas.planning import JogLimit
-from services.arm.collisions import LinkPair
-from services.arm.description import Joint
+from services.arm.kinematics.self_collisions import LinkPair
+from services.arm.model.description import Joint
 from services.planner.collision.clearance import CLEARANCE
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.collisions import LinkPair
+from services.arm.kinematics.self_collisions import LinkPair
 from services.planner.collision.world import World
 
 Array = NDArray[np.float64]

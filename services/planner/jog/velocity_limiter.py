@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.planning import JogLimit
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.collision.world import World
 from services.planner.jog.braking import Braking
 from services.planner.jog.jog_limits import joint_limit

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.kinematics.joint_ranges import FullTurns
 from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, Target, any_normal
 

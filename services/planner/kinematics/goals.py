@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from schemas.message import Vector
 from schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
-from services.arm.transforms import IDENTITY, Rigid, from_message
+from services.arm.frames.transforms import IDENTITY, Rigid, from_message
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.collision.clearance import DistanceChecker
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.pose_goals import target_of

@@ -8,8 +8,8 @@ from itertools import chain, islice
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.kinematics.centring import Centring
 from services.planner.kinematics.closed_form import ClosedForm, chain_order, closed_form, completed, turns_about
 from services.planner.kinematics.descent import Attempt, Descent

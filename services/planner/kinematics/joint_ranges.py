@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm, Joint
+from services.arm.model.description import Arm, Joint
 
 Array = NDArray[np.float64]
 

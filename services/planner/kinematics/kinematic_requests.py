@@ -9,8 +9,8 @@ import msgspec
 
 from schemas.joints import JointState
 from schemas.planning import FkRequest, FkResponse, IkRequest, IkResponse, IkSolution, PlanCode
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.collision.clearance import CLEARANCE, DistanceChecker
 from services.planner.kinematics.goals import INVALID, Goals, Start
 from services.planner.kinematics.pose_goals import FARTHEST

@@ -11,8 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics, Pose
+from services.arm.kinematics.kinematics import Kinematics, Pose
+from services.arm.model.description import Arm
 from services.planner.kinematics.closed_form import chain_order
 from services.planner.kinematics.joint_ranges import FullTurns, one_turn
 from services.planner.kinematics.targets import any_normal

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from schemas.message import Vector
 from schemas.planning import PlanCode, PoseGoal
-from services.arm.kinematics import Pose
-from services.arm.transforms import IDENTITY, Point, Quaternion, Rigid, compose, inverse, rotate
+from services.arm.frames.transforms import IDENTITY, Point, Quaternion, Rigid, compose, inverse, rotate
+from services.arm.kinematics.kinematics import Pose
 from services.planner.kinematics.targets import Pointing, Target, turn_between
 from services.planner.request.refusals import malformed
 

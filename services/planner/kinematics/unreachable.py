@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from schemas.message import Vector
 from schemas.planning import PlanCode, PoseGoal, Refusal
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
-from services.arm.transforms import IDENTITY, Rigid, compose, inverse
+from services.arm.frames.transforms import IDENTITY, Rigid, compose, inverse
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.collision.clearance import CLEARANCE, DistanceChecker, last_free
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.pose_goals import as_goal

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.chain import origin_of
-from services.arm.description import Arm
 from services.arm.errors import DescriptionError
-from services.arm.urdf import JointKind, UrdfJoint
+from services.arm.kinematics.chain import origin_of
+from services.arm.model.description import Arm
+from services.arm.model.urdf import JointKind, UrdfJoint
 from services.planner.collision_geometry.shapes import matrix_of
 
 Array = NDArray[np.float64]

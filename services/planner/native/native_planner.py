@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.collision_geometry.shapes import Attachment, CollisionShape
 from services.planner.native.assembly import Assembly
 from services.planner.native.binding import CancelFlag as NativeCancelFlag

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.native.paths import FreePath, NoPath
 from services.planner.path.path import Path, PathNotFound
 from services.planner.request.deadline import Deadline

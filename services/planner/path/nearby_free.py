@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.path.validity import ValidityChecker
 from services.planner.request.deadline import Deadline
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.path.path import PathNotFound
 from services.planner.path.roadmap import shortest_path
 from services.planner.path.validity import ValidityChecker

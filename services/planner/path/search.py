@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.planning import PlanCode, Refusal
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.collision.checker import CollisionChecker
 from services.planner.path.native_search import NATIVE, native_path
 from services.planner.path.nearby_free import nearby_free

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from schemas.message import Vector
 from schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.collision.checker import CollisionChecker
 from services.planner.collision.clearance import CLEARANCE, ROUNDING, first_collision, last_free
 from services.planner.kinematics.goals import Goals

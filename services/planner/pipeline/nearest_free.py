@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.description import Arm, Joint
+from services.arm.model.description import Arm, Joint
 from services.planner.collision.checker import CollisionChecker
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.jog.jog_obstacles import CONTACT_SPEED, comes_away

@@ -10,7 +10,7 @@ import numpy as np
 
 from schemas.motion import JointTrajectory
 from schemas.planning import PlanRequest, StepMargin, StepPolicy, Timing
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.collision.clearance import PathChecker
 from services.planner.path.curve import TurnsOnTheSpot
 from services.planner.path.path import Array, Path, Start

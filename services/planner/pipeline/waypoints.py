@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory
 from schemas.planning import FreeMotion, Timing, WaypointGoal
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.cartesian.path_points import Run, states_of_runs
 from services.planner.cartesian.tool_motions import points_of
 from services.planner.collision.checker import CollisionChecker

@@ -7,8 +7,8 @@ from enum import StrEnum
 
 from schemas.message import Vector
 from schemas.planning import PlanCode, Refusal
-from services.arm.description import Arm, Joint
 from services.arm.errors import nearest_name, suggestion
+from services.arm.model.description import Arm, Joint
 
 Point = Sequence[float]
 

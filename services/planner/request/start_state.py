@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from schemas.joints import JointState
 from schemas.planning import PlanCode
-from services.arm.description import Arm, Joint
+from services.arm.model.description import Arm, Joint
 from services.planner.request.refusals import malformed, moving_start, stale_state, start_beyond_limit, unknown_name
 
 # Tuning constants: chosen, where a line does not say measured or standard.

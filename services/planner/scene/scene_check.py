@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import msgspec
 
 from schemas.scene import AllowedPair, PlaneShape, PlanningScene, SceneObject
-from services.arm.description import Arm
 from services.arm.errors import suggestion
+from services.arm.model.description import Arm
 from services.planner.collision.scene_shapes import ANY, Folders, SceneError, shape_of
 
 # Tuning constants: chosen, where a line does not say measured or standard.

@@ -23,9 +23,9 @@ from schemas.scene import (
     SceneReplace,
     SceneResize,
 )
-from services.arm.description import Arm
 from services.arm.errors import suggestion
-from services.arm.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
+from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
+from services.arm.model.description import Arm
 from services.planner.collision.scene_shapes import SceneError, pose_of
 from services.planner.scene.scene_check import require_link
 

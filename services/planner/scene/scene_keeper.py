@@ -13,8 +13,8 @@ from schemas.message import Vector
 from schemas.planning import PlanCode, PlanResponse
 from schemas.scene import Contacts, PlanningScene, SceneRequest, SceneResponse
 from schemas.topics import CONTACTS, SCENE, SCENE_EDIT
-from services.arm.description import Arm
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.collision.clearance import CLEARANCE, ROUNDING
 from services.planner.collision.scene_shapes import SceneError
 from services.planner.collision.world import World

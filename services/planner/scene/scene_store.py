@@ -10,7 +10,7 @@ import secrets
 import msgspec
 
 from schemas.scene import PlanningScene, SceneRequest, SceneResponse
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.collision.scene_shapes import Folders, SceneError
 from services.planner.scene.scene_check import require_scene
 from services.planner.scene.scene_edit import LinkPoses, edited

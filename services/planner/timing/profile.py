@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
 from schemas.motion import JointTrajectory, TrajectoryPoint
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 
 Array = NDArray[np.float64]
 

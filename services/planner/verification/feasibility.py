@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.planning import PlanCode, Refusal, StepMargin
-from services.arm.description import Arm, Joint
+from services.arm.model.description import Arm, Joint
 from services.planner.request.refusals import PlanRefused
 from services.planner.timing.profile import LONGEST
 from services.planner.verification.verify import at_times

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.planner.timing.profile import JointLimits
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from services.planner.core import Planner
 from services.planner.scene.scene_keeper import SceneKeeper
 from services.planner.workers.workers import Workers
 from services.runtime.node import Node
-from services.runtime.request_server import Pending
+from services.runtime.requests.server import Pending
 
 
 class PlanService:

@@ -14,7 +14,7 @@ from queue import SimpleQueue
 from typing import IO
 
 from schemas.planning import PlanPhase, PlanResponse, Refusal, Timing
-from services.arm.description import load_arm
+from services.arm.model.description import load_arm
 from services.planner.collision.sphere_check import cancel_flag
 from services.planner.collision.world import World
 from services.planner.core import Planner

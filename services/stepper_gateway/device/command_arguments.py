@@ -15,8 +15,8 @@ from schemas.device import (
     SpeedCommand,
     StopKind,
 )
-from services.arm.description import Arm, Joint
 from services.arm.errors import suggestion
+from services.arm.model.description import Arm, Joint
 from services.stepper_gateway.device.pending_commands import NO_ARGUMENTS, Arguments
 from services.stepper_gateway.goals.limit_checks import SLACK, beyond
 from services.stepper_gateway.goals.rejections import invalid

@@ -8,8 +8,8 @@ from schemas.device import ConfigureResponse, DeviceConfiguration, DeviceMode
 from schemas.device_config import config_crc, config_text
 from schemas.system import LogLevel
 from schemas.topics import DEVICE_CONFIGURATION
-from services.arm.description import Arm
-from services.arm.device_config import device_config
+from services.arm.device.device_config import device_config
+from services.arm.model.description import Arm
 from services.stepper_gateway.device.session import DeviceSession
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.links.reports import ConfigAckReport

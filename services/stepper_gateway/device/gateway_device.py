@@ -5,7 +5,7 @@ from __future__ import annotations
 from schemas.device import DeviceEvent, DeviceStatus
 from schemas.system import LogLevel
 from schemas.topics import DEVICE_EVENTS
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.stepper_gateway.device.configurator import Configuration
 from services.stepper_gateway.device.pending_commands import PendingCommands
 from services.stepper_gateway.device.readiness import not_ready_reason

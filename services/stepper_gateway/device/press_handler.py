@@ -9,8 +9,8 @@ import msgspec
 from msgspec.structs import replace
 
 from schemas.device import PressKind, PressRequest, PressResponse
-from services.arm.description import Arm
 from services.arm.errors import suggestion
+from services.arm.model.description import Arm
 from services.stepper_gateway.device.gateway_device import GatewayDevice
 from services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from services.stepper_gateway.links.link import Kind

@@ -5,7 +5,7 @@ from __future__ import annotations
 from schemas.device import DeviceMode
 from schemas.device_config import InputRole
 from schemas.device_faults import fault_text
-from services.arm.description import Arm
+from services.arm.model.description import Arm
 from services.stepper_gateway.links.frames import State, StateFlag
 
 

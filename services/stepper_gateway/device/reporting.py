@@ -5,7 +5,7 @@ from __future__ import annotations
 from schemas.device import CommandAck, CommandChunk, DeviceMode, DeviceState, ShaftPositions
 from schemas.joints import JointState, StepErrors
 from schemas.message import Vector
-from services.arm.description import Arm, Joint
+from services.arm.model.description import Arm, Joint
 from services.stepper_gateway.device.clock import ClockSync
 from services.stepper_gateway.device.readiness import input_names, joint_name
 from services.stepper_gateway.links.frames import Ack, BadFrame, Chunk, Code, State, StateFlag, code_name

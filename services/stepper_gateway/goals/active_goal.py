@@ -15,7 +15,7 @@ from schemas.motion import (
     FollowJointTrajectoryResult,
     TrajectoryPoint,
 )
-from services.arm.description import Joint
+from services.arm.model.description import Joint
 from services.stepper_gateway.goals.goal_validator import MotionStart, ValidatedGoal
 from services.stepper_gateway.links.frames import State
 from services.stepper_gateway.moment import Moment

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from schemas.message import Vector
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
-from services.arm.description import Joint
 from services.arm.interpolation import TrajectorySampler
+from services.arm.model.description import Joint
 from services.stepper_gateway.goals.limit_checks import require_path_within, require_points_within, within
 from services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from services.stepper_gateway.goals.scene_versions import PlannedIn

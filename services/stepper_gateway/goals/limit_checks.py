@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from schemas.motion import JointTrajectory
-from services.arm.description import Joint
+from services.arm.model.description import Joint
 from services.stepper_gateway.goals.rejections import invalid
 from services.stepper_gateway.motion.knot_sources import KNOT_TIME
 from services.stepper_gateway.motion.knots import Knot

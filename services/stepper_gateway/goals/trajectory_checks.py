@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from schemas.message import Vector
 from schemas.motion import FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
-from services.arm.description import Joint
 from services.arm.errors import suggestion
+from services.arm.model.description import Joint
 from services.stepper_gateway.goals.rejections import invalid, invalid_joints
 
 REST = 1e-6  # [rad/s] or [m/s] that a final velocity may be off zero

@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 from schemas.message import Vector
-from services.arm.description import Joint
-from services.arm.device_config import WIDEST_Q8
+from services.arm.device.device_config import WIDEST_Q8
+from services.arm.model.description import Joint
 
 
 class Knot(NamedTuple):

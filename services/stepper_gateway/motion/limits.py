@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from schemas.message import Vector
-from services.arm.description import Joint
+from services.arm.model.description import Joint
 from services.stepper_gateway.motion.knots import Knot
 
 

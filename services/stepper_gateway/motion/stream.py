@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from schemas.device import DeviceMode
-from services.arm.description import Joint
+from services.arm.model.description import Joint
 from services.stepper_gateway.device.clock import ClockSync
 from services.stepper_gateway.links.frames import NO_JOINT, Ack, Chunk, ChunkFlag, Code, State, code_name
 from services.stepper_gateway.moment import Moment

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from schemas.joints import JointTargets
 from schemas.message import Vector
-from services.arm.description import Joint
+from services.arm.model.description import Joint
 from services.stepper_gateway.goals.limit_checks import SLACK, beyond
 from services.stepper_gateway.goals.rejections import invalid, invalid_joints
 from services.stepper_gateway.goals.trajectory_checks import require_known

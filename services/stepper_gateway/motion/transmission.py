@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services.arm.description import Joint
+from services.arm.model.description import Joint
 from services.stepper_gateway.device.clock import ClockSync
 from services.stepper_gateway.links.frames import Chunk
 from services.stepper_gateway.moment import Moment

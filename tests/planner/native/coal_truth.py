@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.configuration import Configuration
-from services.arm.description import Arm
+from services.arm.kinematics.joint_mapping import Configuration
+from services.arm.model.description import Arm
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 Array = NDArray[np.float64]

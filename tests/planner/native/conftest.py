@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from services.arm.description import Arm, load_arm
+from services.arm.model.description import Arm, load_arm
 from services.planner.native.native_planner import NativePlanner
 
 ARMS = ("rm1", "parol6")

@@ -7,7 +7,7 @@ import struct
 import numpy as np
 from numpy.typing import NDArray
 
-from services.arm.transforms import Rigid
+from services.arm.frames.transforms import Rigid
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from services.arm.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics
 from services.planner.collision_geometry.shapes import ShapeKind
 from services.planner.native.binding import motion
 from services.planner.native.native_planner import NativePlanner

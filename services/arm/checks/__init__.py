@@ -1,0 +1,1 @@
+"""The checks of a robot's folder: `gemelo check`."""

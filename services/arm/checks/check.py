@@ -1,0 +1,104 @@
+"""`gemelo check`: everything that can be known to be wrong with a robot's folder before anything moves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+
+from schemas.robot import RobotFile
+from services.arm.checks.cross_check import second_opinion
+from services.arm.checks.device import check_device
+from services.arm.checks.findings import Finding, Severity, error
+from services.arm.checks.homing import check_homing
+from services.arm.checks.motors import check_motors
+from services.arm.checks.pull_out import check_pull_out
+from services.arm.checks.srdf import check_srdf
+from services.arm.checks.urdf import check_urdf
+from services.arm.device.device_config import device_config
+from services.arm.errors import DescriptionError
+from services.arm.model.description import ROBOT_FILE, load_arm
+from services.arm.model.robot_file import dotted, line_of, not_finite, parse_toml, read_text, unknown_keys, where_of
+from services.arm.model.srdf import read_srdf
+from services.arm.model.urdf import read_urdf
+
+__all__ = ["Finding", "Severity", "check"]
+
+
+def check(folder: Path) -> list[Finding]:
+    """Every finding in `folder`, errors first; empty where all is well."""
+    folder = Path(folder)
+    try:
+        text = read_text(folder / ROBOT_FILE)
+        data = parse_toml(folder / ROBOT_FILE, text)
+    except DescriptionError as problem:
+        return [error(ROBOT_FILE, "file", str(problem), f"a robot is a folder with a {ROBOT_FILE}")]
+    findings = [*_unknown_keys(data, text), *_not_finite(data, text)]
+    try:
+        robot = msgspec.convert(_known(data), RobotFile)
+    except msgspec.ValidationError as problem:
+        thing = where_of(problem, text).removeprefix(", ") or "types"
+        return [*findings, error(ROBOT_FILE, thing, str(problem), "see schemas/robot.py")]
+    if not_finite(data):
+        return findings
+    findings += _files(folder, robot)
+    if not any(finding.severity is Severity.ERROR for finding in findings):
+        findings += _whole(folder)
+    return sorted(findings, key=lambda finding: finding.severity is not Severity.ERROR)
+
+
+def _unknown_keys(data: dict[str, object], text: str) -> list[Finding]:
+    return [
+        error(ROBOT_FILE, f"line {key.line}", f"unknown key `{dotted(key.path)}`{key.hint}", "correct or remove it")
+        for key in unknown_keys(data, text)
+    ]
+
+
+def _not_finite(data: dict[str, object], text: str) -> list[Finding]:
+    return [
+        error(ROBOT_FILE, f"line {line_of(key, text)}", f"`{dotted(key)}` is {value}", "write a number that is finite")
+        for key, value in not_finite(data)
+    ]
+
+
+def _known(data: dict[str, object]) -> object:
+    """`data` without the keys that its types do not have, so that one of them does not hide what else is wrong."""
+    unknown = {key.path for key in unknown_keys(data, "")}
+
+    def keep(value: object, path: tuple[str | int, ...]) -> object:
+        if isinstance(value, dict):
+            return {k: keep(v, (*path, k)) for k, v in value.items() if (*path, k) not in unknown}
+        if isinstance(value, list):
+            return [keep(v, (*path, i)) for i, v in enumerate(value)]
+        return value
+
+    return keep(data, ())
+
+
+def _files(folder: Path, robot: RobotFile) -> list[Finding]:
+    """Each file for itself, then the motors against the URDF."""
+    findings: list[Finding] = []
+    try:
+        model = read_urdf(folder / robot.urdf)
+    except DescriptionError as problem:
+        return [error(robot.urdf, "file", str(problem))]
+    findings += check_urdf(model, folder / robot.urdf)
+    findings += check_motors(robot, model)
+    findings += check_device(robot)
+    findings += check_homing(robot, model)
+    findings += check_pull_out(robot)
+    try:
+        findings += check_srdf(read_srdf(folder / robot.srdf), robot, model)
+    except DescriptionError as problem:
+        findings.append(error(robot.srdf, "file", str(problem)))
+    return findings
+
+
+def _whole(folder: Path) -> list[Finding]:
+    """What only shows when all of it is put together."""
+    try:
+        arm = load_arm(folder)
+        device_config(arm)
+    except DescriptionError as problem:
+        return [error(ROBOT_FILE, "robot", str(problem))]
+    return second_opinion(arm)

@@ -1,0 +1,64 @@
+"""Checks of [joint.motor.pull_out]: a curve that is one, and a joint that keeps under it."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+from schemas.robot import PullOut, RobotFile, StepperJoint
+from services.arm.checks.findings import Finding, error, warning
+from services.arm.errors import DescriptionError
+from services.arm.model.description import ROBOT_FILE
+from services.arm.motors.speed import speed_limits
+
+
+def check_pull_out(robot: RobotFile) -> list[Finding]:
+    """Every motor whose torque is known."""
+    findings: list[Finding] = []
+    for drive in robot.joint:
+        curve = drive.motor.pull_out
+        if curve is not None:
+            thing = f'joint "{drive.name}"'
+            wrong = _shape(curve, thing)
+            findings += wrong or _demand(drive, curve, thing)
+    return findings
+
+
+def torque_at(curve: PullOut, rate: float) -> float:
+    """[N m] at `rate` [steps/s], straight between the points and 0 beyond the last."""
+    points = list(zip(curve.speed, curve.torque, strict=True))
+    if rate <= points[0][0]:
+        return points[0][1]
+    for (low, first), (high, second) in pairwise(points):
+        if rate <= high:
+            return first + (second - first) * (rate - low) / (high - low)
+    return 0.0
+
+
+def _shape(curve: PullOut, thing: str) -> list[Finding]:
+    if not curve.speed or len(curve.speed) != len(curve.torque):
+        message = f"pull_out has {len(curve.speed)} speeds and {len(curve.torque)} torques"
+        return [error(ROBOT_FILE, thing, message, "one torque for each speed")]
+    for slower, faster in pairwise(curve.speed):
+        if faster <= slower:
+            message = f"pull_out.speed falls from {slower:g} to {faster:g} steps/s"
+            return [error(ROBOT_FILE, thing, message, "write the speeds in rising order")]
+    return []
+
+
+def _demand(drive: StepperJoint, curve: PullOut, thing: str) -> list[Finding]:
+    """The torque at full speed while still accelerating, as the end of a ramp is."""
+    try:
+        speed = speed_limits(drive)
+    except DescriptionError:
+        return []
+    radians = math.tau / drive.motor.pulses_per_turn  # [rad/step] of the motor shaft
+    needed = curve.friction + curve.inertia * float(speed.step_acceleration) * radians
+    given = torque_at(curve, float(speed.step_rate))
+    if needed <= given:
+        return []
+    message = (
+        f"at {drive.max_speed_rpm:g} RPM its motor gives {given:.3g} N m at {float(speed.step_rate):.0f} steps/s, "
+        f"but needs {needed:.3g} N m: it will lose steps"
+    )
+    return [warning(ROBOT_FILE, thing, message, "a lower max_speed_rpm or a longer ramp_time")]

@@ -1,0 +1,1 @@
+"""The device configuration that follows from the description of an arm."""

@@ -1,0 +1,123 @@
+"""Which pairs of links need no collision check, found by sampling: neighbours, always in touch, never near.
+
+As MoveIt's setup assistant does it, but what seems never to be near is also searched for nearer configurations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.kinematics.self_collisions import LinkPair, SelfCollisions
+from services.arm.model.description import Arm
+
+Array = NDArray[np.float64]
+
+SAMPLES = 4000
+SEED = 0
+NEVER_BELOW = 0.005  # [m] that must stay between two links for them to be never near
+SEARCHES = 4  # from the nearest samples of a pair
+STEPS = 60
+SHRINK = 0.9
+
+
+class Reason(StrEnum):
+    """Why a pair is not checked; an SRDF's other reasons are a person's."""
+
+    ADJACENT = "Adjacent"
+    ALWAYS = "Always"
+    NEVER = "Never"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One pair of links; `reason` None: it can touch and is to be checked. `nearest`, `farthest` [m] as seen."""
+
+    pair: LinkPair
+    reason: Reason | None
+    nearest: float
+    farthest: float
+
+
+def collision_matrix(arm: Arm, samples: int = SAMPLES) -> list[Verdict]:
+    """Every pair of links that have collision shapes; the same arm gives the same matrix."""
+    kinematics = Kinematics(arm)
+    bare = replace(arm, disabled_collisions=frozenset())
+    checker = SelfCollisions(bare, kinematics.model, kinematics.configuration)
+    random = np.random.default_rng(SEED)
+    configurations = _configurations(arm, samples, random)
+    distances = [checker.distances(configuration) for configuration in configurations]
+    return [_verdict(arm, checker, pair, configurations, distances, random) for pair in checker.pairs]
+
+
+def _verdict(
+    arm: Arm,
+    checker: SelfCollisions,
+    pair: LinkPair,
+    configurations: Array,
+    distances: list[dict[LinkPair, float]],
+    random: np.random.Generator,
+) -> Verdict:
+    seen = np.array([row[pair] for row in distances])
+    nearest, farthest = float(seen.min()), float(seen.max())
+    if are_adjacent(arm, *pair):
+        return Verdict(pair, Reason.ADJACENT, nearest, farthest)
+    if farthest <= 0.0:
+        return Verdict(pair, Reason.ALWAYS, nearest, farthest)
+    if nearest > NEVER_BELOW:
+        starts = configurations[np.argsort(seen, kind="stable")[:SEARCHES]]
+        nearest = min(nearest, *(_nearest_from(arm, checker, pair, start, random) for start in starts))
+    return Verdict(pair, Reason.NEVER if nearest > NEVER_BELOW else None, nearest, farthest)
+
+
+def _nearest_from(
+    arm: Arm, checker: SelfCollisions, pair: LinkPair, start: Array, random: np.random.Generator
+) -> float:
+    """[m] by a random search in a shrinking neighbourhood."""
+    lower, upper = _limits(arm)
+    best, configuration = checker.distances(start)[pair], start
+    reach = 0.2 * (upper - lower)
+    for _ in range(STEPS):
+        tried = np.clip(configuration + reach * random.uniform(-1.0, 1.0, len(start)), lower, upper)
+        distance = checker.distances(tried)[pair]
+        if distance < best:
+            best, configuration = distance, tried
+        else:
+            reach = SHRINK * reach
+    return best
+
+
+def _configurations(arm: Arm, samples: int, random: np.random.Generator) -> Array:
+    """(m, n) the named ones and random ones within the limits."""
+    lower, upper = _limits(arm)
+    named = [np.array(state) for state in arm.named_states.values()]
+    return np.vstack([*named, random.uniform(lower, upper, (samples, len(lower)))])
+
+
+def _limits(arm: Arm) -> tuple[Array, Array]:
+    """(n,) each; a whole turn where there is none."""
+    lower = np.array([joint.lower if math.isfinite(joint.lower) else -math.pi for joint in arm.joints])
+    upper = np.array([joint.upper if math.isfinite(joint.upper) else math.pi for joint in arm.joints])
+    return lower, upper
+
+
+def are_adjacent(arm: Arm, first: str, second: str) -> bool:
+    """Whether one joint is between two links; links without a shape in between do not count."""
+    return second in _neighbours(arm, first) or first in _neighbours(arm, second)
+
+
+def _neighbours(arm: Arm, link: str) -> Iterator[str]:
+    """The nearest links with a shape on the way out from `link`."""
+    shaped = {each.name for each in arm.model.links if each.collisions}
+    for joint in arm.model.joints:
+        if joint.parent == link:
+            if joint.child in shaped:
+                yield joint.child
+            else:
+                yield from _neighbours(arm, joint.child)

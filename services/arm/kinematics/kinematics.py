@@ -1,0 +1,104 @@
+"""Where the links are, how the tool moves with the joints, and whether the arm touches itself. By pinocchio."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from schemas.frames import Transform
+from services.arm.errors import DescriptionError
+from services.arm.kinematics.joint_mapping import Configuration
+from services.arm.kinematics.self_collisions import SelfCollisions
+from services.arm.model.description import Arm
+
+Array = NDArray[np.float64]
+Positions = Sequence[float] | Array
+
+
+@dataclass(frozen=True)
+class Pose:
+    """`position` (3,) [m] and `rotation` (3, 3) in the base frame."""
+
+    position: Array
+    rotation: Array
+
+
+class Kinematics:
+    """The arm's geometry; joint values are (n,) [rad] or [m] in the arm's order, poses in its base frame."""
+
+    def __init__(self, arm: Arm) -> None:
+        self.arm = arm
+        self._model = pin.buildModelFromUrdf(str(arm.urdf_path))
+        self._data = self._model.createData()
+        self._configuration = Configuration(arm, self._model)
+        self._tool = self._model.getFrameId(arm.tool_frame)
+        self._base = self._fixed_base()
+        self._base_is_root = self._base.isIdentity()
+        self._links = {name: self._model.getFrameId(name) for name in arm.model.link_names}
+        self.collisions = SelfCollisions(arm, self._model, self._configuration)
+
+    @property
+    def model(self) -> pin.Model:
+        """The arm as pinocchio has it; not to be changed."""
+        return self._model
+
+    @property
+    def configuration(self) -> Configuration:
+        """From the arm's joints to pinocchio's."""
+        return self._configuration
+
+    @property
+    def base(self) -> pin.SE3:
+        """The base frame in pinocchio's world."""
+        return self._base.copy()
+
+    def tool(self, positions: Positions) -> Pose:
+        """The tool's pose."""
+        pin.forwardKinematics(self._model, self._data, self._configuration.to_pinocchio(positions))
+        placement = self._in_base(pin.updateFramePlacement(self._model, self._data, self._tool))
+        return Pose(placement.translation.copy(), placement.rotation.copy())
+
+    def jacobian(self, positions: Positions) -> Array:
+        """(6, n): the tool point's velocity [m/s] above its angular velocity [rad/s], along the base's axes."""
+        return self.tool_and_jacobian(positions)[1]
+
+    def tool_and_jacobian(self, positions: Positions) -> tuple[Pose, Array]:
+        """Both for the price of one."""
+        q = self._configuration.to_pinocchio(positions)
+        jacobian = pin.computeFrameJacobian(self._model, self._data, q, self._tool, pin.LOCAL_WORLD_ALIGNED)
+        placement = self._in_base(pin.updateFramePlacement(self._model, self._data, self._tool))
+        jacobian = self._configuration.fold(jacobian)
+        if not self._base_is_root:
+            turn = self._base.rotation.T
+            jacobian = np.vstack((turn @ jacobian[:3], turn @ jacobian[3:]))
+        return Pose(placement.translation.copy(), placement.rotation.copy()), jacobian
+
+    def link_poses(self, positions: Positions) -> dict[str, Transform]:
+        """Every link's pose."""
+        pin.framesForwardKinematics(self._model, self._data, self._configuration.to_pinocchio(positions))
+        return {name: _message(self._in_base(self._data.oMf[index])) for name, index in self._links.items()}
+
+    def self_collisions(self, positions: Positions, margin: float = 0.0) -> list[tuple[str, str]]:
+        """The pairs of links that are nearer than `margin` [m] and are not allowed to be."""
+        return self.collisions.pairs_within(positions, margin)
+
+    def _in_base(self, placement: pin.SE3) -> pin.SE3:
+        return placement if self._base_is_root else self._base.actInv(placement)
+
+    def _fixed_base(self) -> pin.SE3:
+        frame = self._model.frames[self._model.getFrameId(self.arm.base_frame)]
+        if frame.parentJoint != 0:
+            raise DescriptionError(f'{self.arm.robot_path}: base_frame "{self.arm.base_frame}" moves with the joints')
+        return frame.placement.copy()
+
+
+def _message(placement: pin.SE3) -> Transform:
+    rotation = pin.Quaternion(placement.rotation)
+    return Transform(
+        translation=tuple(placement.translation.tolist()),
+        rotation=(rotation.x, rotation.y, rotation.z, rotation.w),
+    )

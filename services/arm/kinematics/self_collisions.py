@@ -1,0 +1,161 @@
+"""Whether the arm touches itself: coal on the URDF's primitives, without the pairs that the SRDF excuses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from services.arm.errors import DescriptionError
+from services.arm.kinematics.joint_mapping import Configuration
+from services.arm.model.description import Arm
+
+Array = NDArray[np.float64]
+LinkPair = tuple[str, str]
+
+
+class SelfCollisions:
+    """Distances between the links that may not touch; joint values are (n,) [rad] or [m] in the arm's order."""
+
+    def __init__(self, arm: Arm, model: pin.Model, configuration: Configuration) -> None:
+        self._model = model
+        self._configuration = configuration
+        self._geometry = load_shapes(arm, model)
+        self._pairs = _add_pairs(arm, model, self._geometry)
+        self._data = model.createData()
+        self._geometry_data = self._geometry.createData()
+        self.reach = reach_of(arm, model, self._geometry)
+
+    @property
+    def geometry_count(self) -> int:
+        """How many shapes there are; never zero."""
+        return int(self._geometry.ngeoms)
+
+    @property
+    def pairs(self) -> tuple[LinkPair, ...]:
+        """The pairs of links that are checked."""
+        return tuple(dict.fromkeys(self._pairs))
+
+    def distance(self, positions: Sequence[float] | Array) -> float:
+        """[m] between the nearest pair that is checked; negative inside; infinite where nothing is checked."""
+        if not self._pairs:
+            return math.inf
+        self._update(positions)
+        return float(min(result.min_distance for result in self._geometry_data.distanceResults))
+
+    def distances(self, positions: Sequence[float] | Array) -> dict[LinkPair, float]:
+        """[m] between the links of every pair that is checked."""
+        if not self._pairs:
+            return {}
+        self._update(positions)
+        nearest: dict[LinkPair, float] = {}
+        for pair, result in zip(self._pairs, self._geometry_data.distanceResults, strict=True):
+            nearest[pair] = min(nearest.get(pair, math.inf), float(result.min_distance))
+        return nearest
+
+    def pairs_within(self, positions: Sequence[float] | Array, margin: float = 0.0) -> list[LinkPair]:
+        """The pairs of links nearer than `margin` [m], each once."""
+        if not self._pairs:
+            return []
+        self._update(positions)
+        results = self._geometry_data.distanceResults
+        near = (pair for pair, result in zip(self._pairs, results, strict=True) if result.min_distance <= margin)
+        return list(dict.fromkeys(near))
+
+    def _update(self, positions: Sequence[float] | Array) -> None:
+        q = self._configuration.to_pinocchio(positions)
+        pin.computeDistances(self._model, self._data, self._geometry, self._geometry_data, q)
+
+
+def load_shapes(arm: Arm, model: pin.Model) -> pin.GeometryModel:
+    """The collision shapes; pinocchio drops what it does not know WITHOUT an error, so they are counted."""
+    expected = sum(len(link.collisions) for link in arm.model.links)
+    geometry = pin.buildGeomFromUrdf(
+        model, str(arm.urdf_path), pin.GeometryType.COLLISION, package_dirs=[str(arm.folder)]
+    )
+    if expected == 0:
+        raise DescriptionError(
+            f"{arm.urdf_path}: no link has a <collision>, so nothing would ever touch; "
+            f"`gemelo collision fit {arm.folder} --meshes --write` makes some from the meshes"
+        )
+    if geometry.ngeoms != expected:
+        raise DescriptionError(
+            f"{arm.urdf_path}: {geometry.ngeoms} of {expected} collision shapes could be loaded; use box, cylinder, "
+            "sphere or mesh (<capsule> is not URDF)"
+        )
+    return geometry
+
+
+def _add_pairs(arm: Arm, model: pin.Model, geometry: pin.GeometryModel) -> list[LinkPair]:
+    """Check every pair of shapes on different links that is not excused; returns the links' names in the same order."""
+    links = [model.frames[shape.parentFrame].name for shape in geometry.geometryObjects]
+    pairs: list[LinkPair] = []
+    for first in range(len(links)):
+        for second in range(first + 1, len(links)):
+            one, other = links[first], links[second]
+            if one != other and not arm.collisions_are_disabled(one, other):
+                geometry.addCollisionPair(pin.CollisionPair(first, second))
+                pairs.append((one, other))
+    return pairs
+
+
+def reach_of(arm: Arm, model: pin.Model, geometry: pin.GeometryModel) -> Array:
+    """(n,) how far at most [m] any point of any shape moves per unit of each joint: [m/rad] or [m/m].
+
+    For a turning joint that is the longest way from its axis to the end of the chain, all travel included.
+    """
+    fold = np.array([_joint_reach(arm, model, geometry, joint) for joint in range(1, model.njoints)])
+    reach = np.zeros(len(arm.joints))
+    for index, bound in enumerate(fold, start=1):
+        source, scale = driver_of(arm, model, index)
+        reach[source] += scale * bound
+    return reach
+
+
+def driver_of(arm: Arm, model: pin.Model, index: int) -> tuple[int, float]:
+    """The arm's joint that moves pinocchio's joint `index`, and how much for each of its units, through mimics."""
+    joint, scale = arm.model.joint(model.names[index]), 1.0
+    while joint.mimic is not None:
+        scale *= abs(joint.mimic.multiplier)
+        joint = arm.model.joint(joint.mimic.joint)
+    return arm.joint_names.index(joint.name), scale
+
+
+def _joint_reach(arm: Arm, model: pin.Model, geometry: pin.GeometryModel, joint: int) -> float:
+    if _slides(model, joint):
+        return 1.0
+    moved = (shape for shape in geometry.geometryObjects if joint in model.supports[shape.parentJoint])
+    return max((shape_reach(arm, model, shape, joint) for shape in moved), default=0.0)
+
+
+def shape_reach(arm: Arm, model: pin.Model, shape: pin.GeometryObject, joint: int) -> float:
+    """How far at most [m] any point of a shape moves per unit of pinocchio's `joint`, which carries it."""
+    if _slides(model, joint):
+        return 1.0
+    shape.geometry.computeLocalAABB()
+    length = float(np.linalg.norm(shape.placement.translation)) + _radius(shape)
+    link = int(shape.parentJoint)
+    while link != joint:
+        length += float(np.linalg.norm(model.jointPlacements[link].translation)) + _travel(arm, model, link)
+        link = int(model.parents[link])
+    return length
+
+
+def _radius(shape: pin.GeometryObject) -> float:
+    """How far a shape reaches from its own origin [m]."""
+    return float(np.linalg.norm(shape.geometry.aabb_center)) + float(shape.geometry.aabb_radius)
+
+
+def _travel(arm: Arm, model: pin.Model, joint: int) -> float:
+    """How far a sliding joint can move [m]; 0 for a turning one."""
+    if not _slides(model, joint):
+        return 0.0
+    limit = arm.model.joint(model.names[joint]).limit
+    return 0.0 if limit is None else max(abs(limit.lower), abs(limit.upper))
+
+
+def _slides(model: pin.Model, joint: int) -> bool:
+    return bool(model.joints[joint].shortname().startswith("JointModelP"))

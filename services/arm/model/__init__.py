@@ -1,0 +1,1 @@
+"""The description of an arm: URDF, SRDF and robot.toml, read and edited."""

@@ -1,0 +1,235 @@
+"""A robot's folder as one typed `Arm`: URDF, SRDF and robot.toml, held against each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from schemas.robot import DeviceRecord, Driver, Input, Output, RobotFile, Sensor, StepperJoint, Transmission
+from services.arm.errors import DescriptionError, suggestion
+from services.arm.model.robot_file import read_robot_file
+from services.arm.model.srdf import SrdfModel, read_srdf
+from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel, read_urdf
+from services.arm.motors.speed import speed_limits
+from services.arm.motors.steps import StepScale, step_scale
+
+ROBOT_FILE = "robot.toml"
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint that a motor moves; limits are the tighter ones of the URDF and of the motor."""
+
+    name: str
+    wire_name: str
+    kind: JointKind
+    unit: str  # "rad" or "m"
+    lower: float  # [rad] or [m]; -inf for a continuous joint
+    upper: float  # [rad] or [m]
+    velocity: float  # [rad/s] or [m/s]
+    acceleration: float  # [rad/s^2] or [m/s^2]
+    jerk: float  # [rad/s^3] or [m/s^3]
+    steps: StepScale
+    drive: StepperJoint
+    driver: Driver
+
+    def clamp(self, position: float) -> float:
+        """The nearest position [rad] or [m] within the limits."""
+        return min(max(position, self.lower), self.upper)
+
+    def is_within(self, position: float) -> bool:
+        """Whether `position` [rad] or [m] is within the limits."""
+        return self.lower <= position <= self.upper
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One robot: its joints in robot.toml's order, which is their order everywhere."""
+
+    name: str
+    folder: Path
+    urdf_path: Path
+    srdf_path: Path
+    robot_path: Path
+    base_frame: str
+    tool_frame: str
+    device: DeviceRecord
+    drivers: tuple[Driver, ...]
+    joints: tuple[Joint, ...]
+    inputs: tuple[Input, ...]
+    outputs: tuple[Output, ...]
+    sensors: tuple[Sensor, ...]
+    named_states: dict[str, tuple[float, ...]]  # [rad] or [m]
+    partial_states: dict[str, dict[str, float]]  # of groups that have only some of the joints
+    disabled_collisions: frozenset[frozenset[str]]  # pairs of links
+    model: UrdfModel
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def reference_position(self) -> tuple[float, ...]:
+        """[rad] or [m] of the pose that a person declares as the reference."""
+        return tuple(joint.drive.reference_position for joint in self.joints)
+
+    def joint(self, name: str) -> Joint:
+        """The joint of that name; raises `DescriptionError` with the nearest one."""
+        for joint in self.joints:
+            if joint.name == name:
+                return joint
+        raise DescriptionError(f'{self.name} has no joint "{name}"{suggestion(name, self.joint_names)}')
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Of all joints, and of some."""
+        return (*self.named_states, *self.partial_states)
+
+    def named_state(self, name: str, standing: Sequence[float]) -> tuple[float, ...] | None:
+        """Its values; joints that it does not name stand as in `standing`. None where there is no such state."""
+        if name in self.named_states:
+            return self.named_states[name]
+        values = self.partial_states.get(name)
+        if values is None:
+            return None
+        return tuple(values.get(joint, value) for joint, value in zip(self.joint_names, standing, strict=True))
+
+    def collisions_are_disabled(self, first: str, second: str) -> bool:
+        """Whether the SRDF says that this pair of links is not to be checked."""
+        return frozenset((first, second)) in self.disabled_collisions
+
+
+def load_arm(folder: Path) -> Arm:
+    """The arm described in `folder`; raises `DescriptionError` with file, thing and value."""
+    robot_path = Path(folder) / ROBOT_FILE
+    robot = read_robot_file(robot_path)
+    urdf_path, srdf_path = robot_path.with_name(robot.urdf), robot_path.with_name(robot.srdf)
+    model, srdf = read_urdf(urdf_path), read_srdf(srdf_path)
+    _require_frames(robot, model, robot_path)
+    drivers = {driver.name: driver for driver in robot.driver}
+    joints = tuple(_joint(drive, drivers, model, robot_path) for drive in robot.joint)
+    _require_joints(joints, model, robot_path)
+    return Arm(
+        name=robot.name,
+        folder=robot_path.parent,
+        urdf_path=urdf_path,
+        srdf_path=srdf_path,
+        robot_path=robot_path,
+        base_frame=robot.base_frame,
+        tool_frame=robot.tool_frame,
+        device=robot.device,
+        drivers=robot.driver,
+        joints=joints,
+        inputs=robot.input,
+        outputs=robot.output,
+        sensors=robot.sensor,
+        named_states=_named_states(srdf, robot.group, joints, srdf_path),
+        partial_states=_partial_states(srdf, robot.group, joints),
+        disabled_collisions=frozenset(frozenset(pair) for pair in srdf.disabled),
+        model=model,
+    )
+
+
+def _joint(drive: StepperJoint, drivers: dict[str, Driver], model: UrdfModel, path: Path) -> Joint:
+    where = f'{path}: joint "{drive.name}"'
+    if drive.name not in model.joint_names:
+        raise DescriptionError(f"{where} is not in the URDF{suggestion(drive.name, model.joint_names)}")
+    if drive.motor.driver not in drivers:
+        raise DescriptionError(f'{where}: there is no [[driver]] "{drive.motor.driver}"')
+    urdf = model.joint(drive.name)
+    _require_transmission(drive, urdf, where)
+    try:
+        scale, speed = step_scale(drive), speed_limits(drive)
+    except DescriptionError as error:
+        raise DescriptionError(f"{path}: {error}") from error
+    lower, upper, velocity = _limits(urdf, drive, where)
+    return Joint(
+        name=drive.name,
+        wire_name=drive.wire_name,
+        kind=urdf.kind,
+        unit="m" if urdf.kind is JointKind.PRISMATIC else "rad",
+        lower=lower,
+        upper=upper,
+        velocity=min(velocity, speed.velocity),
+        acceleration=speed.acceleration,
+        jerk=speed.jerk,
+        steps=scale,
+        drive=drive,
+        driver=drivers[drive.motor.driver],
+    )
+
+
+def _require_transmission(drive: StepperJoint, urdf: UrdfJoint, where: str) -> None:
+    """A metre is not a radian: a sliding joint has a rack, a turning one has none."""
+    if urdf.kind is JointKind.FIXED or urdf.mimic is not None:
+        raise DescriptionError(
+            f"{where} has a motor, but is {'fixed' if urdf.mimic is None else 'a mimic'} in the URDF"
+        )
+    slides = urdf.kind is JointKind.PRISMATIC
+    if slides != (drive.transmission is Transmission.RACK_AND_PINION):
+        needed = Transmission.RACK_AND_PINION if slides else Transmission.ROTARY
+        raise DescriptionError(f'{where} is {urdf.kind} in the URDF, so transmission must be "{needed}"')
+
+
+def _limits(urdf: UrdfJoint, drive: StepperJoint, where: str) -> tuple[float, float, float]:
+    """Lower, upper and velocity, within the mechanics; `gemelo check` says more about limits that are odd."""
+    if urdf.limit is None:
+        raise DescriptionError(f"{where}: the URDF has no <limit> for it")
+    if not urdf.limit.velocity > 0.0:
+        raise DescriptionError(f"{where}: the URDF's velocity limit is {urdf.limit.velocity}, it must be above 0")
+    if urdf.kind is JointKind.CONTINUOUS:
+        return -math.inf, math.inf, urdf.limit.velocity
+    lower, upper = urdf.limit.lower, urdf.limit.upper
+    if drive.mechanical_lower is not None:
+        lower = max(lower, drive.mechanical_lower)
+    if drive.mechanical_upper is not None:
+        upper = min(upper, drive.mechanical_upper)
+    if not lower < upper:
+        raise DescriptionError(f"{where}: the limits {lower} to {upper} leave no travel")
+    return lower, upper, urdf.limit.velocity
+
+
+def _require_frames(robot: RobotFile, model: UrdfModel, path: Path) -> None:
+    for key, frame in (("base_frame", robot.base_frame), ("tool_frame", robot.tool_frame)):
+        if frame not in model.link_names:
+            raise DescriptionError(f'{path}: {key} "{frame}" is no link{suggestion(frame, model.link_names)}')
+
+
+def _require_joints(joints: tuple[Joint, ...], model: UrdfModel, path: Path) -> None:
+    """Every moving joint has exactly one motor, and every wire name is used once."""
+    if not joints:
+        raise DescriptionError(f"{path}: there is no [[joint]]")
+    for names in ([j.name for j in joints], [j.wire_name for j in joints]):
+        for name in names:
+            if names.count(name) > 1:
+                raise DescriptionError(f'{path}: joint "{name}" is there {names.count(name)} times')
+    driven = {joint.name for joint in joints}
+    for urdf in model.joints:
+        if urdf.kind is not JointKind.FIXED and urdf.mimic is None and urdf.name not in driven:
+            raise DescriptionError(f'{path}: the URDF\'s joint "{urdf.name}" moves, but has no [[joint]] here')
+
+
+def _named_states(srdf: SrdfModel, group: str, joints: tuple[Joint, ...], path: Path) -> dict[str, tuple[float, ...]]:
+    """The states of the group in the arm's joint order."""
+    states: dict[str, tuple[float, ...]] = {}
+    for state in srdf.states:
+        if state.group != group:
+            continue
+        missing = [joint.name for joint in joints if joint.name not in state.values]
+        if missing:
+            raise DescriptionError(f'{path}: state "{state.name}" has no value for {", ".join(missing)}')
+        states[state.name] = tuple(state.values[joint.name] for joint in joints)
+    return states
+
+
+def _partial_states(srdf: SrdfModel, group: str, joints: tuple[Joint, ...]) -> dict[str, dict[str, float]]:
+    """The states of the other groups whose joints are all driven, by names that the arm's own group does not have."""
+    names = {joint.name for joint in joints}
+    own = {state.name for state in srdf.states if state.group == group}
+    return {
+        state.name: state.values
+        for state in srdf.states
+        if state.group != group and state.name not in own and state.values and names >= set(state.values)
+    }

@@ -1,0 +1,1 @@
+"""Motor steps and speed limits of the joints."""

@@ -1,0 +1,91 @@
+"""Between joint units and motor steps, by exact ratios: the error is never above half a step, over any distance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+from schemas.robot import StepperJoint, Transmission
+from services.arm.errors import DescriptionError
+from services.arm.model.robot_file import exact_ratio
+
+TAU = 2.0 * math.pi
+Q8 = 256  # the wire's positions are 1/256 steps
+
+
+@dataclass(frozen=True)
+class StepScale:
+    """How many motor steps a joint's travel is; absolute positions only, so nothing accumulates.
+
+    The sign of a motor that turns the other way is the device's matter and not in here.
+    """
+
+    steps_per_turn: Fraction  # [steps/rev] of the output shaft, exact
+    travel_per_turn: float  # [rad] or [m] of the joint for one turn of the output shaft
+
+    @cached_property
+    def per_unit(self) -> float:
+        """[steps/rad] or [steps/m]."""
+        return float(self.steps_per_turn) / self.travel_per_turn
+
+    @cached_property
+    def _steps(self) -> float:
+        return float(self.steps_per_turn)
+
+    @cached_property
+    def _q8(self) -> float:
+        return float(self.steps_per_turn * Q8)
+
+    @property
+    def degrees_per_step(self) -> Fraction:
+        """[deg] of the output shaft, exact: 25/1296 for q1 of rm1."""
+        return 360 / self.steps_per_turn
+
+    @property
+    def resolution(self) -> float:
+        """[rad] or [m] of one step."""
+        return self.travel_per_turn / self._steps
+
+    def to_steps(self, position: float) -> float:
+        """Steps, with their fraction, at `position` [rad] or [m]."""
+        return position / self.travel_per_turn * self._steps
+
+    def to_position(self, steps: float) -> float:
+        """Position [rad] or [m] of so many steps."""
+        return steps / self._steps * self.travel_per_turn
+
+    def to_q8(self, position: float) -> int:
+        """The nearest 1/256 step to `position` [rad] or [m]."""
+        return round(position / self.travel_per_turn * self._q8)
+
+    def from_q8(self, steps: int) -> float:
+        """Position [rad] or [m] of so many 1/256 steps."""
+        return steps / self._q8 * self.travel_per_turn
+
+
+def step_scale(drive: StepperJoint) -> StepScale:
+    """The scale of one joint of robot.toml; raises `DescriptionError` naming the joint."""
+    where = f'joint "{drive.name}": motor.gear_ratio'
+    if drive.motor.pulses_per_turn <= 0:
+        raise DescriptionError(f'joint "{drive.name}": motor.pulses_per_turn is {drive.motor.pulses_per_turn}, not > 0')
+    return StepScale(drive.motor.pulses_per_turn * exact_ratio(drive.motor.gear_ratio, where), travel_per_turn(drive))
+
+
+def travel_per_turn(drive: StepperJoint) -> float:
+    """[rad] or [m] that the joint moves for one turn of the output shaft."""
+    match drive.transmission:
+        case Transmission.ROTARY:
+            if drive.pinion_radius is not None:
+                raise DescriptionError(
+                    f'joint "{drive.name}": pinion_radius belongs to transmission = "rack_and_pinion", not "rotary"'
+                )
+            return TAU
+        case Transmission.RACK_AND_PINION:
+            if drive.pinion_radius is None or not 1e-4 <= drive.pinion_radius <= 10.0:
+                raise DescriptionError(
+                    f'joint "{drive.name}": rack_and_pinion needs pinion_radius of 0.0001 to 10 m, '
+                    f"it is {drive.pinion_radius}"
+                )
+            return TAU * drive.pinion_radius

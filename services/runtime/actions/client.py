@@ -1,0 +1,120 @@
+"""The client's side of an action: send, follow, cancel, and a clear end in bounded time."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+import msgspec
+
+from schemas.actions import CancelRequest, GoalFeedback, GoalRequest, GoalStatuses
+from schemas.message import BadMessage, Message, decode, encode
+from schemas.topics import Action, Topic
+from services.runtime.actions import keys as keys
+from services.runtime.actions.goal_handle import GoalHandle
+from services.runtime.bus.interface import Bus
+from services.runtime.errors import GoalRefused, NoAnswer
+from services.runtime.loop.loop import Loop
+from services.runtime.requests import client as requests
+
+G = TypeVar("G", bound=Message)
+F = TypeVar("F", bound=Message)
+R = TypeVar("R", bound=Message)
+
+ATTEMPT = 1.0  # [s] of one try to send a goal; further tries carry the same id, so it is accepted once
+
+
+class ActionClient(Generic[G, F, R]):
+    """Sends goals of one action; any number may be under way."""
+
+    TICK = 0.1  # [s]
+
+    def __init__(
+        self,
+        action: Action[G, F, R],
+        bus: Bus,
+        loop: Loop,
+        subscribe: Callable[[Topic[Any], Callable[[Any], None]], object],
+        client: str,
+    ) -> None:
+        self.action = action
+        self._bus, self._loop, self._client = bus, loop, client
+        self._handles: dict[str, GoalHandle[F, R]] = {}
+        self._ticked = time.monotonic()
+        subscribe(keys.feedback_topic(action), self._on_feedback)
+        subscribe(keys.status_topic(action), self._on_status)
+
+    def send(
+        self,
+        goal: G,
+        on_feedback: Callable[[F], object] | None = None,
+        timeout: float = 2.0,
+        attached: bool = False,
+    ) -> GoalHandle[F, R]:
+        """Blocks for the decision; raises `GoalRefused`, `Refused` (not a goal at all) or `NoAnswer`.
+
+        An `attached` goal is cancelled by the server when this node disappears, by its end or by the network's.
+        """
+        goal_id = uuid.uuid4().hex
+        handle: GoalHandle[F, R] = GoalHandle(self.action, goal_id, self._bus, self._loop, on_feedback)
+        self._handles[goal_id] = handle
+        try:
+            request = GoalRequest(goal_id=goal_id, client=self._client, goal=_raw(goal), attached=attached)
+            response = self._ask(request, timeout)
+        except (NoAnswer, KeyboardInterrupt):
+            handle.cancel()  # it may have been accepted all the same
+            del self._handles[goal_id]
+            raise
+        except BaseException:
+            del self._handles[goal_id]
+            raise
+        if not response.accepted:
+            del self._handles[goal_id]
+            raise GoalRefused(response.code, response.reason)
+        handle.accepted_at(response.stamp)
+        return handle
+
+    def cancel_all(self, timeout: float = 2.0) -> tuple[str, ...]:
+        """Cancels every goal of the server, whoever sent it; the ids of those that are being cancelled."""
+        return requests.call(self._bus, keys.cancel_request(self.action), CancelRequest(), timeout).canceling
+
+    def tick(self) -> None:
+        """Looks whether the server still lives; a pause of our own does not count against it."""
+        now = time.monotonic()
+        slept = now - self._ticked > 5 * self.TICK
+        self._ticked = now
+        for handle in list(self._handles.values()):
+            if slept:
+                handle.heard()
+            handle.tick(now)
+            if handle.is_over:
+                del self._handles[handle.goal_id]
+
+    def _ask(self, request: GoalRequest, timeout: float) -> Any:
+        end = time.monotonic() + timeout
+        while True:
+            left = end - time.monotonic()
+            try:
+                return requests.call(self._bus, keys.goal_request(self.action), request, max(0.05, min(ATTEMPT, left)))
+            except NoAnswer:
+                if time.monotonic() >= end - 0.05:
+                    raise
+
+    def _on_feedback(self, message: GoalFeedback) -> None:
+        handle = self._handles.get(message.goal_id)
+        if handle is None:
+            return
+        try:
+            handle.on_feedback(decode(self.action.feedback, bytes(message.feedback)))
+        except BadMessage:
+            handle.bad_feedback += 1
+
+    def _on_status(self, message: GoalStatuses) -> None:
+        for handle in list(self._handles.values()):
+            handle.on_status(message)
+
+
+def _raw(message: Message) -> msgspec.Raw:
+    return msgspec.Raw(encode(message))

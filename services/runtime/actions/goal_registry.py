@@ -1,0 +1,101 @@
+"""The goals that an action's server knows, and their results for as long as they are kept."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import msgspec
+
+from schemas.actions import (
+    NOTHING,
+    GoalResponse,
+    GoalStatus,
+    GoalStatusCode,
+    GoalStatuses,
+    ResultRequest,
+    ResultResponse,
+)
+from services.runtime.requests.server import Pending
+
+KEPT = 120.0  # [s] that a result can be asked for after the end
+MOST_KEPT = 256  # goals
+LONGEST_WAIT = 5.0  # [s] that the answer to a result request may be held back
+
+
+@dataclass
+class Goal:
+    """What the server knows of a goal."""
+
+    goal_id: str
+    client: str
+    response: GoalResponse
+    status: GoalStatusCode = GoalStatusCode.ACCEPTED
+    result: msgspec.Raw = field(default_factory=lambda: NOTHING)
+    ended: float = 0.0  # [s] monotonic
+    waiting: list[tuple[float, Pending[ResultResponse]]] = field(default_factory=list)  # until when, who
+
+    def end(self, status: GoalStatusCode, result: msgspec.Raw) -> None:
+        """Keeps the result and answers who waits for it."""
+        self.status, self.result, self.ended = status, result, time.monotonic()
+        for _, pending in self.waiting:
+            pending.reply(ResultResponse(status=status, result=result))
+        self.waiting.clear()
+
+    def answer_overdue(self, now: float) -> None:
+        """Tells those who have waited long enough that it has not ended."""
+        for each in [each for each in self.waiting if now >= each[0]]:
+            self.waiting.remove(each)
+            each[1].reply(ResultResponse(status=self.status))
+
+
+class GoalBook:
+    """Goals by id, oldest first."""
+
+    def __init__(self) -> None:
+        self._goals: dict[str, Goal] = {}
+
+    def __getitem__(self, goal_id: str) -> Goal:
+        return self._goals[goal_id]
+
+    def get(self, goal_id: str) -> Goal | None:
+        return self._goals.get(goal_id)
+
+    def add(self, goal: Goal) -> None:
+        self._goals[goal.goal_id] = goal
+
+    def remove(self, goal_id: str) -> None:
+        del self._goals[goal_id]
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """The goals that have not ended."""
+        return tuple(goal.goal_id for goal in self._goals.values() if not goal.status.is_terminal)
+
+    @property
+    def statuses(self) -> GoalStatuses:
+        """What clients are told of all of them."""
+        goals = tuple(
+            GoalStatus(goal_id=goal.goal_id, client=goal.client, status=goal.status) for goal in self._goals.values()
+        )
+        return GoalStatuses(stamp=time.time_ns(), goals=goals)
+
+    def tidy(self) -> None:
+        """Forgets what was kept long enough, and answers who has waited long enough."""
+        now = time.monotonic()
+        ended = [goal for goal in self._goals.values() if goal.status.is_terminal]
+        for index, goal in enumerate(ended):
+            if now - goal.ended > KEPT or index < len(ended) - MOST_KEPT:
+                self.remove(goal.goal_id)
+        for goal in self._goals.values():
+            goal.answer_overdue(now)
+
+    def answer_result(self, request: ResultRequest, pending: Pending[ResultResponse]) -> None:
+        """At once, or when the goal ends, if the request may be held back."""
+        goal = self._goals.get(request.goal_id)
+        if goal is None:
+            pending.reply(ResultResponse(status=GoalStatusCode.UNKNOWN))
+        elif goal.status.is_terminal or request.wait <= 0.0:
+            pending.reply(ResultResponse(status=goal.status, result=goal.result))
+        else:
+            goal.waiting.append((time.monotonic() + min(request.wait, LONGEST_WAIT), pending))

@@ -1,0 +1,194 @@
+"""The server's side of an action: decisions, feedback, results that are kept, and a heartbeat."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import msgspec
+
+from schemas.actions import (
+    CancelRequest,
+    CancelResponse,
+    GoalFeedback,
+    GoalRequest,
+    GoalResponse,
+    GoalStatusCode,
+    GoalStatuses,
+)
+from schemas.message import BadMessage, Message, decode, encode
+from schemas.topics import Action
+from services.runtime.actions import keys as keys
+from services.runtime.actions.goal_registry import Goal, GoalBook
+from services.runtime.client_watch import ClientWatch
+from services.runtime.errors import Refused
+from services.runtime.requests.server import Pending, RequestServer
+from services.runtime.topics import Complain, Publisher
+
+G = TypeVar("G", bound=Message)
+F = TypeVar("F", bound=Message)
+R = TypeVar("R", bound=Message)
+
+OVERTAKEN = 2.0  # [s] that a goal may come after its own cancel, which overtakes what waits
+MOST_OVERTAKEN = 256  # such cancels that are remembered
+
+
+@dataclass(frozen=True)
+class GoalDecision:
+    """Whether a goal is accepted; if not, the action's own code and a reason that names the thing."""
+
+    accepted: bool
+    code: int = 0
+    reason: str = ""
+
+
+def accept() -> GoalDecision:
+    return GoalDecision(True)
+
+
+def refuse(code: int, reason: str) -> GoalDecision:
+    return GoalDecision(False, code, reason)
+
+
+OnGoal = Callable[[str, G], GoalDecision]
+OnCancel = Callable[[str], str]
+
+
+class ActionServer(Generic[G, F, R]):
+    """Everything here runs in the thread of logic."""
+
+    HEARTBEAT = 0.25  # [s]
+
+    def __init__(
+        self,
+        action: Action[G, F, R],
+        on_goal: OnGoal[G],
+        on_cancel: OnCancel,
+        serve: Callable[[Any, Callable[[Any, Pending[Any]], None]], RequestServer[Any, Any]],
+        publisher: Callable[[Any], Publisher[Any]],
+        clients: ClientWatch,
+        complain: Complain,
+    ) -> None:
+        self.action = action
+        self._on_goal, self._on_cancel = on_goal, on_cancel
+        self._goals, self._clients, self._complain = GoalBook(), clients, complain
+        self._cancelled_early: dict[str, float] = {}  # by goal that has not come yet: [s] monotonic
+        self._feedback: Publisher[GoalFeedback] = publisher(keys.feedback_topic(action))
+        self._status: Publisher[GoalStatuses] = publisher(keys.status_topic(action))
+        self._goal_requests = serve(keys.goal_request(action), self._answer_goal)
+        serve(keys.cancel_request(action), self._answer_cancel)
+        serve(keys.result_request(action), self._goals.answer_result)
+        self.beat()
+
+    def feedback(self, goal_id: str, feedback: F) -> None:
+        """Tells the clients how the goal stands."""
+        self._feedback.put(GoalFeedback(goal_id=goal_id, feedback=msgspec.Raw(encode(feedback))))
+
+    def executing(self, goal_id: str) -> None:
+        """The goal is being carried out."""
+        self._set(self._goals[goal_id], GoalStatusCode.EXECUTING)
+
+    def finish(self, goal_id: str, status: GoalStatusCode, result: R) -> None:
+        """The goal has ended; its result is kept for two minutes. Ending it twice is an error."""
+        if not status.is_terminal:
+            raise ValueError(f"a goal cannot end as {status.name}")
+        goal = self._goals[goal_id]
+        if goal.status.is_terminal:
+            raise ValueError(f"goal {goal_id} has ended already, as {goal.status.name}")
+        goal.end(status, msgspec.Raw(encode(result)))
+        self._clients.forget(goal_id)
+        self._publish_status()
+
+    def refuse_waiting(self, reason: str) -> None:
+        """Refuses the goals that have arrived by now and were not looked at yet."""
+        self._goal_requests.refuse_waiting(reason)
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """The goals that have not ended, oldest first."""
+        return self._goals.active
+
+    def beat(self) -> None:
+        """The server's sign of life; forgets what was kept long enough, and cancels goals whose client is gone."""
+        self._goals.tidy()
+        for goal_id, client in self._clients.take_lost(time.monotonic()):
+            self._cancel_lost(goal_id, client)
+        self._publish_status()
+
+    def _answer_goal(self, request: GoalRequest, pending: Pending[GoalResponse]) -> None:
+        known = self._goals.get(request.goal_id)
+        pending.reply(known.response if known else self._decide(request))
+        self._publish_status()
+
+    def _decide(self, request: GoalRequest) -> GoalResponse:
+        if not request.goal_id:
+            raise Refused(f"{self.action.key}: a goal needs an id", "bad request")
+        try:
+            wanted = decode(self.action.goal, bytes(request.goal))
+        except BadMessage as error:
+            raise Refused(f"{self.action.key}: {error}", "bad request") from error
+        if self._cancelled_early.pop(request.goal_id, None) is not None:
+            reason = "it was cancelled before it was looked at"
+            return GoalResponse(accepted=False, reason=reason, stamp=time.time_ns())
+        goal = Goal(request.goal_id, request.client, GoalResponse(accepted=True, stamp=time.time_ns()))
+        self._goals.add(goal)
+        decision = refuse(0, "the server failed")
+        try:
+            decision = self._on_goal(request.goal_id, wanted)
+        finally:
+            if not decision.accepted:
+                self._goals.remove(request.goal_id)
+        if decision.accepted:
+            if request.attached and not goal.status.is_terminal:
+                self._clients.add(request.goal_id, request.client, time.monotonic())
+            return goal.response
+        return GoalResponse(accepted=False, code=decision.code, reason=decision.reason, stamp=time.time_ns())
+
+    def _answer_cancel(self, request: CancelRequest, pending: Pending[CancelResponse]) -> None:
+        if request.goal_id and request.goal_id not in self.active:
+            pending.reply(CancelResponse(reason=self._cancel_absent(request.goal_id)))
+            return
+        if not request.goal_id:
+            self.refuse_waiting("all goals were cancelled after it was sent: send it again")
+        wanted = (request.goal_id,) if request.goal_id else self.active
+        canceling, reasons = [], [] if wanted else ["no goal is active"]
+        for goal_id in wanted:
+            reason = self._cancel(goal_id)
+            if reason:
+                reasons.append(reason)
+            else:
+                canceling.append(goal_id)
+        pending.reply(CancelResponse(canceling=tuple(canceling), reason="; ".join(reasons)))
+
+    def _cancel_absent(self, goal_id: str) -> str:
+        """Says why `goal_id` is not active; one that is not known may have been overtaken by its own cancel."""
+        known = self._goals.get(goal_id)
+        if known is not None:
+            return f"it has ended as {known.status.name}"
+        now = time.monotonic()
+        self._cancelled_early = {key: at for key, at in self._cancelled_early.items() if now - at < OVERTAKEN}
+        if len(self._cancelled_early) < MOST_OVERTAKEN:
+            self._cancelled_early[goal_id] = now
+        return "no such goal is known here; one of that name that comes within 2 s is refused"
+
+    def _cancel(self, goal_id: str) -> str:
+        """Empty if the goal is being cancelled, else why not."""
+        reason = self._on_cancel(goal_id)
+        if not reason and not self._goals[goal_id].status.is_terminal:
+            self._set(self._goals[goal_id], GoalStatusCode.CANCELING)
+        return reason
+
+    def _cancel_lost(self, goal_id: str, client: str) -> None:
+        """Nobody watches an attached goal any more."""
+        reason = self._cancel(goal_id)
+        self._complain(f"goal {goal_id}: its client {client} is gone, so it is {reason or 'cancelled'}")
+
+    def _set(self, goal: Goal, status: GoalStatusCode) -> None:
+        if not goal.status.is_terminal and goal.status is not status:
+            goal.status = status
+            self._publish_status()
+
+    def _publish_status(self) -> None:
+        self._status.put(self._goals.statuses)

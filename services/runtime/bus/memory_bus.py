@@ -1,0 +1,116 @@
+"""A bus within one process, for tests: the same promises as Zenoh's, without a router."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from schemas.topics import Delivery
+from services.runtime.bus.interface import Answer, Arrival, Declaration, Query
+from services.runtime.bus.memory_network import (
+    MemoryNetwork,
+    MemoryPublication,
+    MemoryQuery,
+    MemoryService,
+    MemorySubscription,
+    MemoryToken,
+    MemoryWatch,
+)
+
+__all__ = ["MemoryBus", "MemoryNetwork"]
+
+
+class MemoryBus:
+    """One node's connection to a `MemoryNetwork`."""
+
+    def __init__(self, network: MemoryNetwork) -> None:
+        self.network = network
+        self._declared: list[Declaration] = []
+
+    @property
+    def is_connected(self) -> bool:
+        return self.network.is_connected
+
+    def require_way_back(self) -> None:
+        pass
+
+    def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> MemoryPublication:
+        publication = MemoryPublication(self, key, schema, delivery, writer)
+        with self.network.lock:
+            self.network.publications.add(publication)
+        self._declared.append(publication)
+        return publication
+
+    def subscribe(
+        self,
+        key: str,
+        delivery: Delivery,
+        on_arrival: Callable[[Arrival], None],
+        on_miss: Callable[[int], None],
+        own: bool = False,
+    ) -> MemorySubscription:
+        subscription = MemorySubscription(self, key, on_arrival, own)
+        with self.network.lock:
+            self.network.subscriptions[key].add(subscription)
+            for publication in self.network.publications if delivery is Delivery.LATCHED else ():
+                if publication.key == key and publication.last and (own or publication.bus is not self):
+                    on_arrival(publication.last)
+        self._declared.append(subscription)
+        return subscription
+
+    def serve(self, key: str, on_query: Callable[[Query], None]) -> MemoryService:
+        service = MemoryService(self, key, on_query)
+        with self.network.served:
+            self.network.services[key] = service
+            self.network.served.notify_all()
+        self._declared.append(service)
+        return service
+
+    def wait_served(self, key: str, timeout: float) -> bool:
+        with self.network.served:
+            return self.network.served.wait_for(lambda: key in self.network.services and self.is_connected, timeout)
+
+    def ask(
+        self,
+        key: str,
+        schema: str,
+        payload: bytes,
+        timeout: float,
+        on_answer: Callable[[Answer | None], None],
+        urgent: bool = False,
+    ) -> None:
+        with self.network.lock:
+            service = self.network.services.get(key) if self.is_connected else None
+        if service is None:
+            on_answer(None)
+        else:
+            service.on_query(MemoryQuery(Arrival(key, schema, payload), f"{id(self):x}", timeout, on_answer))
+
+    def declare_alive(self, key: str) -> MemoryToken:
+        with self.network.lock:
+            self.network.count_token(key, 1)
+        token = MemoryToken(self, key)
+        self._declared.append(token)
+        return token
+
+    def watch_alive(self, key: str, on_change: Callable[[bool], None]) -> MemoryWatch:
+        watch = MemoryWatch(self, key, on_change)
+        with self.network.lock:
+            self.network.watches.add(watch)
+            if self.network.tokens[key] > 0:
+                on_change(True)
+        self._declared.append(watch)
+        return watch
+
+    def alive(self, pattern: str) -> set[str]:
+        with self.network.lock:
+            return {key for key, count in self.network.tokens.items() if count > 0 and _matches(pattern, key)}
+
+    def close(self) -> None:
+        for each in self._declared:
+            each.close()
+        self._declared.clear()
+
+
+def _matches(pattern: str, key: str) -> bool:
+    wanted, chunks = pattern.split("/"), key.split("/")
+    return len(wanted) == len(chunks) and all(want in ("*", chunk) for want, chunk in zip(wanted, chunks, strict=True))

@@ -1,0 +1,172 @@
+"""What the in-memory buses of one robot share: who hears, writes, answers and lives.
+
+`MemoryNetwork.is_connected = False` is a router that is away: LATEST is lost, EVERY and LATCHED
+wait, requests find nobody.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from schemas.topics import Delivery
+from services.runtime.bus.interface import Answer, Arrival, Query
+
+if TYPE_CHECKING:
+    from services.runtime.bus.memory_bus import MemoryBus
+
+KEPT = 1024  # messages that wait for the network to come back, as in Zenoh's publishers' cache
+
+
+@dataclass(eq=False)
+class MemorySubscription:
+    """One reader of one key."""
+
+    bus: MemoryBus
+    key: str
+    on_arrival: Callable[[Arrival], None]
+    own: bool
+
+    def close(self) -> None:
+        with self.bus.network.lock:
+            self.bus.network.subscriptions[self.key].discard(self)
+
+
+@dataclass(eq=False)
+class MemoryPublication:
+    """One writer of one key, with what it keeps for late joiners."""
+
+    bus: MemoryBus
+    key: str
+    schema: str
+    delivery: Delivery
+    writer: str = ""
+    last: Arrival | None = None
+    unsent: deque[Arrival] = field(default_factory=lambda: deque(maxlen=KEPT))
+
+    def put(self, payload: bytes) -> None:
+        arrival = Arrival(self.key, self.schema, payload, self.writer)
+        network = self.bus.network
+        with network.lock:
+            if self.delivery is Delivery.LATCHED:
+                self.last = arrival
+            if network.is_connected:
+                self.send(arrival)
+            elif self.delivery is not Delivery.LATEST:
+                self.unsent.append(arrival)
+
+    def send(self, arrival: Arrival) -> None:
+        for reader in list(self.bus.network.subscriptions[self.key]):
+            if reader.own or reader.bus is not self.bus:
+                reader.on_arrival(arrival)
+
+    def close(self) -> None:
+        with self.bus.network.lock:
+            self.bus.network.publications.discard(self)
+
+
+@dataclass(eq=False)
+class MemoryService:
+    """Who answers the requests of one key."""
+
+    bus: MemoryBus
+    key: str
+    on_query: Callable[[Query], None]
+
+    def close(self) -> None:
+        network = self.bus.network
+        with network.lock:
+            if network.services.get(self.key) is self:
+                del network.services[self.key]
+
+
+@dataclass(eq=False)
+class MemoryToken:
+    """A sign of life."""
+
+    bus: MemoryBus
+    key: str
+    is_open: bool = True
+
+    def close(self) -> None:
+        with self.bus.network.lock:
+            if self.is_open:
+                self.is_open = False
+                self.bus.network.count_token(self.key, -1)
+
+
+@dataclass(eq=False)
+class MemoryWatch:
+    """Who wants to know whether a token is there."""
+
+    bus: MemoryBus
+    key: str
+    on_change: Callable[[bool], None]
+
+    def close(self) -> None:
+        with self.bus.network.lock:
+            self.bus.network.watches.discard(self)
+
+
+class MemoryQuery:
+    """A request on its way; the first answer counts, and after the time-out none does."""
+
+    def __init__(
+        self, arrival: Arrival, client: str, timeout: float, on_answer: Callable[[Answer | None], None]
+    ) -> None:
+        self.arrival, self.client = arrival, client
+        self._on_answer = on_answer
+        self._lock = threading.Lock()
+        self._is_open = True
+        self._timer = threading.Timer(timeout, self._finish, (None,))
+        self._timer.daemon = True
+        self._timer.start()
+
+    def reply(self, schema: str, payload: bytes) -> None:
+        self._finish(Answer(True, schema, payload))
+
+    def fail(self, schema: str, payload: bytes) -> None:
+        self._finish(Answer(False, schema, payload))
+
+    def _finish(self, answer: Answer | None) -> None:
+        with self._lock:
+            was_open, self._is_open = self._is_open, False
+        self._timer.cancel()
+        if was_open:
+            self._on_answer(answer)
+
+
+class MemoryNetwork:
+    """What the buses of one robot share."""
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self.served = threading.Condition(self.lock)
+        self.subscriptions: defaultdict[str, set[MemorySubscription]] = defaultdict(set)
+        self.publications: set[MemoryPublication] = set()
+        self.services: dict[str, MemoryService] = {}
+        self.tokens: Counter[str] = Counter()
+        self.watches: set[MemoryWatch] = set()
+        self._is_connected = True
+
+    def count_token(self, key: str, change: int) -> None:
+        """One more (1) or one less (-1) of the tokens `key`; tells who watches it. Call with the lock."""
+        was, self.tokens[key] = self.tokens[key] > 0, self.tokens[key] + change
+        if was != (self.tokens[key] > 0):
+            for watch in [each for each in self.watches if each.key == key]:
+                watch.on_change(not was)
+
+    @property
+    def is_connected(self) -> bool:
+        return self._is_connected
+
+    @is_connected.setter
+    def is_connected(self, value: bool) -> None:
+        with self.lock:
+            self._is_connected = value
+            for publication in self.publications if value else ():
+                while publication.unsent:
+                    publication.send(publication.unsent.popleft())

@@ -1,0 +1,200 @@
+"""The bus over Zenoh: a client session of the router, with the robot's name as its namespace.
+
+EVERY and LATCHED use Zenoh's advanced publishers and subscribers: sequence numbers, a cache at the
+writer, and recovery by the reader, so that a router that restarts costs nothing.
+"""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Callable
+
+import zenoh
+import zenoh.ext as zx
+from zenoh.handlers import Callback
+
+from schemas.topics import Delivery
+from services.runtime.bus.interface import Answer, Arrival, Query
+from services.runtime.bus.zenoh_config import client_config
+from services.runtime.bus.zenoh_declarations import (
+    Presence,
+    ZenohDeclaration,
+    ZenohPublication,
+    ZenohQuery,
+    close_with_the_program,
+    encoding_of,
+    forget,
+    is_timeout,
+    schema_in,
+    writer_in,
+)
+from services.runtime.errors import BusError
+
+CACHE = 1024  # messages of an EVERY key that survive while the router is away
+HEARTBEAT = 0.5  # [s] after which a reader notices that it misses the last message
+CLOSE_TIMEOUT = 1.0  # [s]
+ASTRAY_PATIENCE = 10.0  # [s] that a session may take to come back to a router that listens
+
+
+class BusNotOpen(BusError):
+    """The router did not take the session."""
+
+
+class ZenohBus:
+    """One node's session."""
+
+    def __init__(self, host: str, port: int, robot: str) -> None:
+        """Raises `BusNotOpen` where the router does not take the session."""
+        try:
+            self._session = zenoh.open(client_config(host, port, robot))
+        except zenoh.ZError as error:
+            raise BusNotOpen(str(error)) from error
+        self._router = (host, port)
+        self._name = str(self._session.zid()).encode()
+        self._astray_since: float | None = None  # [s] monotonic
+        self._tokens: list[ZenohDeclaration] = []
+        self._presence: dict[str, Presence] = {}
+        self._lock = threading.Lock()
+        close_with_the_program(self)
+
+    @property
+    def is_connected(self) -> bool:
+        return bool(self._session.info.routers_zid())
+
+    def require_way_back(self) -> None:
+        if self.is_connected or not router_answers(*self._router, timeout=0.1):
+            self._astray_since = None
+            return
+        self._astray_since = self._astray_since or time.monotonic()
+        if time.monotonic() - self._astray_since > ASTRAY_PATIENCE:
+            raise BusError(f"the router is there, but did not take this session back within {ASTRAY_PATIENCE:g} s")
+
+    def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> ZenohPublication:
+        encoding = encoding_of(schema)
+        if delivery is Delivery.LATEST:
+            drop = zenoh.CongestionControl.DROP
+            plain = self._session.declare_publisher(key, encoding=encoding, congestion_control=drop)
+            return ZenohPublication(plain, writer)
+        latched = delivery is Delivery.LATCHED
+        publisher = zx.declare_advanced_publisher(
+            self._session,
+            key,
+            encoding=encoding,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            reliability=zenoh.Reliability.RELIABLE,
+            cache=zx.CacheConfig(max_samples=1 if latched else CACHE),
+            sample_miss_detection=zx.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None),
+            publisher_detection=latched,
+        )
+        return ZenohPublication(publisher, writer)
+
+    def subscribe(
+        self,
+        key: str,
+        delivery: Delivery,
+        on_arrival: Callable[[Arrival], None],
+        on_miss: Callable[[int], None],
+        own: bool = False,
+    ) -> ZenohDeclaration:
+        def on_sample(sample: zenoh.Sample) -> None:
+            on_arrival(Arrival(key, schema_in(sample.encoding), bytes(sample.payload), writer_in(sample)))
+
+        origin = zenoh.Locality.ANY if own else zenoh.Locality.REMOTE
+        if delivery is Delivery.LATEST:
+            return ZenohDeclaration(self._session.declare_subscriber(key, on_sample, allowed_origin=origin))
+        latched = delivery is Delivery.LATCHED
+        joined = self._session.new_timestamp()
+
+        def on_news(sample: zenoh.Sample) -> None:
+            # Recovery would hand a late joiner the writer's whole cache, which was never meant for it.
+            if sample.timestamp is None or sample.timestamp >= joined:
+                on_sample(sample)
+
+        subscriber = zx.declare_advanced_subscriber(
+            self._session,
+            key,
+            on_sample if latched else on_news,
+            allowed_origin=origin,
+            history=zx.HistoryConfig(detect_late_publishers=True, max_samples=1) if latched else None,
+            recovery=zx.RecoveryConfig(periodic_queries=None, heartbeat=True),
+        )
+        misses = subscriber.sample_miss_listener(lambda miss: on_miss(0 if latched else miss.nb))
+        return ZenohDeclaration(misses, subscriber)
+
+    def serve(self, key: str, on_query: Callable[[Query], None]) -> ZenohDeclaration:
+        return ZenohDeclaration(
+            self._session.declare_queryable(key, lambda query: on_query(ZenohQuery(query, key)), complete=True)
+        )
+
+    def wait_served(self, key: str, timeout: float) -> bool:
+        with self._lock:
+            presence = self._presence.get(key)
+            if presence is None:
+                presence = self._presence[key] = Presence(self._session, key)
+        return presence.wait(timeout)
+
+    def ask(
+        self,
+        key: str,
+        schema: str,
+        payload: bytes,
+        timeout: float,
+        on_answer: Callable[[Answer | None], None],
+        urgent: bool = False,
+    ) -> None:
+        answers: list[Answer] = []
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            sample, error = reply.ok, reply.err
+            if sample is not None:
+                answers.append(Answer(True, schema_in(sample.encoding), bytes(sample.payload)))
+            elif error is not None and not is_timeout(error):
+                answers.append(Answer(False, schema_in(error.encoding), bytes(error.payload)))
+
+        def on_end() -> None:
+            on_answer(answers[0] if answers else None)
+
+        self._session.get(
+            key,
+            Callback(on_reply, on_end),
+            payload=payload,
+            encoding=encoding_of(schema),
+            timeout=timeout,
+            target=zenoh.QueryTarget.BEST_MATCHING,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            priority=zenoh.Priority.REAL_TIME if urgent else zenoh.Priority.DATA,
+            express=urgent,
+            attachment=self._name,
+        )
+
+    def declare_alive(self, key: str) -> ZenohDeclaration:
+        token = ZenohDeclaration(self._session.liveliness().declare_token(key))
+        self._tokens.append(token)  # one that nobody holds would be undeclared
+        return token
+
+    def watch_alive(self, key: str, on_change: Callable[[bool], None]) -> ZenohDeclaration:
+        def on_sample(sample: zenoh.Sample) -> None:
+            on_change(sample.kind == zenoh.SampleKind.PUT)
+
+        return ZenohDeclaration(self._session.liveliness().declare_subscriber(key, on_sample, history=True))
+
+    def alive(self, pattern: str) -> set[str]:
+        replies = self._session.liveliness().get(pattern, timeout=1.0)
+        return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
+
+    def close(self) -> None:
+        forget(self)
+        closing = threading.Thread(target=self._session.close, daemon=True, name="close")
+        closing.start()
+        closing.join(CLOSE_TIMEOUT)
+
+
+def router_answers(host: str, port: int, timeout: float = 0.5) -> bool:
+    """Whether something listens at the router's address."""
+    try:
+        socket.create_connection((host, port), timeout=timeout).close()
+    except OSError:
+        return False
+    return True

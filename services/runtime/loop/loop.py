@@ -1,0 +1,159 @@
+"""The thread of logic: steps at their deadlines, what is due now and then, and between them the inbox.
+
+The deadline is looked at before every message, so a flood cannot starve the step; at least one
+message is handled after every step, so a slow step cannot starve the inbox.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from services.runtime.loop.task_queue import Inbox, Task
+from services.runtime.process.shutdown import StopRequest
+
+
+@dataclass
+class LoopFigures:
+    """What a loop did since the last report."""
+
+    steps: int = 0
+    late_max: float = 0.0  # [s]
+
+
+class Schedule:
+    """Deadlines at `start + k / rate`; those that a long step slept through are left out."""
+
+    def __init__(self, rate: float, start: float) -> None:
+        if not rate > 0.0:
+            raise ValueError(f"rate {rate} Hz: it must be above 0")
+        self._start, self._rate, self._count = start, rate, 0
+        self.figures = LoopFigures()
+
+    @property
+    def deadline(self) -> float:
+        """[s] of the next step, on the clock of `start`."""
+        return self._start + self._count / self._rate
+
+    def begin(self, now: float) -> None:
+        """Notes how late the step that begins at `now` is."""
+        self.figures.steps += 1
+        self.figures.late_max = max(self.figures.late_max, now - self.deadline)
+
+    def end(self, now: float) -> None:
+        """Moves on to the first deadline after `now`."""
+        self._count = max(self._count + 1, int((now - self._start) * self._rate) + 1)
+
+    def take_figures(self) -> LoopFigures:
+        """The figures since the last call."""
+        figures, self.figures = self.figures, LoopFigures()
+        return figures
+
+
+FOR_EVER = 3600.0  # [s] how long to wait at most where nothing is due
+TICK = 0.05  # [s] between two looks of `wait_for`
+
+
+@dataclass
+class Chore:
+    """Something that is due every `period` [s]."""
+
+    period: float
+    task: Task
+    due: float = 0.0  # [s] monotonic
+
+
+class Loop:
+    """Runs in one thread at a time."""
+
+    def __init__(self, stop: StopRequest) -> None:
+        self.inbox = Inbox()
+        self._chores: list[Chore] = []
+        self._thread: int | None = None
+        self._schedule: Schedule | None = None
+        self.stop = stop
+        stop.on_set(self.inbox.wake)
+
+    def every(self, period: float, task: Task) -> None:
+        """`task` runs every `period` [s] while the loop does."""
+        self._chores = [*self._chores, Chore(period, task)]  # not in place: a chore may add one
+
+    def forget(self, task: Task) -> None:
+        """Ends an `every`."""
+        self._chores = [each for each in self._chores if each.task != task]
+
+    def take_figures(self) -> LoopFigures:
+        """What `spin` did since the last call."""
+        return self._schedule.take_figures() if self._schedule else LoopFigures()
+
+    def spin(self, step: Callable[[int], object], rate: float) -> None:
+        """Calls `step(now [ns UNIX])` at `rate` [Hz] until asked to stop."""
+        with self._in_this_thread():
+            schedule = self._schedule = Schedule(rate, time.monotonic())
+            while not self.stop.is_set:
+                now = time.monotonic()
+                if now >= schedule.deadline:
+                    schedule.begin(now)
+                    step(time.time_ns())
+                    schedule.end(time.monotonic())
+                    self._turn(now, now)
+                else:
+                    self._turn(now, schedule.deadline)
+
+    def wait(self, seconds: float) -> None:
+        """Handles the inbox for so long, or until asked to stop."""
+        self.wait_for(lambda: False, seconds)
+
+    def wait_for(self, is_done: Callable[[], bool], timeout: float, on_tick: Task | None = None) -> bool:
+        """Handles the inbox until `is_done()`; False after `timeout` [s]. `on_tick` is called 20 times a second.
+
+        While another thread runs the loop, this one only looks on.
+        """
+        end = time.monotonic() + timeout
+        if self._thread is not None and self._thread != threading.get_ident():
+            return self._look_on(is_done, end, on_tick)
+        with self._in_this_thread():
+            tick = time.monotonic()
+            while not is_done():
+                now = time.monotonic()
+                if self.stop.is_set or now >= end:
+                    return False
+                if on_tick is not None and now >= tick:
+                    tick = now + TICK
+                    on_tick()
+                self._turn(now, min(end, tick) if on_tick is not None else end)
+        return True
+
+    def _look_on(self, is_done: Callable[[], bool], end: float, on_tick: Task | None) -> bool:
+        while not is_done():
+            if self.stop.is_set or time.monotonic() >= end:
+                return False
+            if on_tick is not None:
+                on_tick()
+            time.sleep(TICK / 5)
+        return True
+
+    def _turn(self, now: float, until: float) -> None:
+        """What is due, then one message, waiting for it until `until`."""
+        due = now + FOR_EVER
+        for chore in self._chores:
+            if now >= chore.due:
+                chore.due = now + chore.period
+                chore.task()
+            due = min(due, chore.due)
+        task = self.inbox.take(min(until, due) - now)
+        if task is not None:
+            task()
+
+    @contextmanager
+    def _in_this_thread(self) -> Iterator[None]:
+        if self._thread is not None:
+            raise RuntimeError("the loop runs already: spin and wait cannot be called from a callback")
+        self._thread = threading.get_ident()
+        try:
+            yield
+        finally:
+            self._thread = None

@@ -1,0 +1,155 @@
+"""The one inbox of a node: threads of the bus put in, the thread of logic takes out.
+
+What waits here is bounded: a LATEST box holds one message, an EVERY box a fixed number, and every
+message that does not fit is counted.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from queue import Empty, SimpleQueue
+from typing import Protocol
+
+from services.runtime.bus.interface import Arrival
+
+EVERY_CAPACITY = 4096  # messages
+EVERY_BYTES = 64 * 1024 * 1024
+
+Task = Callable[[], None]
+
+
+class Inbox:
+    """A queue of things to do in the thread of logic, and a short one that goes before it."""
+
+    def __init__(self) -> None:
+        self._tasks: SimpleQueue[Task] = SimpleQueue()
+        self._urgent: deque[Task] = deque()
+
+    def put(self, task: Task) -> None:
+        self._tasks.put(task)
+
+    def put_first(self, task: Task) -> None:
+        """`task` is taken before all that `put` has brought."""
+        self._urgent.append(task)
+        self.wake()
+
+    def wake(self) -> None:
+        """Lets `take` return; safe in a signal handler."""
+        self._tasks.put(_nothing)
+
+    def take(self, timeout: float) -> Task | None:
+        """The next task, or None after `timeout` [s]."""
+        if self._urgent:
+            return self._urgent.popleft()
+        try:
+            return self._tasks.get(timeout=timeout) if timeout > 0.0 else self._tasks.get_nowait()
+        except Empty:
+            return None
+
+
+class Box(Protocol):
+    """Where the arrivals of one key wait."""
+
+    dropped: int
+
+    def on_arrival(self, arrival: Arrival) -> None: ...
+
+    def on_miss(self, count: int) -> None: ...
+
+
+class LatestBox:
+    """Room for one arrival: a newer one replaces it."""
+
+    def __init__(self, inbox: Inbox, handle: Callable[[Arrival], None]) -> None:
+        self._inbox, self._handle = inbox, handle
+        self._lock = threading.Lock()
+        self._waiting: Arrival | None = None
+        self.dropped = 0
+
+    def on_arrival(self, arrival: Arrival) -> None:
+        with self._lock:
+            replaces = self._waiting is not None
+            self._waiting = arrival
+            self.dropped += replaces
+        if not replaces:
+            self._inbox.put(self._deliver)
+
+    def on_miss(self, count: int) -> None:
+        self.dropped += count
+
+    def _deliver(self) -> None:
+        with self._lock:
+            arrival, self._waiting = self._waiting, None
+        if arrival is not None:
+            self._handle(arrival)
+
+
+class EveryBox:
+    """Room for many arrivals in order: one that does not fit is lost, and counted.
+
+    Each has a task of its own in the inbox; without one they wait to be handled together, and wake nobody.
+    """
+
+    def __init__(self, inbox: Inbox | None, handle: Callable[[Arrival], None]) -> None:
+        self._inbox, self._handle = inbox, handle
+        self._lock = threading.Lock()
+        self._waiting: deque[Arrival] = deque()
+        self._bytes = 0
+        self.dropped = 0
+
+    def on_arrival(self, arrival: Arrival) -> None:
+        with self._lock:
+            size = len(arrival.payload)
+            if len(self._waiting) >= EVERY_CAPACITY or self._bytes + size > EVERY_BYTES:
+                self.dropped += 1
+                return
+            self._waiting.append(arrival)
+            self._bytes += size
+        if self._inbox is not None:
+            self._inbox.put(self._deliver)
+
+    def on_miss(self, count: int) -> None:
+        with self._lock:
+            self.dropped += count
+
+    def deliver_all(self) -> None:
+        """Handles all that wait, in order."""
+        with self._lock:
+            waiting, self._waiting = self._waiting, deque()
+            self._bytes = 0
+        for arrival in waiting:
+            self._handle(arrival)
+
+    def _deliver(self) -> None:
+        with self._lock:
+            arrival = self._waiting.popleft()
+            self._bytes -= len(arrival.payload)
+        self._handle(arrival)
+
+
+def _nothing() -> None:
+    pass
+
+
+class Worker:
+    """Does tasks in order, in a thread that starts with the first."""
+
+    def __init__(self) -> None:
+        self._tasks: SimpleQueue[Task | None] = SimpleQueue()
+        self._thread: threading.Thread | None = None
+
+    def put(self, task: Task) -> None:
+        self._tasks.put(task)
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, daemon=True, name="worker")
+            self._thread.start()
+
+    def close(self) -> None:
+        """Ends after the present task; does not wait for it."""
+        self._tasks.put(None)
+
+    def _run(self) -> None:
+        while (task := self._tasks.get()) is not None:
+            task()

@@ -1,0 +1,1 @@
+"""What a process needs beside its node: logs, readiness, ports, shutdown."""

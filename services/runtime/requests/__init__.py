@@ -1,0 +1,1 @@
+"""Requests: client and server."""

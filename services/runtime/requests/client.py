@@ -1,0 +1,86 @@
+"""Requests as their client sees them: a question with one answer."""
+
+from __future__ import annotations
+
+from queue import Empty, SimpleQueue
+from typing import Generic, TypeVar
+
+from schemas.message import BadMessage, Message
+from schemas.system import Failure
+from schemas.topics import Request
+from services.runtime.bus.interface import Answer, Arrival, Bus
+from services.runtime.bus.wire import from_arrival, schema_of, to_payload
+from services.runtime.errors import NoAnswer, Refused
+from services.runtime.loop.task_queue import Task
+
+Q = TypeVar("Q", bound=Message)
+R = TypeVar("R", bound=Message)
+
+PRESENCE_PATIENCE = 1.0  # [s] that a client waits for a server to appear
+
+
+class Asked(Generic[Q, R]):
+    """A question that was sent, and its answer when it comes."""
+
+    def __init__(self, bus: Bus, request: Request[Q, R], question: Q, timeout: float, wake: Task) -> None:
+        """`wake` is called when it comes, from another thread; raises `NoAnswer` where nobody serves the request."""
+        self._bus, self._request, self._wake = bus, request, wake
+        self._patience = timeout
+        self._answers: SimpleQueue[Answer | None] = SimpleQueue()
+        payload = to_payload(question)
+        if not bus.wait_served(request.key, min(timeout, PRESENCE_PATIENCE)):
+            raise NoAnswer(_nobody(bus, request))
+        bus.ask(request.key, schema_of(request.request), payload, timeout, self._on_answer, request.urgent)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether `response` would not block."""
+        return not self._answers.empty()
+
+    def response(self) -> R:
+        """Blocks up to the time-out; raises `Refused` or `NoAnswer`."""
+        try:
+            answer = self._answers.get(timeout=self._patience + 1.0)
+        except Empty:
+            answer = None
+        if answer is None:
+            raise NoAnswer(_silent(self._bus, self._request, self._patience))
+        return response_in(self._request, answer)
+
+    def _on_answer(self, answer: Answer | None) -> None:
+        self._answers.put(answer)
+        self._wake()
+
+
+def call(bus: Bus, request: Request[Q, R], question: Q, timeout: float) -> R:
+    """The answer; blocks up to `timeout` [s]. Raises `Refused` or `NoAnswer`."""
+    return Asked(bus, request, question, timeout, wake=lambda: None).response()
+
+
+def response_in(request: Request[Q, R], answer: Answer) -> R:
+    """The response in `answer`; raises `Refused` for a failure, `NoAnswer` where it cannot be read."""
+    try:
+        arrival = Arrival(request.key, answer.schema, answer.payload)
+        if answer.ok:
+            return from_arrival(request.response, arrival)
+        failure = from_arrival(Failure, arrival)
+    except BadMessage as error:
+        raise NoAnswer(f"the answer of {request.server} to {request.key} cannot be read: {error}") from error
+    raise Refused(failure.message, failure.kind)
+
+
+def _silent(bus: Bus, request: Request[Q, R], timeout: float) -> str:
+    """Who is known to serve may be forgotten a moment after the router has gone: so its absence is looked for first."""
+    if not bus.is_connected:
+        return _away(request)
+    return f"{request.server} did not answer {request.key} within {timeout:g} s: is it busy, or gone?"
+
+
+def _away(request: Request[Q, R]) -> str:
+    return f"{request.key}: the router is away; start it with `make up`"
+
+
+def _nobody(bus: Bus, request: Request[Q, R]) -> str:
+    if not bus.is_connected:
+        return _away(request)
+    return f"nobody serves {request.key}: is {request.server} running? `gemelo node list` shows who is"

@@ -1,0 +1,1 @@
+"""The content of the view: typed updates for entities, without Rerun."""

@@ -1,0 +1,53 @@
+"""What has been said since the last batch: log records, events of the device, and shafts that leave their counters."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.device import DeviceEvent
+from schemas.system import LogRecord
+from services.visualizer.content import entities
+from services.visualizer.content.thinning import LAST_STAMP
+from services.visualizer.content.updates import LogLines, Update
+
+EVENT_LEVELS = {"fault": "ERROR", "estop": "ERROR", "homing_stopped": "WARNING", "press_refused": "WARNING"}
+
+
+class Journal:
+    """Lines with their time and level, until they are taken."""
+
+    def __init__(self) -> None:
+        self._lines: list[tuple[int, str, str]] = []  # [ns], text, level
+
+    def add(self, stamp: int, text: str, level: str = "INFO") -> None:
+        """`stamp` in ns UNIX; `level` as in `LogLevel`'s names."""
+        self._lines.append((bounded(stamp), text, level))
+
+    def on_log(self, message: LogRecord) -> None:
+        """A line of a node."""
+        self.add(message.stamp, f"{message.node}: {message.text}", message.level.name)
+
+    def on_event(self, message: DeviceEvent) -> None:
+        """Something that the device reports once."""
+        text = f"{message.device}: {message.event}" + (f" ({message.detail})" if message.detail else "")
+        self.add(message.stamp, text, EVENT_LEVELS.get(message.event, "INFO"))
+
+    def take(self, latest: int = LAST_STAMP) -> list[Update]:
+        """The lines since the last call; one of after `latest` [ns] is of then."""
+        lines, self._lines = self._lines, []
+        if not lines:
+            return []
+        stamps, said, levels = zip(*((min(stamp, latest), *line) for stamp, *line in lines), strict=True)
+        texts = tuple(f"{time_of_day(stamp)} {text}" for stamp, text in zip(stamps, said, strict=True))
+        return [LogLines(entities.LOG, np.array(stamps, dtype=np.int64), texts, levels)]
+
+
+def time_of_day(stamp: int) -> str:
+    """UTC to the second, of ns UNIX."""
+    minutes, seconds = divmod(stamp // 1_000_000_000 % 86_400, 60)
+    return f"{minutes // 60:02d}:{minutes % 60:02d}:{seconds:02d}"
+
+
+def bounded(stamp: int) -> int:
+    """`stamp` as a time column can hold it."""
+    return min(max(stamp, 0), LAST_STAMP)

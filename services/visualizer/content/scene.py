@@ -1,0 +1,172 @@
+"""The planning scene as it is drawn: objects, what is carried, and in red what touches where a plan was refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.message import Vector
+from schemas.scene import (
+    BoxShape,
+    Contacts,
+    CylinderShape,
+    MeshShape,
+    PlaneShape,
+    PlanningScene,
+    SceneObject,
+    SphereShape,
+)
+from services.visualizer.content import entities, palette
+from services.visualizer.content.arm_poses import arm_at
+from services.visualizer.content.event_log import bounded
+from services.visualizer.content.updates import Gone, Labels, Shadow, Thing, Update
+from services.visualizer.model.triangle_meshes import Mesh, mesh_of
+from services.visualizer.model.visual_model import Model, Shape
+
+PLANE = Shape("box", (2.0, 2.0, 0.004))  # [m] as much of a plane as is drawn
+Loader = Callable[[MeshShape], Mesh | None]
+
+
+def no_mesh(shape: MeshShape) -> None:
+    """For a view that has no files."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One object where and how it was shown last."""
+
+    item: SceneObject
+    entity: str
+    color: palette.Rgba
+
+
+class SceneView:
+    """The newest scene and contacts, told anew only where they changed; `load` reads mesh files, or gives None."""
+
+    def __init__(self, model: Model, load: Loader) -> None:
+        self._model, self._load = model, load
+        self._scene, self._contacts = PlanningScene(), Contacts()
+        self._drawn: dict[str, Drawn] = {}
+        self._meshes: dict[MeshShape, Mesh | None] = {}
+        self._is_new = False
+
+    def on_scene(self, message: PlanningScene) -> None:
+        """What stands around the arm and what it carries."""
+        self._scene, self._is_new = message, True
+
+    def on_contacts(self, message: Contacts) -> None:
+        """What touches in the configuration that was refused last."""
+        self._contacts, self._is_new = message, True
+
+    def on_motion(self) -> None:
+        """The real arm goes: a configuration that was refused is of the past."""
+        if self._contacts.contacts:
+            self._contacts, self._is_new = Contacts(), True
+
+    def restart(self) -> None:
+        """Say everything again: the viewer is a new one."""
+        self._drawn, self._is_new = {}, True
+
+    def take(self, now: int) -> list[Update]:
+        """What has changed since; `now` in ns UNIX."""
+        if not self._is_new:
+            return []
+        self._is_new = False
+        now = bounded(now)
+        wanted = {item.name: self._wanted(item) for item in self._scene.objects if self._has_place(item)}
+        updates: list[Update] = []
+        for name, old in self._drawn.items():
+            if name not in wanted or wanted[name].entity != old.entity:
+                updates.append(Gone(old.entity, now))
+        for name, new in wanted.items():
+            if self._drawn.get(name) != new:
+                updates += self._thing(new.item, new.entity, new.color, now)
+        self._drawn = wanted
+        return [*updates, *self._refused(now)]
+
+    def _has_place(self, item: SceneObject) -> bool:
+        return not item.attached or item.frame in self._model.paths
+
+    def _wanted(self, item: SceneObject) -> Drawn:
+        root = entities.carried(entities.MEASURED, self._model.paths[item.frame]) if item.attached else entities.SCENE
+        color = palette.CARRIED if item.attached else palette.OBJECT
+        # A carried object touches in the refused configuration, where the shadow shows it; here it is where the arm is.
+        is_red = item.name in self._touching() and not item.attached
+        return Drawn(item, f"{root}/{entities.part(item.name)}", palette.TOUCHING if is_red else color)
+
+    def _touching(self) -> frozenset[str]:
+        return frozenset(name for contact in self._contacts.contacts for name in (contact.first, contact.second))
+
+    def _thing(self, item: SceneObject, entity: str, color: palette.Rgba, now: int) -> list[Update]:
+        mesh = self._mesh(item)
+        if mesh is None or len(item.pose.translation) != 3 or len(item.pose.rotation) != 4:
+            return []
+        return [Thing(entity, now, mesh, item.pose.translation, item.pose.rotation, color)]
+
+    def _refused(self, now: int) -> list[Update]:
+        """The arm in the refused configuration, with what touches in red and named; nothing once nothing does."""
+        # A nanosecond before: Rerun forgets a pose that is told at the very time of a clearing, told later or not.
+        updates: list[Update] = [Gone(entities.REFUSED, now - 1)]
+        configuration = dict(zip(self._contacts.name, self._contacts.position, strict=False))
+        names = [joint.name for joint in self._model.moving]
+        if not self._contacts.contacts or any(name not in configuration for name in names):
+            return updates
+        touching = self._touching()
+        updates.append(Shadow(entities.REFUSED, now, touching, palette.SHADOW))
+        updates += arm_at(self._model, entities.REFUSED, now, np.array([configuration[name] for name in names]))
+        updates += self.carried(entities.REFUSED, palette.SHADOW, now)
+        return [*updates, *self._labels(now)]
+
+    def carried(self, root: str, color: palette.Rgba, now: int) -> list[Update]:
+        """What the arm carries, in the hand of another arm under `root`; what touches in a refused configuration is
+        red."""
+        red = self._touching() if root == entities.REFUSED else frozenset()
+        updates: list[Update] = []
+        for item in self._scene.objects:
+            if item.attached and self._has_place(item):
+                hand = entities.carried(root, self._model.paths[item.frame])
+                shown = palette.TOUCHING if item.name in red else color
+                updates += self._thing(item, f"{hand}/{entities.part(item.name)}", shown, now)
+        return updates
+
+    def _labels(self, now: int) -> list[Update]:
+        """A dot for each pair, and all their names at the nearest: several labels would hide one another."""
+        placed = [contact for contact in self._contacts.contacts if len(contact.point) == 3]
+        if not placed:
+            return []
+        lines = [f"{each.first} and {each.second}: {_gap(each.distance)}" for each in placed]
+        points = np.array([contact.point for contact in placed], dtype=float)
+        return [Labels(entities.CONTACTS, now, points, ("\n".join(lines), *("" for _ in lines[1:])))]
+
+    def _mesh(self, item: SceneObject) -> Mesh | None:
+        match item.shape:
+            case BoxShape(size=size) if len(size) == 3:
+                return mesh_of(Shape("box", size), item.padding)
+            case SphereShape(radius=radius):
+                return mesh_of(Shape("sphere", (radius,)), item.padding)
+            case CylinderShape(radius=radius, length=length):
+                return mesh_of(Shape("cylinder", (radius, length)), item.padding)
+            case PlaneShape():
+                return _below(mesh_of(PLANE), item.padding)
+            case MeshShape():
+                return self._loaded(item.shape)
+        return None
+
+    def _loaded(self, shape: MeshShape) -> Mesh | None:
+        """Each file is read once."""
+        if shape not in self._meshes:
+            self._meshes[shape] = self._load(shape)
+        return self._meshes[shape]
+
+
+def _gap(distance: float) -> str:
+    """[m] in words: a minus sign between two names would be read as a dash."""
+    return f"{1000.0 * distance:.1f} mm apart" if distance > 0.0 else f"{-1000.0 * distance:z.1f} mm inside one another"
+
+
+def _below(mesh: Mesh, padding: float) -> Mesh:
+    """Its upper face at z = `padding` [m]."""
+    down: Vector = (0.0, 0.0, padding - float(mesh.vertices[:, 2].max()))
+    return Mesh(mesh.vertices + down, mesh.normals, mesh.triangles)

@@ -1,0 +1,124 @@
+"""What the core wants shown: typed columns for entities, without a word of Rerun. Times are ns UNIX."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from schemas.message import Vector
+from services.visualizer.content.palette import Rgba
+from services.visualizer.model.rotations import Array
+from services.visualizer.model.triangle_meshes import Mesh
+
+Times = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Scalars:
+    """Values (n, series) at times (n,)."""
+
+    entity: str
+    times: Times
+    values: Array
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Translations (n, 3) [m] and quaternions (n, 4) x y z w in the parent entity, at times (n,)."""
+
+    entity: str
+    times: Times
+    translations: Array
+    rotations: Array
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A line through points (n, 3) [m] in the root frame."""
+
+    entity: str
+    time: int
+    points: Array
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A text in Markdown that replaces the previous one."""
+
+    entity: str
+    time: int
+    markdown: str
+
+
+@dataclass(frozen=True)
+class LogLines:
+    """Lines with their levels (as in `LogLevel`'s names)."""
+
+    entity: str
+    times: Times
+    texts: tuple[str, ...]
+    levels: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class State:
+    """A named state that lasts until the next."""
+
+    entity: str
+    time: int
+    state: str
+
+
+@dataclass(frozen=True)
+class Tint:
+    """The arm under `entity` as it looks in a mode of the device."""
+
+    entity: str
+    time: int
+    mode: str
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A solid at a pose in its parent entity: (3,) [m] and quaternion (4,) x y z w; its colour with alpha."""
+
+    entity: str
+    time: int
+    mesh: Mesh
+    translation: Vector
+    rotation: Vector
+    color: Rgba
+
+
+@dataclass(frozen=True)
+class Gone:
+    """An entity and all below it that are no longer there."""
+
+    entity: str
+    time: int
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Texts at points (n, 3) [m] in the root frame."""
+
+    entity: str
+    time: int
+    points: Array
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Shadow:
+    """A translucent arm under `entity`, with the links `touching` in red; `Poses` say its configuration."""
+
+    entity: str
+    time: int
+    touching: frozenset[str]
+    color: Rgba
+
+
+Update: TypeAlias = Scalars | Poses | Strip | Panel | LogLines | State | Tint | Thing | Gone | Labels | Shadow

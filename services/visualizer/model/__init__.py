@@ -1,0 +1,1 @@
+"""The arm and the objects as meshes and poses."""

@@ -1,0 +1,1 @@
+"""The rerun program as a process: start, stop, connection, screenshot."""

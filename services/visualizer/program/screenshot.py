@@ -1,0 +1,83 @@
+"""A picture of the viewer as it opens a recording, taken without a display.
+
+The program's own `--screenshot-to` shoots before a recording has been loaded; this asks the running viewer.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rerun.experimental import ViewerClient
+
+from services.visualizer.program.rerun_program import environment, rerun_binary
+
+SETTLE = 6.0  # [s] until the viewer's own notices have gone and every chunk is drawn
+LOOPBACK = "127.0.0.1"
+
+
+def picture(rrd: Path, png: Path, size: tuple[int, int] = (1600, 900), timeout: float = 60.0) -> Path:
+    """Write `png` of `size` [pixels] from the recording `rrd`; raises RuntimeError with the viewer's own words."""
+    if not rrd.is_file():
+        raise RuntimeError(f"there is no recording {rrd}")
+    png.parent.mkdir(parents=True, exist_ok=True)
+    deadline = time.monotonic() + timeout
+    with _headless_viewer(rrd, png.with_suffix(".viewer.log"), size) as (viewer, port):
+        client = _connected(viewer, port, deadline)
+        _settle(client, deadline)
+        png.write_bytes(client.take_screenshot(max_size=max(size)))
+    return png
+
+
+@contextmanager
+def _headless_viewer(rrd: Path, log: Path, size: tuple[int, int]) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
+    port = free_port()
+    command = [
+        str(rerun_binary()), str(rrd), "--headless", "--window-size", f"{size[0]}x{size[1]}",
+        "--bind", LOOPBACK, "--port", str(port),
+    ]  # fmt: skip
+    with log.open("wb") as output:
+        viewer = subprocess.Popen(command, env=environment(os.environ), stdout=output, stderr=output)
+    try:
+        yield viewer, port
+    except Exception as error:
+        words = log.read_text(errors="replace").strip()[-600:]
+        raise RuntimeError(f"no picture of {rrd}: {error}; the viewer says: {words or 'nothing'}") from error
+    finally:
+        viewer.kill()
+        viewer.wait()
+        log.unlink(missing_ok=True)
+
+
+def _connected(viewer: subprocess.Popen[bytes], port: int, deadline: float) -> ViewerClient:
+    while viewer.poll() is None and time.monotonic() < deadline:
+        with socket.socket() as probe:
+            probe.settimeout(0.2)
+            if probe.connect_ex((LOOPBACK, port)) == 0:
+                return ViewerClient.connect(f"rerun+http://{LOOPBACK}:{port}/proxy")
+        time.sleep(0.1)
+    raise RuntimeError("the viewer did not start")
+
+
+def _settle(client: ViewerClient, deadline: float) -> None:
+    """Wait until the recording has been loaded for `SETTLE` seconds."""
+    loaded_since = time.monotonic()
+    while time.monotonic() - loaded_since < SETTLE:
+        if time.monotonic() > deadline:
+            raise RuntimeError("the recording was not loaded in time")
+        state = client.get_state()
+        if state.loading or not any(recording.timelines for recording in state.recordings):
+            loaded_since = time.monotonic()
+        time.sleep(0.25)
+
+
+def free_port() -> int:
+    """A port on loopback that is free now."""
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        return int(probe.getsockname()[1])

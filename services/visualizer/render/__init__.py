@@ -1,0 +1,1 @@
+"""The output to Rerun: layout, columns, viewer and recording."""

@@ -1,0 +1,109 @@
+"""What a person sees first: the arm, what it does, and how exactly, on one screen."""
+
+from __future__ import annotations
+
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun.blueprint.encodings import TimelineColumn
+
+from services.visualizer.content import entities, palette
+from services.visualizer.core import unit
+from services.visualizer.model.visual_model import Joint, Model
+
+TIMELINE = "time"
+JOINTS_PER_PAGE = 3  # rows of plots that stay readable
+
+
+def blueprint(model: Model, window: float, trail: float) -> rrb.Blueprint:
+    """The layout for this arm; `window` and `trail` in s."""
+    scene = rrb.Vertical(
+        _scene(model, trail),
+        rrb.Horizontal(_panel(), rrb.Vertical(_modes(window), _log(), row_shares=[5, 9]), column_shares=[11, 8]),
+        row_shares=[17, 10],
+        name="Twin",
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(scene, _joints(model, window), column_shares=[11, 9]),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _scene(model: Model, trail: float) -> rrb.Spatial3DView:
+    size, waist = max(model.reach, 2.1 * model.height), 0.6 * model.height  # an arm that stands needs a step back
+    return rrb.Spatial3DView(
+        origin=entities.WORLD,
+        name="Twin: measured (solid), commanded (blue), planned arm and way (cyan), what touches (red) [m]",
+        line_grid=rrb.LineGrid3D(visible=True, spacing=0.1, color=palette.GRID),
+        background=rrb.Background(kind="SolidColor", color=palette.BACKGROUND),
+        eye_controls=rrb.EyeControls3D(
+            kind="Orbital",
+            position=(0.86 * size, -0.72 * size, waist + 0.47 * size),
+            look_target=(0.24 * size, 0.0, waist),
+            eye_up=(0.0, 0.0, 1.0),
+        ),
+        overrides={entities.TRAIL: rrb.VisibleTimeRanges([_last(trail)])},
+    )
+
+
+def _joints(model: Model, window: float) -> rrb.Container:
+    moving = model.moving
+    pages = [moving[first : first + JOINTS_PER_PAGE] for first in range(0, len(moving), JOINTS_PER_PAGE)]
+    grids = [_page(page, window) for page in pages]
+    return grids[0] if len(grids) == 1 else rrb.Tabs(*grids, name="Joints")
+
+
+def _page(joints: tuple[Joint, ...], window: float) -> rrb.Container:
+    name = " · ".join(joint.name for joint in joints)
+    rows = [rrb.Horizontal(_position(joint, window, joint is joints[0]), _error(joint, window)) for joint in joints]
+    return rrb.Vertical(*rows, name=name)
+
+
+def _position(joint: Joint, window: float, has_legend: bool) -> rrb.TimeSeriesView:
+    return _plot(entities.position(joint.name), f"{joint.name} · position [{unit(joint)}]", window, has_legend)
+
+
+def _error(joint: Joint, window: float) -> rrb.TimeSeriesView:
+    return _plot(entities.error(joint.name), f"{joint.name} · step error [steps]", window, False)
+
+
+def _plot(origin: str, name: str, window: float, has_legend: bool) -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin=origin,
+        name=name,
+        axis_x=rrb.TimeAxis(view_range=_range(window)),
+        plot_legend=rrb.PlotLegend("LeftTop", visible=has_legend),
+        time_ranges=[_last(window)],
+    )
+
+
+def _panel() -> rrb.TextDocumentView:
+    return rrb.TextDocumentView(origin=entities.PANEL, name="Device")
+
+
+def _modes(window: float) -> rrb.StateTimelineView:
+    return rrb.StateTimelineView(
+        origin=entities.MODE, name="Mode of the device", time_view=rrb.TimeAxis(view_range=_range(window))
+    )
+
+
+def _log() -> rrb.TextLogView:
+    # The lines begin with their time of day; the column would show only the century.
+    hidden = TimelineColumn(TIMELINE, visible=False)
+    return rrb.TextLogView(
+        origin=entities.LOG,
+        name="Log",
+        columns=rrb.TextLogColumns(timeline_columns=[hidden], text_log_columns=["LogLevel", "Body"]),
+    )
+
+
+def _range(window: float) -> rr.TimeRange:
+    relative = rr.TimeRangeBoundary.cursor_relative
+    return rr.TimeRange(start=relative(seconds=-window), end=relative(seconds=0.0))
+
+
+def _last(window: float) -> rrb.VisibleTimeRange:
+    return rrb.VisibleTimeRange(TIMELINE, range=_range(window))
