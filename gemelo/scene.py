@@ -345,11 +345,11 @@ def mesh_of(path: Path, scale: float) -> MeshShape:
 
 def _require_size(path: Path, content: bytes, scale: float) -> None:
     """Refuses what is far too large; what is no mesh at all the planner says."""
-    from services.arm.stl import BadMesh, read_stl  # numpy takes half of the time of `import gemelo`
+    from services.arm.stl import BadStl, read_stl  # numpy takes half of the time of `import gemelo`
 
     try:
         vertices = read_stl(content).vertices
-    except BadMesh:
+    except BadStl:
         return
     longest = scale * float((vertices.max(axis=0) - vertices.min(axis=0)).max())
     if longest > LARGEST_MESH:

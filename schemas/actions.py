@@ -8,7 +8,7 @@ import msgspec
 
 from schemas.message import Message
 
-NOTHING = msgspec.Raw(b"\xc0")  # msgpack nil
+NIL = msgspec.Raw(b"\xc0")  # msgpack nil
 
 
 class GoalStatusCode(IntEnum):
@@ -33,7 +33,7 @@ class GoalRequest(Message, frozen=True, kw_only=True):
 
     goal_id: str = ""
     client: str = ""  # key of its liveliness token
-    goal: msgspec.Raw = NOTHING
+    goal: msgspec.Raw = NIL
     attached: bool = False  # cancel the goal when the client's token vanishes
 
 
@@ -70,14 +70,14 @@ class ResultResponse(Message, frozen=True, kw_only=True):
     """Status and, if terminal, the action's own result message."""
 
     status: GoalStatusCode = GoalStatusCode.UNKNOWN
-    result: msgspec.Raw = NOTHING
+    result: msgspec.Raw = NIL
 
 
 class GoalFeedback(Message, frozen=True, kw_only=True):
     """The action's own feedback message for one goal."""
 
     goal_id: str = ""
-    feedback: msgspec.Raw = NOTHING
+    feedback: msgspec.Raw = NIL
 
 
 class GoalStatus(Message, frozen=True, kw_only=True):

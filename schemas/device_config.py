@@ -11,7 +11,7 @@ from enum import StrEnum
 
 import msgspec
 
-NOTHING = 255  # no pin, no joint, no input
+UNUSED = 255  # no pin, no joint, no input
 
 
 class ConfigRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -66,8 +66,8 @@ class JointConfig(ConfigRecord, frozen=True, kw_only=True):
     max_acceleration_q8: int
     inverted: bool = False
     dir_setup_us: int = 0
-    step_pin: int = NOTHING
-    dir_pin: int = NOTHING
+    step_pin: int = UNUSED
+    dir_pin: int = UNUSED
     text_scale_q32: int = 0  # [1/256 step per 1e-7 rad or m] Q32, for text mode; 0: the joint has none
     homing: HomingConfig | None = None
 
@@ -78,7 +78,7 @@ class InputConfig(ConfigRecord, frozen=True, kw_only=True):
     name: str
     pin: int
     role: InputRole
-    joint: int = NOTHING  # that the switch belongs to
+    joint: int = UNUSED  # that the switch belongs to
     inverted: bool = False  # active at low level
     pull: Pull = Pull.NONE
 
@@ -99,7 +99,7 @@ class SensorConfig(ConfigRecord, frozen=True, kw_only=True):
     name: str
     kind: SensorKind
     pin: int
-    trigger_pin: int = NOTHING  # ULTRASONIC
+    trigger_pin: int = UNUSED  # ULTRASONIC
     scale_q16: int = 65_536_000
     offset_milli: int = 0
 
@@ -116,7 +116,7 @@ class DeviceConfig(ConfigRecord, frozen=True, kw_only=True):
     hold_timeout_ms: int = 500
     enable_lead_ms: int = 0  # from enabling the drivers to the first step
     armed_at_boot: bool = True
-    enable_pin: int = NOTHING
+    enable_pin: int = UNUSED
     enable_inverted: bool = False  # the drivers are enabled at low level
     inputs: tuple[InputConfig, ...] = ()
     outputs: tuple[OutputConfig, ...] = ()

@@ -9,7 +9,7 @@ from schemas.device import DeviceFault
 AGAIN = "`gemelo reset`, `gemelo home`"
 
 
-class Explanation(NamedTuple):
+class FaultDescription(NamedTuple):
     """One fault in words."""
 
     name: str
@@ -50,14 +50,14 @@ _ABOUT = {
 }
 
 
-def explain(fault: int) -> Explanation | None:
+def explain(fault: int) -> FaultDescription | None:
     """The fault with that number on the wire; None for none."""
     if fault == DeviceFault.NONE:
         return None
     if fault not in _ABOUT:
-        return Explanation(f"FAULT {fault}", "a fault that only a newer gemelo knows", "update gemelo")
+        return FaultDescription(f"FAULT {fault}", "a fault that only a newer gemelo knows", "update gemelo")
     meaning, remedy = _ABOUT[DeviceFault(fault)]
-    return Explanation(DeviceFault(fault).name, meaning, remedy)
+    return FaultDescription(DeviceFault(fault).name, meaning, remedy)
 
 
 def fault_text(fault: int, joint: str = "") -> str:

@@ -15,7 +15,7 @@ from msgspec import Meta
 
 from schemas.device_config import InputRole, Pull, SensorKind
 
-Word = Annotated[str, Meta(pattern="^[A-Za-z0-9_-]+$")]  # part of a key on the bus or of an MQTT topic
+KeyPart = Annotated[str, Meta(pattern="^[A-Za-z0-9_-]+$")]  # part of a key on the bus or of an MQTT topic
 Pin = Annotated[int, Meta(ge=0, le=63)]  # GPIO
 NotNegative = Annotated[float, Meta(ge=0.0)]
 Positive = Annotated[float, Meta(gt=0.0)]
@@ -105,7 +105,7 @@ class StepperJoint(RobotRecord, frozen=True, kw_only=True):
     goal_tolerance_steps: AtLeastHalfAStep = 0.75
 
 
-class Level(StrEnum):
+class PinLevel(StrEnum):
     """Of a pin."""
 
     HIGH = "high"
@@ -115,20 +115,20 @@ class Level(StrEnum):
 class Input(RobotRecord, frozen=True, kw_only=True):
     """A switch or button on the controller board. A contact that opens when pressed also tells of a torn wire."""
 
-    name: Word
+    name: KeyPart
     pin: Pin
     role: InputRole
     joint: str = ""  # name of the URDF joint; empty for the e-stop
-    active: Level = Level.HIGH  # of the pressed switch
+    active: PinLevel = PinLevel.HIGH  # of the pressed switch
     pull: Pull = Pull.NONE
 
 
 class Output(RobotRecord, frozen=True, kw_only=True):
     """A digital output of the controller board."""
 
-    name: Word
+    name: KeyPart
     pin: Pin
-    active: Level = Level.HIGH
+    active: PinLevel = PinLevel.HIGH
     at_boot: bool = False
     off_at_estop: bool = False
 
@@ -136,7 +136,7 @@ class Output(RobotRecord, frozen=True, kw_only=True):
 class Sensor(RobotRecord, frozen=True, kw_only=True):
     """A reading of the controller board: value = raw * scale + offset, raw in mV or in us of the echo."""
 
-    name: Word
+    name: KeyPart
     kind: SensorKind
     pin: Pin
     trigger_pin: Pin | None = None  # ultrasonic
@@ -148,19 +148,19 @@ class Sensor(RobotRecord, frozen=True, kw_only=True):
 class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
     """The controller board."""
 
-    name: Word  # MQTT: gemelo/v1/<name>/...
+    name: KeyPart  # MQTT: gemelo/v1/<name>/...
     tick_hz: Annotated[int, Meta(ge=10_000, le=100_000, multiple_of=1000)] = 50_000  # the firmware's bounds
     queue_capacity: Annotated[int, Meta(ge=2, le=128)] = 128  # [knots], and the firmware's again
     sensor_hz: Annotated[int, Meta(ge=1, le=50)] = 10  # a divisor of 1000
     armed_at_boot: bool = True  # as it is where no enable pin is wired
     enable_pin: Pin | None = None  # of all drivers
-    enable_active: Level = Level.LOW
+    enable_active: PinLevel = PinLevel.LOW
 
 
 class RobotFile(RobotRecord, frozen=True, kw_only=True):
     """The whole robot.toml."""
 
-    name: Word
+    name: KeyPart
     urdf: str = "robot.urdf"
     srdf: str = "robot.srdf"
     group: str = "arm"

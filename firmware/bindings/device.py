@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import msgspec
 
-from firmware.bindings.frames import OUTPUTS, Levels, OutFrame, PinChange, Request
+from firmware.bindings.frames import OUTPUTS, InputLevels, OutFrame, PinChange, PlatformRequest
 from firmware.bindings.library import MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
 from firmware.bindings.motor import MotorError, motor_record
 from schemas.device import DeviceMode
@@ -142,15 +142,15 @@ class Device:
             data += c.string_at(self._buffer, size)
         return bytes(data)
 
-    def take_requests(self) -> list[Request]:
+    def take_requests(self) -> list[PlatformRequest]:
         """What came over the serial line and is the platform's matter, oldest first."""
-        requests: list[Request] = []
+        requests: list[PlatformRequest] = []
         text = (c.c_uint8 * LARGEST)()
         while True:
             size = self._library.gemelo_take_request(self._handle, c.byref(self._output), text, LARGEST)
             if size < 0:
                 return requests
-            requests.append(Request(JsonFrame(self._output.value), c.string_at(text, size)))
+            requests.append(PlatformRequest(JsonFrame(self._output.value), c.string_at(text, size)))
 
     def say(self, kind: JsonFrame, text: bytes) -> bool:
         """JSON of the platform's own; true: it is to be said over MQTT too, by the caller."""
@@ -220,10 +220,10 @@ class Device:
         return tuple(output.name for i, output in enumerate(self.config.outputs) if bits >> i & 1)
 
     @property
-    def levels(self) -> Levels:
+    def levels(self) -> InputLevels:
         """What the input pins read now."""
         record = self._snapshot()
-        return Levels(record.level_low, record.level_high)
+        return InputLevels(record.level_low, record.level_high)
 
     @property
     def steps(self) -> tuple[int, ...]:
@@ -241,7 +241,7 @@ class Device:
         report = {"t_us": record.now_us, "steps": record.steps[:count], "shaft": record.shaft[:count]}
         return json.dumps(report).encode()
 
-    def inherit_world(self, before: Device) -> None:
+    def inherit_environment(self, before: Device) -> None:
         """Wake up in the world that the board was in: what is pressed, blocked and measured stays."""
         self._library.gemelo_inherit(self._handle, before._handle)
 

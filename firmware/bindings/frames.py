@@ -16,7 +16,7 @@ class OutFrame(NamedTuple):
     payload: bytes
 
 
-class Request(NamedTuple):
+class PlatformRequest(NamedTuple):
     """PROVISION or PRESS, as it came over the serial line."""
 
     kind: JsonFrame
@@ -24,14 +24,14 @@ class Request(NamedTuple):
 
 
 class PinChange(NamedTuple):
-    """Levels from this tick on; bit j is joint j."""
+    """InputLevels from this tick on; bit j is joint j."""
 
     tick: int
     step: int
     dir: int
 
 
-class Levels(NamedTuple):
+class InputLevels(NamedTuple):
     """What the device's input pins read: bit i is GPIO i, then GPIO 32 + i."""
 
     low: int

@@ -12,7 +12,7 @@ PART_SIZE, REASON_SIZE = 32, 128  # of `Refusal` in core/refusal.h
 LIBRARY = Path(__file__).resolve().parents[1] / "build" / "libgemelo_core.so"
 
 
-class CoreMissing(RuntimeError):
+class LibraryMissing(RuntimeError):
     """The core has not been built."""
 
 
@@ -56,11 +56,11 @@ class MotorRecord(c.Structure):
 
 @functools.cache
 def load_library(path: Path = LIBRARY) -> c.CDLL:
-    """The library with its functions typed; raises CoreMissing with the remedy where there is none."""
+    """The library with its functions typed; raises LibraryMissing with the remedy where there is none."""
     try:
         library = c.CDLL(str(path))
     except OSError as error:
-        raise CoreMissing(
+        raise LibraryMissing(
             f"the firmware core cannot be loaded ({error}): run `make setup`, or firmware/bindings/build.sh"
         ) from error
     u8, u32, u64, size, device = c.POINTER(c.c_uint8), c.c_uint32, c.c_uint64, c.c_size_t, c.c_void_p

@@ -12,7 +12,7 @@ from schemas.device_config import DeviceConfig
 LARGEST = 1 << 16  # [bytes] of what the core says it has read
 
 
-class Refused(ValueError):
+class ConfigTextRefused(ValueError):
     """The core does not take the text; the message is the part and the reason."""
 
     def __init__(self, part: str, reason: str) -> None:
@@ -22,12 +22,12 @@ class Refused(ValueError):
 
 
 def read_config(text: bytes) -> DeviceConfig:
-    """The configuration as the core has understood it; raises Refused."""
+    """The configuration as the core has understood it; raises ConfigTextRefused."""
     part, reason = c.create_string_buffer(PART_SIZE), c.create_string_buffer(REASON_SIZE)
     out = c.create_string_buffer(LARGEST)
     size = load_library().gemelo_read_config(text, len(text), part, reason, out, LARGEST)
     if size < 0:
-        raise Refused(part.value.decode(), reason.value.decode(errors="replace"))
+        raise ConfigTextRefused(part.value.decode(), reason.value.decode(errors="replace"))
     return msgspec.json.decode(out.raw[:size], type=DeviceConfig)
 
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 HEADER, ROW = 80, 50  # bytes: free text; a normal, three corners and two more
-MOST_TRIANGLES = 500_000
+MAX_TRIANGLES = 500_000
 
 
-class BadMesh(ValueError):
+class BadStl(ValueError):
     """A file that holds no triangles; the text says why."""
 
 
@@ -25,20 +25,20 @@ class Triangles:
 
 
 def read_stl(content: bytes) -> Triangles:
-    """The file's triangles without those that have no area; raises `BadMesh`."""
+    """The file's triangles without those that have no area; raises `BadStl`."""
     corners = _binary(content) if _is_binary(content) else _text(content)
     if not len(corners):
-        raise BadMesh("it holds no triangle")
-    if len(corners) > MOST_TRIANGLES:
-        raise BadMesh(f"it holds {len(corners)} triangles, more than {MOST_TRIANGLES}; simplify it")
+        raise BadStl("it holds no triangle")
+    if len(corners) > MAX_TRIANGLES:
+        raise BadStl(f"it holds {len(corners)} triangles, more than {MAX_TRIANGLES}; simplify it")
     if not np.isfinite(corners).all():
-        raise BadMesh("a corner of it is not finite")
+        raise BadStl("a corner of it is not finite")
     vertices, numbers = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     faces = numbers.reshape(-1, 3).astype(np.int32)
     first, second, third = faces.T
     faces = faces[(first != second) & (second != third) & (third != first)]
     if not len(faces):
-        raise BadMesh("none of its triangles has an area")
+        raise BadStl("none of its triangles has an area")
     return Triangles(np.ascontiguousarray(vertices), np.ascontiguousarray(faces))
 
 
@@ -60,12 +60,12 @@ def _binary(content: bytes) -> NDArray[np.float64]:
 def _text(content: bytes) -> NDArray[np.float64]:
     """(f, 3, 3) corners; every `facet` has an outer loop of three `vertex` lines."""
     if not content.lstrip()[:5].lower() == b"solid":
-        raise BadMesh(f"it is no STL file: {len(content)} bytes that are neither the binary form nor begin with solid")
+        raise BadStl(f"it is no STL file: {len(content)} bytes that are neither the binary form nor begin with solid")
     lines = [line.split() for line in content.decode("utf-8", "replace").splitlines()]
     vertices = [words[1:] for words in lines if words and words[0].lower() == "vertex"]
     if len(vertices) % 3:
-        raise BadMesh(f"it has {len(vertices)} vertex lines, no multiple of three: was it cut off?")
+        raise BadStl(f"it has {len(vertices)} vertex lines, no multiple of three: was it cut off?")
     try:
         return np.array([[float(x), float(y), float(z)] for x, y, z in vertices]).reshape(-1, 3, 3)
     except ValueError as error:
-        raise BadMesh(f"a vertex line of it is not three numbers ({error})") from None
+        raise BadStl(f"a vertex line of it is not three numbers ({error})") from None

@@ -45,8 +45,8 @@ def find() -> str:
     return found
 
 
-def serve(section: MqttSection, run: Path, beat: Callable[[], None], gone: Callable[[], None]) -> int:
-    """Becomes mosquitto; a small companion calls `beat` once a second while it accepts, and `gone` after it.
+def serve(section: MqttSection, run: Path, beat: Callable[[], None], on_end: Callable[[], None]) -> int:
+    """Becomes mosquitto; a small companion calls `beat` once a second while it accepts, and `on_end` after it.
 
     Does not return in the process that becomes mosquitto.
     """
@@ -56,7 +56,7 @@ def serve(section: MqttSection, run: Path, beat: Callable[[], None], gone: Calla
     alive, held = os.pipe()
     if os.fork() == 0:
         os.close(held)
-        _accompany(section, alive, beat, gone)
+        _watch_broker(section, alive, beat, on_end)
         os._exit(0)
     os.close(alive)
     # Held open by mosquitto, never written: its end is seen by the companion whatever way it ends.
@@ -66,7 +66,7 @@ def serve(section: MqttSection, run: Path, beat: Callable[[], None], gone: Calla
     os.execv(program, [program, "-c", str(conf)])
 
 
-def _accompany(section: MqttSection, alive: int, beat: Callable[[], None], gone: Callable[[], None]) -> None:
+def _watch_broker(section: MqttSection, alive: int, beat: Callable[[], None], on_end: Callable[[], None]) -> None:
     for number in (signal.SIGTERM, signal.SIGINT):  # they are mosquitto's; this one ends with it
         signal.signal(number, signal.SIG_IGN)
     interval = 0.02
@@ -74,7 +74,7 @@ def _accompany(section: MqttSection, alive: int, beat: Callable[[], None], gone:
         if interval == BEAT or _accepts(section):
             interval = BEAT
             beat()
-    gone()
+    on_end()
 
 
 def _accepts(section: MqttSection) -> bool:

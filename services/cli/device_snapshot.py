@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from schemas.device import DeviceConfiguration, DeviceState, DeviceStatus, SensorReadings
-from schemas.device_faults import Explanation, explain
+from schemas.device_faults import FaultDescription, explain
 from schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATE, DEVICE_STATUS, SENSORS
 from services.cli.errors import CommandError, ExitCode
 from services.cli.robot_names import joint_name
@@ -129,7 +129,7 @@ def device_snapshot(
     """The snapshot of the messages received so far; None for one that was not."""
     status = status or DeviceStatus(reason="nobody has said who the device is")
     about = explain(state.fault) if state is not None else None
-    about = about or Explanation("", "", "")
+    about = about or FaultDescription("", "", "")
     active = frozenset(state.inputs) if state is not None else frozenset[str]()
     on = frozenset(state.outputs) if state is not None else frozenset[str]()
     configured, said = _configured(status, configuration)

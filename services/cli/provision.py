@@ -15,7 +15,7 @@ from services.cli.credentials import MQTT_PASSWORD, WIFI_PASSWORD, Credentials, 
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.terminal import confirm
-from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame, sync_frame
+from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame, sync_frame
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -105,7 +105,7 @@ class Exchange:
 
     def __init__(self, line: Line) -> None:
         self._line = line
-        self._packets = Packets()
+        self._packets = PacketDecoder()
 
     def send(self, text: bytes, patience: float = PATIENCE) -> ProvisionAnswer:
         """Sends `text` until the board answers: opening the port may have restarted it.

@@ -14,7 +14,7 @@ from services.cli.text_table import table
 from services.cli.units import positive_length
 
 if TYPE_CHECKING:
-    from services.arm.kinematics.collision_matrix import Verdict
+    from services.arm.kinematics.collision_matrix import LinkPairData
 
 FIT = "services.collision_fitting.main"  # in a process of its own: the command line loads no planner
 BULGE = 0.005  # [m] that a sphere may reach beyond its link
@@ -121,7 +121,7 @@ def print_matrix(folder: Path, write: bool) -> ExitCode:
     return ExitCode.OK
 
 
-def plan_of(text: str, verdicts: list[Verdict]) -> tuple[dict[tuple[str, str], str], list[str]]:
+def plan_of(text: str, verdicts: list[LinkPairData]) -> tuple[dict[tuple[str, str], str], list[str]]:
     """The pairs that the SRDF is to have with their reasons, and each change as a line; a person's reasons stay."""
     from services.arm.kinematics.collision_matrix import Reason
     from services.arm.model.srdf_edit import entries
@@ -146,13 +146,13 @@ def plan_of(text: str, verdicts: list[Verdict]) -> tuple[dict[tuple[str, str], s
     return wanted, lines
 
 
-def _why(verdict: Verdict | None) -> str:
+def _why(verdict: LinkPairData | None) -> str:
     if verdict is None:
         return "one of them has no collision shape"
     return f"they come as near as {1000.0 * verdict.nearest:.1f} mm"
 
 
-def listing(verdicts: list[Verdict]) -> str:
+def listing(verdicts: list[LinkPairData]) -> str:
     """A table of all pairs, distances in [mm]."""
     rows = [
         (

@@ -63,11 +63,11 @@ def mesh_of(path: Path, scale: float) -> MeshShape:
 
 def _require_size(path: Path, scale: float) -> None:
     """Raises `CommandError` for a mesh longer than `LARGEST_MESH`; the planner refuses files that are no mesh."""
-    from services.arm.stl import BadMesh, read_stl
+    from services.arm.stl import BadStl, read_stl
 
     try:
         vertices = read_stl(path.read_bytes()).vertices
-    except (BadMesh, OSError):
+    except (BadStl, OSError):
         return
     longest = scale * float((vertices.max(axis=0) - vertices.min(axis=0)).max())
     if longest > LARGEST_MESH:

@@ -98,10 +98,10 @@ def missing_files(folder: Path, recording: Path) -> list[str]:
 
 def take_picture(recording: Path, png: Path) -> list[str]:
     """Takes a picture of the viewer; returns what went wrong, empty if nothing did."""
-    from services.visualizer.program.screenshot import picture
+    from services.visualizer.program.screenshot import save_screenshot
 
     try:
-        picture(recording, png)
+        save_screenshot(recording, png)
     except (RuntimeError, OSError) as error:
         return [f"no picture: {error}"]
     return []

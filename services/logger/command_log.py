@@ -16,7 +16,7 @@ Row = tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Line:
+class CommandRow:
     """One row of the table of these joints."""
 
     joints: tuple[str, ...]
@@ -24,7 +24,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class _Pending:
+class _PendingChunk:
     chunk: CommandChunk
     arrival: int  # [ns] UNIX time
 
@@ -36,10 +36,10 @@ class CommandLog:
         self.lost = 0  # chunks without an answer
         self.missing = 0  # chunks that never arrived here: gaps of the sequence number
         self.malformed = 0  # chunks whose tables do not fit together; they are in the MCAP only
-        self._pending: dict[tuple[int, int], _Pending] = {}
+        self._pending: dict[tuple[int, int], _PendingChunk] = {}
         self._early: dict[tuple[int, int], CommandAck] = {}
         self._newest: tuple[int, int] = (0, -1)  # stream, seq
-        self._lines: list[Line] = []
+        self._lines: list[CommandRow] = []
 
     @property
     def pending(self) -> int:
@@ -58,7 +58,7 @@ class CommandLog:
             self._lines += _lines(first.chunk, None, RESENT)
         early = self._early.pop(key, None)
         if early is None or early.stamp < chunk.stamp:
-            self._pending[key] = _Pending(chunk, now)
+            self._pending[key] = _PendingChunk(chunk, now)
         else:
             self._lines += _lines(chunk, early, str(early.code))
 
@@ -76,7 +76,7 @@ class CommandLog:
         if len(self._early) > MAX_EARLY:
             del self._early[next(iter(self._early))]
 
-    def step(self, now: int) -> list[Line]:
+    def step(self, now: int) -> list[CommandRow]:
         """The lines completed since the last call, those of lost chunks among them."""
         while self._pending:
             key, waiting = next(iter(self._pending.items()))
@@ -88,7 +88,7 @@ class CommandLog:
         lines, self._lines = self._lines, []
         return lines
 
-    def finish(self, now: int) -> list[Line]:
+    def finish(self, now: int) -> list[CommandRow]:
         """All lines that are left, with those still waiting marked as unanswered."""
         lines = self.step(now)
         for waiting in self._pending.values():
@@ -122,13 +122,13 @@ def is_well_formed(chunk: CommandChunk) -> bool:
     )
 
 
-def _lines(chunk: CommandChunk, ack: CommandAck | None, code: str) -> list[Line]:
+def _lines(chunk: CommandChunk, ack: CommandAck | None, code: str) -> list[CommandRow]:
     when = (str(chunk.seq), str(chunk.stamp // 1000), iso(chunk.stamp))
     stamp, round_trip = ("", "") if ack is None else (str(ack.stamp // 1000), f"{ack.round_trip * 1e3:.3f}")
     is_known = ack is not None and len(ack.steps) == len(chunk.name)
     executed = tuple(map(str, ack.steps)) if ack is not None and is_known else ("",) * len(chunk.name)
     return [
-        Line(
+        CommandRow(
             chunk.name,
             (*when, *_motion(chunk, knot), _words(chunk, knot), str(chunk.stream), str(knot), _time(chunk, knot),
              stamp, code, round_trip, *executed),

@@ -9,7 +9,7 @@ from schemas.device import CommandAck, CommandChunk
 from schemas.frames import RobotDescription
 from schemas.message import Message
 from schemas.topics import Delivery, Topic
-from services.logger.command_log import CommandLog, Line
+from services.logger.command_log import CommandLog, CommandRow
 
 MAX_WAITING = 10_000  # messages held while the disk refuses: about half a minute of full motion
 LAST_STAMP = 2**63 - 1  # [ns] readers take times as signed 64 bits
@@ -35,7 +35,7 @@ class Batch:
     """What is to be written now."""
 
     entries: tuple[Entry, ...] = ()
-    lines: tuple[Line, ...] = ()
+    lines: tuple[CommandRow, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Logger:
         self.commands = CommandLog()
         self.description: RobotDescription | None = None
         self._waiting: deque[Entry] = deque()
-        self._lines: deque[Line] = deque()
+        self._lines: deque[CommandRow] = deque()
         self._max_waiting = max_waiting
         self._latched: dict[str, Entry] = {}
         self._dropped: Counter[str] = Counter()

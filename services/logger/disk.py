@@ -30,14 +30,14 @@ RETRY = 2_000_000_000  # [ns] between two attempts on a disk that refuses
 
 
 @dataclass
-class Disk:
+class RecordingWriter:
     """Writes what the logger gives and never dies of the disk."""
 
     robot: str
     metadata: dict[str, str]
-    tell: Callable[[str], None]  # a warning for a person
+    warn: Callable[[str], None]  # a warning for a person
     recording: Recording | None = field(default=None, init=False)
-    trouble: str = field(default="", init=False)  # why nothing can be written at present
+    problem: str = field(default="", init=False)  # why nothing can be written at present
     files: list[Path] = field(default_factory=list, init=False)  # begun since the start
     _retry_at: int = field(default=0, init=False)
 
@@ -62,7 +62,7 @@ class Disk:
             try:
                 recording.close()
             except OSError as error:
-                self.tell(f"{recording.path} could not be finished ({error}); a streaming reader still reads it")
+                self.warn(f"{recording.path} could not be finished ({error}); a streaming reader still reads it")
 
     def _open_recording(
         self, logger: Logger, batch: Batch, folder: Path, parameters: LoggerParameters, now: int
@@ -97,11 +97,11 @@ class Disk:
             self._forget_if_empty(self.recording)
             self.recording = None
         self._retry_at = now + RETRY
-        trouble = f"cannot write to {folder}: {error.strerror or error}"
-        if trouble != self.trouble:
+        problem = f"cannot write to {folder}: {error.strerror or error}"
+        if problem != self.problem:
             remedy = "free space or set the parameter `log_dir`; tried again every 2 s, messages wait in memory"
-            self.tell(f"{trouble}; {remedy}")
-        self.trouble = trouble
+            self.warn(f"{problem}; {remedy}")
+        self.problem = problem
 
     def _forget_if_empty(self, recording: Recording) -> None:
         """A full disk must not gather a new empty file at every attempt."""
@@ -110,7 +110,7 @@ class Disk:
                 recording.path.unlink()
 
     def _recovered(self, recording: Recording) -> None:
-        if self.trouble:
-            self.tell(f"writing again, to {recording.path}")
-        self.trouble = ""
+        if self.problem:
+            self.warn(f"writing again, to {recording.path}")
+        self.problem = ""
         self._retry_at = 0

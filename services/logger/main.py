@@ -9,7 +9,7 @@ from schemas.message import Message
 from schemas.topics import Topic
 from services.logger.channels import recorded_topics
 from services.logger.core import Batch, Logger
-from services.logger.disk import Disk, LoggerParameters
+from services.logger.disk import LoggerParameters, RecordingWriter
 from services.logger.origin import origin
 from services.runtime.application import service
 from services.runtime.deployment import project_root
@@ -19,10 +19,10 @@ WRITE_RATE = 2.0  # [Hz] a batch and an MCAP chunk each: what a kill -9 can cost
 
 
 def run(node: Node, deployment: Deployment) -> None:
-    """Collect between writes; the disk's trouble shows in the readiness and in the log."""
+    """Collect between writes; the disk's problem shows in the readiness and in the log."""
     parameters = node.parameters(LoggerParameters)
     logger = Logger()
-    disk = Disk(node.robot, origin(node.robot, project_root()), node.log.warning)
+    disk = RecordingWriter(node.robot, origin(node.robot, project_root()), node.log.warning)
     for topic in recorded_topics():
         _subscribe(node, logger, topic)
     said = ""
@@ -40,7 +40,7 @@ def run(node: Node, deployment: Deployment) -> None:
 
     def step(now: int) -> None:
         write(now, logger.step(now))
-        node.set_ready(not disk.trouble, disk.trouble)
+        node.set_ready(not disk.problem, disk.problem)
 
     node.spin(step, rate=WRITE_RATE)
     now = node.now()

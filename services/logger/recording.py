@@ -19,7 +19,7 @@ from mcap.writer import CompressionType, Writer
 
 from schemas.frames import RobotDescription
 from services.logger.channels import MESSAGE_ENCODING, SCHEMA_ENCODING, channel_of, recorded_topics
-from services.logger.command_log import Line, Row, header
+from services.logger.command_log import CommandRow, Row, header
 from services.logger.core import Entry
 from services.logger.files import CSV, MCAP
 
@@ -66,7 +66,7 @@ class Recording:
         self._writer.add_metadata("robot", {"robot": description.robot, **files})
         self._writer.flush()
 
-    def write_lines(self, lines: Iterable[Line]) -> None:
+    def write_lines(self, lines: Iterable[CommandRow]) -> None:
         """Add commands, each to the table of its joints."""
         for joints, group in groupby(lines, key=lambda line: line.joints):
             table = self._tables.get(joints) or self._begin_table(joints)

@@ -13,7 +13,7 @@ from services.runtime.deployment import load_deployment
 from services.runtime.errors import BusError, Refused
 from services.runtime.node import Node
 from services.runtime.process.logs import LEVELS, line_logger
-from services.runtime.process.shutdown import StopRequest, end_soon, stop_on_signals
+from services.runtime.process.shutdown import ShutdownRequest, end_soon, stop_on_signals
 
 Run = Callable[[Node, Deployment], None]
 EXPECTED = (ConfigurationError, BusError, Refused)  # a sentence says all; anything else shows where it happened
@@ -22,14 +22,14 @@ EXPECTED = (ConfigurationError, BusError, Refused)  # a sentence says all; anyth
 def service(name: str, run: Run, arguments: Sequence[str] | None = None) -> None:
     """Opens the node `name`, runs `run(node, deployment)`, and ends the process: 0 when stopped, 1 for an error."""
     options = _parse(name, arguments)
-    stop = StopRequest()
+    stop = ShutdownRequest()
     with stop_on_signals(stop):
         code = _run(name, run, options, stop)
     end_soon(code)  # whatever threads a library has left behind
     sys.exit(code)
 
 
-def _run(name: str, run: Run, options: argparse.Namespace, stop: StopRequest) -> int:
+def _run(name: str, run: Run, options: argparse.Namespace, stop: ShutdownRequest) -> int:
     log = line_logger(name, options.log_level)
     try:
         deployment = load_deployment(options.config)
@@ -42,7 +42,7 @@ def _run(name: str, run: Run, options: argparse.Namespace, stop: StopRequest) ->
         return 1
 
 
-def _guarded(run: Run, node: Node, deployment: Deployment, stop: StopRequest) -> int:
+def _guarded(run: Run, node: Node, deployment: Deployment, stop: ShutdownRequest) -> int:
     try:
         run(node, deployment)
     except KeyboardInterrupt:

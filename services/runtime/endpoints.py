@@ -17,7 +17,7 @@ from services.runtime.topics import Publisher, Subscription
 
 
 @dataclass
-class Declared:
+class NodeEndpoints:
     """Everything that a node says, hears and answers."""
 
     publishers: dict[str, Publisher[Any]] = field(default_factory=dict)  # by key

@@ -23,13 +23,13 @@ from services.runtime.bus.connection import connect
 from services.runtime.bus.interface import Bus, Declaration
 from services.runtime.client_watch import ClientWatch
 from services.runtime.deployment import load_deployment, project_root, robot_name
-from services.runtime.endpoints import Declared, LoopStatistics
+from services.runtime.endpoints import LoopStatistics, NodeEndpoints
 from services.runtime.loop.loop import Loop
 from services.runtime.loop.task_queue import Worker
 from services.runtime.parameters import ParameterRegistry, ParameterSet
 from services.runtime.process.logs import BusHandler, line_logger
 from services.runtime.process.readiness import Readiness
-from services.runtime.process.shutdown import StopRequest, stop_on_signals
+from services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
 from services.runtime.requests import client as requests
 from services.runtime.requests.server import Pending, RequestServer, UrgentServer
 from services.runtime.topics import Latest, Publisher, Subscription
@@ -58,7 +58,7 @@ class Node:
         bus: Bus | None = None,
         overrides: Mapping[str, ParameterValue] | None = None,
         log_level: str = "info",
-        stop: StopRequest | None = None,
+        stop: ShutdownRequest | None = None,
     ) -> None:
         """Waits for the router; raises `NodeNameTaken` where `name` lives already. `overrides` are parameters."""
         self._identity = identity.identify(name)
@@ -67,11 +67,11 @@ class Node:
         self.robot = robot or robot_name(self.deployment)
         self.log = line_logger(name, log_level)
         self._signals = stop is None
-        self._stop = stop or StopRequest()
+        self._stop = stop or ShutdownRequest()
         self._loop = Loop(self._stop)
         self._worker = Worker()
         self._readiness: Readiness | None = None
-        self._declared = Declared()
+        self._endpoints = NodeEndpoints()
         from_file = self.deployment.parameters.get(name, {})
         self._parameters = ParameterRegistry(name, from_file, overrides or {}, self.log)
         self._is_closed = False
@@ -95,7 +95,7 @@ class Node:
 
     def publisher(self, topic: Topic[M]) -> Publisher[M]:
         """The publisher of a topic; the same one for every call."""
-        publishers = self._declared.publishers
+        publishers = self._endpoints.publishers
         if topic.key not in publishers:
             publishers[topic.key] = Publisher(self._bus, topic, self.name)
         return publishers[topic.key]
@@ -109,7 +109,7 @@ class Node:
         cheaper for a node that shows or keeps them.
         """
         subscription = Subscription(self._bus, self._loop, topic, on_message, self.log.warning, own, batch)
-        self._declared.subscriptions.append(subscription)
+        self._endpoints.subscriptions.append(subscription)
         return subscription
 
     def latest(self, topic: Topic[M]) -> Latest[M]:
@@ -137,17 +137,17 @@ class Node:
 
         With `on_tick` the inbox is handled meanwhile, and `on_tick` called 20 times a second: for scripts.
         """
-        asked = requests.Asked(self._bus, request, question, timeout, self._loop.inbox.wake)
+        pending_call = requests.PendingCall(self._bus, request, question, timeout, self._loop.tasks.wake)
         if on_tick is not None:
-            self._loop.wait_for(lambda: asked.is_over, timeout, on_tick)
-        return asked.response()
+            self._loop.wait_for(lambda: pending_call.is_over, timeout, on_tick)
+        return pending_call.response()
 
     def serve_action(self, action: Action[G, F, R], on_goal: OnGoal[G], on_cancel: OnCancel) -> ActionServer[G, F, R]:
         """Serves an action: `on_goal(goal_id, goal)` accepts or refuses, `on_cancel(goal_id)` says "" or why not."""
         clients = ClientWatch(self._watch_alive, lambda: self._bus.is_connected)
         server = ActionServer(action, on_goal, on_cancel, self._serve, self.publisher, clients, self.log.warning)
         self._loop.every(ActionServer.HEARTBEAT, server.beat)
-        self._declared.actions.append(server)
+        self._endpoints.actions.append(server)
         return server
 
     def action(self, action: Action[G, F, R]) -> ActionClient[G, F, R]:
@@ -166,7 +166,7 @@ class Node:
 
     def info(self) -> NodeInfo:
         """Who this node is and what it speaks."""
-        return self._declared.info(self._identity, self.robot)
+        return self._endpoints.info(self._identity, self.robot)
 
     def set_ready(self, ok: bool, reason: str = "") -> None:
         """Says whether this node's state is valid; `reason` is logged when it changes."""
@@ -235,7 +235,7 @@ class Node:
 
     def post(self, task: Callable[[], None]) -> None:
         """`task` runs in the thread of logic; from any thread, for what a library's own threads hear."""
-        self._loop.inbox.put(task)
+        self._loop.tasks.put(task)
 
     def stop(self) -> None:
         """Lets `spin` return; from any thread."""
@@ -257,11 +257,11 @@ class Node:
     ) -> RequestServer[Q, R]:
         server: RequestServer[Q, R]
         if request.urgent:
-            server = UrgentServer(self._bus, self._loop.inbox.put_first, request, handler, self.log.warning)
+            server = UrgentServer(self._bus, self._loop.tasks.put_first, request, handler, self.log.warning)
         else:
-            put = self._worker.put if worker else self._loop.inbox.put
+            put = self._worker.put if worker else self._loop.tasks.put
             server = RequestServer(self._bus, put, request, handler, self.log.warning)
-        self._declared.servers.append(server)
+        self._endpoints.servers.append(server)
         return server
 
     def _watch_alive(self, key: str, on_change: Callable[[bool], None]) -> Declaration:
@@ -277,8 +277,8 @@ class Node:
     def _beat(self) -> None:
         if self._readiness is not None:
             self._readiness.beat()
-        self._bus.require_way_back()
-        self._declared.report_losses()
-        report = self._statistics.report(self._loop.take_figures(), self._declared.statistics())
+        self._bus.require_reconnection()
+        self._endpoints.report_losses()
+        report = self._statistics.report(self._loop.take_figures(), self._endpoints.statistics())
         if report is not None:
             self.publisher(STATISTICS).put(report)

@@ -14,7 +14,7 @@ from services.runtime.deployment import DeploymentError, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.readiness import Readiness
-from services.runtime.process.shutdown import StopRequest, stop_on_signals
+from services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
 
 BEAT = 1.0  # [s]
 
@@ -26,7 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--log-level", default="info", choices=LEVELS)
     options = parser.parse_args(arguments)
     log = line_logger("router", options.log_level)
-    stop = StopRequest()
+    stop = ShutdownRequest()
     try:
         deployment = load_deployment(options.config)
         section = deployment.router
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _beat_until(stop: StopRequest, readiness: Readiness) -> None:
+def _beat_until(stop: ShutdownRequest, readiness: Readiness) -> None:
     readiness.ready()
     try:
         while not stop.wait(BEAT):

@@ -84,7 +84,7 @@ def cobs_decode(data: bytes) -> bytes:
     return bytes(out)
 
 
-class Packets:
+class PacketDecoder:
     """Bytes as they arrive, cut into frames; garbage costs itself only."""
 
     def __init__(self) -> None:
@@ -122,15 +122,15 @@ class Packets:
 
 def json_frame(kind: JsonFrame, text: bytes, boot_id: int = 0) -> bytes:
     """The frame that carries `text`."""
-    return sealed(kind, text, boot_id)
+    return build_frame(kind, text, boot_id)
 
 
 def sync_frame(t0: int) -> bytes:
     """A SYNC: any device answers it and does nothing, so it is a knock at the door."""
-    return sealed(SYNC, _SYNC.pack(t0))
+    return build_frame(SYNC, _SYNC.pack(t0))
 
 
-def sealed(kind: int, body: bytes, boot_id: int = 0, joints: int = 0) -> bytes:
+def build_frame(kind: int, body: bytes, boot_id: int = 0, joints: int = 0) -> bytes:
     """A frame of any kind: header, body and CRC."""
     frame = _HEADER.pack(MAGIC, VERSION, kind, joints, boot_id) + body
     return frame + _CRC.pack(zlib.crc32(frame))

@@ -12,15 +12,15 @@ from schemas.topics import ANY, Delivery, Topic
 from services.runtime.bus.interface import Arrival, Bus
 from services.runtime.bus.wire import from_arrival, schema_of, to_payload
 from services.runtime.loop.loop import Loop
-from services.runtime.loop.task_queue import Box, EveryBox, LatestBox
+from services.runtime.loop.task_queue import ArrivalQueue, EveryQueue, LatestQueue
 
 M = TypeVar("M", bound=Message)
 
-DEFAULT_PATIENCE = 1.0  # [s] after which a topic without a rate counts as stale
+DEFAULT_STALE_AFTER = 1.0  # [s] after which a topic without a rate counts as stale
 PERIODS_TO_STALE = 5.0
 
 
-class Complain(Protocol):
+class Warn(Protocol):
     """Where a sentence about a bad message goes."""
 
     def __call__(self, text: str, /) -> None: ...
@@ -50,39 +50,39 @@ class Subscription(Generic[M]):
         loop: Loop,
         topic: Topic[M],
         handler: Callable[[M], object],
-        complain: Complain,
+        warn: Warn,
         own: bool,
         batch: float | None,
     ) -> None:
         self.topic = topic
-        self._handler, self._complain = handler, complain
+        self._handler, self._warn = handler, warn
         self._received, self._bad, self._lost_said = 0, 0, False
         self._loop = loop
-        self._box = self._box_for(batch)
-        self._declaration = bus.subscribe(topic.key, topic.delivery, self._box.on_arrival, self._box.on_miss, own)
+        self._queue = self._queue_for(batch)
+        self._declaration = bus.subscribe(topic.key, topic.delivery, self._queue.on_arrival, self._queue.on_miss, own)
 
-    def _box_for(self, batch: float | None) -> Box:
+    def _queue_for(self, batch: float | None) -> ArrivalQueue:
         if batch is not None:
-            box = EveryBox(None, self._handle)
-            self._loop.every(batch, box.deliver_all)
-            return box
+            queue = EveryQueue(None, self._handle)
+            self._loop.every(batch, queue.deliver_all)
+            return queue
         latest = self.topic.delivery is Delivery.LATEST
-        return (LatestBox if latest else EveryBox)(self._loop.inbox, self._handle)
+        return (LatestQueue if latest else EveryQueue)(self._loop.tasks, self._handle)
 
     @property
     def statistics(self) -> TopicStatistics:
-        return TopicStatistics(key=self.topic.key, received=self._received, dropped=self._box.dropped, bad=self._bad)
+        return TopicStatistics(key=self.topic.key, received=self._received, dropped=self._queue.dropped, bad=self._bad)
 
     def close(self) -> None:
         self._declaration.close()
-        if isinstance(self._box, EveryBox):
-            self._loop.forget(self._box.deliver_all)
+        if isinstance(self._queue, EveryQueue):
+            self._loop.forget(self._queue.deliver_all)
 
     def report_losses(self) -> None:
         """Says once that an EVERY topic has lost messages."""
-        if self._box.dropped and self.topic.delivery is not Delivery.LATEST and not self._lost_said:
+        if self._queue.dropped and self.topic.delivery is not Delivery.LATEST and not self._lost_said:
             self._lost_said = True
-            self._complain(f"{self.topic.key}: {self._box.dropped} messages lost (counted from now on in statistics)")
+            self._warn(f"{self.topic.key}: {self._queue.dropped} messages lost (counted from now on in statistics)")
 
     def _handle(self, arrival: Arrival) -> None:
         try:
@@ -91,7 +91,7 @@ class Subscription(Generic[M]):
         except BadMessage as error:
             self._bad += 1
             if self._bad == 1:
-                self._complain(f"{self.topic.key}: dropped a bad message: {error} (further ones are only counted)")
+                self._warn(f"{self.topic.key}: dropped a bad message: {error} (further ones are only counted)")
             return
         self._received += 1
         self._handler(message)
@@ -131,5 +131,5 @@ class Latest(Generic[M]):
         """Older than five periods of the topic's rate, or never heard; a latched message stays valid."""
         if self.message is not None and self.topic.delivery is Delivery.LATCHED:
             return False
-        patience = DEFAULT_PATIENCE if self.topic.rate is None else PERIODS_TO_STALE / self.topic.rate
-        return self.age() > patience
+        stale_after = DEFAULT_STALE_AFTER if self.topic.rate is None else PERIODS_TO_STALE / self.topic.rate
+        return self.age() > stale_after

@@ -16,14 +16,14 @@ from schemas.joints import JointState, StepErrors
 from schemas.planning import PlannedPath
 from services.visualizer.content import entities
 from services.visualizer.content.arm_poses import arm_poses
-from services.visualizer.content.event_log import Journal, bounded
-from services.visualizer.content.panel import Facts, is_lost, panel, shaft_errors
-from services.visualizer.content.preview import MOVING, Preview
-from services.visualizer.content.scene import Loader, SceneView, no_mesh
-from services.visualizer.content.thinning import Thinned
-from services.visualizer.content.updates import Panel, Scalars, State, Strip, Times, Tint, Update
+from services.visualizer.content.event_log import EventLog, clamp_stamp
+from services.visualizer.content.panel import PanelInputs, is_lost, panel, shaft_errors
+from services.visualizer.content.preview import MOVING, PlanPreview
+from services.visualizer.content.scene import MeshLoader, SceneView, load_no_mesh
+from services.visualizer.content.thinning import ThinnedSeries
+from services.visualizer.content.updates import LineStrip, Panel, Scalars, State, Times, Tint, Update
 from services.visualizer.model.rotations import Array
-from services.visualizer.model.visual_model import Joint, Model
+from services.visualizer.model.visual_model import VisualJoint, VisualModel
 
 PANEL_PERIOD = 500_000_000  # [ns]
 AHEAD = 60_000_000_000  # [ns] chosen: a stamp further in the future is false, and the view would follow it there
@@ -34,29 +34,29 @@ BAND = 0.5  # [steps] rounding to whole steps alone gives as much
 class Visualizer:
     """The newest state of one arm, and the samples that have not been shown yet."""
 
-    def __init__(self, model: Model, robot: str, tool: str, load: Loader = no_mesh) -> None:
+    def __init__(self, model: VisualModel, robot: str, tool: str, load: MeshLoader = load_no_mesh) -> None:
         """`load` reads the mesh files of the scene."""
         self.model = model
         self.scene = SceneView(model, load)
-        self._preview = Preview(model, self.scene.carried)
+        self._preview = PlanPreview(model, self.scene.attached)
         self._tool = tool
         self._names = [joint.name for joint in model.moving]
         width = len(self._names)
-        self._executed, self._commanded, self._errors = Thinned(width), Thinned(width), Thinned(width)
-        self._shaft = Thinned(width)
-        self.journal = Journal()
+        self._executed, self._commanded, self._errors = ThinnedSeries(width), ThinnedSeries(width), ThinnedSeries(width)
+        self._shaft = ThinnedSeries(width)
+        self.event_log = EventLog()
         self._path: PlannedPath | None = None
         self._path_is_new = False
-        self._tip: Array | None = None  # where the trail ends
+        self._trail_end: Array | None = None  # where the trail ends
         self._shown = ("", "")  # mode, panel
         self._panel_at = 0
         self._latest = 0  # [ns] what is stamped later was never measured
         prismatic = frozenset(joint.name for joint in model.moving if joint.is_prismatic)
-        self._facts = Facts(robot=robot, prismatic=prismatic)
+        self._panel_inputs = PanelInputs(robot=robot, prismatic=prismatic)
 
     def on_joint_state(self, message: JointState) -> None:
         """What the arm did."""
-        self._facts = replace(self._facts, joints=message)
+        self._panel_inputs = replace(self._panel_inputs, joints=message)
         self._preview.on_joint_state(message)
         if any(abs(speed) > MOVING for speed in message.velocity):
             self.scene.on_motion()
@@ -68,32 +68,32 @@ class Visualizer:
 
     def on_step_errors(self, message: StepErrors) -> None:
         """Commanded minus executed steps."""
-        self._facts = replace(self._facts, errors=message)
+        self._panel_inputs = replace(self._panel_inputs, errors=message)
         self._errors.add(message.stamp, self._row(message.name, message.error, self._errors))
 
     def on_device_state(self, message: DeviceState) -> None:
         """Mode, queue, counters."""
-        self._facts = replace(self._facts, state=message)
+        self._panel_inputs = replace(self._panel_inputs, state=message)
 
     def on_device_status(self, message: DeviceStatus) -> None:
         """Whether the device is there."""
-        self._facts = replace(self._facts, status=message)
+        self._panel_inputs = replace(self._panel_inputs, status=message)
 
     def on_sensors(self, message: SensorReadings) -> None:
         """What the board reads."""
-        self._facts = replace(self._facts, sensors=message)
+        self._panel_inputs = replace(self._panel_inputs, sensors=message)
 
     def on_shaft(self, message: ShaftPositions) -> None:
         """Where a virtual device's shafts truly are; a joint that leaves its counter, or comes back, is a line."""
-        before, after = shaft_errors(self._facts.shaft), shaft_errors(message)
-        self._facts = replace(self._facts, shaft=message)
+        before, after = shaft_errors(self._panel_inputs.shaft), shaft_errors(message)
+        self._panel_inputs = replace(self._panel_inputs, shaft=message)
         # A loaded motor lags by a step and catches up; only what stays behind is worth the plot's scale.
         lost = [float(error) if is_lost(error) else 0.0 for error in after.values()]
         self._shaft.add(message.stamp, self._row(message.name, lost, self._shaft))
         for name, error in after.items():
             if is_lost(error) is not is_lost(before.get(name, 0)):
                 text = f"{name}: its shaft is {error:+d} steps from its counter"
-                self.journal.add(message.stamp, text, "ERROR" if is_lost(error) else "INFO")
+                self.event_log.add(message.stamp, text, "ERROR" if is_lost(error) else "INFO")
 
     def on_planned_path(self, message: PlannedPath) -> None:
         """The way the tool will take."""
@@ -105,16 +105,16 @@ class Visualizer:
         self._latest = now + AHEAD
         return [*self._measured(), *self._ghost(), *self._step_errors(), *self._shafts(), *self._planned(),
                 *self._preview.take(now), *self.scene.take(now), *self._device(now),
-                *self.journal.take(self._latest)]  # fmt: skip
+                *self.event_log.take(self._latest)]  # fmt: skip
 
     def restart(self) -> None:
         """Say the lasting things again: the viewer is a new one."""
         self._path_is_new = self._path is not None
         self.scene.restart()
         self._preview.restart()
-        self._shown, self._tip, self._panel_at = ("", ""), None, 0
+        self._shown, self._trail_end, self._panel_at = ("", ""), None, 0
 
-    def _row(self, names: Sequence[str], values: Sequence[float], before: Thinned) -> list[float]:
+    def _row(self, names: Sequence[str], values: Sequence[float], before: ThinnedSeries) -> list[float]:
         row = list(before.newest or (0.0,) * len(self._names))
         for name, value in zip(names, values, strict=False):
             if name in self._names:
@@ -142,11 +142,11 @@ class Visualizer:
         ]
 
     def _trail(self, times: Times, rows: Array) -> list[Update]:
-        points = self.model.tips(self._tool, rows, self._names)
-        line = points if self._tip is None else np.vstack([self._tip, points])
-        self._tip = points[-1:]
+        points = self.model.link_positions(self._tool, rows, self._names)
+        line = points if self._trail_end is None else np.vstack([self._trail_end, points])
+        self._trail_end = points[-1:]
         moved = len(line) > 1 and float(np.ptp(line, axis=0).max()) > 1e-6
-        return [Strip(entities.TRAIL, int(times[-1]), line)] if moved else []
+        return [LineStrip(entities.TRAIL, int(times[-1]), line)] if moved else []
 
     def _step_errors(self) -> list[Update]:
         times, rows = self._errors.take(self._latest)
@@ -168,15 +168,14 @@ class Visualizer:
         if self._path is None or not self._path_is_new:
             return []
         self._path_is_new = False
-        return [
-            Strip(entities.PATH, bounded(self._path.stamp), np.array(self._path.points, dtype=float).reshape(-1, 3))
-        ]
+        points = np.array(self._path.points, dtype=float).reshape(-1, 3)
+        return [LineStrip(entities.PATH, clamp_stamp(self._path.stamp), points)]
 
     def _device(self, now: int) -> list[Update]:
         if now - self._panel_at < PANEL_PERIOD:
             return []
         self._panel_at = now
-        mode, text = self._mode(), panel(self._facts, now)
+        mode, text = self._mode(), panel(self._panel_inputs, now)
         shown, self._shown = self._shown, (mode, text)
         updates: list[Update] = []
         updates += [State(entities.MODE, now, mode), Tint(entities.MEASURED, now, mode)] if mode != shown[0] else []
@@ -184,16 +183,16 @@ class Visualizer:
         return updates
 
     def _mode(self) -> str:
-        if self._facts.status is not None and not self._facts.status.online:
+        if self._panel_inputs.status is not None and not self._panel_inputs.status.online:
             return "OFFLINE"
-        return "WAITING" if self._facts.state is None else self._facts.state.mode.name
+        return "WAITING" if self._panel_inputs.state is None else self._panel_inputs.state.mode.name
 
 
-def on_screen(joint: Joint) -> float:
+def on_screen(joint: VisualJoint) -> float:
     """Screen units per SI unit: mm for a prismatic joint, degrees for the others."""
     return 1e3 if joint.is_prismatic else math.degrees(1.0)
 
 
-def unit(joint: Joint) -> str:
+def unit(joint: VisualJoint) -> str:
     """The screen's unit."""
     return "mm" if joint.is_prismatic else "°"

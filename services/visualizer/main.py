@@ -27,7 +27,7 @@ from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.visualizer.core import Visualizer
 from services.visualizer.model.mesh_files import missing_meshes, scene_mesh
-from services.visualizer.model.triangle_meshes import Mesh
+from services.visualizer.model.triangle_meshes import TriangleMesh
 from services.visualizer.model.urdf import parse_urdf, tool_link
 from services.visualizer.render.outputs import Outputs, VisualizerParameters
 
@@ -55,8 +55,8 @@ def run(node: Node, deployment: Deployment) -> None:
         if visualizer is None:
             node.set_ready(False, "no robot description yet: is state_publisher running?")
             return
-        trouble = outputs.step(visualizer, now, node.monotonic())
-        node.set_ready(not trouble, trouble)
+        problem = outputs.step(visualizer, now, node.monotonic())
+        node.set_ready(not problem, problem)
 
     node.subscribe(DESCRIPTION, on_description)
     node.spin(step, rate=BATCH_RATE)
@@ -67,7 +67,7 @@ def _visualizer(node: Node, message: RobotDescription, folders: tuple[Path, ...]
     """The core for the arm that was described, fed from the bus; the scene's mesh files are in `folders`."""
     model = parse_urdf(message.urdf)
 
-    def load(shape: MeshShape) -> Mesh | None:
+    def load(shape: MeshShape) -> TriangleMesh | None:
         return scene_mesh(shape, folders, node.log.warning)
 
     core = Visualizer(model, message.robot, tool_link(model, message.robot_toml), load)
@@ -76,13 +76,13 @@ def _visualizer(node: Node, message: RobotDescription, folders: tuple[Path, ...]
     node.subscribe(STEP_ERRORS, core.on_step_errors, batch=1 / BATCH_RATE)
     node.subscribe(DEVICE_STATE, core.on_device_state, batch=1 / BATCH_RATE)
     node.subscribe(DEVICE_STATUS, core.on_device_status)
-    node.subscribe(DEVICE_EVENTS, core.journal.on_event)
+    node.subscribe(DEVICE_EVENTS, core.event_log.on_event)
     node.subscribe(SENSORS, core.on_sensors)
     node.subscribe(DEVICE_SHAFT, core.on_shaft, batch=1 / BATCH_RATE)
     node.subscribe(PLANNED_PATH, core.on_planned_path)
     node.subscribe(SCENE, core.scene.on_scene)
     node.subscribe(CONTACTS, core.scene.on_contacts)
-    node.subscribe(LOG, core.journal.on_log, own=True)
+    node.subscribe(LOG, core.event_log.on_log, own=True)
     return core
 
 

@@ -22,7 +22,7 @@ from services.runtime.deployment import load_deployment, project_root
 from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.readiness import Readiness
 from services.visualizer.program.rerun_program import rerun_binary, start, stop
-from services.visualizer.program.viewer_connection import Watch
+from services.visualizer.program.viewer_connection import ViewerConnection
 
 PERIOD = 0.5  # [s] between two looks at the child
 CUT_OFF = "viewer: a sender ended or was cut off in the midst of a message; a visualizer comes back by itself"
@@ -91,7 +91,7 @@ def _idle(readiness: Readiness, stopping: threading.Event) -> int:
 
 def _keep(viewer: ViewerSection, mode: ViewerMode, memory: str, readiness: Readiness, stopping: threading.Event) -> int:
     """Run the viewer once. A native one that ends well was closed by its user; a web one never ends by itself."""
-    watch = Watch(viewer.host, viewer.port)
+    connection = ViewerConnection(viewer.host, viewer.port)
     child = start(command(rerun_binary(), viewer, mode, memory), stderr=subprocess.PIPE)
     threading.Thread(target=_relay, args=(child.stderr,), daemon=True, name="viewer's errors").start()
     started = time.monotonic()
@@ -99,10 +99,10 @@ def _keep(viewer: ViewerSection, mode: ViewerMode, memory: str, readiness: Readi
         while not stopping.wait(PERIOD):
             if child.poll() is not None:
                 return _ended(child, mode, time.monotonic() - started)
-            _beat(watch, readiness, address(viewer, mode))
+            _beat(connection, readiness, address(viewer, mode))
         return 0
     finally:
-        watch.close()
+        connection.close()
         stop(child)
 
 
@@ -113,11 +113,11 @@ def _relay(errors: IO[bytes] | None) -> None:
         print(CUT_OFF if "h2 protocol error" in text else text, file=sys.stderr, flush=True)
 
 
-def _beat(watch: Watch, readiness: Readiness, where: str) -> None:
-    if watch.is_new(time.monotonic()):
+def _beat(connection: ViewerConnection, readiness: Readiness, where: str) -> None:
+    if connection.is_new(time.monotonic()):
         print(f"viewer: {where}", flush=True)
         readiness.ready()
-    elif watch.is_alive:
+    elif connection.is_alive:
         readiness.beat()
     else:
         readiness.not_ready()

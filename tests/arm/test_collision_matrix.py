@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from services.arm.kinematics.collision_matrix import Reason, are_adjacent, collision_matrix
+from services.arm.kinematics.collision_matrix import DisabledReason, are_adjacent, collision_matrix
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.kinematics.self_collisions import SelfCollisions
+from services.arm.kinematics.self_collisions import SelfCollisionChecker
 from services.arm.model.description import load_arm
 from services.arm.model.srdf_edit import entries, with_pairs
 
@@ -41,7 +41,7 @@ def test_the_matrix_is_the_same_every_time(rm1_folder: Path) -> None:
 def test_distances_name_every_pair_with_its_nearest_shapes(rm1_folder: Path) -> None:
     arm = load_arm(rm1_folder.parent / "parol6")
     kinematics = Kinematics(arm)
-    checker = SelfCollisions(arm, kinematics.model, kinematics.configuration)
+    checker = SelfCollisionChecker(arm, kinematics.model, kinematics.configuration)
     for configuration in arm.named_states.values():
         distances = checker.distances(configuration)
         assert tuple(distances) == checker.pairs
@@ -81,7 +81,7 @@ def test_changes_leave_everything_else_as_it_was() -> None:
     empty = with_pairs(TEXT, {})
     assert entries(empty) == []
     assert "<!-- neighbours -->" in empty
-    again = with_pairs(empty, {("a", "b"): str(Reason.ADJACENT)})
+    again = with_pairs(empty, {("a", "b"): str(DisabledReason.ADJACENT)})
     assert again.endswith('  <disable_collisions link1="a" link2="b" reason="Adjacent"/>\n</robot>\n')
 
 

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from schemas.device_config import NOTHING, DeviceConfig, InputRole, Pull, SensorKind, config_crc, config_text
+from schemas.device_config import UNUSED, DeviceConfig, InputRole, Pull, SensorKind, config_crc, config_text
 from schemas.robot import Sensor
 from services.arm.device.device_config import HEADROOM, device_config, reference_steps
 from services.arm.device.device_parts import sensor_config
@@ -100,7 +100,7 @@ def test_everything_of_robot_toml_reaches_the_device(folder: Path) -> None:
     assert (homing.fast_q8, homing.slow_q8) == (joint.steps.to_q8(0.5), joint.steps.to_q8(0.05))
     switch, stop = config.inputs
     assert (switch.joint, switch.role, switch.inverted, switch.pull) == (0, InputRole.HOME, True, Pull.UP)
-    assert (stop.joint, stop.role, stop.inverted) == (NOTHING, InputRole.ESTOP, False)
+    assert (stop.joint, stop.role, stop.inverted) == (UNUSED, InputRole.ESTOP, False)
     assert config.outputs[0].off_at_estop
     sensor = config.sensors[0]
     assert (sensor.kind, sensor.pin, sensor.trigger_pin) == (SensorKind.ULTRASONIC, 35, 4)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.arm.stl import BadMesh, read_stl
+from services.arm.stl import BadStl, read_stl
 
 TRIANGLES = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[1, 0, 0], [1, 1, 0], [0, 1, 0]]], dtype=float)
 
@@ -40,7 +40,7 @@ def test_both_forms_give_the_same_triangles_with_shared_corners(content: bytes) 
 def test_triangles_without_an_area_are_left_out() -> None:
     flat = np.array([[[0, 0, 0], [0, 0, 0], [1, 1, 1]]], dtype=float)
     assert len(read_stl(binary(np.concatenate([TRIANGLES, flat]))).faces) == 2
-    with pytest.raises(BadMesh, match="none of its triangles has an area"):
+    with pytest.raises(BadStl, match="none of its triangles has an area"):
         read_stl(binary(flat))
 
 
@@ -59,11 +59,11 @@ def test_triangles_without_an_area_are_left_out() -> None:
     ],
 )
 def test_what_is_no_mesh_says_why(content: bytes, reason: str) -> None:
-    with pytest.raises(BadMesh, match=reason):
+    with pytest.raises(BadStl, match=reason):
         read_stl(content)
 
 
 @given(st.one_of(st.binary(max_size=300), st.binary(max_size=100).map(lambda tail: b"solid " + tail)))
 def test_no_bytes_bring_it_down(content: bytes) -> None:
-    with suppress(BadMesh):
+    with suppress(BadStl):
         assert len(read_stl(content).faces) > 0

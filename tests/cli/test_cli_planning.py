@@ -21,7 +21,7 @@ from services.planner.main import run
 from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.errors import NoAnswer
 from services.runtime.node import Node
-from services.runtime.process.shutdown import StopRequest
+from services.runtime.process.shutdown import ShutdownRequest
 from tests.planner.walled import WALLED, past_the_wall
 
 PATIENCE = 60.0  # [s]
@@ -30,7 +30,7 @@ PATIENCE = 60.0  # [s]
 @pytest.fixture
 def walled(session, network, deployment) -> Iterator[None]:
     """A planner whose arm stands between walls."""
-    stop = StopRequest()
+    stop = ShutdownRequest()
 
     def serve() -> None:
         with Node("planner", deployment, robot="rm1", bus=MemoryBus(network), stop=stop) as node:
@@ -49,7 +49,7 @@ def walled(session, network, deployment) -> Iterator[None]:
 @pytest.fixture
 def watcher(network, deployment) -> Iterator[Node]:
     """Who sees from outside how plans stand."""
-    with Node("watcher", deployment, robot="rm1", bus=MemoryBus(network), stop=StopRequest()) as node:
+    with Node("watcher", deployment, robot="rm1", bus=MemoryBus(network), stop=ShutdownRequest()) as node:
         yield node
         node.stop()
 

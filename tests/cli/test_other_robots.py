@@ -8,7 +8,7 @@ from services.cli import state
 from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.runtime.node import Node
-from services.runtime.process.shutdown import StopRequest
+from services.runtime.process.shutdown import ShutdownRequest
 from services.runtime.robots import robots_on
 from tests.runtime.support import RouterProcess
 
@@ -24,12 +24,12 @@ def router(tmp_path, monkeypatch):
 @pytest.fixture
 def parol6(router):
     """A gateway of another robot."""
-    with Node("stepper_gateway", router.deployment, robot="parol6", stop=StopRequest()) as node:
+    with Node("stepper_gateway", router.deployment, robot="parol6", stop=ShutdownRequest()) as node:
         yield node
 
 
 def test_the_robots_of_a_router_are_those_with_the_node_asked_for(router, parol6):
-    with Node("planner", router.deployment, robot="other", stop=StopRequest()):
+    with Node("planner", router.deployment, robot="other", stop=ShutdownRequest()):
         assert robots_on(router.deployment.router) == ("other", "parol6")
         assert robots_on(router.deployment.router, "stepper_gateway") == ("parol6",)
 

@@ -16,7 +16,7 @@ from services.cli import provision as module
 from services.cli.credentials import Credentials, certificate, password, require_sound
 from services.cli.errors import CommandError, ExitCode
 from services.cli.main import run
-from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
+from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 
 
 class Board:
@@ -27,7 +27,7 @@ class Board:
         self.deaf = 0  # packets that are lost
         self.refuses = ""
         self.says = b"rst:0x1 (POWERON)\r\n"  # before everything, as a boot loader does
-        self._master, self._packets = master, Packets()
+        self._master, self._packets = master, PacketDecoder()
         self.thread = threading.Thread(target=self._run)
         self.thread.start()
 

@@ -21,7 +21,7 @@ from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
 from schemas.device import DeviceCommandKind, PressKind
-from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
+from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 from tests.optional import need
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -200,7 +200,7 @@ class SerialPort:
 
     def __init__(self, path: Path) -> None:
         self._line = os.open(path, os.O_RDWR | os.O_NOCTTY)
-        self._packets = Packets()
+        self._packets = PacketDecoder()
         self._heard: list[bytes] = []
 
     def send(self, frame: bytes) -> None:

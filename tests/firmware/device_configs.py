@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from schemas.device_config import (
-    NOTHING,
+    UNUSED,
     DeviceConfig,
     HomingConfig,
     InputConfig,
@@ -43,8 +43,8 @@ def joints(draw: st.DrawFn, name: str, step_pin: int, dir_pin: int) -> JointConf
         max_acceleration_q8=draw(POSITIVE),
         inverted=draw(FLAG),
         dir_setup_us=draw(st.integers(0, 200)),
-        step_pin=step_pin if is_wired else NOTHING,
-        dir_pin=dir_pin if is_wired else NOTHING,
+        step_pin=step_pin if is_wired else UNUSED,
+        dir_pin=dir_pin if is_wired else UNUSED,
         text_scale_q32=draw(st.integers(0, 2**63 - 1)),
     )
 
@@ -73,7 +73,7 @@ def inputs(draw: st.DrawFn, name: str, pin: int, joint_count: int, may_be_estop:
         name=name,
         pin=pin,
         role=InputRole.ESTOP if is_estop else draw(st.sampled_from([r for r in InputRole if r is not InputRole.ESTOP])),
-        joint=NOTHING if is_estop else draw(st.integers(0, joint_count - 1)),
+        joint=UNUSED if is_estop else draw(st.integers(0, joint_count - 1)),
         inverted=draw(FLAG),
         pull=draw(st.sampled_from(Pull)),
     )
@@ -82,7 +82,7 @@ def inputs(draw: st.DrawFn, name: str, pin: int, joint_count: int, may_be_estop:
 @st.composite
 def sensors(draw: st.DrawFn, name: str, pin: int, trigger_pin: int) -> SensorConfig:
     kind = draw(st.sampled_from(SensorKind))
-    trigger = trigger_pin if kind is SensorKind.ULTRASONIC else NOTHING
+    trigger = trigger_pin if kind is SensorKind.ULTRASONIC else UNUSED
     return SensorConfig(name=name, kind=kind, pin=pin, trigger_pin=trigger, scale_q16=draw(I32), offset_milli=draw(I32))
 
 
@@ -105,7 +105,7 @@ def good_configs(draw: st.DrawFn) -> DeviceConfig:
         for index, name in enumerate(draw(names(input_count)))
     ]
     for index, switch in enumerate(switches):
-        if switch.joint != NOTHING:
+        if switch.joint != UNUSED:
             homing = draw(homings(index, arms[switch.joint], tick_hz))
             if may_home(switch, switch.joint, homing.direction):
                 arms[switch.joint] = replace(arms[switch.joint], homing=homing)
@@ -119,7 +119,7 @@ def good_configs(draw: st.DrawFn) -> DeviceConfig:
         hold_timeout_ms=draw(st.integers(1, 60_000)),
         enable_lead_ms=draw(st.integers(0, 10_000)),
         armed_at_boot=draw(FLAG),
-        enable_pin=next(pins, NOTHING),
+        enable_pin=next(pins, UNUSED),
         enable_inverted=draw(FLAG),
         inputs=tuple(switches),
         outputs=tuple(

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from firmware.bindings.parsers import Refused, read_config
+from firmware.bindings.parsers import ConfigTextRefused, read_config
 from schemas.device_config import DeviceConfig, JointConfig, config_text
 from services.arm.device.device_config import device_config
 from services.arm.model.description import load_arm
@@ -48,7 +48,7 @@ def assert_agreed(text: bytes) -> None:
     """The core reads what Python reads, or refuses with a sentence."""
     try:
         read = read_config(text)
-    except Refused as refused:
+    except ConfigTextRefused as refused:
         reason = refused.reason
     else:
         assert read == msgspec.json.decode(text, type=DeviceConfig)
@@ -99,7 +99,7 @@ def test_what_is_left_out_has_the_same_default_on_both_sides():
 
 
 def test_a_text_that_no_packet_could_carry_is_refused():
-    with pytest.raises(Refused, match=f"its text is longer than {LARGEST} bytes"):
+    with pytest.raises(ConfigTextRefused, match=f"its text is longer than {LARGEST} bytes"):
         read_config(b" " * (LARGEST + 1))
 
 

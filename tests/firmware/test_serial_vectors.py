@@ -10,9 +10,9 @@ import msgspec
 import pytest
 
 from firmware.bindings.device import Device
-from firmware.bindings.parsers import Refused, read_config
+from firmware.bindings.parsers import ConfigTextRefused, read_config
 from schemas.device_config import DeviceConfig
-from services.runtime.serial_frames import Packets
+from services.runtime.serial_frames import PacketDecoder
 
 FOLDER = Path(__file__).resolve().parents[2] / "firmware/tests/vectors/serial"
 LINES = json.loads((FOLDER / "lines.json").read_text())
@@ -24,7 +24,7 @@ def cases(content: list[dict[str, Any]]) -> list[Any]:
 
 @pytest.mark.parametrize("case", cases(json.loads((FOLDER / "packets.json").read_text())))
 def test_packets_are_cut_alike(case: dict[str, Any]):
-    packets = Packets()
+    packets = PacketDecoder()
     frames = packets.feed(bytes.fromhex(case["sent"]))
     # Python hands on what is well packed but does not begin with the magic; the core drops it at once.
     assert [frame.hex() for frame in frames if frame.startswith(b"g")] == case["frames"]
@@ -47,6 +47,6 @@ def test_configurations_are_judged_alike(case: dict[str, Any]):
     part = reason = ""
     try:
         read_config(case["text"].encode())
-    except Refused as refused:
+    except ConfigTextRefused as refused:
         part, reason = refused.part, refused.reason
     assert (part, reason) == (case["part"], case["reason"])

@@ -20,7 +20,7 @@ from schemas.device import DeviceCommandKind, DeviceMode, PressKind
 from schemas.device_config import DeviceConfig, config_text
 from services.arm.device.device_config import device_config
 from services.arm.model.description import Arm
-from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
+from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 
 ACK, CMD_ACK, SYNC_R, STATE = 2, 4, 7, 8
 OK = 0
@@ -32,7 +32,7 @@ def sync(t0: int) -> bytes:
 
 
 def kinds(data: bytes) -> set[int]:
-    return {frame[2] for frame in Packets().feed(data)}
+    return {frame[2] for frame in PacketDecoder().feed(data)}
 
 
 def other(arm: Arm) -> DeviceConfig:
@@ -70,7 +70,7 @@ def test_a_move_over_the_line_arrives_to_the_step(rm1: Arm):
     wire = b"\x00garbage" + packet(heartbeat(1)) + packet(traj(1, 0, rows, FIRST | LAST))
     for i in range(0, len(wire), 7):  # as bytes trickle in
         device.receive_serial(wire[i : i + 7])
-    answers = [frame for frame in Packets().feed(device.take_serial()) if frame[2] == ACK]
+    answers = [frame for frame in PacketDecoder().feed(device.take_serial()) if frame[2] == ACK]
     assert [frame[20] for frame in answers] == [OK]
     for beat in range(2, 14):
         device.advance(device.now_us + 200_000)
@@ -100,7 +100,7 @@ def test_a_configuration_over_the_line_is_taken_by_a_device_that_has_none(rm1: A
     text = config_text(device_config(rm1))
     device.receive_serial(packet(json_frame(JsonFrame.CONFIG, text)))
     device.advance(100_000)
-    answers = [parse_json_frame(frame) for frame in Packets().feed(device.take_serial())]
+    answers = [parse_json_frame(frame) for frame in PacketDecoder().feed(device.take_serial())]
     acks = [json.loads(found.text) for found in answers if found is not None and found.kind == JsonFrame.CONFIG_ACK]
     assert [ack["accepted"] for ack in acks] == [True]
     assert device.mode == DeviceMode.UNREFERENCED

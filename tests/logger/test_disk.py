@@ -11,7 +11,7 @@ from schemas.joints import JointState
 from schemas.system import LogRecord
 from schemas.topics import COMMAND_ACKS, COMMANDS, DESCRIPTION, JOINT_STATES, LOG
 from services.logger.core import Logger
-from services.logger.disk import RETRY, Disk, LoggerParameters
+from services.logger.disk import RETRY, LoggerParameters, RecordingWriter
 from services.logger.files import is_due, stem_of, surplus
 
 START = 1_795_000_000_000_000_000
@@ -23,7 +23,7 @@ class Rig:
         self.folder = folder
         self.warnings = []
         self.logger = Logger()
-        self.disk = Disk("rm1", {}, self.warnings.append)
+        self.disk = RecordingWriter("rm1", {}, self.warnings.append)
         self.parameters = LoggerParameters(**parameters)
 
     def put(self, count, now, size=10):

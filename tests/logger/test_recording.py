@@ -19,7 +19,7 @@ from schemas.frames import FrameTransform, FrameTransforms, RobotDescription
 from schemas.joints import JointState
 from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, TOPICS
 from services.logger.channels import recorded_topics, schema_of
-from services.logger.command_log import Line
+from services.logger.command_log import CommandRow
 from services.logger.core import Entry
 from services.logger.recording import Recording
 
@@ -84,8 +84,9 @@ def test_the_robots_files_and_the_origin_are_kept_beside_the_data(recording):
 
 
 def test_the_table_of_commands_is_plain_csv(recording):
-    recording.write_lines([Line(("a",), ("0", "1")), Line(("a",), ("1", "2")), Line(("b", "c"), ("7", "8"))])
-    recording.write_lines([Line(("a",), ("2", "3"))])
+    rows = [CommandRow(("a",), ("0", "1")), CommandRow(("a",), ("1", "2")), CommandRow(("b", "c"), ("7", "8"))]
+    recording.write_lines(rows)
+    recording.write_lines([CommandRow(("a",), ("2", "3"))])
     recording.close()
     rows = list(csv.reader(recording.csv_path.read_text().splitlines()))
     assert rows[0][:4] == ["seq", "timestamp_pc_us", "timestamp_pc_iso", "a_pos"]
@@ -100,7 +101,7 @@ import sys, time
 from pathlib import Path
 from schemas.joints import JointState
 from schemas.topics import JOINT_STATES
-from services.logger.command_log import Line
+from services.logger.command_log import CommandRow
 from services.logger.core import Entry
 from services.logger.recording import Recording
 recording = Recording(Path(sys.argv[1]), "killed", 1, {})

@@ -16,7 +16,7 @@ from services.arm.model.description import Arm
 from services.planner.main import run
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.process.shutdown import StopRequest
+from services.runtime.process.shutdown import ShutdownRequest
 
 TURN = JogCommand(name=("brazo_joint",), velocity=(0.3,))
 PATIENCE = 20.0  # [s]
@@ -46,7 +46,7 @@ class Follower:
 
 @pytest.fixture
 def follower(tmp_path: Path, rm1: Arm) -> Iterator[Follower]:
-    network, stop = MemoryNetwork(), StopRequest()
+    network, stop = MemoryNetwork(), ShutdownRequest()
     deployment = Deployment(paths=PathsSection(run=str(tmp_path)))
 
     def serve() -> None:
@@ -56,7 +56,7 @@ def follower(tmp_path: Path, rm1: Arm) -> Iterator[Follower]:
     thread = threading.Thread(target=serve)
     thread.start()
     try:
-        with Node("follower", deployment, bus=MemoryBus(network), stop=StopRequest()) as node:
+        with Node("follower", deployment, bus=MemoryBus(network), stop=ShutdownRequest()) as node:
             yield Follower(node, rm1)
     finally:
         stop.set()

@@ -20,7 +20,7 @@ from services.planner.main import run
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.errors import NoAnswer
 from services.runtime.node import Node
-from services.runtime.process.shutdown import StopRequest
+from services.runtime.process.shutdown import ShutdownRequest
 from tests.planner.walled import WALLED, past_the_wall
 
 PATIENCE = 60.0  # [s]
@@ -31,13 +31,13 @@ class Bus:
     """A planner, and as many clients as wanted."""
 
     def __init__(self, folder: Path) -> None:
-        self.network, self.stop = MemoryNetwork(), StopRequest()
+        self.network, self.stop = MemoryNetwork(), ShutdownRequest()
         self.deployment = Deployment(paths=PathsSection(run=str(folder)))
         self._planner = threading.Thread(target=self._serve)
         self._planner.start()
 
     def client(self, name: str) -> Node:
-        return Node(name, self.deployment, bus=MemoryBus(self.network), stop=StopRequest())
+        return Node(name, self.deployment, bus=MemoryBus(self.network), stop=ShutdownRequest())
 
     def close(self) -> None:
         self.stop.set()

@@ -16,13 +16,13 @@ from services.arm.model.description import Arm
 from services.planner.main import run
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.process.shutdown import StopRequest
+from services.runtime.process.shutdown import ShutdownRequest
 
 
 @pytest.fixture
 def asker(tmp_path: Path) -> Iterator[Node]:
     """A node beside a running planner."""
-    network, stop = MemoryNetwork(), StopRequest()
+    network, stop = MemoryNetwork(), ShutdownRequest()
     deployment = Deployment(paths=PathsSection(run=str(tmp_path)))
 
     def serve() -> None:
@@ -32,7 +32,7 @@ def asker(tmp_path: Path) -> Iterator[Node]:
     thread = threading.Thread(target=serve)
     thread.start()
     try:
-        with Node("asker", deployment, bus=MemoryBus(network), stop=StopRequest()) as node:
+        with Node("asker", deployment, bus=MemoryBus(network), stop=ShutdownRequest()) as node:
             yield node
     finally:
         stop.set()

@@ -35,7 +35,7 @@ from services.planner.main import run
 from services.planner.scene.scene_file import load_scene, save_scene
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.process.shutdown import StopRequest
+from services.runtime.process.shutdown import ShutdownRequest
 
 WAIT = 5.0  # [s]
 LONG_WAIT = 60.0  # [s]
@@ -45,7 +45,7 @@ GOAL = PlanRequest(goal=JointGoal(name=("brazo_joint",), position=(1.2,)), motio
 @contextmanager
 def planning(folder: Path) -> Iterator[Node]:
     """A node beside a running planner."""
-    network, stop = MemoryNetwork(), StopRequest()
+    network, stop = MemoryNetwork(), ShutdownRequest()
     deployment = Deployment(paths=PathsSection(run=str(folder)))
 
     def serve() -> None:
@@ -55,7 +55,7 @@ def planning(folder: Path) -> Iterator[Node]:
     thread = threading.Thread(target=serve)
     thread.start()
     try:
-        with Node("asker", deployment, bus=MemoryBus(network), stop=StopRequest()) as node:
+        with Node("asker", deployment, bus=MemoryBus(network), stop=ShutdownRequest()) as node:
             yield node
     finally:
         stop.set()

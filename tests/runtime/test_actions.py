@@ -223,7 +223,7 @@ def test_a_restarted_server_does_not_know_the_goal(buses: Buses) -> None:
 
 
 def test_a_client_that_was_busy_itself_does_not_give_up(buses: Buses, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.runtime.actions.goal_handle.SERVER_PATIENCE", 0.8)
+    monkeypatch.setattr("services.runtime.actions.goal_handle.SERVER_TIMEOUT", 0.8)
     with moving(buses):
         node = buses.node("client")
         handle = node.action(FOLLOW).send(goal_of(110))

@@ -7,7 +7,7 @@ import time
 from queue import SimpleQueue
 
 from schemas.topics import EVERY, LATCHED, LATEST
-from services.runtime.bus.interface import Answer, Arrival, Query
+from services.runtime.bus.interface import Arrival, BusReply, Query
 from services.runtime.bus.zenoh_bus import HEARTBEAT
 from tests.runtime.support import Buses, until
 
@@ -104,8 +104,8 @@ def test_robots_do_not_hear_one_another(buses: Buses) -> None:
     assert buses.open("parol6").alive("@alive/*") == set()
 
 
-def ask(bus: object, key: str, payload: bytes, timeout: float = 1.0) -> Answer | None:
-    answers: SimpleQueue[Answer | None] = SimpleQueue()
+def ask(bus: object, key: str, payload: bytes, timeout: float = 1.0) -> BusReply | None:
+    answers: SimpleQueue[BusReply | None] = SimpleQueue()
     bus.ask(key, "Question", payload, timeout, answers.put)
     return answers.get(timeout=timeout + 1.0)
 
@@ -113,18 +113,18 @@ def ask(bus: object, key: str, payload: bytes, timeout: float = 1.0) -> Answer |
 def test_a_request_gets_one_answer_from_any_thread(buses: Buses) -> None:
     def answer(query: Query) -> None:
         if query.arrival.payload == b"later":
-            threading.Timer(0.05, query.reply, ("Answer", b"late")).start()
+            threading.Timer(0.05, query.reply, ("BusReply", b"late")).start()
         elif query.arrival.payload == b"no":
             query.fail("Failure", b"why")
         else:
-            query.reply("Answer", query.arrival.schema.encode())
+            query.reply("BusReply", query.arrival.schema.encode())
 
     buses.open().serve("plan", answer)
     client = buses.open()
     assert client.wait_served("plan", 1.0)
-    assert ask(client, "plan", b"x") == Answer(True, "Answer", b"Question")
-    assert ask(client, "plan", b"later") == Answer(True, "Answer", b"late")
-    assert ask(client, "plan", b"no") == Answer(False, "Failure", b"why")
+    assert ask(client, "plan", b"x") == BusReply(True, "BusReply", b"Question")
+    assert ask(client, "plan", b"later") == BusReply(True, "BusReply", b"late")
+    assert ask(client, "plan", b"no") == BusReply(False, "Failure", b"why")
 
 
 def test_a_request_without_an_answer_ends_in_time(buses: Buses) -> None:
@@ -141,7 +141,7 @@ def test_a_request_without_an_answer_ends_in_time(buses: Buses) -> None:
 
 def test_wait_served_wakes_when_a_server_comes_and_knows_when_it_is_gone(buses: Buses) -> None:
     client, server = buses.open(), buses.open()
-    threading.Timer(0.2, server.serve, ("plan", lambda query: query.reply("Answer", b""))).start()
+    threading.Timer(0.2, server.serve, ("plan", lambda query: query.reply("BusReply", b""))).start()
     begin = time.monotonic()
     assert client.wait_served("plan", 2.0)
     assert 0.1 < time.monotonic() - begin < 1.0

@@ -15,7 +15,7 @@ from schemas.message import decode
 from schemas.system import Failure
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY, PLAN, TOPICS
 from services.runtime.actions import accept
-from services.runtime.bus.interface import Answer
+from services.runtime.bus.interface import BusReply
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.errors import NoAnswer, Refused
 from services.runtime.node import Node
@@ -79,7 +79,7 @@ def test_a_message_is_handled_or_counted_as_bad(
 def test_a_request_is_always_answered(
     network: MemoryNetwork, victim: Node, key: str, schema: str, payload: bytes
 ) -> None:
-    answers: list[Answer | None] = []
+    answers: list[BusReply | None] = []
     MemoryBus(network).ask(key, schema, full_size(payload), 5.0, answers.append)
     assert hear(victim, lambda: len(answers) == 1)
     assert answers[0] is not None
@@ -90,7 +90,7 @@ def test_a_request_is_always_answered(
 @given(st.binary(max_size=64), SCHEMAS, st.booleans())
 def test_an_answer_is_a_response_a_refusal_or_no_answer(payload: bytes, schema: str, ok: bool) -> None:
     with contextlib.suppress(NoAnswer, Refused):
-        assert isinstance(response_in(PLAN, Answer(ok, schema, payload)), PLAN.response)
+        assert isinstance(response_in(PLAN, BusReply(ok, schema, payload)), PLAN.response)
         assert schema == PLAN.response.__name__
 
 
@@ -100,5 +100,5 @@ def full_size(payload: bytes) -> bytes:
 
 def counted(node: Node, key: str) -> tuple[int, int]:
     """Good and bad messages of a key."""
-    statistics = next(each for each in node._declared.statistics() if each.key == key)
+    statistics = next(each for each in node._endpoints.statistics() if each.key == key)
     return statistics.received, statistics.bad

@@ -17,7 +17,7 @@ from schemas.message import BadMessage, encode
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
 from schemas.system import Empty, LogRecord, NodeStatistics, Parameter, Parameters, SetParameter
 from schemas.topics import COMMAND_ACKS, DESCRIPTION, JOINT_STATES, LOG, PLAN, STATISTICS, Request
-from services.runtime.bus.interface import Answer
+from services.runtime.bus.interface import BusReply
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.errors import NoAnswer, NodeNameTaken, Refused
 from services.runtime.node import Node
@@ -272,7 +272,7 @@ def test_a_crowd_of_requests_is_told_that_the_server_is_busy(buses: Buses) -> No
     server, client = buses.node("planner"), buses.open()
     server.serve(PLAN, lambda request: PlanResponse())
     assert client.wait_served(PLAN.key, 1.0)
-    answers: list[Answer | None] = []
+    answers: list[BusReply | None] = []
     for _ in range(100):
         client.ask(PLAN.key, "PlanRequest", encode(PlanRequest()), 2.0, answers.append)
     assert until(lambda: len(answers) == 36, 1.0)
@@ -434,7 +434,7 @@ def test_a_flood_does_not_starve_the_step(buses: Buses) -> None:
     node = buses.node("loop")
     steps: list[float] = []
     for _ in range(2000):
-        node._loop.inbox.put(lambda: time.sleep(0.0005))
+        node._loop.tasks.put(lambda: time.sleep(0.0005))
     with spinning(node, lambda now: steps.append(time.monotonic()), rate=50.0):
         time.sleep(0.6)
     assert len(steps) >= 25

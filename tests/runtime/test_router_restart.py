@@ -124,7 +124,7 @@ def _call_in_vain(client: Node) -> None:
 
 
 def test_a_router_that_stays_away_ends_the_waiting(own_router: RouterProcess, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.runtime.actions.goal_handle.ROUTER_PATIENCE", 1.0)
+    monkeypatch.setattr("services.runtime.actions.goal_handle.ROUTER_TIMEOUT", 1.0)
     with open_node(own_router, "stepper_gateway") as gateway, open_node(own_router, "client") as client:
         arm = Arm(gateway)
         with spinning(gateway, arm.step, rate=100.0):
@@ -154,7 +154,7 @@ def test_a_frozen_router_blocks_a_publisher_for_a_bounded_time(own_router: Route
 def test_a_node_that_does_not_find_back_ends_so_that_it_is_started_anew(
     own_router: RouterProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("services.runtime.bus.zenoh_bus.ASTRAY_PATIENCE", 0.5)
+    monkeypatch.setattr("services.runtime.bus.zenoh_bus.RECONNECTION_TIMEOUT", 0.5)
     monkeypatch.setattr("services.runtime.bus.zenoh_bus.ZenohBus.is_connected", False)
     with open_node(own_router, "astray") as node, pytest.raises(BusError, match="did not take this session back"):
         node.spin()

@@ -12,7 +12,7 @@ from services.runtime.serial_frames import (
     LARGEST,
     BadPacket,
     JsonFrame,
-    Packets,
+    PacketDecoder,
     cobs_decode,
     cobs_encode,
     json_frame,
@@ -60,7 +60,7 @@ def test_any_bytes_are_decoded_or_refused(garbage):
 
 @given(st.lists(st.binary(min_size=1, max_size=300), max_size=5), st.lists(st.integers(1, 40), max_size=60))
 def test_frames_come_whole_however_the_line_cuts_them(frames, cuts):
-    line, packets, got = b"".join(packet(frame) for frame in frames), Packets(), []
+    line, packets, got = b"".join(packet(frame) for frame in frames), PacketDecoder(), []
     for size in [*cuts, len(line)]:
         piece, line = line[:size], line[size:]
         got += packets.feed(piece)
@@ -70,12 +70,12 @@ def test_frames_come_whole_however_the_line_cuts_them(frames, cuts):
 
 @given(st.binary(max_size=100))
 def test_garbage_costs_itself_only(garbage):
-    packets = Packets()
+    packets = PacketDecoder()
     assert packets.feed(garbage + packet(b"whole"))[-1] == b"whole"
 
 
 def test_what_is_too_long_is_dropped_up_to_the_next_end():
-    packets = Packets()
+    packets = PacketDecoder()
     for _ in range(3):
         assert packets.feed(b"\x02" * LARGEST) == []
     assert packets.feed(b"\x00" + packet(b"whole")) == [b"whole"]

@@ -14,18 +14,18 @@ from schemas.topics import DEVICE_STOP, PLAN
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
 from services.runtime.actions import keys as keys
 from services.runtime.actions.server import accept
-from services.runtime.bus.interface import Answer, Bus
-from services.runtime.requests.server import MOST_OF_A_CLIENT, MOST_UNANSWERED, MOST_WAITING, Pending
+from services.runtime.bus.interface import Bus, BusReply
+from services.runtime.requests.server import MAX_UNANSWERED, MAX_WAITING, MAX_WAITING_OF_A_CLIENT, Pending
 from tests.runtime.support import Buses, hear, spinning, until
 
-Answers = list[Answer | None]
+Answers = list[BusReply | None]
 
 
 def ask(client: Bus, key: str, question: Message, answers: Answers, timeout: float = 5.0) -> None:
     client.ask(key, type(question).__name__, encode(question), timeout, answers.append, True)
 
 
-def words(answer: Answer | None) -> str:
+def words(answer: BusReply | None) -> str:
     assert answer is not None
     return decode(Failure, answer.payload).message
 
@@ -38,7 +38,7 @@ def test_an_urgent_request_is_handled_before_all_that_waits(buses: Buses) -> Non
     assert client.wait_served(PLAN.key, 1.0)
     assert client.wait_served(DEVICE_STOP.key, 1.0)
     answers: Answers = []
-    for _ in range(MOST_OF_A_CLIENT):
+    for _ in range(MAX_WAITING_OF_A_CLIENT):
         ask(client, PLAN.key, PlanRequest(), answers)
     refused: Answers = []
     ask(client, PLAN.key, PlanRequest(), refused)  # its answer says that the others have arrived
@@ -46,8 +46,8 @@ def test_an_urgent_request_is_handled_before_all_that_waits(buses: Buses) -> Non
     stopped: Answers = []
     ask(client, DEVICE_STOP.key, DeviceStopRequest(), stopped)
     assert until(lambda: _received(server) == 1)
-    assert hear(server, lambda: len(handled) == MOST_OF_A_CLIENT + 1)
-    assert handled == ["stop"] + ["plan"] * MOST_OF_A_CLIENT
+    assert hear(server, lambda: len(handled) == MAX_WAITING_OF_A_CLIENT + 1)
+    assert handled == ["stop"] + ["plan"] * MAX_WAITING_OF_A_CLIENT
 
 
 def test_equal_stops_that_wait_are_handled_once_and_all_answered(buses: Buses) -> None:
@@ -67,7 +67,7 @@ def test_equal_stops_that_wait_are_handled_once_and_all_answered(buses: Buses) -
 
 
 def _received(server) -> int:
-    return sum(each.received for each in server._declared.statistics() if each.key == DEVICE_STOP.key)
+    return sum(each.received for each in server._endpoints.statistics() if each.key == DEVICE_STOP.key)
 
 
 def test_stops_are_carried_out_however_many_callers_wait(buses: Buses) -> None:
@@ -76,7 +76,7 @@ def test_stops_are_carried_out_however_many_callers_wait(buses: Buses) -> None:
     server.serve_later(DEVICE_STOP, lambda request, pending: pendings.append(pending))
     assert client.wait_served(DEVICE_STOP.key, 1.0)
     answers: Answers = []
-    for _ in range(MOST_UNANSWERED + 1):
+    for _ in range(MAX_UNANSWERED + 1):
         ask(client, DEVICE_STOP.key, DeviceStopRequest(), answers)
     assert until(lambda: len(answers) == 1)
     assert "taken; 1024 callers wait for its answer already" in words(answers[0])
@@ -102,9 +102,9 @@ def test_the_flood_of_one_client_leaves_room_for_another(buses: Buses) -> None:
     assert flooder.wait_served(PLAN.key, 1.0)
     assert client.wait_served(PLAN.key, 1.0)
     flood: Answers = []
-    for _ in range(MOST_WAITING):
+    for _ in range(MAX_WAITING):
         ask(flooder, PLAN.key, PlanRequest(), flood)
-    assert until(lambda: len(flood) == MOST_WAITING - MOST_OF_A_CLIENT)
+    assert until(lambda: len(flood) == MAX_WAITING - MAX_WAITING_OF_A_CLIENT)
     assert "requests are waiting already, all of this client" in words(flood[0])
     answers: Answers = []
     ask(client, PLAN.key, PlanRequest(), answers)
@@ -128,14 +128,14 @@ def test_what_a_stop_has_overtaken_is_refused(buses: Buses) -> None:
     assert client.wait_served(goal_key, 1.0)
     assert client.wait_served(DEVICE_STOP.key, 1.0)
     goals: Answers = []
-    for _ in range(MOST_OF_A_CLIENT + 1):  # the answer to the last one says that the others have arrived
+    for _ in range(MAX_WAITING_OF_A_CLIENT + 1):  # the answer to the last one says that the others have arrived
         ask(client, goal_key, _goal("early"), goals)
     assert until(lambda: len(goals) == 1)
     stops: Answers = []
     ask(client, DEVICE_STOP.key, DeviceStopRequest(), stops)
     assert until(lambda: _received(server) == 1)
     with spinning(server):
-        assert until(lambda: len(goals) == MOST_OF_A_CLIENT + 1 and len(stops) == 1)
+        assert until(lambda: len(goals) == MAX_WAITING_OF_A_CLIENT + 1 and len(stops) == 1)
         assert "was asked for after it" in words(goals[1])
         assert not started
         ask(client, goal_key, _goal("later"), goals)

@@ -22,7 +22,7 @@ from services.arm.model.description import load_arm
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.errors import GoalRefused, NoAnswer, Refused
 from services.runtime.node import Node
-from services.runtime.process.shutdown import StopRequest
+from services.runtime.process.shutdown import ShutdownRequest
 
 HERE_OR_THERE = (0.45, -0.35)  # of the way from a joint's middle to its limits: two poses to go between
 SETTLE = 10.0  # [s] for a stack to accept a goal again
@@ -35,7 +35,7 @@ class Operator:
         self.stack = stack
         deployment = load_deployment(None, stack.environment)
         self.arm = load_arm(project_root() / deployment.robot)
-        self.node = Node("operator", deployment, robot=self.arm.name, stop=StopRequest())
+        self.node = Node("operator", deployment, robot=self.arm.name, stop=ShutdownRequest())
         self.seen: list[JointState] = []
         self.node.subscribe(JOINT_STATES, self._see)
         self.follow = self.node.action(FOLLOW_JOINT_TRAJECTORY)

@@ -14,14 +14,14 @@ from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, STATIC_FRAMES
 from services.arm.model.description import Arm
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.process.shutdown import StopRequest
+from services.runtime.process.shutdown import ShutdownRequest
 from services.state_publisher.main import run
 
 
 @pytest.fixture
 def listener(tmp_path: Path) -> Iterator[Node]:
     """A node that joins after a state publisher has started."""
-    network, stop = MemoryNetwork(), StopRequest()
+    network, stop = MemoryNetwork(), ShutdownRequest()
     deployment = Deployment(paths=PathsSection(run=str(tmp_path)))
 
     def publish() -> None:
@@ -31,7 +31,7 @@ def listener(tmp_path: Path) -> Iterator[Node]:
     thread = threading.Thread(target=publish)
     thread.start()
     try:
-        with Node("listener", deployment, bus=MemoryBus(network), stop=StopRequest()) as node:
+        with Node("listener", deployment, bus=MemoryBus(network), stop=ShutdownRequest()) as node:
             node.wait(0.3)
             yield node
     finally:

@@ -16,7 +16,7 @@ import pytest
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
-from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
+from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 from services.stepper_gateway.links.frames import (
     Ack,
     Command,
@@ -111,7 +111,7 @@ class SerialPeer:
     def __init__(self, folder: Path) -> None:
         self.path = folder / "board"
         self._heard: list[tuple[Kind, bytes]] = []
-        self._packets = Packets()
+        self._packets = PacketDecoder()
         self._ours = self._theirs = -1
         self.mend()
 

@@ -36,7 +36,7 @@ from schemas.topics import (
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.errors import GoalRefused
 from services.runtime.node import Node
-from services.runtime.process.shutdown import StopRequest
+from services.runtime.process.shutdown import ShutdownRequest
 from services.stepper_gateway.main import run
 from tests.stepper_gateway.harness import move
 from tests.stepper_gateway.processes import DEVICE, Processes
@@ -47,14 +47,16 @@ class Running:
 
     def __init__(self, processes: Processes) -> None:
         network = self._network = MemoryNetwork()
-        self._stop = StopRequest()
+        self._stop = ShutdownRequest()
         self.gateway = Node(
             "stepper_gateway", processes.deployment, robot="rm1", bus=MemoryBus(network), stop=self._stop
         )
         self._thread = threading.Thread(target=run, args=(self.gateway, processes.deployment))
         self._thread.start()
-        self.client = Node("client", processes.deployment, robot="rm1", bus=MemoryBus(network), stop=StopRequest())
-        self.planner = Node("planner", processes.deployment, robot="rm1", bus=MemoryBus(network), stop=StopRequest())
+        self.client = Node("client", processes.deployment, robot="rm1", bus=MemoryBus(network), stop=ShutdownRequest())
+        self.planner = Node(
+            "planner", processes.deployment, robot="rm1", bus=MemoryBus(network), stop=ShutdownRequest()
+        )
         self.joints = self.client.latest(JOINT_STATES)
 
     def network_bus(self) -> MemoryBus:

@@ -160,7 +160,7 @@ from services.arm.model.description import load_arm
 from services.runtime.deployment import project_root
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.process.shutdown import StopRequest
+from services.runtime.process.shutdown import ShutdownRequest
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits
@@ -169,7 +169,7 @@ from services.stepper_gateway.motion.target_tracker import TargetTracker
 arm = load_arm(project_root() / "urdf/rm1")
 core = GatewayCore(arm, 1)
 core.own = core
-node = Node("stepper_gateway", robot="rm1", bus=MemoryBus(MemoryNetwork()), stop=StopRequest())
+node = Node("stepper_gateway", robot="rm1", bus=MemoryBus(MemoryNetwork()), stop=ShutdownRequest())
 
 def step(now):
     core.tracker = TargetTracker(Limits.of(arm.joints), 0.02, Knot.at_rest((0.0, 0.0, 0.0)))

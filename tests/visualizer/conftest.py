@@ -87,13 +87,13 @@ def tell_of_a_move(core: Visualizer, second: int) -> None:
     """The plan and the log of a move that begins now."""
     stamp = START + second * 1_000_000_000
     rows = np.array([path_at(second + 4.0 * k / 40) for k in range(41)])
-    points = core.model.tips("efector_link", rows, list(NAMES))
+    points = core.model.link_positions("efector_link", rows, list(NAMES))
     core.on_planned_path(PlannedPath(stamp=stamp, frame="base_link", points=tuple(map(tuple, points.tolist()))))
-    core.journal.on_log(
+    core.event_log.on_log(
         LogRecord(stamp=stamp, node="planner", text=f"planned {second // 6 + 1} in 1.4 ms, takes 4.00 s")
     )
-    core.journal.on_event(DeviceEvent(stamp=stamp, device="rm1", event="started"))
-    core.journal.on_log(
+    core.event_log.on_event(DeviceEvent(stamp=stamp, device="rm1", event="started"))
+    core.event_log.on_log(
         LogRecord(stamp=stamp + 4 * 10**9, node="stepper_gateway", level=LogLevel.WARNING, text="a warning")
     )
 

@@ -20,8 +20,8 @@ from schemas.joints import JointState, StepErrors
 from schemas.planning import PlannedPath
 from schemas.system import LogLevel, LogRecord
 from services.visualizer.content import entities
-from services.visualizer.content.thinning import KEEP_ALIVE, Thinned
-from services.visualizer.content.updates import LogLines, Panel, Poses, Scalars, State, Strip, Tint
+from services.visualizer.content.thinning import KEEP_ALIVE, ThinnedSeries
+from services.visualizer.content.updates import LineStrip, LogLines, Panel, Poses, Scalars, State, Tint
 from services.visualizer.core import AHEAD
 
 START = 1_795_000_000_000_000_000
@@ -80,7 +80,7 @@ def test_a_resting_arm_sends_two_samples_a_second(core):
 
 
 def test_thinning_keeps_every_change_and_the_sample_before_it():
-    thinned = Thinned(1)
+    thinned = ThinnedSeries(1)
     for stamp in range(0, 10):
         thinned.add(stamp, (1.0,))
     thinned.add(10, (2.0,))
@@ -93,7 +93,7 @@ def test_thinning_keeps_every_change_and_the_sample_before_it():
 
 
 def test_one_stamp_far_ahead_does_not_freeze_the_view():
-    thinned = Thinned(1)
+    thinned = ThinnedSeries(1)
     for stamp in (START, START + 10**15, START + 20_000_000, -1):
         thinned.add(stamp, (float(stamp),))
     assert thinned.take()[0].tolist() == [START, START + 10**15, START + 20_000_000]
@@ -105,7 +105,7 @@ def test_the_trail_is_one_unbroken_line_and_rests_with_the_arm(core):
         angle = min(index, 20) * 0.02
         core.on_joint_state(joint_state(angle, 0.0, 0.0, stamp=START + index * 20_000_000))
         if index % 5 == 0:
-            lines += [update.points for update in core.step(START) if isinstance(update, Strip)]
+            lines += [update.points for update in core.step(START) if isinstance(update, LineStrip)]
     assert len(lines) == 4
     for before, after in pairwise(lines):
         assert before[-1] == pytest.approx(after[0])
@@ -121,8 +121,8 @@ def test_the_planned_path_is_told_once_and_again_to_a_new_viewer(core):
 
 
 def test_logs_and_events_are_lines_with_a_level(core):
-    core.journal.on_log(LogRecord(stamp=START, node="planner", level=LogLevel.WARNING, text="slow"))
-    core.journal.on_event(DeviceEvent(stamp=START, device="rm1", event="fault", detail="TICK_OVERRUN"))
+    core.event_log.on_log(LogRecord(stamp=START, node="planner", level=LogLevel.WARNING, text="slow"))
+    core.event_log.on_event(DeviceEvent(stamp=START, device="rm1", event="fault", detail="TICK_OVERRUN"))
     (lines,) = [update for update in core.step(START) if isinstance(update, LogLines)]
     assert lines.texts == ("11:06:40 planner: slow", "11:06:40 rm1: fault (TICK_OVERRUN)")
     assert lines.levels == ("WARNING", "ERROR")
@@ -261,7 +261,7 @@ def test_a_stamp_of_the_far_future_does_not_take_the_view_with_it(core):
     """The view follows the latest time that it was ever told: one false stamp, and it would never come back."""
     for stamp in (2**62, START + 20_000_000):
         core.on_joint_state(JointState(stamp=stamp, name=NAMES, position=(0.5,) * len(NAMES)))
-        core.journal.on_log(LogRecord(stamp=stamp, node="anybody", text="here"))
+        core.event_log.on_log(LogRecord(stamp=stamp, node="anybody", text="here"))
     updates = core.step(START + 30_000_000)
     times = [int(time) for update in updates if hasattr(update, "times") for time in update.times]
     assert START + 20_000_000 in times

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from services.visualizer.model.mesh_files import mesh_path, missing_meshes
 from services.visualizer.model.rotations import multiply, quaternion, rotate
-from services.visualizer.model.triangle_meshes import mesh_of
+from services.visualizer.model.triangle_meshes import primitive_mesh
 from services.visualizer.model.urdf import parse_urdf, tool_link
-from services.visualizer.model.visual_model import Shape
+from services.visualizer.model.visual_model import VisualShape
 
 
 def joint(parent, child, more=""):
@@ -34,9 +34,9 @@ def test_links_hang_below_each_other(model):
 
 def test_the_tool_is_where_a_person_computes_it(model):
     rows = np.array([[0.0, 0.0, 0.0], [math.pi / 2, 0.0, 0.05]])
-    tips = model.tips("efector_link", rows, NAMES)
-    assert tips[0] == pytest.approx((0.40633, 0.00063, 0.18605), abs=1e-5)
-    assert tips[1] == pytest.approx((-0.00063, 0.40633, 0.13605), abs=1e-4)
+    link_positions = model.link_positions("efector_link", rows, NAMES)
+    assert link_positions[0] == pytest.approx((0.40633, 0.00063, 0.18605), abs=1e-5)
+    assert link_positions[1] == pytest.approx((-0.00063, 0.40633, 0.13605), abs=1e-4)
 
 
 def test_poses_agree_with_yourdfpy(model, urdf_text, tmp_path):
@@ -45,7 +45,8 @@ def test_poses_agree_with_yourdfpy(model, urdf_text, tmp_path):
     reference = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
     reference.update_cfg([0.7, -1.1, 0.03])
     expected = reference.get_transform("efector_link", "base_link")[:3, 3]
-    assert model.tips("efector_link", np.array([[0.7, -1.1, 0.03]]), NAMES)[0] == pytest.approx(expected, abs=1e-9)
+    found = model.link_positions("efector_link", np.array([[0.7, -1.1, 0.03]]), NAMES)
+    assert found[0] == pytest.approx(expected, abs=1e-9)
 
 
 @given(angles, angles, angles)
@@ -59,23 +60,23 @@ def test_roll_pitch_yaw_turn_about_fixed_axes(roll, pitch, yaw):
 
 
 SHAPES = {
-    "box": (Shape("box", (0.2, 0.1, 0.3)), 0.2 * 0.1 * 0.3),
-    "cylinder": (Shape("cylinder", (0.05, 0.2)), math.pi * 0.05**2 * 0.2),
-    "sphere": (Shape("sphere", (0.1,)), 4 / 3 * math.pi * 0.1**3),
+    "box": (VisualShape("box", (0.2, 0.1, 0.3)), 0.2 * 0.1 * 0.3),
+    "cylinder": (VisualShape("cylinder", (0.05, 0.2)), math.pi * 0.05**2 * 0.2),
+    "sphere": (VisualShape("sphere", (0.1,)), 4 / 3 * math.pi * 0.1**3),
 }
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_primitive_encloses_its_volume_with_its_faces_outwards(name):
     shape, volume = SHAPES[name]
-    mesh = mesh_of(shape)
+    mesh = primitive_mesh(shape)
     a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
     assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0 == pytest.approx(volume, rel=0.02)
     assert np.linalg.norm(mesh.normals, axis=1) == pytest.approx(1.0)
 
 
 def test_a_margin_moves_every_surface_out():
-    grown = mesh_of(Shape("box", (0.2, 0.1, 0.3)), margin=0.01).vertices
+    grown = primitive_mesh(VisualShape("box", (0.2, 0.1, 0.3)), margin=0.01).vertices
     assert np.ptp(grown, axis=0) == pytest.approx((0.22, 0.12, 0.32))
 
 
@@ -100,7 +101,7 @@ def test_a_mimic_joint_follows_and_a_fixed_one_stays():
         "<joint name='f' type='fixed'><origin xyz='0 0 1'/><parent link='c'/><child link='d'/></joint></robot>"
     )
     assert [joint.name for joint in model.moving] == ["j"]
-    assert model.tips("d", np.array([[math.pi]]), ["j"])[0] == pytest.approx(
+    assert model.link_positions("d", np.array([[math.pi]]), ["j"])[0] == pytest.approx(
         (-(math.pi / 2 + 0.1), 0.0, 1.0), abs=1e-12
     )
 

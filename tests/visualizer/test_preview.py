@@ -10,8 +10,8 @@ from schemas.joints import JointState
 from schemas.planning import PlannedPath
 from schemas.scene import PlanningScene, SceneObject, SphereShape
 from services.visualizer.content import entities
-from services.visualizer.content.preview import REST, TIMES, Preview
-from services.visualizer.content.updates import Gone, Poses, Shadow, Thing
+from services.visualizer.content.preview import REST, TIMES, PlanPreview
+from services.visualizer.content.updates import ClearEntity, Poses, SolidMesh, TranslucentArm
 from services.visualizer.core import Visualizer
 
 NOW = 1_795_000_000_000_000_000
@@ -22,7 +22,7 @@ PATH = PlannedPath(stamp=NOW, name=NAMES, positions=((0.0, 0.0, 0.0), (0.02, 1.0
 
 @pytest.fixture
 def preview(model):
-    preview = Preview(model)
+    preview = PlanPreview(model)
     preview.on_planned_path(PATH)
     return preview
 
@@ -35,10 +35,10 @@ def turn(updates, link: str) -> float:
 
 def test_a_plan_is_played_in_its_own_time_and_again(preview):
     first = preview.take(NOW)
-    assert [update.entity for update in first if isinstance(update, Shadow)] == [entities.PLANNED]
+    assert [update.entity for update in first if isinstance(update, TranslucentArm)] == [entities.PLANNED]
     assert turn(first, "brazo_link") == pytest.approx(0.0)
     half = preview.take(NOW + SECOND)
-    assert not any(isinstance(update, Shadow) for update in half)
+    assert not any(isinstance(update, TranslucentArm) for update in half)
     assert turn(half, "brazo_link") == pytest.approx(0.5)
     assert turn(half, "antebrazo_link") == pytest.approx(-0.25)
     assert turn(preview.take(NOW + int(2.5 * SECOND)), "brazo_link") == pytest.approx(1.0)
@@ -49,7 +49,7 @@ def test_it_ends_after_some_times(preview):
     preview.take(NOW)
     after = NOW + int(TIMES * (2.0 + REST) * SECOND) + 1
     preview.take(after)
-    assert [type(update) for update in preview.take(after + 1)] == [Gone]
+    assert [type(update) for update in preview.take(after + 1)] == [ClearEntity]
     assert preview.take(after + 2) == []
 
 
@@ -58,13 +58,13 @@ def test_it_ends_when_the_arm_goes(preview):
     preview.on_joint_state(JointState(name=NAMES, velocity=(0.0, 0.0, 0.0)))
     assert any(isinstance(update, Poses) for update in preview.take(NOW + 1))
     preview.on_joint_state(JointState(name=NAMES, velocity=(0.0, 0.1, 0.0)))
-    assert [type(update) for update in preview.take(NOW + 2)] == [Gone]
+    assert [type(update) for update in preview.take(NOW + 2)] == [ClearEntity]
 
 
 def test_a_new_viewer_gets_the_arm_again(preview):
     preview.take(NOW)
     preview.restart()
-    assert any(isinstance(update, Shadow) for update in preview.take(NOW + 1))
+    assert any(isinstance(update, TranslucentArm) for update in preview.take(NOW + 1))
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_new_viewer_gets_the_arm_again(preview):
     ],
 )
 def test_a_path_without_a_motion_is_not_played(model, path):
-    preview = Preview(model)
+    preview = PlanPreview(model)
     preview.on_planned_path(path)
     assert preview.take(NOW) == []
 
@@ -87,6 +87,6 @@ def test_the_arm_that_plays_the_plan_carries_what_the_real_one_does(model):
     cup = SceneObject(name="cup", shape=SphereShape(radius=0.02), frame="efector_link", attached=True)
     core.scene.on_scene(PlanningScene(objects=(cup,)))
     core.on_planned_path(PATH)
-    hands = [update.entity for update in core.step(NOW) if isinstance(update, Thing)]
+    hands = [update.entity for update in core.step(NOW) if isinstance(update, SolidMesh)]
     assert sorted(hand.split("/")[1] for hand in hands) == ["measured", "planned"]
     assert all(hand.endswith("efector_link/carried/cup") for hand in hands)

@@ -8,7 +8,7 @@ from PIL import Image
 
 from services.visualizer.content import entities
 from services.visualizer.program.rerun_program import rerun_binary
-from services.visualizer.program.screenshot import picture
+from services.visualizer.program.screenshot import save_screenshot
 from tests.optional import need
 
 
@@ -42,7 +42,7 @@ def test_the_layout_travels_with_the_recording(recording):
 
 def test_the_picture_shows_an_arm_and_its_plots(recording, tmp_path):
     need("vulkan")
-    with Image.open(picture(recording, tmp_path / "view.png", size=(960, 540))) as image:
+    with Image.open(save_screenshot(recording, tmp_path / "view.png", size=(960, 540))) as image:
         pixels = np.asarray(image.convert("RGB"))
     height, width, _ = pixels.shape
     assert width == 960
@@ -55,10 +55,10 @@ def test_the_picture_shows_an_arm_and_its_plots(recording, tmp_path):
 
 def test_a_missing_recording_is_said(tmp_path):
     with pytest.raises(RuntimeError, match=r"there is no recording .*none\.rrd"):
-        picture(tmp_path / "none.rrd", tmp_path / "view.png")
+        save_screenshot(tmp_path / "none.rrd", tmp_path / "view.png")
 
 
 def test_a_broken_recording_is_said_with_the_viewers_words(tmp_path):
     (tmp_path / "broken.rrd").write_bytes(b"not a recording")
     with pytest.raises(RuntimeError, match=r"no picture of .*broken\.rrd"):
-        picture(tmp_path / "broken.rrd", tmp_path / "view.png", timeout=4.0)
+        save_screenshot(tmp_path / "broken.rrd", tmp_path / "view.png", timeout=4.0)

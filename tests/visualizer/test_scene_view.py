@@ -1,4 +1,4 @@
-"""The planning scene on the screen: objects, what is carried, and what touches where a plan was refused."""
+"""The planning scene on the screen: objects, what is attached, and what touches where a plan was refused."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from schemas.scene import (
 )
 from services.visualizer.content import entities, palette
 from services.visualizer.content.scene import SceneView
-from services.visualizer.content.updates import Gone, Labels, Poses, Shadow, Thing
+from services.visualizer.content.updates import ClearEntity, Labels, Poses, SolidMesh, TranslucentArm
 from services.visualizer.core import Visualizer
 from services.visualizer.model.mesh_files import scene_mesh
-from services.visualizer.model.visual_model import Model
+from services.visualizer.model.visual_model import VisualModel
 from services.visualizer.program.rerun_program import rerun_binary
 from services.visualizer.render.sink import APPLICATION, Sink
 
@@ -43,7 +43,7 @@ CUP = SceneObject(name="cup", shape=CylinderShape(radius=0.03, length=0.08), fra
 
 
 @pytest.fixture
-def view(model: Model) -> SceneView:
+def view(model: VisualModel) -> SceneView:
     return SceneView(model, lambda shape: scene_mesh(shape, (), lambda text: None))
 
 
@@ -52,8 +52,8 @@ def touching(*pairs: tuple[str, str]) -> Contacts:
     return Contacts(stamp=NOW, name=NAMES, position=(0.5, 0.2, 0.01), contacts=contacts)
 
 
-def things(view: SceneView) -> dict[str, Thing]:
-    return {update.entity: update for update in view.take(NOW) if isinstance(update, Thing)}
+def things(view: SceneView) -> dict[str, SolidMesh]:
+    return {update.entity: update for update in view.take(NOW) if isinstance(update, SolidMesh)}
 
 
 def test_what_stands_is_in_the_world_and_what_is_carried_moves_with_its_link(view):
@@ -82,9 +82,9 @@ def test_what_is_taken_away_or_let_go_is_gone_from_where_it_was(view):
     free = SceneObject(name="cup", shape=CUP.shape)
     view.on_scene(PlanningScene(objects=(free,)))
     updates = view.take(NOW)
-    gone = [update.entity for update in updates if isinstance(update, Gone)]
+    gone = [update.entity for update in updates if isinstance(update, ClearEntity)]
     assert gone[:2] == ["world/scene/table", f"world/measured/{TOOL}/carried/cup"]
-    assert [update.entity for update in updates if isinstance(update, Thing)] == ["world/scene/cup"]
+    assert [update.entity for update in updates if isinstance(update, SolidMesh)] == ["world/scene/cup"]
 
 
 @pytest.mark.parametrize(
@@ -126,11 +126,11 @@ def test_a_refused_configuration_shows_what_touches_in_red_with_its_names(view):
     view.take(NOW)
     view.on_contacts(touching(("efector_link", "table"), ("cup", "table")))
     updates = view.take(NOW)
-    red = {update.entity for update in updates if isinstance(update, Thing) and update.color == palette.TOUCHING}
+    red = {update.entity for update in updates if isinstance(update, SolidMesh) and update.color == palette.IN_CONTACT}
     assert red == {"world/scene/table", f"world/refused/{TOOL}/carried/cup"}
-    [shadow] = [update for update in updates if isinstance(update, Shadow)]
+    [shadow] = [update for update in updates if isinstance(update, TranslucentArm)]
     assert "efector_link" in shadow.touching
-    assert shadow.color == palette.SHADOW
+    assert shadow.color == palette.REFUSED_ARM
     poses = [update.entity for update in updates if isinstance(update, Poses)]
     assert f"world/refused/{TOOL}" in poses
     [labels] = [update for update in updates if isinstance(update, Labels)]
@@ -146,10 +146,10 @@ def test_when_nothing_touches_any_more_the_shadow_goes_and_the_red_too(view):
     view.take(NOW)
     view.on_contacts(Contacts(stamp=NOW))
     updates = view.take(NOW)
-    [table] = [update for update in updates if isinstance(update, Thing)]
+    [table] = [update for update in updates if isinstance(update, SolidMesh)]
     assert table.color == palette.OBJECT
-    assert [update.entity for update in updates if isinstance(update, Gone)] == [entities.REFUSED]
-    assert not any(isinstance(update, Shadow | Labels) for update in updates)
+    assert [update.entity for update in updates if isinstance(update, ClearEntity)] == [entities.REFUSED]
+    assert not any(isinstance(update, TranslucentArm | Labels) for update in updates)
 
 
 def test_the_configuration_that_was_refused_is_gone_as_soon_as_the_arm_goes(model):
@@ -162,8 +162,8 @@ def test_the_configuration_that_was_refused_is_gone_as_soon_as_the_arm_goes(mode
     assert any(isinstance(update, Labels) for update in shown.step(NOW))
     shown.on_joint_state(msgspec.structs.replace(still, velocity=(0.1,) * len(names)))
     updates = shown.step(NOW + 1)
-    assert entities.REFUSED in [update.entity for update in updates if isinstance(update, Gone)]
-    assert not any(isinstance(update, Shadow | Labels) for update in updates)
+    assert entities.REFUSED in [update.entity for update in updates if isinstance(update, ClearEntity)]
+    assert not any(isinstance(update, TranslucentArm | Labels) for update in updates)
 
 
 @pytest.mark.parametrize("name", ["table", "box 1", "a/b", "..", "größe", "a_b-c.d", "ö*", 'say "x"'])

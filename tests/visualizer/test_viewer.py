@@ -15,7 +15,7 @@ import rerun as rr
 from schemas.deployment import ViewerMode, ViewerSection
 from services.visualizer.program.rerun_program import environment, rerun_binary
 from services.visualizer.program.screenshot import free_port
-from services.visualizer.program.viewer_connection import Watch
+from services.visualizer.program.viewer_connection import ViewerConnection
 from services.visualizer.viewer import CUT_OFF, address, command, resolved
 
 
@@ -222,7 +222,7 @@ def test_the_program_is_always_bound_and_limited(tmp_path):
 
 
 def test_the_watch_sees_the_end_and_the_return_of_a_viewer():
-    watch = Watch("127.0.0.1", free_port())
+    watch = ViewerConnection("127.0.0.1", free_port())
     assert not watch.is_new(0.0)
     assert not watch.is_alive
     with socket.create_server(("127.0.0.1", watch.port)) as server:

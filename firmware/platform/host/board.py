@@ -12,7 +12,7 @@ import msgspec
 from firmware.bindings.device import ConfigError, Device, joint_count
 from firmware.bindings.parsers import ProvisionRefused, asks_for_factory_reset
 from firmware.platform.host.flash import Credentials, Flash
-from firmware.platform.host.memory import Awakening, Memory, PoseMemory
+from firmware.platform.host.memory import BootState, PositionStore, StoredPosition
 from schemas.device_config import config_text
 from services.arm.device.device_config import device_config, reference_steps
 from services.arm.model.description import Arm
@@ -55,7 +55,7 @@ class Board:
         self._motors = tuple(joint.drive.motor for joint in arm.joints)
         self.name = arm.device.name
         self._flash = Flash(folder / f"{name}_flash.json", self.name)
-        self._memory = PoseMemory(folder / f"{name}.json", self.name)
+        self._memory = PositionStore(folder / f"{name}.json", self.name)
         self._shaft: tuple[int, ...] = ()  # [steps] where the arm truly is; empty: as the memory has it
         self._crc32 = 0  # of the configuration that the flash has
 
@@ -87,7 +87,7 @@ class Board:
             return
         self._shaft = device.shaft
         self._memory.keep(
-            Memory(
+            StoredPosition(
                 device=self.name,
                 steps=device.steps,
                 moving=not device.still,
@@ -105,20 +105,22 @@ class Board:
         self._flash.forget()
         nowhere = (0,) * len(self._reference)
         self._memory.keep(
-            Memory(device=self.name, steps=nowhere, moving=False, referenced=False, shaft=self._shaft or nowhere)
+            StoredPosition(
+                device=self.name, steps=nowhere, moving=False, referenced=False, shaft=self._shaft or nowhere
+            )
         )
 
     def _boot(self, text: bytes, reset_cause: str) -> Device:
-        awakening = self._memory.wake(self._reference)
-        self._shaft = self._shaft or awakening.shaft
+        boot_state = self._memory.wake(self._reference)
+        self._shaft = self._shaft or boot_state.shaft
         count = joint_count(text)
-        is_known = count == len(awakening.steps)
+        is_known = count == len(boot_state.steps)
         device = Device(
             text or None,
             boot_id=secrets.randbelow((1 << 32) - 1) + 1,
-            steps=awakening.steps if is_known else (0,) * count,
-            referenced=awakening.referenced and is_known,
-            reset_cause=_cause(awakening, reset_cause),
+            steps=boot_state.steps if is_known else (0,) * count,
+            referenced=boot_state.referenced and is_known,
+            reset_cause=_cause(boot_state, reset_cause),
             motors=self._motors,
             shaft=self._shaft,
         )
@@ -126,8 +128,8 @@ class Board:
         return device
 
 
-def _cause(awakening: Awakening, reset_cause: str) -> str:
-    return reset_cause if reset_cause and awakening.reset_cause == "power_on" else awakening.reset_cause
+def _cause(boot_state: BootState, reset_cause: str) -> str:
+    return reset_cause if reset_cause and boot_state.reset_cause == "power_on" else boot_state.reset_cause
 
 
 def provision(board: Board, device: Device, text: bytes) -> str:

@@ -40,7 +40,7 @@ class BrokerAddress:
 
 
 @dataclass(frozen=True)
-class Arrived:
+class MqttMessage:
     """One message; a frame on the wrong topic, and whatever is too long, comes as no bytes at all."""
 
     kind: str  # the last part of its topic
@@ -70,11 +70,11 @@ class Disconnected:
 
 
 @dataclass(frozen=True)
-class Stop:
+class ShutdownRequested:
     """The process is asked to end."""
 
 
-Item = Arrived | SerialBytes | Connected | Disconnected | Stop
+Item = MqttMessage | SerialBytes | Connected | Disconnected | ShutdownRequested
 
 
 class DeviceLink:
@@ -113,14 +113,14 @@ class DeviceLink:
         """Send a report; what cannot be sent now is dropped by paho or the caller, never blocks."""
         self._client.publish(self._topic + kind, payload, qos=REPORTS[kind], retain=kind == "status")
 
-    def close(self, farewell: bytes) -> None:
+    def close(self, offline: bytes) -> None:
         """Leave a retained status behind and end; waits at most a second for the broker."""
         if self._client.is_connected():
-            sent = self._client.publish(self._topic + "status", farewell, qos=1, retain=True)
+            sent = self._client.publish(self._topic + "status", offline, qos=1, retain=True)
             try:
                 sent.wait_for_publish(timeout=1.0)
             except RuntimeError as error:
-                log.warning("the broker did not take our farewell: %s", error)
+                log.warning("the broker did not take our offline: %s", error)
         self._client.disconnect()
         self._client.loop_stop()
 
@@ -159,7 +159,7 @@ class DeviceLink:
         if self._inbox.qsize() > FULL_INBOX:
             return
         kind, payload = message.topic.removeprefix(self._topic), bytes(message.payload)
-        self._put(Arrived(kind, payload if _fits(kind, payload) else b"", message.retain, arrival))
+        self._put(MqttMessage(kind, payload if _fits(kind, payload) else b"", message.retain, arrival))
 
 
 def _fits(kind: str, payload: bytes) -> bool:

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from firmware.bindings.device import ConfigError
-from firmware.bindings.library import CoreMissing
+from firmware.bindings.library import LibraryMissing
 from firmware.bindings.motor import MotorError
 from firmware.platform.host.board import Board
-from firmware.platform.host.link import BrokerAddress, Item, Stop
+from firmware.platform.host.link import BrokerAddress, Item, ShutdownRequested
 from firmware.platform.host.network import Network
 from firmware.platform.host.pty import SerialLine
 from firmware.platform.host.virtual_esp32 import VirtualEsp32
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     log.propagate = False
     try:
         run(load_deployment(options.config), options.serial)
-    except (DeploymentError, DescriptionError, ConfigError, MotorError, CoreMissing) as error:
+    except (DeploymentError, DescriptionError, ConfigError, MotorError, LibraryMissing) as error:
         log.error("%s", error)
         return 1
     return 0
@@ -52,9 +52,9 @@ def run(deployment: Deployment, has_line: bool = False) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: inbox.put(Stop()))
+        signal.signal(number, lambda *_: inbox.put(ShutdownRequested()))
     if deployment.device is DeviceKind.BOARD:
-        return stand_aside(inbox, Readiness(folder, NAME))
+        return idle(inbox, Readiness(folder, NAME))
     network = Network(BrokerAddress(deployment.mqtt.host, deployment.mqtt.port), inbox)
     line = _serial_line(folder, inbox) if has_line or deployment.wire is Wire.SERIAL else None
     VirtualEsp32(Board(arm, folder, NAME), Wires(network, line), inbox, Readiness(folder, NAME)).run()
@@ -66,13 +66,13 @@ def _serial_line(folder: Path, inbox: queue.SimpleQueue[Item]) -> SerialLine:
     return line
 
 
-def stand_aside(inbox: queue.SimpleQueue[Item], readiness: Readiness) -> None:
+def idle(inbox: queue.SimpleQueue[Item], readiness: Readiness) -> None:
     """Be ready and do nothing until asked to stop: a real board plays the arm."""
     log.info("the deployment has a board: this virtual one stands aside")
     readiness.ready()
     while True:
         try:
-            if isinstance(inbox.get(timeout=BEAT), Stop):
+            if isinstance(inbox.get(timeout=BEAT), ShutdownRequested):
                 return readiness.not_ready()
         except queue.Empty:
             readiness.beat()

@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 
 
-class Memory(msgspec.Struct, frozen=True, kw_only=True):
+class StoredPosition(msgspec.Struct, frozen=True, kw_only=True):
     """The file's content."""
 
     device: str
@@ -22,7 +22,7 @@ class Memory(msgspec.Struct, frozen=True, kw_only=True):
     shaft: tuple[int, ...] = ()  # where the arm truly is, which a real board does not know
 
 
-class Awakening(msgspec.Struct, frozen=True, kw_only=True):
+class BootState(msgspec.Struct, frozen=True, kw_only=True):
     """How the device starts."""
 
     steps: tuple[int, ...]
@@ -31,18 +31,18 @@ class Awakening(msgspec.Struct, frozen=True, kw_only=True):
     reset_cause: str
 
 
-class PoseMemory:
+class PositionStore:
     """The file, and what was written last."""
 
     def __init__(self, path: Path, device: str) -> None:
         self._path = path
         self._device = device
-        self._written: Memory | None = None
+        self._written: StoredPosition | None = None
 
-    def wake(self, reference: tuple[int, ...]) -> Awakening:
+    def wake(self, reference: tuple[int, ...]) -> BootState:
         """Where the joints are: at `reference` [steps] on the very first start, else where they were left."""
         try:
-            memory = msgspec.json.decode(self._path.read_bytes(), type=Memory)
+            memory = msgspec.json.decode(self._path.read_bytes(), type=StoredPosition)
         except FileNotFoundError:
             return _at(reference, "first_start")
         except (OSError, msgspec.DecodeError):
@@ -52,9 +52,9 @@ class PoseMemory:
         shaft = memory.shaft if len(memory.shaft) == len(reference) else memory.steps
         if memory.moving:
             return _lost(reference, shaft, "lost_while_moving")
-        return Awakening(steps=memory.steps, shaft=shaft, referenced=memory.referenced, reset_cause="power_on")
+        return BootState(steps=memory.steps, shaft=shaft, referenced=memory.referenced, reset_cause="power_on")
 
-    def keep(self, memory: Memory) -> None:
+    def keep(self, memory: StoredPosition) -> None:
         """Remember; touches the disk only when something has changed, and never while moving."""
         written = self._written
         if memory == written or (written is not None and written.moving and memory.moving):
@@ -65,9 +65,9 @@ class PoseMemory:
         self._written = memory
 
 
-def _at(steps: tuple[int, ...], cause: str) -> Awakening:
-    return Awakening(steps=steps, shaft=steps, referenced=True, reset_cause=cause)
+def _at(steps: tuple[int, ...], cause: str) -> BootState:
+    return BootState(steps=steps, shaft=steps, referenced=True, reset_cause=cause)
 
 
-def _lost(reference: tuple[int, ...], shaft: tuple[int, ...], cause: str) -> Awakening:
-    return Awakening(steps=(0,) * len(reference), shaft=shaft, referenced=False, reset_cause=cause)
+def _lost(reference: tuple[int, ...], shaft: tuple[int, ...], cause: str) -> BootState:
+    return BootState(steps=(0,) * len(reference), shaft=shaft, referenced=False, reset_cause=cause)

@@ -16,7 +16,7 @@ from firmware.platform.host.link import REPORTS, BrokerAddress, DeviceLink, Item
 
 log = logging.getLogger("virtual_esp32")
 
-PATIENCE = 3.0  # [s] that a broker which is started together with us may take
+SILENT_WAIT = 3.0  # [s] that a broker which is started together with us may take
 MQTT_PORT, MQTTS_PORT = 1883, 8883
 
 
@@ -25,27 +25,27 @@ class AddressError(ValueError):
 
 
 class Network:
-    """One device's MQTT; `here` is the broker where none was provisioned."""
+    """One device's MQTT; `default` is the broker where none was provisioned."""
 
-    def __init__(self, here: BrokerAddress, inbox: queue.SimpleQueue[Item]) -> None:
-        self._here = here
+    def __init__(self, default: BrokerAddress, inbox: queue.SimpleQueue[Item]) -> None:
+        self._default = default
         self._inbox = inbox
         self._link: DeviceLink | None = None
-        self._farewell = b""
-        self._born = time.monotonic()
+        self._offline_status = b""
+        self._started = time.monotonic()
         self._was_refused = ""
         self.is_connected = False
 
     def join(self, device: Device, name: str, credentials: Credentials) -> None:
         """Connect for as long as it takes, with this device's last will; whatever was connected vanishes."""
         self.break_off()
-        self._farewell = offline_status(name, device.boot_id)
+        self._offline_status = offline_status(name, device.boot_id)
         try:
-            broker = broker_address(credentials, self._here)
+            broker = broker_address(credentials, self._default)
         except AddressError as error:
             log.error("%s", error)
             return
-        self._link = DeviceLink(broker, name, self._farewell, self._inbox)
+        self._link = DeviceLink(broker, name, self._offline_status, self._inbox)
         self._link.start()
 
     def break_off(self) -> None:
@@ -57,7 +57,7 @@ class Network:
     def leave(self) -> None:
         """Say goodbye and end."""
         if self._link is not None:
-            self._link.close(self._farewell)
+            self._link.close(self._offline_status)
 
     def publish(self, frame: OutFrame) -> None:
         """What is said while there is no broker is lost: state and status come again."""
@@ -71,21 +71,21 @@ class Network:
     def on_disconnected(self, reason: str) -> None:
         if self.is_connected:
             log.warning("lost the broker (%s); trying again", reason)
-        elif reason != self._was_refused and time.monotonic() - self._born > PATIENCE:
+        elif reason != self._was_refused and time.monotonic() - self._started > SILENT_WAIT:
             log.warning("no connection: %s", reason)
             self._was_refused = reason
         self.is_connected = False
 
 
 def offline_status(name: str, boot_id: int) -> bytes:
-    """The last will, and the farewell."""
+    """The last will, and the offline."""
     return json.dumps({"online": False, "device": name, "boot_id": boot_id}).encode()
 
 
-def broker_address(credentials: Credentials, here: BrokerAddress) -> BrokerAddress:
-    """The provisioned broker, or `here` where none was; raises AddressError."""
+def broker_address(credentials: Credentials, default: BrokerAddress) -> BrokerAddress:
+    """The provisioned broker, or `default` where none was; raises AddressError."""
     if not credentials.mqtt_uri:
-        return here
+        return default
     try:
         uri = urlsplit(credentials.mqtt_uri)
         port = uri.port

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from firmware.platform.host.link import Item, SerialBytes
 
-MOST = 4096  # [bytes] read at once
+MAX_READ = 4096  # [bytes] read at once
 
 
 class SerialLine:
@@ -23,9 +23,9 @@ class SerialLine:
         self.path = path
         self._inbox = inbox
         # The other end stays open here too, or reading would fail whenever nobody else has it open.
-        self._ours, self._theirs = os.openpty()
-        tty.setraw(self._theirs)
-        os.set_blocking(self._ours, False)
+        self._device_end, self._host_end = os.openpty()
+        tty.setraw(self._host_end)
+        os.set_blocking(self._device_end, False)
         self._wake, self._asleep = os.pipe()
         self._link()
         self._reader = threading.Thread(target=self._read, name="serial", daemon=True)
@@ -38,28 +38,28 @@ class SerialLine:
         """Send; what nobody reads is lost, as on a wire."""
         if data:
             with contextlib.suppress(BlockingIOError):
-                os.write(self._ours, data)
+                os.write(self._device_end, data)
 
     def close(self) -> None:
         """Take the path away and end the thread."""
         os.close(self._asleep)
         self._reader.join(timeout=1.0)
         with contextlib.suppress(OSError):
-            if os.readlink(self.path) == os.ttyname(self._theirs):
+            if os.readlink(self.path) == os.ttyname(self._host_end):
                 self.path.unlink()
-        for descriptor in (self._ours, self._theirs, self._wake):
+        for descriptor in (self._device_end, self._host_end, self._wake):
             os.close(descriptor)
 
     def _link(self) -> None:
         beside = self.path.with_suffix(".new")
         beside.unlink(missing_ok=True)
-        beside.symlink_to(os.ttyname(self._theirs))
+        beside.symlink_to(os.ttyname(self._host_end))
         os.replace(beside, self.path)
 
     def _read(self) -> None:
         while True:
-            ready, _, _ = select.select([self._ours, self._wake], [], [])
+            ready, _, _ = select.select([self._device_end, self._wake], [], [])
             if self._wake in ready:
                 return
             with contextlib.suppress(BlockingIOError):
-                self._inbox.put(SerialBytes(os.read(self._ours, MOST), time.monotonic()))
+                self._inbox.put(SerialBytes(os.read(self._device_end, MAX_READ), time.monotonic()))

@@ -9,11 +9,11 @@ from collections.abc import Callable
 from functools import partial
 
 from firmware.bindings.device import Device
-from firmware.bindings.frames import Request
+from firmware.bindings.frames import PlatformRequest
 from firmware.bindings.parsers import ProvisionRefused
 from firmware.bindings.press import PressRefused, press, read_press, within
 from firmware.platform.host.board import Board, DeviceClock, provision, provision_answer
-from firmware.platform.host.link import Arrived, Connected, Disconnected, Item, SerialBytes, Stop
+from firmware.platform.host.link import Connected, Disconnected, Item, MqttMessage, SerialBytes, ShutdownRequested
 from firmware.platform.host.wires import Wires, say_event
 from schemas.device import PressKind, PressRequest
 from services.runtime.process.readiness import Readiness
@@ -27,7 +27,7 @@ STALL = 0.1  # [s] a loop that was late by more was stopped by the operating sys
 LAST_SLOTS = 2000  # [us] that run after a stall: one slot, and what is begun of the next
 LONGEST_STOP = 5.0  # [s] when the process is asked to end while the arm moves
 BEAT = 1.0  # [s] of the readiness file
-PARTING = 0.1  # [s] that an answer has to leave, before the wire is lost
+REPLY_TIME = 0.1  # [s] that an answer has to leave, before the wire is lost
 LARGEST_DRIFT = 10_000.0  # [ppm]
 LONGEST_OFFLINE = 3600.0  # [s]
 
@@ -41,25 +41,25 @@ class VirtualEsp32:
         self._inbox = inbox
         self._readiness = readiness
         self._device = self._boot()
-        self._looked = time.monotonic()
-        self._clock = DeviceClock(self._looked)
+        self._advanced_to = time.monotonic()
+        self._clock = DeviceClock(self._advanced_to)
         self._next_beat = 0.0
         self._later: list[tuple[float, Callable[[], None]]] = []  # [s] when, and what
         self._running = True
 
     def run(self) -> None:
-        """Until a Stop arrives in the inbox."""
+        """Until a ShutdownRequested arrives in the inbox."""
         self._announce()
         self._join()
         self._wires.listen()
         while self._running:
-            self._turn()
-        self._come_to_rest()
+            self._run_once()
+        self._stop_motion()
         self._readiness.not_ready()
         self._board.remember(self._device)
         self._wires.close()
 
-    def _come_to_rest(self) -> None:
+    def _stop_motion(self) -> None:
         """Only a device that stands knows where it will wake up."""
         self._device.halt()
         deadline = time.monotonic() + LONGEST_STOP
@@ -68,7 +68,7 @@ class VirtualEsp32:
             self._advance(time.monotonic())
             self._wires.publish(self._device, time.monotonic())
 
-    def _turn(self) -> None:
+    def _run_once(self) -> None:
         items = self._wait()
         now = time.monotonic()
         self._advance(now)
@@ -99,8 +99,8 @@ class VirtualEsp32:
 
     def _handle(self, item: Item) -> None:
         match item:
-            case Arrived():
-                self._take_in(item)
+            case MqttMessage():
+                self._receive(item)
             case SerialBytes():
                 self._advance(item.monotonic)
                 self._device.receive_serial(item.data, self._clock.at(item.monotonic))
@@ -112,10 +112,10 @@ class VirtualEsp32:
             case Disconnected():
                 self._wires.network.on_disconnected(item.reason)
                 self._readiness.not_ready()
-            case Stop():
+            case ShutdownRequested():
                 self._running = False
 
-    def _take_in(self, item: Arrived) -> None:
+    def _receive(self, item: MqttMessage) -> None:
         self._advance(item.monotonic)
         received_us = self._clock.at(item.monotonic)
         match item.kind:
@@ -127,7 +127,7 @@ class VirtualEsp32:
             case _:
                 self._device.receive(item.payload, item.retained, received_us)
 
-    def _on_request(self, request: Request) -> None:
+    def _on_request(self, request: PlatformRequest) -> None:
         if request.kind is JsonFrame.PRESS:
             self._press(request.text)
         else:
@@ -159,11 +159,11 @@ class VirtualEsp32:
         now = time.monotonic()
         match request.press:
             case PressKind.REBOOT:
-                self._later.append((now + PARTING, partial(self._reboot, "reset_button")))
+                self._later.append((now + REPLY_TIME, partial(self._reboot, "reset_button")))
             case PressKind.OFFLINE:
                 away = within(request, LONGEST_OFFLINE)
-                self._later.append((now + PARTING, self._wires.network.break_off))
-                self._later.append((now + PARTING + away, self._join))
+                self._later.append((now + REPLY_TIME, self._wires.network.break_off))
+                self._later.append((now + REPLY_TIME + away, self._join))
             case PressKind.DRIFT:
                 self._clock.drift(now, within(request, LARGEST_DRIFT, -LARGEST_DRIFT))
             case _:
@@ -177,7 +177,7 @@ class VirtualEsp32:
         self._wires.publish(self._device, time.monotonic())
         self._later.clear()
         before, self._device = self._device, self._boot(cause)
-        self._device.inherit_world(before)
+        self._device.inherit_environment(before)
         self._clock.restart(time.monotonic())
         self._announce()
         self._join()
@@ -203,13 +203,13 @@ class VirtualEsp32:
 
     def _advance(self, monotonic: float) -> None:
         """Let the board run up to then; what a stall of this process has missed is not caught up."""
-        late, until_us = monotonic - self._looked, self._clock.at(monotonic)
+        late, until_us = monotonic - self._advanced_to, self._clock.at(monotonic)
         if late > STALL:
             level = logging.WARNING if self._device.moving else logging.INFO
             log.log(level, "the operating system kept us waiting for %.0f ms: they are not caught up", late * 1e3)
             self._device.stand_still(max(0, until_us - LAST_SLOTS))
         self._device.advance(until_us)
-        self._looked = max(self._looked, monotonic)
+        self._advanced_to = max(self._advanced_to, monotonic)
 
     def _beat(self, now: float) -> None:
         if now < self._next_beat or not self._wires.is_reachable:

@@ -14,8 +14,8 @@ from services.runtime.serial_frames import JsonFrame
 log = logging.getLogger("virtual_esp32")
 
 SHAFT_PERIOD = 0.1  # [s]
-LOUD = ("fault", "estop", "hold", "underrun")
-QUIET = ("homed", "configured", "pressed", "press_refused")
+LOGGED_WITH_TIME = ("fault", "estop", "hold", "underrun")
+LOGGED = ("homed", "configured", "pressed", "press_refused")
 
 
 class Wires:
@@ -70,8 +70,8 @@ def say_event(device: Device, name: str, detail: str) -> None:
 
 def _log_event(frame: OutFrame) -> None:
     event = json.loads(frame.payload)
-    if event["event"] in LOUD:
+    if event["event"] in LOGGED_WITH_TIME:
         level = logging.INFO if event["detail"] == "command" else logging.WARNING
         log.log(level, "%s %s at %.3f s", event["event"], event["detail"], event["t_us"] / 1e6)
-    elif event["event"] in QUIET:
+    elif event["event"] in LOGGED:
         log.info("%s %s", event["event"], event["detail"])

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from schemas.robot import RobotFile
-from services.arm.checks.cross_check import second_opinion
+from services.arm.checks.cross_check import check_with_yourdfpy
 from services.arm.checks.device import check_device
 from services.arm.checks.findings import Finding, Severity, error
 from services.arm.checks.homing import check_homing
@@ -43,7 +43,7 @@ def check(folder: Path) -> list[Finding]:
         return findings
     findings += _files(folder, robot)
     if not any(finding.severity is Severity.ERROR for finding in findings):
-        findings += _whole(folder)
+        findings += _cross_checks(folder)
     return sorted(findings, key=lambda finding: finding.severity is not Severity.ERROR)
 
 
@@ -94,11 +94,11 @@ def _files(folder: Path, robot: RobotFile) -> list[Finding]:
     return findings
 
 
-def _whole(folder: Path) -> list[Finding]:
+def _cross_checks(folder: Path) -> list[Finding]:
     """What only shows when all of it is put together."""
     try:
         arm = load_arm(folder)
         device_config(arm)
     except DescriptionError as problem:
         return [error(ROBOT_FILE, "robot", str(problem))]
-    return second_opinion(arm)
+    return check_with_yourdfpy(arm)

@@ -12,7 +12,7 @@ from services.arm.model.description import Arm
 TOLERANCE = 1e-9  # [m]
 
 
-def second_opinion(arm: Arm) -> list[Finding]:
+def check_with_yourdfpy(arm: Arm) -> list[Finding]:
     """Findings of yourdfpy on the arm's URDF; a warning where it is not installed."""
     file = arm.urdf_path.name
     try:

@@ -11,7 +11,7 @@ from services.arm.checks.findings import Finding, error
 from services.arm.errors import suggestion
 from services.arm.model.description import ROBOT_FILE
 
-TAKEN = ("t_us", "boot_id")  # by the message that carries the readings
+RESERVED_NAMES = ("t_us", "boot_id")  # by the message that carries the readings
 
 
 def check_device(robot: RobotFile) -> list[Finding]:
@@ -85,7 +85,7 @@ def _switch(switch: Input, robot: RobotFile) -> list[Finding]:
 
 def _sensor(sensor: Sensor) -> list[Finding]:
     thing, findings = f'sensor "{sensor.name}"', []
-    if sensor.name in TAKEN:
+    if sensor.name in RESERVED_NAMES:
         findings.append(error(ROBOT_FILE, thing, "this name is taken by the readings' message", "choose another one"))
     if sensor.kind is SensorKind.ULTRASONIC and sensor.trigger_pin is None:
         findings.append(error(ROBOT_FILE, thing, "an ultrasonic sensor is asked by a pulse", "write trigger_pin"))

@@ -95,13 +95,13 @@ def _travel(homing: Homing, limit: Limit, thing: str, unit: str) -> list[Finding
     """Whether the switch is found from the far end, in time."""
     findings = []
     far = limit.lower if homing.direction is HomingDirection.UPPER else limit.upper
-    way = abs(homing.position - far)
-    if homing.max_travel is not None and homing.max_travel < way:
+    travel = abs(homing.position - far)
+    if homing.max_travel is not None and homing.max_travel < travel:
         message = (
-            f"homing.max_travel {homing.max_travel:g} {unit} is shorter than the {way:.4g} {unit} from its far end"
+            f"homing.max_travel {homing.max_travel:g} {unit} is shorter than the {travel:.4g} {unit} from its far end"
         )
         findings.append(warning(ROBOT_FILE, thing, message, "a longer max_travel"))
-    time = way / homing.fast + homing.back_off * (2.0 / homing.fast + 1.0 / homing.slow)
+    time = travel / homing.fast + homing.back_off * (2.0 / homing.fast + 1.0 / homing.slow)
     if time > homing.timeout:
         message = f"homing from its far end takes {time:.0f} s, longer than its timeout of {homing.timeout:g} s"
         findings.append(warning(ROBOT_FILE, thing, message, "a longer timeout"))

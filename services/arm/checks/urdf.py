@@ -11,7 +11,7 @@ from services.arm.checks.findings import Finding, error, warning
 from services.arm.errors import suggestion
 from services.arm.model.urdf import Geometry, Inertial, JointKind, UrdfJoint, UrdfLink, UrdfModel
 
-FITTED = "add a box or a cylinder, or let `gemelo collision fit --meshes` fit some"
+COLLISION_REMEDY = "add a box or a cylinder, or let `gemelo collision fit --meshes` fit some"
 SHAPES = ("box", "cylinder", "sphere", "mesh")
 PLACEHOLDER_EFFORTS = (100.0, 300.0, 1000.0)  # what exporters write when nobody thought about it
 
@@ -79,7 +79,8 @@ def _link(link: UrdfLink, path: Path) -> list[Finding]:
         for geometry in shapes:
             findings += _geometry(geometry, role, thing, path)
     if link.visuals and not link.collisions:
-        findings.append(warning(path.name, thing, "can be seen but not touched: it has no <collision>", FITTED))
+        message = "can be seen but not touched: it has no <collision>"
+        findings.append(warning(path.name, thing, message, COLLISION_REMEDY))
     return findings
 
 

@@ -6,18 +6,18 @@ import math
 from fractions import Fraction
 
 from schemas.device_config import DeviceConfig, HomingConfig, JointConfig
-from schemas.robot import Homing, HomingDirection, Level
+from schemas.robot import Homing, HomingDirection, PinLevel
 from services.arm.device.device_parts import input_config, output_config, sensor_config
-from services.arm.device.device_values import device_name, int32, nearest, pin_or_nothing
+from services.arm.device.device_values import device_name, int32, nearest, pin_or_unused
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.description import Arm, Joint
 from services.arm.motors.steps import Q8, StepScale
 
 # Knots are rounded to 1/256 step and sampled from profiles that touch their limits.
 HEADROOM = 1.02
-WIDEST_Q8 = 1 << 30  # of a joint without limits: 4 million steps each way
-MOST = {"joint": 8, "input": 16, "output": 8, "sensor": 8}  # of one device, the firmware's
-MORE_THAN_THE_TRAVEL = 1.1  # how far a joint looks for its switch, where robot.toml does not say
+UNLIMITED_Q8 = 1 << 30  # of a joint without limits: 4 million steps each way
+MAX_COUNTS = {"joint": 8, "input": 16, "output": 8, "sensor": 8}  # of one device, the firmware's
+DEFAULT_TRAVEL_FACTOR = 1.1  # how far a joint looks for its switch, where robot.toml does not say
 
 
 def device_config(arm: Arm) -> DeviceConfig:
@@ -32,8 +32,8 @@ def device_config(arm: Arm) -> DeviceConfig:
         sensor_hz=_sensor_hz(device.sensor_hz),
         enable_lead_ms=max(math.ceil(joint.driver.enable_lead_ms) for joint in arm.joints),
         armed_at_boot=device.armed_at_boot,
-        enable_pin=pin_or_nothing(device.enable_pin),
-        enable_inverted=device.enable_active is Level.LOW,
+        enable_pin=pin_or_unused(device.enable_pin),
+        enable_inverted=device.enable_active is PinLevel.LOW,
         inputs=tuple(input_config(switch, arm) for switch in arm.inputs),
         outputs=tuple(output_config(output) for output in arm.outputs),
         sensors=tuple(sensor_config(sensor) for sensor in arm.sensors),
@@ -58,8 +58,8 @@ def _joint(joint: Joint, arm: Arm) -> JointConfig:
         max_acceleration_q8=int32(math.ceil(joint.acceleration * scale), f"{where}: its acceleration limit"),
         inverted=motor.inverted,
         dir_setup_us=math.ceil(joint.driver.dir_setup_us),
-        step_pin=pin_or_nothing(motor.step_pin),
-        dir_pin=pin_or_nothing(motor.dir_pin),
+        step_pin=pin_or_unused(motor.step_pin),
+        dir_pin=pin_or_unused(motor.dir_pin),
         text_scale_q32=_text_scale(joint.steps),
         homing=_homing(joint.drive.homing, joint, arm) if joint.drive.homing is not None else None,
     )
@@ -92,7 +92,7 @@ def _max_travel(homing: Homing, joint: Joint) -> float:
             f'joint "{joint.name}" turns without limits, so homing.max_travel has no default: write how far it may '
             "turn on the way to its switch"
         )
-    return (joint.upper - joint.lower) * MORE_THAN_THE_TRAVEL
+    return (joint.upper - joint.lower) * DEFAULT_TRAVEL_FACTOR
 
 
 def _sensor_hz(rate: int) -> int:
@@ -105,8 +105,8 @@ def _sensor_hz(rate: int) -> int:
 def _require_counts(arm: Arm) -> None:
     parts = {"joint": arm.joints, "input": arm.inputs, "output": arm.outputs, "sensor": arm.sensors}
     for kind, things in parts.items():
-        if len(things) > MOST[kind]:
-            raise DescriptionError(f"{len(things)} [[{kind}]] are more than the {MOST[kind]} that a device has")
+        if len(things) > MAX_COUNTS[kind]:
+            raise DescriptionError(f"{len(things)} [[{kind}]] are more than the {MAX_COUNTS[kind]} that a device has")
 
 
 def _require_tick(joint: Joint, tick_hz: int) -> None:
@@ -121,7 +121,7 @@ def _require_tick(joint: Joint, tick_hz: int) -> None:
 
 def _limit_q8(joint: Joint, position: float) -> int:
     if math.isinf(position):
-        return WIDEST_Q8 if position > 0 else -WIDEST_Q8
+        return UNLIMITED_Q8 if position > 0 else -UNLIMITED_Q8
     return int32(joint.steps.to_q8(position), f'joint "{joint.name}": its limit {position:g} {joint.unit}')
 
 

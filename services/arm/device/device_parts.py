@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from schemas.device_config import NOTHING, InputConfig, InputRole, OutputConfig, SensorConfig
-from schemas.robot import Input, Level, Output, Sensor
-from services.arm.device.device_values import device_name, int32, nearest, pin_or_nothing
+from schemas.device_config import UNUSED, InputConfig, InputRole, OutputConfig, SensorConfig
+from schemas.robot import Input, Output, PinLevel, Sensor
+from services.arm.device.device_values import device_name, int32, nearest, pin_or_unused
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.description import Arm
 
@@ -19,7 +19,7 @@ def input_config(switch: Input, arm: Arm) -> InputConfig:
         pin=switch.pin,
         role=switch.role,
         joint=_joint_index(switch, arm, where),
-        inverted=switch.active is Level.LOW,
+        inverted=switch.active is PinLevel.LOW,
         pull=switch.pull,
     )
 
@@ -28,7 +28,7 @@ def _joint_index(switch: Input, arm: Arm, where: str) -> int:
     if switch.role is InputRole.ESTOP:
         if switch.joint:
             raise DescriptionError(f'{where}: an e-stop belongs to all joints, not to "{switch.joint}": remove `joint`')
-        return NOTHING
+        return UNUSED
     if not switch.joint:
         raise DescriptionError(f"{where}: write the `joint` that this {switch.role} switch belongs to")
     if switch.joint not in arm.joint_names:
@@ -43,7 +43,7 @@ def output_config(output: Output) -> OutputConfig:
     return OutputConfig(
         name=device_name(output.name, f'output "{output.name}"'),
         pin=output.pin,
-        inverted=output.active is Level.LOW,
+        inverted=output.active is PinLevel.LOW,
         at_boot=output.at_boot,
         off_at_estop=output.off_at_estop,
     )
@@ -56,7 +56,7 @@ def sensor_config(sensor: Sensor) -> SensorConfig:
         name=device_name(sensor.name, where),
         kind=sensor.kind,
         pin=sensor.pin,
-        trigger_pin=pin_or_nothing(sensor.trigger_pin),
+        trigger_pin=pin_or_unused(sensor.trigger_pin),
         scale_q16=int32(nearest(Fraction(sensor.scale) * 65_536_000), f"{where}: scale"),
         offset_milli=int32(nearest(Fraction(sensor.offset) * 1000), f"{where}: offset"),
     )

@@ -6,11 +6,11 @@ import math
 import re
 from fractions import Fraction
 
-from schemas.device_config import NOTHING
+from schemas.device_config import UNUSED
 from services.arm.errors import DescriptionError
 
-LONGEST_NAME = 31  # bytes, the firmware's
-NAME = re.compile(rf"[A-Za-z0-9_-]{{1,{LONGEST_NAME}}}")
+MAX_NAME = 31  # bytes, the firmware's
+NAME = re.compile(rf"[A-Za-z0-9_-]{{1,{MAX_NAME}}}")
 
 
 def nearest(value: Fraction) -> int:
@@ -28,10 +28,10 @@ def int32(value: int, where: str) -> int:
 def device_name(text: str, where: str) -> str:
     """`text`, if the firmware takes it as a name; raises `DescriptionError`."""
     if not NAME.fullmatch(text):
-        raise DescriptionError(f'{where} "{text}" is not 1 to {LONGEST_NAME} letters, digits, "_" or "-"')
+        raise DescriptionError(f'{where} "{text}" is not 1 to {MAX_NAME} letters, digits, "_" or "-"')
     return text
 
 
-def pin_or_nothing(pin: int | None) -> int:
+def pin_or_unused(pin: int | None) -> int:
     """The GPIO, or the number that stands for none."""
-    return NOTHING if pin is None else pin
+    return UNUSED if pin is None else pin

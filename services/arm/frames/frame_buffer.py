@@ -17,7 +17,7 @@ from services.arm.frames.frame_errors import (
     WaitTimeout,
     seconds,
 )
-from services.arm.frames.time_cache import Edge
+from services.arm.frames.time_cache import TimeCache
 from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
 
 __all__ = [
@@ -34,7 +34,8 @@ __all__ = [
 WINDOW = 10_000_000_000  # [ns] how long samples are kept
 
 
-_Way = tuple[tuple[Edge, ...], tuple[Edge, ...]]  # up from the source, up from the target, without what is common
+# Up from the source and up from the target, without the part that both share.
+_Chain = tuple[tuple[TimeCache, ...], tuple[TimeCache, ...]]
 
 
 class FrameBuffer:
@@ -42,9 +43,9 @@ class FrameBuffer:
 
     def __init__(self, window: int = WINDOW) -> None:
         self._window = window
-        self._edges: dict[str, Edge] = {}  # by child
+        self._caches: dict[str, TimeCache] = {}  # by child
         self._frames: set[str] = set()
-        self._ways: dict[tuple[str, str], _Way] = {}
+        self._chains: dict[tuple[str, str], _Chain] = {}
         self._changed = Condition()
 
     def insert(self, frame: FrameTransform) -> bool:
@@ -64,9 +65,9 @@ class FrameBuffer:
     def clear(self) -> None:
         """Forget every moving sample; for a clock that jumped backwards. Static frames stay."""
         with self._changed:
-            self._edges = {child: edge for child, edge in self._edges.items() if edge.is_static}
-            self._frames = set(self._edges) | {edge.parent for edge in self._edges.values()}
-            self._ways.clear()
+            self._caches = {child: cache for child, cache in self._caches.items() if cache.is_static}
+            self._frames = set(self._caches) | {cache.parent for cache in self._caches.values()}
+            self._chains.clear()
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -86,11 +87,11 @@ class FrameBuffer:
     def look_up_rigid(self, target: str, source: str, stamp: int = 0) -> tuple[int, Rigid]:
         """As `look_up_stamped`, as plain tuples."""
         with self._changed:
-            up, down = self._ways.get((target, source)) or self._find_way(target, source, stamp)
+            up, down = self._chains.get((target, source)) or self._find_chain(target, source, stamp)
             time_asked = stamp or _latest_common(up, down)
-            pose = _climb(up, time_asked, self._window)
+            pose = _chain_pose(up, time_asked, self._window)
             if down:
-                pose = compose(inverse(_climb(down, time_asked, self._window)), pose)
+                pose = compose(inverse(_chain_pose(down, time_asked, self._window)), pose)
             return time_asked, pose
 
     def wait(self, target: str, source: str, stamp: int = 0, timeout: float = 1.0) -> Transform:
@@ -113,24 +114,24 @@ class FrameBuffer:
             raise ValueError(f'a transform from "{frame.parent}" to "{frame.child}" joins no two frames')
         pose = from_message(frame.transform)
         with self._changed:
-            edge = self._edges.get(frame.child)
-            if edge is None or edge.parent != frame.parent or edge.is_static != is_static:
-                edge = self._new_edge(frame.parent, frame.child, is_static)
+            cache = self._caches.get(frame.child)
+            if cache is None or cache.parent != frame.parent or cache.is_static != is_static:
+                cache = self._new_cache(frame.parent, frame.child, is_static)
             if is_static:
-                edge.stamps, edge.poses, kept = [0], [pose], True
+                cache.stamps, cache.poses, kept = [0], [pose], True
             else:
-                kept = edge.insert(frame.stamp, pose, self._window)
+                kept = cache.insert(frame.stamp, pose, self._window)
             self._changed.notify_all()
             return kept
 
-    def _new_edge(self, parent: str, child: str, is_static: bool) -> Edge:
+    def _new_cache(self, parent: str, child: str, is_static: bool) -> TimeCache:
         """A frame that is new, or has a new parent: the ways through it are no longer known."""
-        edge = self._edges[child] = Edge(parent, child, is_static)
+        cache = self._caches[child] = TimeCache(parent, child, is_static)
         self._frames.update((parent, child))
-        self._ways.clear()
-        return edge
+        self._chains.clear()
+        return cache
 
-    def _find_way(self, target: str, source: str, stamp: int) -> _Way:
+    def _find_chain(self, target: str, source: str, stamp: int) -> _Chain:
         for name in (target, source):
             if name not in self._frames:
                 raise UnknownFrameError(
@@ -146,43 +147,43 @@ class FrameBuffer:
         while up and down and up[-1] is down[-1]:
             up.pop()
             down.pop()
-        way = self._ways[target, source] = (tuple(up), tuple(down))
-        return way
+        chain = self._chains[target, source] = (tuple(up), tuple(down))
+        return chain
 
-    def _to_root(self, frame: str, stamp: int) -> list[Edge]:
-        edges: list[Edge] = []
-        while (edge := self._edges.get(frame)) is not None:
-            if edge in edges:
-                ring = " in ".join(each.child for each in edges)
+    def _to_root(self, frame: str, stamp: int) -> list[TimeCache]:
+        caches: list[TimeCache] = []
+        while (cache := self._caches.get(frame)) is not None:
+            if cache in caches:
+                ring = " in ".join(each.child for each in caches)
                 raise UnconnectedError(
                     f'asked for {seconds(stamp)}: "{frame}" is its own ancestor: {ring}; '
                     f"newest sample of any frame is at {self._newest()}"
                 )
-            edges.append(edge)
-            frame = edge.parent
-        return edges
+            caches.append(cache)
+            frame = cache.parent
+        return caches
 
     def _newest(self) -> str:
-        stamps = [edge.stamps[-1] for edge in self._edges.values() if not edge.is_static and edge.stamps]
+        stamps = [cache.stamps[-1] for cache in self._caches.values() if not cache.is_static and cache.stamps]
         return seconds(max(stamps)) if stamps else "no time yet"
 
 
-def _latest_common(up: tuple[Edge, ...], down: tuple[Edge, ...]) -> int:
-    """The newest time [ns] at which every moving edge is known; 0 where all are static."""
+def _latest_common(up: tuple[TimeCache, ...], down: tuple[TimeCache, ...]) -> int:
+    """The newest time [ns] at which every moving cache is known; 0 where all are static."""
     latest = 0
-    for edge in (*up, *down):
-        if not edge.is_static:
-            stamp = edge.stamps[-1]
+    for cache in (*up, *down):
+        if not cache.is_static:
+            stamp = cache.stamps[-1]
             if latest == 0 or stamp < latest:
                 latest = stamp
     return latest
 
 
-def _climb(edges: tuple[Edge, ...], stamp: int, window: int) -> Rigid:
-    """The pose of the first edge's child in the last edge's parent."""
-    if not edges:
+def _chain_pose(caches: tuple[TimeCache, ...], stamp: int, window: int) -> Rigid:
+    """The pose of the first cache's child in the last cache's parent."""
+    if not caches:
         return IDENTITY
-    pose = edges[0].at(stamp, window)
-    for edge in edges[1:]:
-        pose = compose(edge.at(stamp, window), pose)
+    pose = caches[0].at(stamp, window)
+    for cache in caches[1:]:
+        pose = compose(cache.at(stamp, window), pose)
     return pose

@@ -10,7 +10,7 @@ from services.arm.frames.transforms import Rigid, interpolate
 _TRIM = 64  # samples that may be too old before they are cut off together
 
 
-class Edge:
+class TimeCache:
     """The samples of one child in its parent, oldest first; a static one has a single, timeless sample."""
 
     __slots__ = ("child", "is_static", "parent", "poses", "stamps")
@@ -65,12 +65,12 @@ class Edge:
         share = (stamp - before) / (stamps[index] - before)
         return interpolate(self.poses[index - 1], self.poses[index], share)
 
-    def _outside(self, kind: type[FrameError], stamp: int, which: str, edge: int) -> FrameError:
+    def _outside(self, kind: type[FrameError], stamp: int, which: str, bound: int) -> FrameError:
         where = f"{self.parent} to {self.child}"
         if len(self.stamps) == 1:
             return SingleSampleError(
-                f"{where}: asked for {seconds(stamp)}, but there is one sample only, at {seconds(edge)}"
+                f"{where}: asked for {seconds(stamp)}, but there is one sample only, at {seconds(bound)}"
             )
-        off = abs(stamp - edge) / 1e9
+        off = abs(stamp - bound) / 1e9
         side = "after" if kind is FutureError else "before"
-        return kind(f"{where}: asked for {seconds(stamp)}, {off:.6f} s {side} the {which} sample at {seconds(edge)}")
+        return kind(f"{where}: asked for {seconds(stamp)}, {off:.6f} s {side} the {which} sample at {seconds(bound)}")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.kinematics.self_collisions import LinkPair, SelfCollisions
+from services.arm.kinematics.self_collisions import LinkPair, SelfCollisionChecker
 from services.arm.model.description import Arm
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ STEPS = 60
 SHRINK = 0.9
 
 
-class Reason(StrEnum):
+class DisabledReason(StrEnum):
     """Why a pair is not checked; an SRDF's other reasons are a person's."""
 
     ADJACENT = "Adjacent"
@@ -36,48 +36,48 @@ class Reason(StrEnum):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class LinkPairData:
     """One pair of links; `reason` None: it can touch and is to be checked. `nearest`, `farthest` [m] as seen."""
 
     pair: LinkPair
-    reason: Reason | None
+    reason: DisabledReason | None
     nearest: float
     farthest: float
 
 
-def collision_matrix(arm: Arm, samples: int = SAMPLES) -> list[Verdict]:
+def collision_matrix(arm: Arm, samples: int = SAMPLES) -> list[LinkPairData]:
     """Every pair of links that have collision shapes; the same arm gives the same matrix."""
     kinematics = Kinematics(arm)
     bare = replace(arm, disabled_collisions=frozenset())
-    checker = SelfCollisions(bare, kinematics.model, kinematics.configuration)
+    checker = SelfCollisionChecker(bare, kinematics.model, kinematics.configuration)
     random = np.random.default_rng(SEED)
     configurations = _configurations(arm, samples, random)
     distances = [checker.distances(configuration) for configuration in configurations]
-    return [_verdict(arm, checker, pair, configurations, distances, random) for pair in checker.pairs]
+    return [_pair_data(arm, checker, pair, configurations, distances, random) for pair in checker.pairs]
 
 
-def _verdict(
+def _pair_data(
     arm: Arm,
-    checker: SelfCollisions,
+    checker: SelfCollisionChecker,
     pair: LinkPair,
     configurations: Array,
     distances: list[dict[LinkPair, float]],
     random: np.random.Generator,
-) -> Verdict:
+) -> LinkPairData:
     seen = np.array([row[pair] for row in distances])
     nearest, farthest = float(seen.min()), float(seen.max())
     if are_adjacent(arm, *pair):
-        return Verdict(pair, Reason.ADJACENT, nearest, farthest)
+        return LinkPairData(pair, DisabledReason.ADJACENT, nearest, farthest)
     if farthest <= 0.0:
-        return Verdict(pair, Reason.ALWAYS, nearest, farthest)
+        return LinkPairData(pair, DisabledReason.ALWAYS, nearest, farthest)
     if nearest > NEVER_BELOW:
         starts = configurations[np.argsort(seen, kind="stable")[:SEARCHES]]
         nearest = min(nearest, *(_nearest_from(arm, checker, pair, start, random) for start in starts))
-    return Verdict(pair, Reason.NEVER if nearest > NEVER_BELOW else None, nearest, farthest)
+    return LinkPairData(pair, DisabledReason.NEVER if nearest > NEVER_BELOW else None, nearest, farthest)
 
 
 def _nearest_from(
-    arm: Arm, checker: SelfCollisions, pair: LinkPair, start: Array, random: np.random.Generator
+    arm: Arm, checker: SelfCollisionChecker, pair: LinkPair, start: Array, random: np.random.Generator
 ) -> float:
     """[m] by a random search in a shrinking neighbourhood."""
     lower, upper = _limits(arm)

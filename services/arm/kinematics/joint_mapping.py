@@ -29,7 +29,7 @@ class _Entry:
     is_circle: bool  # stored as cosine and sine
 
 
-class Configuration:
+class JointMapping:
     """Fills pinocchio's vectors from the arm's joints, and folds its Jacobian's columns back."""
 
     def __init__(self, arm: Arm, model: pin.Model) -> None:

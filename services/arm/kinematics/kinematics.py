@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from schemas.frames import Transform
 from services.arm.errors import DescriptionError
-from services.arm.kinematics.joint_mapping import Configuration
-from services.arm.kinematics.self_collisions import SelfCollisions
+from services.arm.kinematics.joint_mapping import JointMapping
+from services.arm.kinematics.self_collisions import SelfCollisionChecker
 from services.arm.model.description import Arm
 
 Array = NDArray[np.float64]
@@ -34,12 +34,12 @@ class Kinematics:
         self.arm = arm
         self._model = pin.buildModelFromUrdf(str(arm.urdf_path))
         self._data = self._model.createData()
-        self._configuration = Configuration(arm, self._model)
+        self._configuration = JointMapping(arm, self._model)
         self._tool = self._model.getFrameId(arm.tool_frame)
         self._base = self._fixed_base()
         self._base_is_root = self._base.isIdentity()
         self._links = {name: self._model.getFrameId(name) for name in arm.model.link_names}
-        self.collisions = SelfCollisions(arm, self._model, self._configuration)
+        self.collisions = SelfCollisionChecker(arm, self._model, self._configuration)
 
     @property
     def model(self) -> pin.Model:
@@ -47,7 +47,7 @@ class Kinematics:
         return self._model
 
     @property
-    def configuration(self) -> Configuration:
+    def configuration(self) -> JointMapping:
         """From the arm's joints to pinocchio's."""
         return self._configuration
 

@@ -10,20 +10,20 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from services.arm.errors import DescriptionError
-from services.arm.kinematics.joint_mapping import Configuration
+from services.arm.kinematics.joint_mapping import JointMapping
 from services.arm.model.description import Arm
 
 Array = NDArray[np.float64]
 LinkPair = tuple[str, str]
 
 
-class SelfCollisions:
+class SelfCollisionChecker:
     """Distances between the links that may not touch; joint values are (n,) [rad] or [m] in the arm's order."""
 
-    def __init__(self, arm: Arm, model: pin.Model, configuration: Configuration) -> None:
+    def __init__(self, arm: Arm, model: pin.Model, configuration: JointMapping) -> None:
         self._model = model
         self._configuration = configuration
-        self._geometry = load_shapes(arm, model)
+        self._geometry = load_collision_geometry(arm, model)
         self._pairs = _add_pairs(arm, model, self._geometry)
         self._data = model.createData()
         self._geometry_data = self._geometry.createData()
@@ -70,7 +70,7 @@ class SelfCollisions:
         pin.computeDistances(self._model, self._data, self._geometry, self._geometry_data, q)
 
 
-def load_shapes(arm: Arm, model: pin.Model) -> pin.GeometryModel:
+def load_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
     """The collision shapes; pinocchio drops what it does not know WITHOUT an error, so they are counted."""
     expected = sum(len(link.collisions) for link in arm.model.links)
     geometry = pin.buildGeomFromUrdf(

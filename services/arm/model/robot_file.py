@@ -17,8 +17,8 @@ from services.arm.errors import DescriptionError, suggestion
 
 Keys = tuple[str | int, ...]
 
-MOST_RATIO = Fraction(10**9)
-LEAST_RATIO = 1 / MOST_RATIO
+MAX_RATIO = Fraction(10**9)
+MIN_RATIO = 1 / MAX_RATIO
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def exact_ratio(text: str, where: str) -> Fraction:
         raise DescriptionError(f'{where}: "{text}" is neither a decimal nor a fraction like "380/21"') from error
     if ratio <= 0:
         raise DescriptionError(f"{where}: a ratio of {text} is not positive; turn the direction with `inverted`")
-    if not LEAST_RATIO <= ratio <= MOST_RATIO:
+    if not MIN_RATIO <= ratio <= MAX_RATIO:
         raise DescriptionError(f"{where}: a ratio of {text} is not within 1/1000000000 to 1000000000")
     return ratio
 

@@ -16,7 +16,7 @@ _ATTRIBUTE = re.compile(r"""(\w+)\s*=\s*(?:"([^"]*)"|'([^']*)')""")
 
 
 @dataclass(frozen=True)
-class Entry:
+class DisabledPair:
     """One element and where it stands in the text."""
 
     pair: Pair
@@ -25,7 +25,7 @@ class Entry:
     end: int
 
 
-def entries(text: str) -> list[Entry]:
+def entries(text: str) -> list[DisabledPair]:
     """All of them, without those in comments."""
     comments = [match.span() for match in _COMMENT.finditer(text)]
     found = []
@@ -34,7 +34,7 @@ def entries(text: str) -> list[Entry]:
             continue
         attributes = {name: unescape(one or other) for name, one, other in _ATTRIBUTE.findall(match[1])}
         pair = frozenset((attributes.get("link1", ""), attributes.get("link2", "")))
-        found.append(Entry(pair, attributes.get("reason", ""), *match.span()))
+        found.append(DisabledPair(pair, attributes.get("reason", ""), *match.span()))
     return found
 
 
@@ -56,5 +56,5 @@ def with_pairs(text: str, wanted: Mapping[tuple[str, str], str]) -> str:
 
 
 def _line(pair: tuple[str, str], reason: str) -> str:
-    first, second, why = (quoteattr(text) for text in (*pair, reason))
-    return f"  <disable_collisions link1={first} link2={second} reason={why}/>\n"
+    first, second, cause = (quoteattr(text) for text in (*pair, reason))
+    return f"  <disable_collisions link1={first} link2={second} reason={cause}/>\n"

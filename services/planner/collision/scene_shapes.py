@@ -11,7 +11,7 @@ import numpy as np
 from schemas.message import Vector
 from schemas.scene import AllowedPair, BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, SphereShape
 from services.arm.frames.transforms import Rigid, from_message
-from services.arm.stl import BadMesh, read_stl
+from services.arm.stl import BadStl, read_stl
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 Folders = Sequence[Path]
@@ -83,7 +83,7 @@ def _mesh(name: str, shape: MeshShape, folders: Folders) -> TriangleMesh:
     x, y, z = shape.scale
     try:
         return _triangles(_content(name, shape, folders), (x, y, z))
-    except BadMesh as error:
+    except BadStl as error:
         what = f'"{shape.path}"' if shape.path else "its data"
         raise SceneError(f'object "{name}": {what} is no usable STL file: {error}') from None
 

@@ -1,6 +1,6 @@
 """True if the arm touches itself, what it carries, or what stands around it: coal on the exact shapes.
 
-The reference of every faster check, with the names that `SelfCollisions` has for the arm alone.
+The reference of every faster check, with the names that `SelfCollisionChecker` has for the arm alone.
 """
 
 from __future__ import annotations

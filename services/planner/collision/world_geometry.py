@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from schemas.scene import PlanningScene, SceneObject
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.kinematics.self_collisions import LinkPair, load_shapes, reach_of
+from services.arm.kinematics.self_collisions import LinkPair, load_collision_geometry, reach_of
 from services.arm.model.description import Arm
 from services.planner.collision.scene_shapes import SceneError, allows, shape_of
 from services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
@@ -29,7 +29,7 @@ class WorldGeometry:
 
     def __init__(self, arm: Arm, kinematics: Kinematics, scene: PlanningScene, folders: Sequence[Path]) -> None:
         self._arm, self._kinematics, self._scene = arm, kinematics, scene
-        self.model = load_shapes(arm, kinematics.model)
+        self.model = load_collision_geometry(arm, kinematics.model)
         links = [kinematics.model.frames[shape.parentFrame].name for shape in self.model.geometryObjects]
         self.shape_names = [*links, *(item.name for item in scene.objects)]
         self.meshes = [mesh_of(shape.geometry) for shape in self.model.geometryObjects]

@@ -8,7 +8,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from services.arm.errors import DescriptionError
-from services.arm.kinematics.self_collisions import load_shapes
+from services.arm.kinematics.self_collisions import load_collision_geometry
 from services.arm.model.description import Arm
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from services.planner.collision_geometry.solids import Box, Capsule, Cylinder, Solid
@@ -22,7 +22,7 @@ def link_shapes(arm: Arm) -> dict[str, tuple[CollisionShape, ...]]:
     not be loaded."""
     model = pin.buildModelFromUrdf(str(arm.urdf_path))
     shapes: dict[str, tuple[CollisionShape, ...]] = {}
-    for item in load_shapes(arm, model).geometryObjects:
+    for item in load_collision_geometry(arm, model).geometryObjects:
         frame = model.frames[item.parentFrame]
         placement = frame.placement.actInv(item.placement)
         x, y, z, w = pin.Quaternion(placement.rotation).coeffs().tolist()

@@ -12,7 +12,7 @@ from schemas.actions import CancelRequest, CancelResponse, GoalStatusCode, GoalS
 from schemas.message import BadMessage, Message, decode, encode
 from schemas.topics import Action, Request
 from services.runtime.actions import keys as keys
-from services.runtime.bus.interface import Answer, Bus
+from services.runtime.bus.interface import Bus, BusReply
 from services.runtime.bus.wire import schema_of
 from services.runtime.errors import NoAnswer, ServerLost
 from services.runtime.loop.loop import Loop
@@ -22,8 +22,8 @@ F = TypeVar("F", bound=Message)
 R = TypeVar("R", bound=Message)
 AnyRequest = Request[Message, Message]
 
-SERVER_PATIENCE = 2.0  # [s] of silence of a server that sends four signs of life a second
-ROUTER_PATIENCE = 10.0  # [s] that a router may be away before a goal counts as lost
+SERVER_TIMEOUT = 2.0  # [s] of silence of a server that sends four signs of life a second
+ROUTER_TIMEOUT = 10.0  # [s] that a router may be away before a goal counts as lost
 ASK_TIMEOUT = 1.0  # [s]
 
 
@@ -130,17 +130,17 @@ class GoalHandle(Generic[F, R]):
             return
         if not self._bus.is_connected:
             self._away = self._away or now
-            if now - self._away > ROUTER_PATIENCE:
-                self._lose(f"the router has been away for {ROUTER_PATIENCE:g} s")
+            if now - self._away > ROUTER_TIMEOUT:
+                self._lose(f"the router has been away for {ROUTER_TIMEOUT:g} s")
         elif self._away is not None:
             self._away = None
             self.heard()
-        elif now - self._heard > SERVER_PATIENCE:
-            self._lose(f"{self.action.server} has been silent for {SERVER_PATIENCE:g} s")
+        elif now - self._heard > SERVER_TIMEOUT:
+            self._lose(f"{self.action.server} has been silent for {SERVER_TIMEOUT:g} s")
 
-    def _ask(self, request: AnyRequest, question: Message, on_answer: Callable[[Answer | None], None]) -> None:
-        def put(answer: Answer | None) -> None:
-            self._loop.inbox.put(lambda: on_answer(answer))
+    def _ask(self, request: AnyRequest, question: Message, on_answer: Callable[[BusReply | None], None]) -> None:
+        def put(answer: BusReply | None) -> None:
+            self._loop.tasks.put(lambda: on_answer(answer))
 
         self._bus.ask(request.key, schema_of(request.request), encode(question), ASK_TIMEOUT, put, request.urgent)
 
@@ -149,7 +149,7 @@ class GoalHandle(Generic[F, R]):
             self._is_canceling = True
             self._ask(keys.cancel_request(self.action), CancelRequest(goal_id=self.goal_id), self._on_cancel)
 
-    def _on_cancel(self, answer: Answer | None) -> None:
+    def _on_cancel(self, answer: BusReply | None) -> None:
         """Without an answer the next sign of life asks again."""
         self._is_canceling = False
         if answer is not None and answer.ok:
@@ -162,7 +162,7 @@ class GoalHandle(Generic[F, R]):
             self._is_asking = True
             self._ask(keys.result_request(self.action), ResultRequest(goal_id=self.goal_id), self._on_result)
 
-    def _on_result(self, answer: Answer | None) -> None:
+    def _on_result(self, answer: BusReply | None) -> None:
         """Without an answer the next sign of life asks again."""
         self._is_asking = False
         if answer is None or not answer.ok or self.is_over:

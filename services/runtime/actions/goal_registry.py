@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import msgspec
 
 from schemas.actions import (
-    NOTHING,
+    NIL,
     GoalResponse,
     GoalStatus,
     GoalStatusCode,
@@ -19,19 +19,19 @@ from schemas.actions import (
 from services.runtime.requests.server import Pending
 
 KEPT = 120.0  # [s] that a result can be asked for after the end
-MOST_KEPT = 256  # goals
-LONGEST_WAIT = 5.0  # [s] that the answer to a result request may be held back
+MAX_KEPT = 256  # goals
+MAX_RESULT_WAIT = 5.0  # [s] that the answer to a result request may be held back
 
 
 @dataclass
-class Goal:
+class GoalRecord:
     """What the server knows of a goal."""
 
     goal_id: str
     client: str
     response: GoalResponse
     status: GoalStatusCode = GoalStatusCode.ACCEPTED
-    result: msgspec.Raw = field(default_factory=lambda: NOTHING)
+    result: msgspec.Raw = field(default_factory=lambda: NIL)
     ended: float = 0.0  # [s] monotonic
     waiting: list[tuple[float, Pending[ResultResponse]]] = field(default_factory=list)  # until when, who
 
@@ -49,19 +49,19 @@ class Goal:
             each[1].reply(ResultResponse(status=self.status))
 
 
-class GoalBook:
+class GoalRegistry:
     """Goals by id, oldest first."""
 
     def __init__(self) -> None:
-        self._goals: dict[str, Goal] = {}
+        self._goals: dict[str, GoalRecord] = {}
 
-    def __getitem__(self, goal_id: str) -> Goal:
+    def __getitem__(self, goal_id: str) -> GoalRecord:
         return self._goals[goal_id]
 
-    def get(self, goal_id: str) -> Goal | None:
+    def get(self, goal_id: str) -> GoalRecord | None:
         return self._goals.get(goal_id)
 
-    def add(self, goal: Goal) -> None:
+    def add(self, goal: GoalRecord) -> None:
         self._goals[goal.goal_id] = goal
 
     def remove(self, goal_id: str) -> None:
@@ -80,12 +80,12 @@ class GoalBook:
         )
         return GoalStatuses(stamp=time.time_ns(), goals=goals)
 
-    def tidy(self) -> None:
+    def forget_expired(self) -> None:
         """Forgets what was kept long enough, and answers who has waited long enough."""
         now = time.monotonic()
         ended = [goal for goal in self._goals.values() if goal.status.is_terminal]
         for index, goal in enumerate(ended):
-            if now - goal.ended > KEPT or index < len(ended) - MOST_KEPT:
+            if now - goal.ended > KEPT or index < len(ended) - MAX_KEPT:
                 self.remove(goal.goal_id)
         for goal in self._goals.values():
             goal.answer_overdue(now)
@@ -98,4 +98,4 @@ class GoalBook:
         elif goal.status.is_terminal or request.wait <= 0.0:
             pending.reply(ResultResponse(status=goal.status, result=goal.result))
         else:
-            goal.waiting.append((time.monotonic() + min(request.wait, LONGEST_WAIT), pending))
+            goal.waiting.append((time.monotonic() + min(request.wait, MAX_RESULT_WAIT), pending))

@@ -21,18 +21,18 @@ from schemas.actions import (
 from schemas.message import BadMessage, Message, decode, encode
 from schemas.topics import Action
 from services.runtime.actions import keys as keys
-from services.runtime.actions.goal_registry import Goal, GoalBook
+from services.runtime.actions.goal_registry import GoalRecord, GoalRegistry
 from services.runtime.client_watch import ClientWatch
 from services.runtime.errors import Refused
 from services.runtime.requests.server import Pending, RequestServer
-from services.runtime.topics import Complain, Publisher
+from services.runtime.topics import Publisher, Warn
 
 G = TypeVar("G", bound=Message)
 F = TypeVar("F", bound=Message)
 R = TypeVar("R", bound=Message)
 
-OVERTAKEN = 2.0  # [s] that a goal may come after its own cancel, which overtakes what waits
-MOST_OVERTAKEN = 256  # such cancels that are remembered
+EARLY_CANCEL_KEPT = 2.0  # [s] that a goal may come after its own cancel, which overtakes what waits
+MAX_EARLY_CANCELS = 256  # such cancels that are remembered
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,11 @@ class ActionServer(Generic[G, F, R]):
         serve: Callable[[Any, Callable[[Any, Pending[Any]], None]], RequestServer[Any, Any]],
         publisher: Callable[[Any], Publisher[Any]],
         clients: ClientWatch,
-        complain: Complain,
+        warn: Warn,
     ) -> None:
         self.action = action
         self._on_goal, self._on_cancel = on_goal, on_cancel
-        self._goals, self._clients, self._complain = GoalBook(), clients, complain
+        self._goals, self._clients, self._warn = GoalRegistry(), clients, warn
         self._cancelled_early: dict[str, float] = {}  # by goal that has not come yet: [s] monotonic
         self._feedback: Publisher[GoalFeedback] = publisher(keys.feedback_topic(action))
         self._status: Publisher[GoalStatuses] = publisher(keys.status_topic(action))
@@ -112,7 +112,7 @@ class ActionServer(Generic[G, F, R]):
 
     def beat(self) -> None:
         """The server's sign of life; forgets what was kept long enough, and cancels goals whose client is gone."""
-        self._goals.tidy()
+        self._goals.forget_expired()
         for goal_id, client in self._clients.take_lost(time.monotonic()):
             self._cancel_lost(goal_id, client)
         self._publish_status()
@@ -132,7 +132,7 @@ class ActionServer(Generic[G, F, R]):
         if self._cancelled_early.pop(request.goal_id, None) is not None:
             reason = "it was cancelled before it was looked at"
             return GoalResponse(accepted=False, reason=reason, stamp=time.time_ns())
-        goal = Goal(request.goal_id, request.client, GoalResponse(accepted=True, stamp=time.time_ns()))
+        goal = GoalRecord(request.goal_id, request.client, GoalResponse(accepted=True, stamp=time.time_ns()))
         self._goals.add(goal)
         decision = refuse(0, "the server failed")
         try:
@@ -168,8 +168,8 @@ class ActionServer(Generic[G, F, R]):
         if known is not None:
             return f"it has ended as {known.status.name}"
         now = time.monotonic()
-        self._cancelled_early = {key: at for key, at in self._cancelled_early.items() if now - at < OVERTAKEN}
-        if len(self._cancelled_early) < MOST_OVERTAKEN:
+        self._cancelled_early = {key: at for key, at in self._cancelled_early.items() if now - at < EARLY_CANCEL_KEPT}
+        if len(self._cancelled_early) < MAX_EARLY_CANCELS:
             self._cancelled_early[goal_id] = now
         return "no such goal is known here; one of that name that comes within 2 s is refused"
 
@@ -183,9 +183,9 @@ class ActionServer(Generic[G, F, R]):
     def _cancel_lost(self, goal_id: str, client: str) -> None:
         """Nobody watches an attached goal any more."""
         reason = self._cancel(goal_id)
-        self._complain(f"goal {goal_id}: its client {client} is gone, so it is {reason or 'cancelled'}")
+        self._warn(f"goal {goal_id}: its client {client} is gone, so it is {reason or 'cancelled'}")
 
-    def _set(self, goal: Goal, status: GoalStatusCode) -> None:
+    def _set(self, goal: GoalRecord, status: GoalStatusCode) -> None:
         if not goal.status.is_terminal and goal.status is not status:
             goal.status = status
             self._publish_status()

@@ -7,13 +7,13 @@ import time
 
 from schemas.deployment import RouterSection
 from services.runtime.bus.interface import Bus
-from services.runtime.process.shutdown import StopRequest
+from services.runtime.process.shutdown import ShutdownRequest
 
-LOOK_EVERY = 0.1  # [s]
-PATIENCE = 1.0  # [s] of waiting that are not worth a word: all processes start at once
+RETRY_PERIOD = 0.1  # [s]
+SILENT_WAIT = 1.0  # [s] of waiting that are not worth a word: all processes start at once
 
 
-def connect(router: RouterSection, robot: str, log: logging.Logger, stop: StopRequest) -> Bus:
+def connect(router: RouterSection, robot: str, log: logging.Logger, stop: ShutdownRequest) -> Bus:
     """A session of the router; ends the process cleanly where it is asked to stop while waiting."""
     from services.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus, router_answers
 
@@ -31,8 +31,8 @@ def connect(router: RouterSection, robot: str, log: logging.Logger, stop: StopRe
                 return bus
         else:
             reason = ""
-        if not is_said and time.monotonic() - started > PATIENCE:
+        if not is_said and time.monotonic() - started > SILENT_WAIT:
             is_said = True
             log.warning("waiting for the router at %s:%d%s; `make up` starts it", router.host, router.port, reason)
-        stop.wait(LOOK_EVERY)
+        stop.wait(RETRY_PERIOD)
     raise SystemExit(0)

@@ -26,7 +26,7 @@ class Arrival:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class BusReply:
     """One reply to a request; `ok` is False where the payload is a `Failure`."""
 
     ok: bool
@@ -70,7 +70,7 @@ class Bus(Protocol):
         """Whether messages can leave now; False while the router is away."""
         ...
 
-    def require_way_back(self) -> None:
+    def require_reconnection(self) -> None:
         """Call once a second; raises `BusError` where the router is there but this bus does not find back to it."""
         ...
 
@@ -106,7 +106,7 @@ class Bus(Protocol):
         schema: str,
         payload: bytes,
         timeout: float,
-        on_answer: Callable[[Answer | None], None],
+        on_answer: Callable[[BusReply | None], None],
         urgent: bool = False,
     ) -> None:
         """Sends one request, before all that waits to be sent if it is `urgent`.

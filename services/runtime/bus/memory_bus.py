@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from schemas.topics import Delivery
-from services.runtime.bus.interface import Answer, Arrival, Declaration, Query
+from services.runtime.bus.interface import Arrival, BusReply, Declaration, Query
 from services.runtime.bus.memory_network import (
     MemoryNetwork,
     MemoryPublication,
     MemoryQuery,
-    MemoryService,
+    MemoryQueryable,
     MemorySubscription,
     MemoryToken,
     MemoryWatch,
@@ -30,7 +30,7 @@ class MemoryBus:
     def is_connected(self) -> bool:
         return self.network.is_connected
 
-    def require_way_back(self) -> None:
+    def require_reconnection(self) -> None:
         pass
 
     def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> MemoryPublication:
@@ -57,8 +57,8 @@ class MemoryBus:
         self._declared.append(subscription)
         return subscription
 
-    def serve(self, key: str, on_query: Callable[[Query], None]) -> MemoryService:
-        service = MemoryService(self, key, on_query)
+    def serve(self, key: str, on_query: Callable[[Query], None]) -> MemoryQueryable:
+        service = MemoryQueryable(self, key, on_query)
         with self.network.served:
             self.network.services[key] = service
             self.network.served.notify_all()
@@ -75,7 +75,7 @@ class MemoryBus:
         schema: str,
         payload: bytes,
         timeout: float,
-        on_answer: Callable[[Answer | None], None],
+        on_answer: Callable[[BusReply | None], None],
         urgent: bool = False,
     ) -> None:
         with self.network.lock:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from schemas.topics import Delivery
-from services.runtime.bus.interface import Answer, Arrival, Query
+from services.runtime.bus.interface import Arrival, BusReply, Query
 
 if TYPE_CHECKING:
     from services.runtime.bus.memory_bus import MemoryBus
@@ -69,7 +69,7 @@ class MemoryPublication:
 
 
 @dataclass(eq=False)
-class MemoryService:
+class MemoryQueryable:
     """Who answers the requests of one key."""
 
     bus: MemoryBus
@@ -115,7 +115,7 @@ class MemoryQuery:
     """A request on its way; the first answer counts, and after the time-out none does."""
 
     def __init__(
-        self, arrival: Arrival, client: str, timeout: float, on_answer: Callable[[Answer | None], None]
+        self, arrival: Arrival, client: str, timeout: float, on_answer: Callable[[BusReply | None], None]
     ) -> None:
         self.arrival, self.client = arrival, client
         self._on_answer = on_answer
@@ -126,12 +126,12 @@ class MemoryQuery:
         self._timer.start()
 
     def reply(self, schema: str, payload: bytes) -> None:
-        self._finish(Answer(True, schema, payload))
+        self._finish(BusReply(True, schema, payload))
 
     def fail(self, schema: str, payload: bytes) -> None:
-        self._finish(Answer(False, schema, payload))
+        self._finish(BusReply(False, schema, payload))
 
-    def _finish(self, answer: Answer | None) -> None:
+    def _finish(self, answer: BusReply | None) -> None:
         with self._lock:
             was_open, self._is_open = self._is_open, False
         self._timer.cancel()
@@ -147,7 +147,7 @@ class MemoryNetwork:
         self.served = threading.Condition(self.lock)
         self.subscriptions: defaultdict[str, set[MemorySubscription]] = defaultdict(set)
         self.publications: set[MemoryPublication] = set()
-        self.services: dict[str, MemoryService] = {}
+        self.services: dict[str, MemoryQueryable] = {}
         self.tokens: Counter[str] = Counter()
         self.watches: set[MemoryWatch] = set()
         self._is_connected = True

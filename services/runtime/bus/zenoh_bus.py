@@ -16,14 +16,14 @@ import zenoh.ext as zx
 from zenoh.handlers import Callback
 
 from schemas.topics import Delivery
-from services.runtime.bus.interface import Answer, Arrival, Query
+from services.runtime.bus.interface import Arrival, BusReply, Query
 from services.runtime.bus.zenoh_config import client_config
 from services.runtime.bus.zenoh_declarations import (
-    Presence,
+    ServerMonitor,
     ZenohDeclaration,
     ZenohPublication,
     ZenohQuery,
-    close_with_the_program,
+    close_at_exit,
     encoding_of,
     forget,
     is_timeout,
@@ -35,7 +35,7 @@ from services.runtime.errors import BusError
 CACHE = 1024  # messages of an EVERY key that survive while the router is away
 HEARTBEAT = 0.5  # [s] after which a reader notices that it misses the last message
 CLOSE_TIMEOUT = 1.0  # [s]
-ASTRAY_PATIENCE = 10.0  # [s] that a session may take to come back to a router that listens
+RECONNECTION_TIMEOUT = 10.0  # [s] that a session may take to come back to a router that listens
 
 
 class BusNotOpen(BusError):
@@ -53,23 +53,23 @@ class ZenohBus:
             raise BusNotOpen(str(error)) from error
         self._router = (host, port)
         self._name = str(self._session.zid()).encode()
-        self._astray_since: float | None = None  # [s] monotonic
+        self._disconnected_since: float | None = None  # [s] monotonic
         self._tokens: list[ZenohDeclaration] = []
-        self._presence: dict[str, Presence] = {}
+        self._monitors: dict[str, ServerMonitor] = {}
         self._lock = threading.Lock()
-        close_with_the_program(self)
+        close_at_exit(self)
 
     @property
     def is_connected(self) -> bool:
         return bool(self._session.info.routers_zid())
 
-    def require_way_back(self) -> None:
+    def require_reconnection(self) -> None:
         if self.is_connected or not router_answers(*self._router, timeout=0.1):
-            self._astray_since = None
+            self._disconnected_since = None
             return
-        self._astray_since = self._astray_since or time.monotonic()
-        if time.monotonic() - self._astray_since > ASTRAY_PATIENCE:
-            raise BusError(f"the router is there, but did not take this session back within {ASTRAY_PATIENCE:g} s")
+        self._disconnected_since = self._disconnected_since or time.monotonic()
+        if time.monotonic() - self._disconnected_since > RECONNECTION_TIMEOUT:
+            raise BusError(f"the router is there, but did not take this session back within {RECONNECTION_TIMEOUT:g} s")
 
     def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> ZenohPublication:
         encoding = encoding_of(schema)
@@ -130,10 +130,10 @@ class ZenohBus:
 
     def wait_served(self, key: str, timeout: float) -> bool:
         with self._lock:
-            presence = self._presence.get(key)
-            if presence is None:
-                presence = self._presence[key] = Presence(self._session, key)
-        return presence.wait(timeout)
+            monitor = self._monitors.get(key)
+            if monitor is None:
+                monitor = self._monitors[key] = ServerMonitor(self._session, key)
+        return monitor.wait(timeout)
 
     def ask(
         self,
@@ -141,17 +141,17 @@ class ZenohBus:
         schema: str,
         payload: bytes,
         timeout: float,
-        on_answer: Callable[[Answer | None], None],
+        on_answer: Callable[[BusReply | None], None],
         urgent: bool = False,
     ) -> None:
-        answers: list[Answer] = []
+        answers: list[BusReply] = []
 
         def on_reply(reply: zenoh.Reply) -> None:
             sample, error = reply.ok, reply.err
             if sample is not None:
-                answers.append(Answer(True, schema_in(sample.encoding), bytes(sample.payload)))
+                answers.append(BusReply(True, schema_in(sample.encoding), bytes(sample.payload)))
             elif error is not None and not is_timeout(error):
-                answers.append(Answer(False, schema_in(error.encoding), bytes(error.payload)))
+                answers.append(BusReply(False, schema_in(error.encoding), bytes(error.payload)))
 
         def on_end() -> None:
             on_answer(answers[0] if answers else None)

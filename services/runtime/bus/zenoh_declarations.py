@@ -9,7 +9,7 @@ import zenoh
 
 from services.runtime.bus.interface import ENCODING, Arrival
 
-MOST_OF_A_NAME = 32  # [bytes] of what a client says of itself
+MAX_CLIENT_NAME = 32  # [bytes] of what a client says of itself
 
 
 class ZenohPublication:
@@ -43,7 +43,7 @@ class ZenohQuery:
     def __init__(self, query: zenoh.Query, key: str) -> None:
         self._query = query
         self.arrival = Arrival(key, schema_in(query.encoding), bytes(query.payload or b""))
-        self.client = bytes(query.attachment or b"")[:MOST_OF_A_NAME].hex()
+        self.client = bytes(query.attachment or b"")[:MAX_CLIENT_NAME].hex()
 
     def reply(self, schema: str, payload: bytes) -> None:
         with self._query as query:
@@ -54,7 +54,7 @@ class ZenohQuery:
             query.reply_err(payload, encoding=encoding_of(schema))
 
 
-class Presence:
+class ServerMonitor:
     """Knows whether somebody serves a key."""
 
     def __init__(self, session: zenoh.Session, key: str) -> None:
@@ -103,7 +103,7 @@ _open: set[Closable] = set()
 _watch: list[threading.Thread] = []  # not a daemon, which would be cut off in the middle of closing
 
 
-def close_with_the_program(session: Closable) -> None:
+def close_at_exit(session: Closable) -> None:
     """Closes it when the main thread ends, unless `forget` is called before."""
     _open.add(session)
     if not _watch:

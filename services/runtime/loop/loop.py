@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from services.runtime.loop.task_queue import Inbox, Task
-from services.runtime.process.shutdown import StopRequest
+from services.runtime.loop.task_queue import Task, TaskQueue
+from services.runtime.process.shutdown import ShutdownRequest
 
 
 @dataclass
@@ -53,12 +53,12 @@ class Schedule:
         return figures
 
 
-FOR_EVER = 3600.0  # [s] how long to wait at most where nothing is due
+IDLE_TIMEOUT = 3600.0  # [s] how long to wait at most where nothing is due
 TICK = 0.05  # [s] between two looks of `wait_for`
 
 
 @dataclass
-class Chore:
+class PeriodicTask:
     """Something that is due every `period` [s]."""
 
     period: float
@@ -69,21 +69,22 @@ class Chore:
 class Loop:
     """Runs in one thread at a time."""
 
-    def __init__(self, stop: StopRequest) -> None:
-        self.inbox = Inbox()
-        self._chores: list[Chore] = []
+    def __init__(self, stop: ShutdownRequest) -> None:
+        self.tasks = TaskQueue()
+        self._periodic_tasks: list[PeriodicTask] = []
         self._thread: int | None = None
         self._schedule: Schedule | None = None
         self.stop = stop
-        stop.on_set(self.inbox.wake)
+        stop.on_set(self.tasks.wake)
 
     def every(self, period: float, task: Task) -> None:
         """`task` runs every `period` [s] while the loop does."""
-        self._chores = [*self._chores, Chore(period, task)]  # not in place: a chore may add one
+        # A new list, because a task may add another one while the old list is iterated.
+        self._periodic_tasks = [*self._periodic_tasks, PeriodicTask(period, task)]
 
     def forget(self, task: Task) -> None:
         """Ends an `every`."""
-        self._chores = [each for each in self._chores if each.task != task]
+        self._periodic_tasks = [each for each in self._periodic_tasks if each.task != task]
 
     def take_figures(self) -> LoopFigures:
         """What `spin` did since the last call."""
@@ -99,9 +100,9 @@ class Loop:
                     schedule.begin(now)
                     step(time.time_ns())
                     schedule.end(time.monotonic())
-                    self._turn(now, now)
+                    self._run_once(now, now)
                 else:
-                    self._turn(now, schedule.deadline)
+                    self._run_once(now, schedule.deadline)
 
     def wait(self, seconds: float) -> None:
         """Handles the inbox for so long, or until asked to stop."""
@@ -114,7 +115,7 @@ class Loop:
         """
         end = time.monotonic() + timeout
         if self._thread is not None and self._thread != threading.get_ident():
-            return self._look_on(is_done, end, on_tick)
+            return self._wait_for_other_thread(is_done, end, on_tick)
         with self._in_this_thread():
             tick = time.monotonic()
             while not is_done():
@@ -124,10 +125,10 @@ class Loop:
                 if on_tick is not None and now >= tick:
                     tick = now + TICK
                     on_tick()
-                self._turn(now, min(end, tick) if on_tick is not None else end)
+                self._run_once(now, min(end, tick) if on_tick is not None else end)
         return True
 
-    def _look_on(self, is_done: Callable[[], bool], end: float, on_tick: Task | None) -> bool:
+    def _wait_for_other_thread(self, is_done: Callable[[], bool], end: float, on_tick: Task | None) -> bool:
         while not is_done():
             if self.stop.is_set or time.monotonic() >= end:
                 return False
@@ -136,15 +137,15 @@ class Loop:
             time.sleep(TICK / 5)
         return True
 
-    def _turn(self, now: float, until: float) -> None:
+    def _run_once(self, now: float, until: float) -> None:
         """What is due, then one message, waiting for it until `until`."""
-        due = now + FOR_EVER
-        for chore in self._chores:
-            if now >= chore.due:
-                chore.due = now + chore.period
-                chore.task()
-            due = min(due, chore.due)
-        task = self.inbox.take(min(until, due) - now)
+        due = now + IDLE_TIMEOUT
+        for periodic in self._periodic_tasks:
+            if now >= periodic.due:
+                periodic.due = now + periodic.period
+                periodic.task()
+            due = min(due, periodic.due)
+        task = self.tasks.take(min(until, due) - now)
         if task is not None:
             task()
 

@@ -20,7 +20,7 @@ EVERY_BYTES = 64 * 1024 * 1024
 Task = Callable[[], None]
 
 
-class Inbox:
+class TaskQueue:
     """A queue of things to do in the thread of logic, and a short one that goes before it."""
 
     def __init__(self) -> None:
@@ -49,7 +49,7 @@ class Inbox:
             return None
 
 
-class Box(Protocol):
+class ArrivalQueue(Protocol):
     """Where the arrivals of one key wait."""
 
     dropped: int
@@ -59,10 +59,10 @@ class Box(Protocol):
     def on_miss(self, count: int) -> None: ...
 
 
-class LatestBox:
+class LatestQueue:
     """Room for one arrival: a newer one replaces it."""
 
-    def __init__(self, inbox: Inbox, handle: Callable[[Arrival], None]) -> None:
+    def __init__(self, inbox: TaskQueue, handle: Callable[[Arrival], None]) -> None:
         self._inbox, self._handle = inbox, handle
         self._lock = threading.Lock()
         self._waiting: Arrival | None = None
@@ -86,13 +86,13 @@ class LatestBox:
             self._handle(arrival)
 
 
-class EveryBox:
+class EveryQueue:
     """Room for many arrivals in order: one that does not fit is lost, and counted.
 
     Each has a task of its own in the inbox; without one they wait to be handled together, and wake nobody.
     """
 
-    def __init__(self, inbox: Inbox | None, handle: Callable[[Arrival], None]) -> None:
+    def __init__(self, inbox: TaskQueue | None, handle: Callable[[Arrival], None]) -> None:
         self._inbox, self._handle = inbox, handle
         self._lock = threading.Lock()
         self._waiting: deque[Arrival] = deque()

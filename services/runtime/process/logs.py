@@ -10,7 +10,7 @@ from collections.abc import Callable
 from schemas.system import LogLevel, LogRecord
 
 LEVELS = ("debug", "info", "warning", "error")
-LONGEST_TEXT = 8_000  # characters of one record on the bus
+MAX_TEXT = 8_000  # characters of one record on the bus
 
 
 class LineFormatter(logging.Formatter):
@@ -40,7 +40,7 @@ class BusHandler(logging.Handler):
                 text += f": {type(record.exc_info[1]).__name__}: {record.exc_info[1]}"
             level = max((each for each in LogLevel if each <= record.levelno), default=LogLevel.DEBUG)
             stamp = int(record.created * 1e9)
-            self._put(LogRecord(stamp=stamp, node=record.name, level=level, text=text[:LONGEST_TEXT]))
+            self._put(LogRecord(stamp=stamp, node=record.name, level=level, text=text[:MAX_TEXT]))
         except Exception:
             self.handleError(record)  # on stderr: a log that cannot be sent must not end a node
         finally:

@@ -18,7 +18,7 @@ GRACE = 2.0  # [s] from the signal to the end of the process, whatever its callb
 SIGNALS = (signal.SIGTERM, signal.SIGINT)
 
 
-class StopRequest:
+class ShutdownRequest:
     """Whether the process has been asked to stop; safe to set in a signal handler."""
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class StopRequest:
 
 
 @contextmanager
-def stop_on_signals(stop: StopRequest) -> Iterator[None]:
+def stop_on_signals(stop: ShutdownRequest) -> Iterator[None]:
     """Sets `stop` at the first signal, until the block ends; does nothing outside the main thread.
 
     A block that has not ended `GRACE` after the signal is ended with the process, exit code 1.

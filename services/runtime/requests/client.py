@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 from schemas.message import BadMessage, Message
 from schemas.system import Failure
 from schemas.topics import Request
-from services.runtime.bus.interface import Answer, Arrival, Bus
+from services.runtime.bus.interface import Arrival, Bus, BusReply
 from services.runtime.bus.wire import from_arrival, schema_of, to_payload
 from services.runtime.errors import NoAnswer, Refused
 from services.runtime.loop.task_queue import Task
@@ -16,19 +16,19 @@ from services.runtime.loop.task_queue import Task
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 
-PRESENCE_PATIENCE = 1.0  # [s] that a client waits for a server to appear
+SERVER_APPEARANCE_TIMEOUT = 1.0  # [s] that a client waits for a server to appear
 
 
-class Asked(Generic[Q, R]):
+class PendingCall(Generic[Q, R]):
     """A question that was sent, and its answer when it comes."""
 
     def __init__(self, bus: Bus, request: Request[Q, R], question: Q, timeout: float, wake: Task) -> None:
         """`wake` is called when it comes, from another thread; raises `NoAnswer` where nobody serves the request."""
         self._bus, self._request, self._wake = bus, request, wake
-        self._patience = timeout
-        self._answers: SimpleQueue[Answer | None] = SimpleQueue()
+        self._timeout = timeout
+        self._answers: SimpleQueue[BusReply | None] = SimpleQueue()
         payload = to_payload(question)
-        if not bus.wait_served(request.key, min(timeout, PRESENCE_PATIENCE)):
+        if not bus.wait_served(request.key, min(timeout, SERVER_APPEARANCE_TIMEOUT)):
             raise NoAnswer(_nobody(bus, request))
         bus.ask(request.key, schema_of(request.request), payload, timeout, self._on_answer, request.urgent)
 
@@ -40,24 +40,24 @@ class Asked(Generic[Q, R]):
     def response(self) -> R:
         """Blocks up to the time-out; raises `Refused` or `NoAnswer`."""
         try:
-            answer = self._answers.get(timeout=self._patience + 1.0)
+            answer = self._answers.get(timeout=self._timeout + 1.0)
         except Empty:
             answer = None
         if answer is None:
-            raise NoAnswer(_silent(self._bus, self._request, self._patience))
+            raise NoAnswer(_silent(self._bus, self._request, self._timeout))
         return response_in(self._request, answer)
 
-    def _on_answer(self, answer: Answer | None) -> None:
+    def _on_answer(self, answer: BusReply | None) -> None:
         self._answers.put(answer)
         self._wake()
 
 
 def call(bus: Bus, request: Request[Q, R], question: Q, timeout: float) -> R:
     """The answer; blocks up to `timeout` [s]. Raises `Refused` or `NoAnswer`."""
-    return Asked(bus, request, question, timeout, wake=lambda: None).response()
+    return PendingCall(bus, request, question, timeout, wake=lambda: None).response()
 
 
-def response_in(request: Request[Q, R], answer: Answer) -> R:
+def response_in(request: Request[Q, R], answer: BusReply) -> R:
     """The response in `answer`; raises `Refused` for a failure, `NoAnswer` where it cannot be read."""
     try:
         arrival = Arrival(request.key, answer.schema, answer.payload)

@@ -17,16 +17,16 @@ from services.runtime.bus.interface import Bus, Query
 from services.runtime.bus.wire import from_arrival, schema_of, to_payload
 from services.runtime.errors import Refused
 from services.runtime.loop.task_queue import Task
-from services.runtime.topics import Complain
+from services.runtime.topics import Warn
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 R_contra = TypeVar("R_contra", bound=Message, contravariant=True)
 
 # Chosen: a script waits for its answers, so few clients ever have more than one request here.
-MOST_OF_A_CLIENT = 64  # requests of one client that wait in one server; more are refused
-MOST_WAITING = 1024  # requests of all clients that wait in one server; more are refused
-MOST_UNANSWERED = 1024  # callers of one urgent server that are answered together; the rest hears so at once
+MAX_WAITING_OF_A_CLIENT = 64  # requests of one client that wait in one server; more are refused
+MAX_WAITING = 1024  # requests of all clients that wait in one server; more are refused
+MAX_UNANSWERED = 1024  # callers of one urgent server that are answered together; the rest hears so at once
 
 
 class Pending(Protocol[R_contra]):
@@ -82,7 +82,7 @@ class PendingGroup(Generic[R]):
         return queries
 
 
-class Waiting:
+class WaitingRequests:
     """Counts the requests that wait, by client, so that one client's flood leaves room for the others."""
 
     def __init__(self, key: str) -> None:
@@ -90,13 +90,13 @@ class Waiting:
         self._of: Counter[str] = Counter()
         self._lock = threading.Lock()
 
-    def objection(self, client: str) -> str:
+    def refusal(self, client: str) -> str:
         """Takes a place for `client`; or, if there is none, says why."""
         with self._lock:
-            if self._of[client] >= MOST_OF_A_CLIENT:
-                return f"{self._key}: {MOST_OF_A_CLIENT} requests are waiting already, all of this client"
-            if self._of.total() >= MOST_WAITING:
-                return f"{self._key}: {MOST_WAITING} requests are waiting already"
+            if self._of[client] >= MAX_WAITING_OF_A_CLIENT:
+                return f"{self._key}: {MAX_WAITING_OF_A_CLIENT} requests are waiting already, all of this client"
+            if self._of.total() >= MAX_WAITING:
+                return f"{self._key}: {MAX_WAITING} requests are waiting already"
             self._of[client] += 1
             return ""
 
@@ -116,13 +116,13 @@ class RequestServer(Generic[Q, R]):
         put: Callable[[Task], None],
         request: Request[Q, R],
         handler: Callable[[Q, Pending[R]], None],
-        complain: Complain,
+        warn: Warn,
     ) -> None:
         self.request = request
         self._put = put
-        self._handler, self._complain = handler, complain
+        self._handler, self._warn = handler, warn
         self._received, self._refused, self._bad = 0, 0, 0
-        self._waiting = Waiting(request.key)
+        self._waiting = WaitingRequests(request.key)
         self._void_before, self._void_reason = -math.inf, ""  # [s] monotonic
         self._declaration = bus.serve(request.key, self._on_query)
 
@@ -138,9 +138,9 @@ class RequestServer(Generic[Q, R]):
         self._void_before, self._void_reason = time.monotonic(), reason
 
     def _on_query(self, query: Query) -> None:
-        if objection := self._waiting.objection(query.client):
+        if refusal := self._waiting.refusal(query.client):
             self._refused += 1
-            PendingQuery[R](query).refuse("busy", objection)
+            PendingQuery[R](query).refuse("busy", refusal)
             return
         arrived = time.monotonic()
         self._put(lambda: self._take(query, arrived))
@@ -162,7 +162,7 @@ class RequestServer(Generic[Q, R]):
         except BadMessage as error:
             self._bad += 1
             if self._bad == 1:
-                self._complain(f"{self.request.key}: refused a bad request: {error} (further ones are only counted)")
+                self._warn(f"{self.request.key}: refused a bad request: {error} (further ones are only counted)")
             pending.refuse("bad request", str(error))
             return None
 
@@ -172,7 +172,7 @@ class RequestServer(Generic[Q, R]):
         except Refused as error:
             pending.refuse(error.kind, str(error))
         except Exception as error:
-            self._complain(f"{self.request.key}: {traceback.format_exc()}")
+            self._warn(f"{self.request.key}: {traceback.format_exc()}")
             pending.refuse("internal error", f"{self.request.server} failed: {type(error).__name__}: {error}")
 
 
@@ -189,34 +189,34 @@ class UrgentServer(RequestServer[Q, R]):
         put: Callable[[Task], None],
         request: Request[Q, R],
         handler: Callable[[Q, Pending[R]], None],
-        complain: Complain,
+        warn: Warn,
     ) -> None:
         self._groups: dict[Q, PendingGroup[R]] = {}
         self._unanswered = 0
         self._lock = threading.Lock()
-        super().__init__(bus, put, request, handler, complain)
+        super().__init__(bus, put, request, handler, warn)
 
     def _on_query(self, query: Query) -> None:
         question = self._question(query, PendingQuery[R](query))
         if question is None:
             return
-        objection = self._join(question, query)
-        if objection:
+        refusal = self._join(question, query)
+        if refusal:
             self._refused += 1
-            PendingQuery[R](query).refuse("busy", objection)
+            PendingQuery[R](query).refuse("busy", refusal)
 
     def _join(self, question: Q, query: Query) -> str:
         """Has `question` handled; not empty where its caller cannot be answered with the others."""
         with self._lock:
             group = self._groups.get(question)
             if group is None:
-                if objection := self._waiting.objection(query.client):
-                    return objection
+                if refusal := self._waiting.refusal(query.client):
+                    return refusal
                 group = self._groups[question] = PendingGroup(self._answered)
                 self._put(lambda: self._take_group(question, query.client))
             self._received += 1
-            if self._unanswered >= MOST_UNANSWERED:
-                return f"{self.request.key}: taken; {MOST_UNANSWERED} callers wait for its answer already"
+            if self._unanswered >= MAX_UNANSWERED:
+                return f"{self.request.key}: taken; {MAX_UNANSWERED} callers wait for its answer already"
             self._unanswered += 1
             group.join(query)
             return ""

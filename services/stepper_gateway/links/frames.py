@@ -13,7 +13,7 @@ from enum import IntEnum, IntFlag
 import msgspec
 
 from schemas.message import Vector
-from services.runtime.serial_frames import MAGIC, VERSION, sealed
+from services.runtime.serial_frames import MAGIC, VERSION, build_frame
 
 UNITY = 32768.0  # of a time scale, Q1.15
 Q8 = 256.0  # of a velocity, Q24.8
@@ -237,7 +237,7 @@ def encode(frame: AnyFrame) -> bytes:
                 frame.flags, frame.fault_joint, frame.outputs, frame.referenced, round(frame.speed * 1000.0),
             )  # fmt: skip
             body += _rows((*frame.steps, *(round(rate * Q8) for rate in frame.velocity)))
-    return sealed(kind, body, frame.boot_id, joints)
+    return build_frame(kind, body, frame.boot_id, joints)
 
 
 def decode(payload: bytes) -> AnyFrame:

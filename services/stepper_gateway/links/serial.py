@@ -11,7 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from services.runtime.serial_frames import JsonFrame, Packets, json_frame, packet, parse_json_frame
+from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 from services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
 from services.stepper_gateway.links.frames import FrameType
 from services.stepper_gateway.links.link import Kind, Received
@@ -101,7 +101,7 @@ class SerialLink:
 
     def _read(self, line: Line) -> None:
         """Until the port fails, the writer gives it up, or the link is closed."""
-        packets = Packets()
+        packets = PacketDecoder()
         while self._line is line and not self._stop.is_set():
             data = line.read(max(1, line.in_waiting))
             arrival, bad = time.monotonic_ns(), packets.bad

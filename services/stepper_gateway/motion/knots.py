@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from schemas.message import Vector
-from services.arm.device.device_config import WIDEST_Q8
+from services.arm.device.device_config import UNLIMITED_Q8
 from services.arm.model.description import Joint
 
 
@@ -59,7 +59,7 @@ class StepEncoder:
 def _bound(joint: Joint, limit: float) -> int:
     """A position limit on the wire; a continuous joint has the device's widest."""
     if math.isinf(limit):
-        return -WIDEST_Q8 if limit < 0.0 else WIDEST_Q8
+        return -UNLIMITED_Q8 if limit < 0.0 else UNLIMITED_Q8
     return joint.steps.to_q8(limit)
 
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from services.visualizer.content.updates import Poses, Times, Update
 from services.visualizer.model.rotations import Array
-from services.visualizer.model.visual_model import Model
+from services.visualizer.model.visual_model import VisualModel
 
 
-def arm_poses(model: Model, root: str, times: Times, rows: Array) -> list[Update]:
+def arm_poses(model: VisualModel, root: str, times: Times, rows: Array) -> list[Update]:
     """The arm under `root` in the configurations `rows` (n, joints), in the order of `model.moving`, at `times`
     (n,)."""
     names = [joint.name for joint in model.moving]
@@ -20,6 +20,6 @@ def arm_poses(model: Model, root: str, times: Times, rows: Array) -> list[Update
     ]
 
 
-def arm_at(model: Model, root: str, now: int, configuration: Array) -> list[Update]:
+def arm_pose_at(model: VisualModel, root: str, now: int, configuration: Array) -> list[Update]:
     """The arm under `root` in one `configuration` (joints,) from `now` on."""
     return arm_poses(model, root, np.array([now], dtype=np.int64), configuration[None, :])

@@ -16,8 +16,8 @@ PANEL = "device/panel"
 LOG = "log"
 
 
-def carried(root: str, link: str) -> str:
-    """What a link of the arm under `root` carries; `link` as in `Model.paths`."""
+def attached(root: str, link: str) -> str:
+    """What a link of the arm under `root` carries; `link` as in `VisualModel.paths`."""
     return f"{root}/{link}/carried"
 
 

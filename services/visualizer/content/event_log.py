@@ -13,7 +13,7 @@ from services.visualizer.content.updates import LogLines, Update
 EVENT_LEVELS = {"fault": "ERROR", "estop": "ERROR", "homing_stopped": "WARNING", "press_refused": "WARNING"}
 
 
-class Journal:
+class EventLog:
     """Lines with their time and level, until they are taken."""
 
     def __init__(self) -> None:
@@ -21,7 +21,7 @@ class Journal:
 
     def add(self, stamp: int, text: str, level: str = "INFO") -> None:
         """`stamp` in ns UNIX; `level` as in `LogLevel`'s names."""
-        self._lines.append((bounded(stamp), text, level))
+        self._lines.append((clamp_stamp(stamp), text, level))
 
     def on_log(self, message: LogRecord) -> None:
         """A line of a node."""
@@ -48,6 +48,6 @@ def time_of_day(stamp: int) -> str:
     return f"{minutes // 60:02d}:{minutes % 60:02d}:{seconds:02d}"
 
 
-def bounded(stamp: int) -> int:
+def clamp_stamp(stamp: int) -> int:
     """`stamp` as a time column can hold it."""
     return min(max(stamp, 0), LAST_STAMP)

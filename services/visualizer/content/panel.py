@@ -14,7 +14,7 @@ LOST = 1  # [steps] between counter and shaft that a motor under load may be off
 
 
 @dataclass(frozen=True)
-class Facts:
+class PanelInputs:
     """The newest of everything that the panel shows."""
 
     robot: str = ""
@@ -27,9 +27,9 @@ class Facts:
     prismatic: frozenset[str] = frozenset()
 
 
-def panel(facts: Facts, now: int) -> str:
+def panel(inputs: PanelInputs, now: int) -> str:
     """Markdown; `now` in ns UNIX."""
-    parts = (_heading(facts, now), _lost(facts), _device(facts, now), _table(facts), _numbers(facts))
+    parts = (_heading(inputs, now), _lost(inputs), _device(inputs, now), _table(inputs), _numbers(inputs))
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
@@ -45,16 +45,16 @@ def is_lost(error: int) -> bool:
     return abs(error) > LOST
 
 
-def _heading(facts: Facts, now: int) -> str:
-    state, status = facts.state, facts.status
+def _heading(inputs: PanelInputs, now: int) -> str:
+    state, status = inputs.state, inputs.status
     if status is not None and not status.online:
-        return f"## {facts.robot} · OFFLINE\n\n{status.reason or 'the device is not connected'}"
+        return f"## {inputs.robot} · OFFLINE\n\n{status.reason or 'the device is not connected'}"
     if state is None:
-        return f"## {facts.robot} · waiting for the device"
+        return f"## {inputs.robot} · waiting for the device"
     age = now - state.stamp
     if age > STALE:
-        return f"## {facts.robot} · SILENT for {age / 1e9:.0f} s\n\nlast mode {state.mode.name}"
-    return _fault(facts.robot, state) or f"## {facts.robot} · {state.mode.name}"
+        return f"## {inputs.robot} · SILENT for {age / 1e9:.0f} s\n\nlast mode {state.mode.name}"
+    return _fault(inputs.robot, state) or f"## {inputs.robot} · {state.mode.name}"
 
 
 def _fault(robot: str, state: DeviceState) -> str:
@@ -68,19 +68,19 @@ def _fault(robot: str, state: DeviceState) -> str:
     return f"# {robot} · {about.name}{where}\n\n**{about.meaning}**\n\n{about.remedy}"
 
 
-def _lost(facts: Facts) -> str:
+def _lost(inputs: PanelInputs) -> str:
     """The shafts that are not where their counters say."""
-    off = {name: error for name, error in shaft_errors(facts.shaft).items() if is_lost(error)}
+    off = {name: error for name, error in shaft_errors(inputs.shaft).items() if is_lost(error)}
     if not off:
         return ""
     said = ", ".join(f"{name} {error:+d}" for name, error in off.items())
     return f"**STEPS LOST: true shaft minus counter {said}** · `gemelo home {' '.join(off)}`"
 
 
-def _device(facts: Facts, now: int) -> str:
+def _device(inputs: PanelInputs, now: int) -> str:
     """Drivers, references, switches, outputs, sensors, in one line."""
-    state = facts.state
-    if state is None or (facts.status is not None and not facts.status.online):
+    state = inputs.state
+    if state is None or (inputs.status is not None and not inputs.status.online):
         return ""
     known = dict(zip(state.name, state.referenced, strict=False))
     parts = ["armed" if state.armed else "**DISARMED**"]
@@ -88,7 +88,7 @@ def _device(facts: Facts, now: int) -> str:
     parts += [f"**speed {state.speed:.0%}**"] if state.speed != 1.0 else []
     parts += [f"**pressed: {', '.join(state.inputs)}**"] if state.inputs else []
     parts += [f"on: {', '.join(state.outputs)}"] if state.outputs else []
-    return " · ".join([*parts, *_sensors(facts.sensors, now)])
+    return " · ".join([*parts, *_sensors(inputs.sensors, now)])
 
 
 def _references(known: dict[str, bool]) -> str:
@@ -105,13 +105,13 @@ def _sensors(sensors: SensorReadings | None, now: int) -> list[str]:
     return [f"{name} {value:.3g} {unit}".rstrip() for name, value, unit in rows]
 
 
-def _table(facts: Facts) -> str:
-    errors = facts.errors
+def _table(inputs: PanelInputs) -> str:
+    errors = inputs.errors
     if errors is None:
         return ""
-    positions = dict(zip(facts.joints.name, facts.joints.position, strict=False)) if facts.joints else {}
+    positions = dict(zip(inputs.joints.name, inputs.joints.position, strict=False)) if inputs.joints else {}
     rows = [
-        f"| {name} | {_position(facts, name, positions.get(name))} | {commanded:z.2f} | {executed} |"
+        f"| {name} | {_position(inputs, name, positions.get(name))} | {commanded:z.2f} | {executed} |"
         f" **{error:+z.2f}** | {worst:.2f} |"
         for name, commanded, executed, error, worst in zip(
             errors.name, errors.commanded, errors.executed, errors.error, errors.max_error, strict=False
@@ -121,17 +121,17 @@ def _table(facts: Facts) -> str:
     return "\n".join([head, *rows])
 
 
-def _position(facts: Facts, name: str, value: float | None) -> str:
+def _position(inputs: PanelInputs, name: str, value: float | None) -> str:
     if value is None:
         return "?"
-    return f"{value * 1e3:z.2f} mm" if name in facts.prismatic else f"{math.degrees(value):z.2f}°"
+    return f"{value * 1e3:z.2f} mm" if name in inputs.prismatic else f"{math.degrees(value):z.2f}°"
 
 
-def _numbers(facts: Facts) -> str:
-    state = facts.state
+def _numbers(inputs: PanelInputs) -> str:
+    state = inputs.state
     if state is None:
         return ""
-    boot = f"firmware {facts.status.firmware} · " if facts.status is not None and facts.status.firmware else ""
+    boot = f"firmware {inputs.status.firmware} · " if inputs.status is not None and inputs.status.firmware else ""
     return (
         f"path {state.time_scale:.0%} of its speed · {state.buffered * 1e3:.0f} ms queued · "
         f"round trip {state.round_trip * 1e3:.1f} ms\n\n"

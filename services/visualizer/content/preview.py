@@ -9,29 +9,29 @@ import numpy as np
 from schemas.joints import JointState
 from schemas.planning import PlannedPath
 from services.visualizer.content import entities, palette
-from services.visualizer.content.arm_poses import arm_at
-from services.visualizer.content.event_log import bounded
-from services.visualizer.content.updates import Gone, Shadow, Update
+from services.visualizer.content.arm_poses import arm_pose_at
+from services.visualizer.content.event_log import clamp_stamp
+from services.visualizer.content.updates import ClearEntity, TranslucentArm, Update
 from services.visualizer.model.rotations import Array
-from services.visualizer.model.visual_model import Model
+from services.visualizer.model.visual_model import VisualModel
 
 TIMES = 3  # that a motion is played
 REST = 0.7  # [s] at its end
 MOVING = 1e-3  # [rad/s] or [m/s]
 
-Carried = Callable[[str, palette.Rgba, int], list[Update]]  # under which arm, in which colour, when [ns]
+DrawAttached = Callable[[str, palette.Rgba, int], list[Update]]  # under which arm, in which colour, when [ns]
 
 
-def empty_handed(root: str, color: palette.Rgba, now: int) -> list[Update]:
+def draw_nothing(root: str, color: palette.Rgba, now: int) -> list[Update]:
     """For a view that has no scene."""
     return []
 
 
-class Preview:
-    """Of the newest plan; without joint positions in it there is none. `carried` draws what is in the arm's hand."""
+class PlanPreview:
+    """Of the newest plan; without joint positions in it there is none. `attached` draws what is in the arm's hand."""
 
-    def __init__(self, model: Model, carried: Carried = empty_handed) -> None:
-        self._model, self._carried = model, carried
+    def __init__(self, model: VisualModel, attached: DrawAttached = draw_nothing) -> None:
+        self._model, self._attached = model, attached
         self._rows: Array = np.empty((0, 0))
         self._times: Array = np.empty(0)
         self._began: int | None = None  # [ns] None: it has not been drawn
@@ -58,17 +58,20 @@ class Preview:
 
     def take(self, now: int) -> list[Update]:
         """The configuration of this moment; `now` in ns UNIX."""
-        now = bounded(now)
+        now = clamp_stamp(now)
         if self._is_over:
-            gone: list[Update] = [Gone(entities.PLANNED, now)] if self._began is not None else []
+            gone: list[Update] = [ClearEntity(entities.PLANNED, now)] if self._began is not None else []
             self._began = None
             return gone
         drawn: list[Update] = []
         if self._began is None:
             self._began = now
-            drawn = [Gone(entities.PLANNED, now - 1), Shadow(entities.PLANNED, now, frozenset(), palette.PLANNED),
-                     *self._carried(entities.PLANNED, palette.PLANNED, now)]  # fmt: skip
+            drawn = [
+                ClearEntity(entities.PLANNED, now - 1),
+                TranslucentArm(entities.PLANNED, now, frozenset(), palette.PLANNED),
+                *self._attached(entities.PLANNED, palette.PLANNED, now),
+            ]
         played, phase = divmod((now - self._began) / 1e9, float(self._times[-1]) + REST)
         self._is_over = played >= TIMES
         configuration = np.array([np.interp(phase, self._times, column) for column in self._rows.T])
-        return [*drawn, *arm_at(self._model, entities.PLANNED, now, configuration)]
+        return [*drawn, *arm_pose_at(self._model, entities.PLANNED, now, configuration)]

@@ -1,4 +1,4 @@
-"""The planning scene as it is drawn: objects, what is carried, and in red what touches where a plan was refused."""
+"""The planning scene as it is drawn: objects, what is attached, and in red what touches where a plan was refused."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from schemas.scene import (
     SphereShape,
 )
 from services.visualizer.content import entities, palette
-from services.visualizer.content.arm_poses import arm_at
-from services.visualizer.content.event_log import bounded
-from services.visualizer.content.updates import Gone, Labels, Shadow, Thing, Update
-from services.visualizer.model.triangle_meshes import Mesh, mesh_of
-from services.visualizer.model.visual_model import Model, Shape
+from services.visualizer.content.arm_poses import arm_pose_at
+from services.visualizer.content.event_log import clamp_stamp
+from services.visualizer.content.updates import ClearEntity, Labels, SolidMesh, TranslucentArm, Update
+from services.visualizer.model.triangle_meshes import TriangleMesh, primitive_mesh
+from services.visualizer.model.visual_model import VisualModel, VisualShape
 
-PLANE = Shape("box", (2.0, 2.0, 0.004))  # [m] as much of a plane as is drawn
-Loader = Callable[[MeshShape], Mesh | None]
+PLANE = VisualShape("box", (2.0, 2.0, 0.004))  # [m] as much of a plane as is drawn
+MeshLoader = Callable[[MeshShape], TriangleMesh | None]
 
 
-def no_mesh(shape: MeshShape) -> None:
+def load_no_mesh(shape: MeshShape) -> None:
     """For a view that has no files."""
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnObject:
     """One object where and how it was shown last."""
 
     item: SceneObject
@@ -45,11 +45,11 @@ class Drawn:
 class SceneView:
     """The newest scene and contacts, told anew only where they changed; `load` reads mesh files, or gives None."""
 
-    def __init__(self, model: Model, load: Loader) -> None:
+    def __init__(self, model: VisualModel, load: MeshLoader) -> None:
         self._model, self._load = model, load
         self._scene, self._contacts = PlanningScene(), Contacts()
-        self._drawn: dict[str, Drawn] = {}
-        self._meshes: dict[MeshShape, Mesh | None] = {}
+        self._drawn: dict[str, DrawnObject] = {}
+        self._meshes: dict[MeshShape, TriangleMesh | None] = {}
         self._is_new = False
 
     def on_scene(self, message: PlanningScene) -> None:
@@ -74,61 +74,61 @@ class SceneView:
         if not self._is_new:
             return []
         self._is_new = False
-        now = bounded(now)
+        now = clamp_stamp(now)
         wanted = {item.name: self._wanted(item) for item in self._scene.objects if self._has_place(item)}
         updates: list[Update] = []
         for name, old in self._drawn.items():
             if name not in wanted or wanted[name].entity != old.entity:
-                updates.append(Gone(old.entity, now))
+                updates.append(ClearEntity(old.entity, now))
         for name, new in wanted.items():
             if self._drawn.get(name) != new:
-                updates += self._thing(new.item, new.entity, new.color, now)
+                updates += self._solid_mesh(new.item, new.entity, new.color, now)
         self._drawn = wanted
         return [*updates, *self._refused(now)]
 
     def _has_place(self, item: SceneObject) -> bool:
         return not item.attached or item.frame in self._model.paths
 
-    def _wanted(self, item: SceneObject) -> Drawn:
-        root = entities.carried(entities.MEASURED, self._model.paths[item.frame]) if item.attached else entities.SCENE
-        color = palette.CARRIED if item.attached else palette.OBJECT
-        # A carried object touches in the refused configuration, where the shadow shows it; here it is where the arm is.
-        is_red = item.name in self._touching() and not item.attached
-        return Drawn(item, f"{root}/{entities.part(item.name)}", palette.TOUCHING if is_red else color)
+    def _wanted(self, item: SceneObject) -> DrawnObject:
+        root = entities.attached(entities.MEASURED, self._model.paths[item.frame]) if item.attached else entities.SCENE
+        color = palette.ATTACHED if item.attached else palette.OBJECT
+        # An attached object is in contact in the refused configuration, and drawn red there; here it follows the arm.
+        is_red = item.name in self._in_contact() and not item.attached
+        return DrawnObject(item, f"{root}/{entities.part(item.name)}", palette.IN_CONTACT if is_red else color)
 
-    def _touching(self) -> frozenset[str]:
+    def _in_contact(self) -> frozenset[str]:
         return frozenset(name for contact in self._contacts.contacts for name in (contact.first, contact.second))
 
-    def _thing(self, item: SceneObject, entity: str, color: palette.Rgba, now: int) -> list[Update]:
+    def _solid_mesh(self, item: SceneObject, entity: str, color: palette.Rgba, now: int) -> list[Update]:
         mesh = self._mesh(item)
         if mesh is None or len(item.pose.translation) != 3 or len(item.pose.rotation) != 4:
             return []
-        return [Thing(entity, now, mesh, item.pose.translation, item.pose.rotation, color)]
+        return [SolidMesh(entity, now, mesh, item.pose.translation, item.pose.rotation, color)]
 
     def _refused(self, now: int) -> list[Update]:
         """The arm in the refused configuration, with what touches in red and named; nothing once nothing does."""
         # A nanosecond before: Rerun forgets a pose that is told at the very time of a clearing, told later or not.
-        updates: list[Update] = [Gone(entities.REFUSED, now - 1)]
+        updates: list[Update] = [ClearEntity(entities.REFUSED, now - 1)]
         configuration = dict(zip(self._contacts.name, self._contacts.position, strict=False))
         names = [joint.name for joint in self._model.moving]
         if not self._contacts.contacts or any(name not in configuration for name in names):
             return updates
-        touching = self._touching()
-        updates.append(Shadow(entities.REFUSED, now, touching, palette.SHADOW))
-        updates += arm_at(self._model, entities.REFUSED, now, np.array([configuration[name] for name in names]))
-        updates += self.carried(entities.REFUSED, palette.SHADOW, now)
+        touching = self._in_contact()
+        updates.append(TranslucentArm(entities.REFUSED, now, touching, palette.REFUSED_ARM))
+        updates += arm_pose_at(self._model, entities.REFUSED, now, np.array([configuration[name] for name in names]))
+        updates += self.attached(entities.REFUSED, palette.REFUSED_ARM, now)
         return [*updates, *self._labels(now)]
 
-    def carried(self, root: str, color: palette.Rgba, now: int) -> list[Update]:
+    def attached(self, root: str, color: palette.Rgba, now: int) -> list[Update]:
         """What the arm carries, in the hand of another arm under `root`; what touches in a refused configuration is
         red."""
-        red = self._touching() if root == entities.REFUSED else frozenset()
+        red = self._in_contact() if root == entities.REFUSED else frozenset()
         updates: list[Update] = []
         for item in self._scene.objects:
             if item.attached and self._has_place(item):
-                hand = entities.carried(root, self._model.paths[item.frame])
-                shown = palette.TOUCHING if item.name in red else color
-                updates += self._thing(item, f"{hand}/{entities.part(item.name)}", shown, now)
+                hand = entities.attached(root, self._model.paths[item.frame])
+                shown = palette.IN_CONTACT if item.name in red else color
+                updates += self._solid_mesh(item, f"{hand}/{entities.part(item.name)}", shown, now)
         return updates
 
     def _labels(self, now: int) -> list[Update]:
@@ -140,21 +140,21 @@ class SceneView:
         points = np.array([contact.point for contact in placed], dtype=float)
         return [Labels(entities.CONTACTS, now, points, ("\n".join(lines), *("" for _ in lines[1:])))]
 
-    def _mesh(self, item: SceneObject) -> Mesh | None:
+    def _mesh(self, item: SceneObject) -> TriangleMesh | None:
         match item.shape:
             case BoxShape(size=size) if len(size) == 3:
-                return mesh_of(Shape("box", size), item.padding)
+                return primitive_mesh(VisualShape("box", size), item.padding)
             case SphereShape(radius=radius):
-                return mesh_of(Shape("sphere", (radius,)), item.padding)
+                return primitive_mesh(VisualShape("sphere", (radius,)), item.padding)
             case CylinderShape(radius=radius, length=length):
-                return mesh_of(Shape("cylinder", (radius, length)), item.padding)
+                return primitive_mesh(VisualShape("cylinder", (radius, length)), item.padding)
             case PlaneShape():
-                return _below(mesh_of(PLANE), item.padding)
+                return _below(primitive_mesh(PLANE), item.padding)
             case MeshShape():
                 return self._loaded(item.shape)
         return None
 
-    def _loaded(self, shape: MeshShape) -> Mesh | None:
+    def _loaded(self, shape: MeshShape) -> TriangleMesh | None:
         """Each file is read once."""
         if shape not in self._meshes:
             self._meshes[shape] = self._load(shape)
@@ -166,7 +166,7 @@ def _gap(distance: float) -> str:
     return f"{1000.0 * distance:.1f} mm apart" if distance > 0.0 else f"{-1000.0 * distance:z.1f} mm inside one another"
 
 
-def _below(mesh: Mesh, padding: float) -> Mesh:
+def _below(mesh: TriangleMesh, padding: float) -> TriangleMesh:
     """Its upper face at z = `padding` [m]."""
     down: Vector = (0.0, 0.0, padding - float(mesh.vertices[:, 2].max()))
-    return Mesh(mesh.vertices + down, mesh.normals, mesh.triangles)
+    return TriangleMesh(mesh.vertices + down, mesh.normals, mesh.triangles)

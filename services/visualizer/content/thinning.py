@@ -16,7 +16,7 @@ KEEP_ALIVE = 500_000_000  # [ns] between samples that say the same
 Sample = tuple[int, tuple[float, ...]]
 
 
-class Thinned:
+class ThinnedSeries:
     """Rows of a fixed width in the order of their stamps."""
 
     def __init__(self, width: int) -> None:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from schemas.message import Vector
 from services.visualizer.content.palette import Rgba
 from services.visualizer.model.rotations import Array
-from services.visualizer.model.triangle_meshes import Mesh
+from services.visualizer.model.triangle_meshes import TriangleMesh
 
 Times = npt.NDArray[np.int64]
 
@@ -36,7 +36,7 @@ class Poses:
 
 
 @dataclass(frozen=True)
-class Strip:
+class LineStrip:
     """A line through points (n, 3) [m] in the root frame."""
 
     entity: str
@@ -82,19 +82,19 @@ class Tint:
 
 
 @dataclass(frozen=True)
-class Thing:
+class SolidMesh:
     """A solid at a pose in its parent entity: (3,) [m] and quaternion (4,) x y z w; its colour with alpha."""
 
     entity: str
     time: int
-    mesh: Mesh
+    mesh: TriangleMesh
     translation: Vector
     rotation: Vector
     color: Rgba
 
 
 @dataclass(frozen=True)
-class Gone:
+class ClearEntity:
     """An entity and all below it that are no longer there."""
 
     entity: str
@@ -112,7 +112,7 @@ class Labels:
 
 
 @dataclass(frozen=True)
-class Shadow:
+class TranslucentArm:
     """A translucent arm under `entity`, with the links `touching` in red; `Poses` say its configuration."""
 
     entity: str
@@ -121,4 +121,6 @@ class Shadow:
     color: Rgba
 
 
-Update: TypeAlias = Scalars | Poses | Strip | Panel | LogLines | State | Tint | Thing | Gone | Labels | Shadow
+Update: TypeAlias = (
+    Scalars | Poses | LineStrip | Panel | LogLines | State | Tint | SolidMesh | ClearEntity | Labels | TranslucentArm
+)

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from schemas.scene import MeshShape
-from services.arm.stl import BadMesh, read_stl
-from services.visualizer.model.triangle_meshes import Mesh
-from services.visualizer.model.visual_model import Model
+from services.arm.stl import BadStl, read_stl
+from services.visualizer.model.triangle_meshes import TriangleMesh
+from services.visualizer.model.visual_model import VisualModel
 
 
 def mesh_path(folder: Path, name: str) -> Path:
@@ -20,24 +20,24 @@ def mesh_path(folder: Path, name: str) -> Path:
     return folder / name.removeprefix("file://")
 
 
-def missing_meshes(model: Model, folder: Path) -> list[str]:
+def missing_meshes(model: VisualModel, folder: Path) -> list[str]:
     """The mesh files that the model names and that are not there."""
     names = {visual.shape.file for visuals in model.visuals.values() for visual in visuals if visual.shape.file}
     return sorted(name for name in names if not mesh_path(folder, name).is_file())
 
 
-def scene_mesh(shape: MeshShape, folders: Sequence[Path], warn: Callable[[str], object]) -> Mesh | None:
+def scene_mesh(shape: MeshShape, folders: Sequence[Path], warn: Callable[[str], object]) -> TriangleMesh | None:
     """The object's triangles in m; None, and a word to `warn`, where they cannot be had."""
     try:
         triangles = read_stl(_content(shape, folders))
-    except (BadMesh, OSError, ValueError) as error:
+    except (BadStl, OSError, ValueError) as error:
         warn(f'mesh "{shape.path}" of the scene cannot be drawn: {error}')
         return None
     corners = (triangles.vertices * np.array(shape.scale))[triangles.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     faces = np.arange(3 * len(corners), dtype=np.uint32).reshape(-1, 3)
-    return Mesh(corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), faces)
+    return TriangleMesh(corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), faces)
 
 
 def _content(shape: MeshShape, folders: Sequence[Path]) -> bytes:

@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from services.visualizer.model.rotations import Array
-from services.visualizer.model.visual_model import Shape
+from services.visualizer.model.visual_model import VisualShape
 
 SEGMENTS = 40  # of a circle
 
 
 @dataclass(frozen=True)
-class Mesh:
+class TriangleMesh:
     """Vertices (n, 3) in m, unit normals (n, 3), triangles (m, 3) counter-clockwise from outside."""
 
     vertices: Array
@@ -22,7 +22,7 @@ class Mesh:
     triangles: npt.NDArray[np.uint32]
 
 
-def mesh_of(shape: Shape, margin: float = 0.0) -> Mesh:
+def primitive_mesh(shape: VisualShape, margin: float = 0.0) -> TriangleMesh:
     """The mesh of a primitive, every surface moved out by `margin` [m]."""
     match shape.kind:
         case "box":
@@ -36,7 +36,7 @@ def mesh_of(shape: Shape, margin: float = 0.0) -> Mesh:
             raise ValueError(f"a {shape.kind} is not a primitive")
 
 
-def _box(half: Array) -> Mesh:
+def _box(half: Array) -> TriangleMesh:
     vertices: list[Array] = []
     normals: list[Array] = []
     triangles: list[tuple[int, int, int]] = []
@@ -49,7 +49,7 @@ def _box(half: Array) -> Mesh:
             vertices += [(normal + a * u + b * v) * half for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
             normals += [normal] * 4
             triangles += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
-    return Mesh(np.array(vertices), np.array(normals), np.array(triangles, dtype=np.uint32))
+    return TriangleMesh(np.array(vertices), np.array(normals), np.array(triangles, dtype=np.uint32))
 
 
 def _cylinder_profile(radius: float, half: float) -> Array:
@@ -69,7 +69,7 @@ def _sphere_profile(radius: float) -> Array:
     return np.stack([radius * across, radius * up, across, up], axis=1)
 
 
-def _revolved(profile: Array) -> Mesh:
+def _revolved(profile: Array) -> TriangleMesh:
     """The profile turned about z."""
     angles = np.linspace(0.0, 2.0 * np.pi, SEGMENTS + 1)
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
@@ -81,4 +81,4 @@ def _revolved(profile: Array) -> Mesh:
     ring = len(circle)
     corners = [(row * ring + k, row * ring + k + 1) for row in range(len(profile) - 1) for k in range(SEGMENTS)]
     triangles = [triangle for a, b in corners for triangle in ((a, b, b + ring), (a, b + ring, a + ring))]
-    return Mesh(vertices, normals, np.array(triangles, dtype=np.uint32))
+    return TriangleMesh(vertices, normals, np.array(triangles, dtype=np.uint32))

@@ -8,10 +8,10 @@ from xml.etree import ElementTree
 import numpy as np
 
 from services.visualizer.model.rotations import Array, quaternion
-from services.visualizer.model.visual_model import Joint, Model, Shape, Visual
+from services.visualizer.model.visual_model import Visual, VisualJoint, VisualModel, VisualShape
 
 
-def parse_urdf(text: str) -> Model:
+def parse_urdf(text: str) -> VisualModel:
     """The model in a URDF's text; raises ValueError with what is wrong with it."""
     try:
         robot = ElementTree.fromstring(text)
@@ -32,15 +32,15 @@ def parse_urdf(text: str) -> Model:
     return model
 
 
-def _require_leaders(model: Model) -> None:
+def _require_leaders(model: VisualModel) -> None:
     names = {joint.name for joint in model.moving}
     for joint in model.joints:
         if joint.mimic is not None and joint.mimic[0] not in names:
             raise ValueError(f"joint {joint.name} mimics {joint.mimic[0]}, which does not move by itself")
 
 
-def _tree(name: str, root: str, joints: list[Joint], visuals: dict[str, tuple[Visual, ...]]) -> Model:
-    ordered: list[Joint] = []
+def _tree(name: str, root: str, joints: list[VisualJoint], visuals: dict[str, tuple[Visual, ...]]) -> VisualModel:
+    ordered: list[VisualJoint] = []
     paths = {root: root}
     links = [root]
     while links:
@@ -52,16 +52,16 @@ def _tree(name: str, root: str, joints: list[Joint], visuals: dict[str, tuple[Vi
                 ordered.append(joint)
                 paths[joint.child] = f"{paths[link]}/{joint.child}"
                 links.append(joint.child)
-    return Model(name, root, tuple(ordered), visuals, paths)
+    return VisualModel(name, root, tuple(ordered), visuals, paths)
 
 
-def _joint(element: ElementTree.Element) -> Joint:
+def _joint(element: ElementTree.Element) -> VisualJoint:
     translation, rotation = _origin(element)
     axis = np.array(_numbers(element.find("axis"), "xyz", (1.0, 0.0, 0.0)))
     mimic, limit = element.find("mimic"), element.find("limit")
     kind = element.get("type", "fixed")
     lower, upper = (0.0, 0.0) if limit is None else (float(limit.get(key, "0")) for key in ("lower", "upper"))
-    return Joint(
+    return VisualJoint(
         name=element.get("name", ""), kind=kind, parent=_link(element, "parent"), child=_link(element, "child"),
         translation=translation, rotation=rotation, axis=axis / (np.linalg.norm(axis) or 1.0),
         mimic=None if mimic is None else _mimic(mimic), travel=upper - lower if kind == "prismatic" else 0.0,
@@ -85,18 +85,18 @@ def _visual(element: ElementTree.Element, colors: dict[str, tuple[int, int, int]
     return Visual(_shape(element), translation, rotation, color)
 
 
-def _shape(visual: ElementTree.Element) -> Shape:
+def _shape(visual: ElementTree.Element) -> VisualShape:
     for element in visual.findall("geometry/*"):
         match element.tag:
             case "box":
-                return Shape("box", _numbers(element, "size", (0.0, 0.0, 0.0)))
+                return VisualShape("box", _numbers(element, "size", (0.0, 0.0, 0.0)))
             case "cylinder":
-                return Shape("cylinder", (float(element.get("radius", "0")), float(element.get("length", "0"))))
+                return VisualShape("cylinder", (float(element.get("radius", "0")), float(element.get("length", "0"))))
             case "sphere":
-                return Shape("sphere", (float(element.get("radius", "0")),))
+                return VisualShape("sphere", (float(element.get("radius", "0")),))
             case "mesh":
-                return Shape("mesh", _numbers(element, "scale", (1.0, 1.0, 1.0)), element.get("filename", ""))
-    return Shape("box", (0.0, 0.0, 0.0))
+                return VisualShape("mesh", _numbers(element, "scale", (1.0, 1.0, 1.0)), element.get("filename", ""))
+    return VisualShape("box", (0.0, 0.0, 0.0))
 
 
 def _color(material: ElementTree.Element) -> tuple[int, int, int] | None:
@@ -120,7 +120,7 @@ def _numbers(element: ElementTree.Element | None, key: str, default: tuple[float
     return values
 
 
-def tool_link(model: Model, robot_toml: str) -> str:
+def tool_link(model: VisualModel, robot_toml: str) -> str:
     """`tool_frame` of robot.toml; the last link of the tree where the file names none that the URDF has."""
     named = str(tomllib.loads(robot_toml).get("tool_frame", ""))
     return named if named in model.paths else max(model.paths, key=lambda link: model.paths[link].count("/"))

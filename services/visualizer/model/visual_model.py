@@ -14,7 +14,7 @@ from services.visualizer.model.rotations import Array, multiply, rotate
 
 
 @dataclass(frozen=True)
-class Shape:
+class VisualShape:
     """A primitive or a mesh file; sizes in m."""
 
     kind: str  # "box", "cylinder", "sphere", "mesh"
@@ -26,14 +26,14 @@ class Shape:
 class Visual:
     """A shape where it sits on its link."""
 
-    shape: Shape
+    shape: VisualShape
     translation: Array  # (3,) [m]
     rotation: Array  # (4,) quaternion x y z w
     color: tuple[int, int, int] | None
 
 
 @dataclass(frozen=True)
-class Joint:
+class VisualJoint:
     """How a link hangs on its parent."""
 
     name: str
@@ -67,17 +67,17 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Model:
+class VisualModel:
     """A tree of links."""
 
     name: str
     root: str
-    joints: tuple[Joint, ...]  # parents before children
+    joints: tuple[VisualJoint, ...]  # parents before children
     visuals: dict[str, tuple[Visual, ...]]  # by link
     paths: dict[str, str] = field(default_factory=dict)  # link -> "root/.../link", an entity path
 
     @property
-    def moving(self) -> tuple[Joint, ...]:
+    def moving(self) -> tuple[VisualJoint, ...]:
         """The joints with a position of their own, in the order of the tree."""
         return tuple(joint for joint in self.joints if joint.is_moving and joint.mimic is None)
 
@@ -91,16 +91,17 @@ class Model:
         """[m] how high the highest frame is above the root with every joint in its middle."""
         names = [joint.name for joint in self.moving]
         middles = np.array([[joint.middle for joint in self.moving]])
-        return max((float(self.tips(joint.child, middles, names)[0, 2]) for joint in self.joints), default=0.0)
+        heights = (float(self.link_positions(joint.child, middles, names)[0, 2]) for joint in self.joints)
+        return max(heights, default=0.0)
 
-    def positions(self, joint: Joint, rows: Array, names: list[str]) -> Array:
+    def positions(self, joint: VisualJoint, rows: Array, names: list[str]) -> Array:
         """The column of `joint` in rows (n, len(names)), by its mimic where it has one."""
         if joint.mimic is None:
             return np.asarray(rows[:, names.index(joint.name)])
         leader, multiplier, offset = joint.mimic
         return np.asarray(rows[:, names.index(leader)] * multiplier + offset)
 
-    def tips(self, link: str, rows: Array, names: list[str]) -> Array:
+    def link_positions(self, link: str, rows: Array, names: list[str]) -> Array:
         """The origin of `link` in the root's frame, (n, 3), for joint positions (n, len(names))."""
         points = np.zeros((len(rows), 3))
         above = {joint.child: joint for joint in self.joints}

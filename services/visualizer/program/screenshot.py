@@ -21,7 +21,7 @@ SETTLE = 6.0  # [s] until the viewer's own notices have gone and every chunk is 
 LOOPBACK = "127.0.0.1"
 
 
-def picture(rrd: Path, png: Path, size: tuple[int, int] = (1600, 900), timeout: float = 60.0) -> Path:
+def save_screenshot(rrd: Path, png: Path, size: tuple[int, int] = (1600, 900), timeout: float = 60.0) -> Path:
     """Write `png` of `size` [pixels] from the recording `rrd`; raises RuntimeError with the viewer's own words."""
     if not rrd.is_file():
         raise RuntimeError(f"there is no recording {rrd}")

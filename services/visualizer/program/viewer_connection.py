@@ -14,7 +14,7 @@ RETRY = 1.0  # [s]
 
 
 @dataclass
-class Watch:
+class ViewerConnection:
     """Follows the life of whoever listens at host:port."""
 
     host: str

@@ -8,13 +8,13 @@ from rerun.blueprint.encodings import TimelineColumn
 
 from services.visualizer.content import entities, palette
 from services.visualizer.core import unit
-from services.visualizer.model.visual_model import Joint, Model
+from services.visualizer.model.visual_model import VisualJoint, VisualModel
 
 TIMELINE = "time"
 JOINTS_PER_PAGE = 3  # rows of plots that stay readable
 
 
-def blueprint(model: Model, window: float, trail: float) -> rrb.Blueprint:
+def blueprint(model: VisualModel, window: float, trail: float) -> rrb.Blueprint:
     """The layout for this arm; `window` and `trail` in s."""
     scene = rrb.Vertical(
         _scene(model, trail),
@@ -32,7 +32,7 @@ def blueprint(model: Model, window: float, trail: float) -> rrb.Blueprint:
     )
 
 
-def _scene(model: Model, trail: float) -> rrb.Spatial3DView:
+def _scene(model: VisualModel, trail: float) -> rrb.Spatial3DView:
     size, waist = max(model.reach, 2.1 * model.height), 0.6 * model.height  # an arm that stands needs a step back
     return rrb.Spatial3DView(
         origin=entities.WORLD,
@@ -49,24 +49,24 @@ def _scene(model: Model, trail: float) -> rrb.Spatial3DView:
     )
 
 
-def _joints(model: Model, window: float) -> rrb.Container:
+def _joints(model: VisualModel, window: float) -> rrb.Container:
     moving = model.moving
     pages = [moving[first : first + JOINTS_PER_PAGE] for first in range(0, len(moving), JOINTS_PER_PAGE)]
     grids = [_page(page, window) for page in pages]
     return grids[0] if len(grids) == 1 else rrb.Tabs(*grids, name="Joints")
 
 
-def _page(joints: tuple[Joint, ...], window: float) -> rrb.Container:
+def _page(joints: tuple[VisualJoint, ...], window: float) -> rrb.Container:
     name = " · ".join(joint.name for joint in joints)
     rows = [rrb.Horizontal(_position(joint, window, joint is joints[0]), _error(joint, window)) for joint in joints]
     return rrb.Vertical(*rows, name=name)
 
 
-def _position(joint: Joint, window: float, has_legend: bool) -> rrb.TimeSeriesView:
+def _position(joint: VisualJoint, window: float, has_legend: bool) -> rrb.TimeSeriesView:
     return _plot(entities.position(joint.name), f"{joint.name} · position [{unit(joint)}]", window, has_legend)
 
 
-def _error(joint: Joint, window: float) -> rrb.TimeSeriesView:
+def _error(joint: VisualJoint, window: float) -> rrb.TimeSeriesView:
     return _plot(entities.error(joint.name), f"{joint.name} · step error [steps]", window, False)
 
 

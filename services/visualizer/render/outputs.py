@@ -12,7 +12,7 @@ from msgspec import Meta
 
 from schemas.deployment import ViewerMode, ViewerSection
 from services.visualizer.core import Visualizer
-from services.visualizer.program.viewer_connection import Watch
+from services.visualizer.program.viewer_connection import ViewerConnection
 from services.visualizer.render.sink import APPLICATION, Sink
 
 
@@ -28,13 +28,13 @@ class Outputs:
     """One stream per sink; a viewer that is new is told everything from the start."""
 
     def __init__(self, viewer: ViewerSection, robot: Path, root: Path, parameters: VisualizerParameters) -> None:
-        self._watch = None if viewer.mode is ViewerMode.NONE else Watch(viewer.host, viewer.port)
+        self._connection = None if viewer.mode is ViewerMode.NONE else ViewerConnection(viewer.host, viewer.port)
         self._folder = robot
         self._parameters = parameters
         self._recording_path = root / parameters.recording_path if parameters.recording_path else None
         self._viewer: Sink | None = None
         self._recording: Sink | None = None
-        self._trouble = ""
+        self._problem = ""
 
     def step(self, core: Visualizer, now: int, monotonic: float) -> str:
         """Send a batch; returns why not everything that is wanted can be shown, or an empty text."""
@@ -44,38 +44,38 @@ class Outputs:
         for sink in (self._viewer, self._recording):
             if sink is not None:
                 sink.write(updates)
-        if self._watch is not None and self._viewer is None:
-            return f"no viewer at {self._watch.host}:{self._watch.port}"
-        return self._trouble
+        if self._connection is not None and self._viewer is None:
+            return f"no viewer at {self._connection.host}:{self._connection.port}"
+        return self._problem
 
     def close(self) -> None:
-        """Hand over what is left, in bounded time."""
+        """Hand over what is left, in clamp_stamp time."""
         if self._recording is not None:
             self._recording.close(timeout=5.0)
-        if self._viewer is not None and self._watch is not None and self._watch.is_alive:
+        if self._viewer is not None and self._connection is not None and self._connection.is_alive:
             with suppress(RuntimeError):  # it may end while we hand over
                 self._viewer.close(timeout=1.0)
 
     def _open_recording(self, core: Visualizer) -> None:
-        if self._recording_path is None or self._recording is not None or self._trouble:
+        if self._recording_path is None or self._recording is not None or self._problem:
             return
         stream = self._stream(core)
         try:
             self._recording_path.parent.mkdir(parents=True, exist_ok=True)
             stream.save(str(self._recording_path))
         except (OSError, RuntimeError) as error:
-            self._trouble = f"cannot write the recording {self._recording_path}: {error}"
+            self._problem = f"cannot write the recording {self._recording_path}: {error}"
             return
         self._recording = self._sink(stream, core)
 
     def _follow_viewer(self, core: Visualizer, monotonic: float) -> None:
-        if self._watch is None:
+        if self._connection is None:
             return
-        if self._viewer is not None and not self._watch.is_alive:
+        if self._viewer is not None and not self._connection.is_alive:
             self._viewer = None
-        if self._viewer is None and self._watch.is_new(monotonic):
+        if self._viewer is None and self._connection.is_new(monotonic):
             stream = self._stream(core)
-            stream.connect_grpc(self._watch.url)
+            stream.connect_grpc(self._connection.url)
             self._viewer = self._sink(stream, core)
             core.restart()
 

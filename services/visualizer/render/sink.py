@@ -10,23 +10,23 @@ import rerun as rr
 
 from services.visualizer.content import entities, palette
 from services.visualizer.content.updates import (
-    Gone,
+    ClearEntity,
     Labels,
+    LineStrip,
     LogLines,
     Panel,
     Poses,
     Scalars,
-    Shadow,
+    SolidMesh,
     State,
-    Strip,
-    Thing,
     Times,
     Tint,
+    TranslucentArm,
     Update,
 )
 from services.visualizer.model.mesh_files import mesh_path
-from services.visualizer.model.triangle_meshes import Mesh, mesh_of
-from services.visualizer.model.visual_model import Joint, Model, Visual
+from services.visualizer.model.triangle_meshes import TriangleMesh, primitive_mesh
+from services.visualizer.model.visual_model import Visual, VisualJoint, VisualModel
 from services.visualizer.render.layout import TIMELINE, blueprint
 
 APPLICATION = "gemelo"
@@ -36,7 +36,9 @@ GHOST_MARGIN = 0.0015  # [m] the ghost is a skin around the arm, or the two woul
 class Sink:
     """A stream that has been told the static things, and takes updates."""
 
-    def __init__(self, stream: rr.RecordingStream, model: Model, folder: Path, window: float, trail: float) -> None:
+    def __init__(
+        self, stream: rr.RecordingStream, model: VisualModel, folder: Path, window: float, trail: float
+    ) -> None:
         self._stream = stream
         self._model = model
         self._folder = folder  # of the robot: meshes stand relative to it
@@ -63,7 +65,7 @@ class Sink:
             case Poses(entity, times, translations, rotations):
                 columns = rr.Transform3D.columns(translation=translations, quaternion=rotations)
                 self._send(entity, times, columns)
-            case Strip(entity, time, points):
+            case LineStrip(entity, time, points):
                 self._send(entity, _once(time), rr.LineStrips3D.columns(strips=[points]))
             case Panel(entity, time, markdown):
                 self._send(entity, _once(time), rr.TextDocument.columns(text=[markdown], media_type=["text/markdown"]))
@@ -71,16 +73,16 @@ class Sink:
                 self._send(entity, _once(time), rr.StateChange.columns(state=[state]))
             case Tint(root, time, mode):
                 self._tint(root, time, palette.TINTS.get(mode))
-            case Thing(entity, time, mesh, translation, rotation, color):
+            case SolidMesh(entity, time, mesh, translation, rotation, color):
                 pose = rr.Transform3D(translation=translation, quaternion=rotation)
                 self._log(entity, time, pose, _solid(mesh, color))
-            case Gone(entity, time):
+            case ClearEntity(entity, time):
                 self._log(entity, time, rr.Clear(recursive=True))
             case Labels(entity, time, points, texts):
                 dots = rr.Points3D(points, labels=texts, colors=[palette.LABEL], radii=[0.006], show_labels=True)
                 self._log(entity, time, dots)
-            case Shadow(root, time, touching, color):
-                self._shadow(root, time, touching, color)
+            case TranslucentArm(root, time, touching, color):
+                self._translucent_arm(root, time, touching, color)
             case LogLines(entity, times, texts, levels):
                 self._send(entity, times, rr.TextLog.columns(text=list(texts), level=[_level(name) for name in levels]))
 
@@ -92,7 +94,7 @@ class Sink:
             columns = kind.columns(albedo_factor=[color] if color else []).partition([1 if color else 0])
             self._send(entity, _once(time), columns)
 
-    def _shadow(self, root: str, time: int, touching: frozenset[str], color: palette.Rgba) -> None:
+    def _translucent_arm(self, root: str, time: int, touching: frozenset[str], color: palette.Rgba) -> None:
         """The arm once more, to be taken away again: nothing of it is static but the fixed joints' poses."""
         for joint in self._model.joints:
             if not joint.is_moving:
@@ -101,7 +103,7 @@ class Sink:
         red = {f"{root}/{self._model.paths[link]}/" for link in touching if link in self._model.paths}
         for entity, visual in self._visuals(root):
             is_red = entity.rpartition("/")[0] + "/" in red
-            drawn = self._drawn(visual, palette.TOUCHING if is_red else color)
+            drawn = self._drawn(visual, palette.IN_CONTACT if is_red else color)
             if drawn is not None:
                 pose = rr.Transform3D(translation=visual.translation, quaternion=visual.rotation)
                 self._log(entity, time, pose, drawn)
@@ -153,9 +155,9 @@ class Sink:
         if visual.shape.kind == "mesh":
             path = mesh_path(self._folder, visual.shape.file)
             return rr.Asset3D(path=path, albedo_factor=color) if path.is_file() else None
-        return _solid(mesh_of(visual.shape, GHOST_MARGIN if color else 0.0), color)
+        return _solid(primitive_mesh(visual.shape, GHOST_MARGIN if color else 0.0), color)
 
-    def _send_styles(self, joint: Joint) -> None:
+    def _send_styles(self, joint: VisualJoint) -> None:
         self._style(entities.commanded(joint.name), [("commanded", palette.COMMANDED, 4.0)])
         self._style(entities.executed(joint.name), [("executed", palette.EXECUTED, 1.5)])
         band = [("+0.5 step", palette.BAND, 1.5), ("-0.5 step", palette.BAND, 1.5)]
@@ -167,7 +169,7 @@ class Sink:
         self._stream.log(entity, rr.SeriesLines(colors=colors, widths=widths, names=names), static=True)
 
 
-def _solid(mesh: Mesh, color: palette.Rgba | None) -> rr.Mesh3D:
+def _solid(mesh: TriangleMesh, color: palette.Rgba | None) -> rr.Mesh3D:
     return rr.Mesh3D(
         vertex_positions=mesh.vertices, vertex_normals=mesh.normals, triangle_indices=mesh.triangles,
         albedo_factor=color,

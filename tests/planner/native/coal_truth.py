@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from services.arm.kinematics.joint_mapping import Configuration
+from services.arm.kinematics.joint_mapping import JointMapping
 from services.arm.model.description import Arm
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
@@ -22,7 +22,7 @@ class Truth:
     def __init__(self, arm: Arm, shapes: Sequence[CollisionShape] = ()) -> None:
         self._model = pin.buildModelFromUrdf(str(arm.urdf_path))
         self._data = self._model.createData()
-        self._configuration = Configuration(arm, self._model)
+        self._configuration = JointMapping(arm, self._model)
         kind = pin.GeometryType.COLLISION
         self._geometry = pin.buildGeomFromUrdf(self._model, str(arm.urdf_path), kind, package_dirs=[str(arm.folder)])
         self._geometry.removeAllCollisionPairs()
