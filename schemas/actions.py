@@ -1,4 +1,4 @@
-"""How any action travels: goal, cancel and result requests, and the feedback and status topics."""
+"""The messages of any action: goal, cancel and result requests, and the feedback and status topics."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NIL = msgspec.Raw(b"\xc0")  # msgpack nil
 
 
 class GoalStatusCode(IntEnum):
-    """Where a goal stands; everything from SUCCEEDED on is terminal."""
+    """The status of a goal; everything from SUCCEEDED on is terminal."""
 
     UNKNOWN = 0
     ACCEPTED = 1

@@ -21,21 +21,21 @@ class Broker(StrEnum):
 
 
 class DeviceKind(StrEnum):
-    """What plays the arm."""
+    """The kind of device that drives the arm."""
 
     VIRTUAL = "virtual"  # the process virtual_esp32
     BOARD = "board"  # a real ESP32; virtual_esp32 stands aside
 
 
 class Wire(StrEnum):
-    """How the gateway reaches the device."""
+    """The link between gateway and device."""
 
     MQTT = "mqtt"
     SERIAL = "serial"
 
 
 class ViewerMode(StrEnum):
-    """How the Rerun viewer shows itself."""
+    """The way the Rerun viewer is shown."""
 
     AUTO = "auto"  # native where there is a display, else web
     NATIVE = "native"

@@ -1,4 +1,4 @@
-"""What the gateway says of the device, and of every command it sent there."""
+"""The messages about the device: status, state, commands, configuration, sensors."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class DeviceFault(IntEnum):
 
 
 class DeviceStatus(Message, frozen=True, kw_only=True):
-    """Who the device is and whether it can be reached; latched."""
+    """The identity of the device and its connection; latched."""
 
     stamp: int = 0  # [ns] UNIX time
     online: bool = False
@@ -52,7 +52,7 @@ class DeviceStatus(Message, frozen=True, kw_only=True):
 
 
 class DeviceState(Message, frozen=True, kw_only=True):
-    """How the device is, as it said itself, 50 times a second."""
+    """The state of the device as it reports it, 50 times a second."""
 
     stamp: int = 0  # [ns] UNIX time of the device's measurement, by clock synchronisation
     device_time: int = 0  # [us] since the device's boot
@@ -61,7 +61,7 @@ class DeviceState(Message, frozen=True, kw_only=True):
     fault: int = 0  # a DeviceFault, or a number that a newer firmware has
     fault_joint: str = ""
     armed: bool = False  # the drivers are energised
-    referenced: tuple[bool, ...] = ()  # whether the joint's position is known
+    referenced: tuple[bool, ...] = ()  # true for each joint whose position is known
     inputs: tuple[str, ...] = ()  # names of the switches that are active
     outputs: tuple[str, ...] = ()  # names of the outputs that are on
     speed: float = 1.0  # the time scale that a person has asked for
@@ -154,7 +154,7 @@ class DeviceCommandRequest(Message, frozen=True, kw_only=True):
 
 
 class StopKind(StrEnum):
-    """How to end a motion or to make it impossible."""
+    """The commands that end a motion or disable the drivers."""
 
     STOP = "stop"  # decelerate along the path and forget the rest of it
     HOLD = "hold"  # decelerate along the path and wait there for a resume
@@ -168,7 +168,7 @@ class DeviceStopRequest(Message, frozen=True, kw_only=True):
 
 
 class DeviceCommandResponse(Message, frozen=True, kw_only=True):
-    """Whether the device did it, in its own words."""
+    """The device's answer to a command."""
 
     accepted: bool = False  # the device has confirmed it
     sent: bool = False  # it has left the gateway; where it was not accepted, what the device did is not known
@@ -192,7 +192,7 @@ class ConfigureRequest(Message, frozen=True, kw_only=True):
 
 
 class ConfigureResponse(Message, frozen=True, kw_only=True):
-    """What the device has said to it."""
+    """The device's answer to its configuration."""
 
     accepted: bool = False
     reason: str = ""
@@ -209,7 +209,7 @@ class SensorReadings(Message, frozen=True, kw_only=True):
 
 
 class ShaftPositions(Message, frozen=True, kw_only=True):
-    """What the step counter believes and where the shaft truly is; a virtual device knows both."""
+    """The step counters and the true shaft positions, which a virtual device knows both."""
 
     stamp: int = 0  # [ns] UNIX time
     name: tuple[str, ...] = ()
@@ -219,7 +219,7 @@ class ShaftPositions(Message, frozen=True, kw_only=True):
 
 
 class PressKind(StrEnum):
-    """What a person can do to a virtual device, or its world."""
+    """The inputs and failures that can be injected into a virtual device."""
 
     ESTOP = "estop"  # value 1 pressed, 0 released
     SWITCH = "switch"  # target: an input; value 1 held, 0 held open, -1 left to the arm
@@ -241,7 +241,7 @@ class PressRequest(Message, frozen=True, kw_only=True):
 
 
 class PressResponse(Message, frozen=True, kw_only=True):
-    """Whether the virtual device has done it."""
+    """The virtual device's answer to an injection."""
 
     accepted: bool = False
     reason: str = ""

@@ -1,4 +1,4 @@
-"""What a device is told of its arm: the JSON of `config` in firmware/PROTOCOL.md.
+"""The configuration of a device: the JSON of `config` in firmware/PROTOCOL.md.
 
 Positions are absolute motor steps in Q24.8 (1/256 step), velocities Q24.8 steps/s, accelerations Q24.8 steps/s^2.
 The bounds that depend on other fields are checked by the firmware core alone.
@@ -19,7 +19,7 @@ class ConfigRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class InputRole(StrEnum):
-    """What a switch means."""
+    """The role of a switch."""
 
     ESTOP = "estop"
     LIMIT_LOWER = "limit_lower"
@@ -36,14 +36,14 @@ class Pull(StrEnum):
 
 
 class SensorKind(StrEnum):
-    """What the raw value is."""
+    """The kind of a sensor's raw value."""
 
     ANALOG = "analog"  # [mV] at the pin
     ULTRASONIC = "ultrasonic"  # [us] length of the echo
 
 
 class HomingConfig(ConfigRecord, frozen=True, kw_only=True):
-    """How a joint finds its place: fast to its switch, off it, slowly to it again."""
+    """The homing of a joint: fast to its switch, back off, slowly to it again."""
 
     input: int  # index of the switch
     group: int = 0  # joints of one group home together, lower groups first

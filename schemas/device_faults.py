@@ -1,4 +1,4 @@
-"""What a device's fault means to a person, and what to do about it."""
+"""The meaning of a device's fault and its remedy, for a person."""
 
 from __future__ import annotations
 

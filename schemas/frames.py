@@ -1,4 +1,4 @@
-"""Where links are: transforms between frames."""
+"""Transforms between frames, and the robot's description."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What joints do: states, streamed targets, and the step error of every joint."""
+"""Joint states, streamed joint targets, and the step error of every joint."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class JointState(Message, frozen=True, kw_only=True):
 
 
 class JointTargets(Message, frozen=True, kw_only=True):
-    """Where a slider or a script wants some or all joints to be, now; the newest one wins."""
+    """Streamed target positions of some or all joints, from a slider or script; the newest one wins."""
 
     stamp: int = 0  # [ns] UNIX time of the sender
     name: tuple[str, ...] = ()

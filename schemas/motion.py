@@ -29,7 +29,7 @@ class JointTrajectory(Message, frozen=True, kw_only=True):
 
 
 class JointTolerance(Message, frozen=True, kw_only=True):
-    """How far `name` may be off: 0 means the default, -1 means no bound, another negative value is refused."""
+    """The tolerance of joint `name`: 0 means the default, -1 means no bound, another negative value is refused."""
 
     name: str = ""
     position: float = 0.0  # [rad] or [m]
@@ -49,7 +49,7 @@ class FollowJointTrajectoryGoal(Message, frozen=True, kw_only=True):
 
 
 class FollowJointTrajectoryFeedback(Message, frozen=True, kw_only=True):
-    """How the execution stands, 20 times a second."""
+    """The progress of an execution, 20 times a second."""
 
     stamp: int = 0  # [ns] UNIX time
     joint_names: tuple[str, ...] = ()
@@ -78,7 +78,7 @@ class FollowErrorCode(IntEnum):
 
 
 class FollowJointTrajectoryResult(Message, frozen=True, kw_only=True):
-    """How an execution ended; success means that the executed steps were read back."""
+    """The result of an execution; success means that the executed steps were read back."""
 
     error_code: FollowErrorCode = FollowErrorCode.SUCCESSFUL
     error_string: str = ""

@@ -27,14 +27,14 @@ class RobotRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class Transmission(StrEnum):
-    """How the output shaft moves the joint."""
+    """The transmission between output shaft and joint."""
 
     ROTARY = "rotary"
     RACK_AND_PINION = "rack_and_pinion"
 
 
 class Driver(RobotRecord, frozen=True, kw_only=True):
-    """What a stepper driver demands of its inputs."""
+    """The timing that a stepper driver requires at its inputs."""
 
     name: str
     step_high_us: Positive
@@ -73,7 +73,7 @@ class HomingDirection(StrEnum):
 
 
 class Homing(RobotRecord, frozen=True, kw_only=True):
-    """How a joint finds its place on the device: fast to its switch, off it, slowly to it again."""
+    """The homing of a joint, done by the device: fast to its switch, back off, slowly to it again."""
 
     switch: str  # name of an [[input]]
     direction: HomingDirection

@@ -1,4 +1,4 @@
-"""What nodes say about themselves: logs, statistics, information, parameters, failures."""
+"""Messages about nodes: logs, statistics, information, parameters, failures."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class LogRecord(Message, frozen=True, kw_only=True):
 
 
 class TopicStatistics(Message, frozen=True, kw_only=True):
-    """What one node has seen of one key."""
+    """The counters of one key in one node."""
 
     key: str = ""
     received: int = 0
@@ -36,7 +36,7 @@ class TopicStatistics(Message, frozen=True, kw_only=True):
 
 
 class NodeStatistics(Message, frozen=True, kw_only=True):
-    """How a node's loop does, once a second."""
+    """The statistics of a node's loop, once a second."""
 
     stamp: int = 0  # [ns] UNIX time
     node: str = ""
@@ -47,7 +47,7 @@ class NodeStatistics(Message, frozen=True, kw_only=True):
 
 
 class NodeInfo(Message, frozen=True, kw_only=True):
-    """Who a node is and what it speaks."""
+    """The identity and endpoints of a node."""
 
     node: str = ""
     robot: str = ""

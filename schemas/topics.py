@@ -60,7 +60,7 @@ F_co = TypeVar("F_co", bound=Message, covariant=True)
 
 
 class Delivery(Enum):
-    """What a message's loss would mean, and so how it travels."""
+    """The delivery of a message: which losses are acceptable."""
 
     LATEST = "latest"  # the newest wins; older ones may be dropped
     EVERY = "every"  # reliable and in order

@@ -1,4 +1,4 @@
-"""The firmware core from Python: a device whose clock is moved by hand, with motors and switches around it."""
+"""The firmware core in Python: a device with an explicit clock, virtual motors and switches."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Device:
 
     @property
     def config(self) -> DeviceConfig:
-        """What the device works with now."""
+        """The active configuration of the device."""
         crc = self.config_crc32
         if crc != self._config_crc:
             self._config, self._config_crc = _decoded(self.kept_config), crc
@@ -143,7 +143,7 @@ class Device:
         return bytes(data)
 
     def take_requests(self) -> list[PlatformRequest]:
-        """What came over the serial line and is the platform's matter, oldest first."""
+        """The requests of the serial line that the platform handles, oldest first."""
         requests: list[PlatformRequest] = []
         text = (c.c_uint8 * LARGEST)()
         while True:
@@ -200,7 +200,7 @@ class Device:
 
     @property
     def referenced(self) -> bool:
-        """Whether the device knows where all its joints stand."""
+        """True if the positions of all joints are known."""
         return bool(self._snapshot().referenced)
 
     @property
@@ -221,7 +221,7 @@ class Device:
 
     @property
     def levels(self) -> InputLevels:
-        """What the input pins read now."""
+        """The present levels of the input pins."""
         record = self._snapshot()
         return InputLevels(record.level_low, record.level_high)
 
@@ -232,7 +232,7 @@ class Device:
 
     @property
     def shaft(self) -> tuple[int, ...]:
-        """Where the shafts truly are [steps], per joint; the device does not know."""
+        """The true shaft positions [steps], per joint; the device does not know them."""
         return tuple(self._snapshot().shaft[: len(self.config.joints)])
 
     def shaft_report(self) -> bytes:
@@ -242,7 +242,7 @@ class Device:
         return json.dumps(report).encode()
 
     def inherit_environment(self, before: Device) -> None:
-        """Wake up in the world that the board was in: what is pressed, blocked and measured stays."""
+        """Takes over the environment of the previous device: held switches, blocked shafts and sensor readings."""
         self._library.gemelo_inherit(self._handle, before._handle)
 
     def press_input(self, index: int, pressed: bool | None) -> None:
@@ -258,11 +258,11 @@ class Device:
         self._library.gemelo_slip(self._handle, joint, steps)
 
     def set_sensor(self, index: int, value: float) -> None:
-        """What a sensor reads from now on, in its own unit."""
+        """Sets a sensor's reading, in the unit [unit] of robot.toml."""
         self._library.gemelo_set_sensor(self._handle, index, value)
 
     def freeze(self, seconds: float) -> None:
-        """The slot's task hangs for so long; only the interrupt runs."""
+        """Blocks the slot task for `seconds` [s]; only the interrupt runs."""
         self._library.gemelo_freeze(self._handle, round(seconds * 1e6))
 
     @property
@@ -282,7 +282,7 @@ class Device:
 
     @property
     def time_scale(self) -> float:
-        """Path time per time in the last whole slot: 1 plays as planned, 0 stands."""
+        """Path time per real time (dimensionless) in the last whole slot: 1 is as planned, 0 is standstill."""
         return float(self._snapshot().scale_q30) / (1 << 30)
 
     @property
@@ -292,7 +292,7 @@ class Device:
 
 
 def joint_count(text: bytes) -> int:
-    """How many joints a configuration has; raises ConfigError where it is none."""
+    """The number of joints in a configuration; raises ConfigError where the text is invalid."""
     return len(_decoded(text).joints)
 
 

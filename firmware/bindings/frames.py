@@ -1,4 +1,4 @@
-"""What goes to and fro between a device and its platform."""
+"""The records between a device and its platform: frames, requests, pin changes, levels."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class PinChange(NamedTuple):
 
 
 class InputLevels(NamedTuple):
-    """What the device's input pins read: bit i is GPIO i, then GPIO 32 + i."""
+    """The levels of the device's input pins: bit i is GPIO i, then GPIO 32 + i."""
 
     low: int
     high: int

@@ -56,5 +56,5 @@ class VirtualMotor:
 
     @property
     def shaft(self) -> int:
-        """Where the shaft truly is [pulses]."""
+        """The true shaft position [pulses]."""
         return int(self._library.gemelo_motor_shaft(self._handle))

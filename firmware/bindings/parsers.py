@@ -1,4 +1,4 @@
-"""What the firmware core reads in the text of a configuration."""
+"""The firmware's own parsers: configuration and provisioning, from JSON."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class ProvisionRefused(ValueError):
 
 
 def asks_for_factory_reset(text: bytes) -> bool:
-    """Whether it asks to forget all, or else brings credentials; raises ProvisionRefused."""
+    """True if the text asks for a factory reset, False if it holds credentials; raises ProvisionRefused."""
     is_reset, reason = c.c_int(), c.create_string_buffer(REASON_SIZE)
     if not load_library().gemelo_check_provision(text, len(text), c.byref(is_reset), reason):
         raise ProvisionRefused(reason.value.decode())

@@ -1,4 +1,4 @@
-"""What a person does to a virtual device and its world, by name."""
+"""The inputs and failures that are injected into a virtual device, by name."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def _choice(request: PressRequest, choices: dict[int, bool | None]) -> bool | No
 
 
 def within(request: PressRequest, most: float, least: float = 0.0) -> float:
-    """Its value, if that is within these bounds; raises PressRefused."""
+    """The value in [unit] of its kind, if it is within these bounds; raises PressRefused."""
     if not least <= request.value <= most:
         raise PressRefused(f"{request.press}: the value {request.value:g} is not {least:g} to {most:g}")
     return request.value

@@ -67,13 +67,19 @@ def segment_coefficients(first: TrajectoryPoint, second: TrajectoryPoint) -> tup
 
 
 def cubic(p0: float, v0: float, p1: float, v1: float, dt: float) -> Coefficients:
-    """The cubic Hermite polynomial through both ends (Biagiotti and Melchiorri 2008, section 2.1)."""
+    """The cubic Hermite polynomial through both ends (Biagiotti and Melchiorri 2008, section 2.1).
+
+    Positions [rad] or [m], velocities [rad/s] or [m/s], `dt` [s]; coefficients of powers 0 to 5 of the time [s].
+    """
     rise = (p1 - p0) / dt
     return p0, v0, (3.0 * rise - 2.0 * v0 - v1) / dt, (v0 + v1 - 2.0 * rise) / (dt * dt), 0.0, 0.0
 
 
 def quintic(p0: float, v0: float, a0: float, p1: float, v1: float, a1: float, dt: float) -> Coefficients:
-    """The quintic one, after subtracting the parabola of the first end (the same section)."""
+    """The quintic polynomial, after subtracting the parabola of the first end (the same section).
+
+    As `cubic`, with accelerations [rad/s^2] or [m/s^2].
+    """
     rise = p1 - p0 - (v0 + 0.5 * a0 * dt) * dt
     climb = (v1 - v0 - a0 * dt) * dt
     bend = (a1 - a0) * dt * dt

@@ -1,4 +1,4 @@
-"""mosquitto in this process's place, so that what ends this process ends mosquitto."""
+"""mosquitto in place of this process (exec), so that a signal to this process ends mosquitto."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def find() -> str:
 
 
 def serve(section: MqttSection, run: Path, beat: Callable[[], None], on_end: Callable[[], None]) -> int:
-    """Becomes mosquitto; a small companion calls `beat` once a second while it accepts, and `on_end` after it.
+    """Becomes mosquitto; a child process calls `beat` once a second while it accepts, and `on_end` when it has ended.
 
     Does not return in the process that becomes mosquitto.
     """

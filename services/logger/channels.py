@@ -23,7 +23,7 @@ Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | Non
 
 @dataclass(frozen=True)
 class Channel:
-    """What MCAP says of a topic once per file."""
+    """The channel record of a topic, once per file."""
 
     key: str
     schema_name: str

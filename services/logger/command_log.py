@@ -43,7 +43,7 @@ class CommandLog:
 
     @property
     def pending(self) -> int:
-        """How many chunks still wait for their answer."""
+        """The number of chunks without an acknowledgement."""
         return len(self._pending)
 
     def on_chunk(self, chunk: CommandChunk, now: int) -> None:
@@ -113,7 +113,7 @@ def header(joints: tuple[str, ...]) -> Row:
 
 
 def is_well_formed(chunk: CommandChunk) -> bool:
-    """Whether every table is absent or has a row per knot and a column per joint, and steps fit the wire."""
+    """True if every table is empty or has a row per knot and a column per joint, and steps fit 32 bits."""
     tables = (chunk.position, chunk.velocity, chunk.acceleration, chunk.steps, chunk.step_rate)
     shape = [len(chunk.name)] * len(chunk.steps)
     words = [word for table in (chunk.steps, chunk.step_rate) for row in table for word in row]

@@ -1,4 +1,4 @@
-"""The logger without its files: what is to be written next, and what was lost. Pure."""
+"""The logger without its files: messages to be written, and losses. Pure."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Batch:
-    """What is to be written now."""
+    """The entries and rows to be written now."""
 
     entries: tuple[Entry, ...] = ()
     lines: tuple[CommandRow, ...] = ()
@@ -40,7 +40,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class Losses:
-    """What this logger knows to be missing from its files."""
+    """The messages that are missing from the files."""
 
     dropped: dict[str, int] = field(default_factory=dict)  # by key: the disk refused for too long
     missing_chunks: int = 0  # gaps in the sequence of commands
@@ -112,7 +112,7 @@ class Logger:
 
     @property
     def losses(self) -> Losses:
-        """What is missing so far."""
+        """The losses so far."""
         return Losses(dict(self._dropped), self.commands.missing, self.commands.lost, self.commands.malformed)
 
     def _keep(self, entry: Entry) -> None:

@@ -1,4 +1,4 @@
-"""Where batches end up: the present recording, its rotation, and patience with a disk that refuses."""
+"""The writer of recordings: rotation of files, and retries when the disk refuses."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from services.logger.recording import Recording
 
 
 class LoggerParameters(msgspec.Struct, frozen=True, kw_only=True):
-    """Where to record, how large and how old a file may become, and how many are kept."""
+    """Folder, size, age and number of the recordings."""
 
     enable_logging: Annotated[bool, Meta(description="record at all")] = True
     log_dir: Annotated[str, Meta(description="folder of the recordings; empty: <paths.out>/recordings")] = ""
@@ -31,7 +31,7 @@ RETRY = 2_000_000_000  # [ns] between two attempts on a disk that refuses
 
 @dataclass
 class RecordingWriter:
-    """Writes what the logger gives and never dies of the disk."""
+    """Writes the logger's batches; an error of the disk is reported and retried, never raised."""
 
     robot: str
     metadata: dict[str, str]

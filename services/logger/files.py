@@ -17,7 +17,7 @@ def stem_of(robot: str, now: int) -> str:
 
 
 def is_due(size: int, age: float, max_file_mb: float, max_age_minutes: float) -> bool:
-    """Whether a file of `size` bytes and `age` seconds is to be followed by a new one."""
+    """True if a file of `size` [B] and `age` [s] is to be followed by a new one."""
     return size >= max_file_mb * 1e6 or age >= max_age_minutes * 60.0
 
 

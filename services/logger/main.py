@@ -53,7 +53,7 @@ def _subscribe(node: Node, logger: Logger, topic: Topic[Message]) -> None:
 
 
 def _folder(deployment: Deployment, parameters: LoggerParameters) -> Path:
-    """Where to record: what a person chose, relative to the project, or the deployment's own place."""
+    """The folder of the recordings: the parameter `log_dir`, relative to the project, or the deployment's own."""
     chosen = Path(parameters.log_dir) if parameters.log_dir else Path(deployment.paths.out) / "recordings"
     return project_root() / chosen
 

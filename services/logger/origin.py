@@ -1,4 +1,4 @@
-"""What a recording says of the software and the machine that made it."""
+"""The metadata of a recording: software versions, machine and commit."""
 
 from __future__ import annotations
 

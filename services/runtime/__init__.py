@@ -1,1 +1,1 @@
-"""How services speak: the node, its bus, requests, actions and parameters."""
+"""The runtime of every service: node, bus, requests, actions and parameters."""

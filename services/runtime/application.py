@@ -1,4 +1,4 @@
-"""What every service's `main` has in common: arguments, deployment, node, exit code."""
+"""The common `main` of all services: arguments, deployment, node, exit code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a node has declared so far, and what that says about it."""
+"""The endpoints of a node (publishers, subscriptions, servers, actions) and their statistics."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from services.runtime.topics import Publisher, Subscription
 
 @dataclass
 class NodeEndpoints:
-    """Everything that a node says, hears and answers."""
+    """All endpoints of one node."""
 
     publishers: dict[str, Publisher[Any]] = field(default_factory=dict)  # by key
     subscriptions: list[Subscription[Any]] = field(default_factory=list)
@@ -26,7 +26,7 @@ class NodeEndpoints:
     actions: list[ActionServer[Any, Any, Any]] = field(default_factory=list)
 
     def info(self, identity: Identity, robot: str) -> NodeInfo:
-        """Who the node is and what it speaks."""
+        """The node's identity and endpoints."""
         from importlib.metadata import version  # 20 ms that most nodes never need
 
         return NodeInfo(
@@ -43,12 +43,12 @@ class NodeEndpoints:
         )
 
     def statistics(self) -> tuple[TopicStatistics, ...]:
-        """What was received, dropped and bad, by key."""
+        """The counters of received, dropped and bad messages, by key."""
         hearers: list[Subscription[Any] | RequestServer[Any, Any]] = [*self.subscriptions, *self.servers]
         return tuple(each.statistics for each in hearers)
 
     def report_losses(self) -> None:
-        """Says once of every topic that may lose nothing if it has."""
+        """Warns once per reliable topic that has lost messages."""
         for each in self.subscriptions:
             each.report_losses()
 

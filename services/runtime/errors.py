@@ -1,4 +1,4 @@
-"""What can go wrong between nodes; every text is a sentence for the person who reads it."""
+"""The errors between nodes; every text is a sentence for a person."""
 
 from __future__ import annotations
 

@@ -105,8 +105,8 @@ class Node:
     ) -> Subscription[M]:
         """`on_message(message)` runs in the thread of logic; `own`: also for what this node publishes.
 
-        With `batch` all messages, of a LATEST topic too, wait and are handled together every so many seconds:
-        cheaper for a node that shows or keeps them.
+        With `batch` all messages, of a LATEST topic too, are queued and handled together once per `batch`:
+        cheaper for a node that displays or records them. `batch` is in [s].
         """
         subscription = Subscription(self._bus, self._loop, topic, on_message, self.log.warning, own, batch)
         self._endpoints.subscriptions.append(subscription)
@@ -165,7 +165,7 @@ class Node:
         return self._parameters.set(SetParameter(name=name, value=value))
 
     def info(self) -> NodeInfo:
-        """Who this node is and what it speaks."""
+        """The node's identity and endpoints."""
         return self._endpoints.info(self._identity, self.robot)
 
     def set_ready(self, ok: bool, reason: str = "") -> None:
@@ -183,7 +183,7 @@ class Node:
 
     @property
     def is_connected(self) -> bool:
-        """Whether the router is there."""
+        """True if the router is connected."""
         return self._bus.is_connected
 
     def alive(self) -> set[str]:
@@ -222,7 +222,7 @@ class Node:
                 self._readiness.not_ready()
 
     def wait(self, seconds: float) -> None:
-        """Handles the inbox for so long: for scripts that do not spin."""
+        """Handles queued tasks for `seconds` [s]: for scripts that do not spin."""
         self._loop.wait(seconds)
 
     def every(self, period: float, task: Callable[[], None]) -> None:

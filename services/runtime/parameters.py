@@ -111,7 +111,7 @@ def _python_type(described: Any) -> type:
 
 
 class ParameterRegistry:
-    """What a node has declared; the command line wins over the deployment file, and that over the defaults."""
+    """All parameters of a node; the command line overrides the deployment file, and that the defaults."""
 
     def __init__(
         self,

@@ -36,7 +36,7 @@ class JsonFrame(IntEnum):
 
 
 class JsonText(NamedTuple):
-    """What a JSON frame holds."""
+    """The content of a JSON frame."""
 
     kind: JsonFrame
     boot_id: int
@@ -85,7 +85,7 @@ def cobs_decode(data: bytes) -> bytes:
 
 
 class PacketDecoder:
-    """Bytes as they arrive, cut into frames; garbage costs itself only."""
+    """Splits received bytes into frames; invalid bytes are skipped and counted."""
 
     def __init__(self) -> None:
         self.bad = 0  # packets that were none, or too long
@@ -126,7 +126,7 @@ def json_frame(kind: JsonFrame, text: bytes, boot_id: int = 0) -> bytes:
 
 
 def sync_frame(t0: int) -> bytes:
-    """A SYNC: any device answers it and does nothing, so it is a knock at the door."""
+    """A SYNC frame: every device answers it and does nothing else, so it tests the connection."""
     return build_frame(SYNC, _SYNC.pack(t0))
 
 
@@ -137,7 +137,7 @@ def build_frame(kind: int, body: bytes, boot_id: int = 0, joints: int = 0) -> by
 
 
 def parse_json_frame(frame: bytes) -> JsonText | None:
-    """What a JSON frame holds; None for any other frame, and for one that was damaged."""
+    """The content of a JSON frame; None for any other frame and for a damaged one."""
     if len(frame) < _HEADER.size + _CRC.size:
         return None
     magic, version, kind, _, boot_id = _HEADER.unpack_from(frame)

@@ -1,4 +1,4 @@
-"""Publishers and subscriptions by a row of the table."""
+"""Publishers and subscriptions of the topics in schemas/topics.py."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PERIODS_TO_STALE = 5.0
 
 
 class Warn(Protocol):
-    """Where a sentence about a bad message goes."""
+    """A function that logs a warning."""
 
     def __call__(self, text: str, /) -> None: ...
 
@@ -54,6 +54,7 @@ class Subscription(Generic[M]):
         own: bool,
         batch: float | None,
     ) -> None:
+        """With `batch` [s] the messages are handled together, once in this time."""
         self.topic = topic
         self._handler, self._warn = handler, warn
         self._received, self._bad, self._lost_said = 0, 0, False

@@ -1,4 +1,4 @@
-"""From joint states to the poses of links: pure, one message in, one message out."""
+"""The frames of the moving links from joint states; pure."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Decimator:
         self._last = 0  # [ns]
 
     def passes(self, stamp: int) -> bool:
-        """Whether the message of `stamp` [ns] is to be passed on."""
+        """True if the message of `stamp` [ns] is to be passed on."""
         if self.rate <= 0.0:
             return True
         period = 1e9 / self.rate
@@ -44,7 +44,7 @@ class Decimator:
 
 @dataclass(frozen=True)
 class Frames:
-    """What one joint state gives: moving frames, if they are due, and what is to be said about it, once."""
+    """The result of one joint state: moving frames, if they are due, and warnings, each once."""
 
     frames: FrameTransforms | None = None
     warnings: tuple[str, ...] = ()
@@ -54,6 +54,7 @@ class StatePublisher:
     """Static frames once, moving ones for every joint state, with that state's own stamp."""
 
     def __init__(self, arm: Arm, rate: float = 0.0) -> None:
+        """`rate` in [Hz] of the moving frames; 0: one for every joint state."""
         self._arm = arm
         self._moving = [j for j in arm.model.joints if j.kind is not JointKind.FIXED]
         self._origins = {joint.name: origin_of(joint) for joint in arm.model.joints}

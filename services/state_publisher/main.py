@@ -20,7 +20,7 @@ FRESH = 0.5  # [s] a joint state counts as fresh: as long as the device waits fo
 
 
 class StatePublisherParameters(msgspec.Struct, frozen=True, kw_only=True):
-    """What can be set at run time."""
+    """The parameters that can be set at run time."""
 
     rate: Annotated[float, msgspec.Meta(ge=0.0, description="frames a second [Hz]; 0: one for every joint state")] = 0.0
 

@@ -1,4 +1,4 @@
-"""Messages in, columns out: what the viewer is told ten times a second. Pure.
+"""The visualizer without Rerun: messages in, updates out, ten times a second. Pure.
 
 Positions are in rad and m on the bus and in degrees and millimetres here, because here is the screen.
 """
@@ -55,7 +55,7 @@ class Visualizer:
         self._panel_inputs = PanelInputs(robot=robot, prismatic=prismatic)
 
     def on_joint_state(self, message: JointState) -> None:
-        """What the arm did."""
+        """The measured joint state."""
         self._panel_inputs = replace(self._panel_inputs, joints=message)
         self._preview.on_joint_state(message)
         if any(abs(speed) > MOVING for speed in message.velocity):
@@ -63,7 +63,7 @@ class Visualizer:
         self._executed.add(message.stamp, self._row(message.name, message.position, self._executed))
 
     def on_joint_command(self, message: JointState) -> None:
-        """What the path asked for at the same instant."""
+        """The commanded joint state at the same instant."""
         self._commanded.add(message.stamp, self._row(message.name, message.position, self._commanded))
 
     def on_step_errors(self, message: StepErrors) -> None:
@@ -76,15 +76,15 @@ class Visualizer:
         self._panel_inputs = replace(self._panel_inputs, state=message)
 
     def on_device_status(self, message: DeviceStatus) -> None:
-        """Whether the device is there."""
+        """The device's connection status."""
         self._panel_inputs = replace(self._panel_inputs, status=message)
 
     def on_sensors(self, message: SensorReadings) -> None:
-        """What the board reads."""
+        """The readings of the board's sensors."""
         self._panel_inputs = replace(self._panel_inputs, sensors=message)
 
     def on_shaft(self, message: ShaftPositions) -> None:
-        """Where a virtual device's shafts truly are; a joint that leaves its counter, or comes back, is a line."""
+        """The true shaft positions of a virtual device; a joint that starts or ends losing steps is logged."""
         before, after = shaft_errors(self._panel_inputs.shaft), shaft_errors(message)
         self._panel_inputs = replace(self._panel_inputs, shaft=message)
         # A loaded motor lags by a step and catches up; only what stays behind is worth the plot's scale.
@@ -96,7 +96,7 @@ class Visualizer:
                 self.event_log.add(message.stamp, text, "ERROR" if is_lost(error) else "INFO")
 
     def on_planned_path(self, message: PlannedPath) -> None:
-        """The way the tool will take."""
+        """The planned path of the tool."""
         self._path, self._path_is_new = message, True
         self._preview.on_planned_path(message)
 
@@ -108,7 +108,7 @@ class Visualizer:
                 *self.event_log.take(self._latest)]  # fmt: skip
 
     def restart(self) -> None:
-        """Say the lasting things again: the viewer is a new one."""
+        """Sends the latched content again to a new viewer."""
         self._path_is_new = self._path is not None
         self.scene.restart()
         self._preview.restart()
@@ -189,7 +189,7 @@ class Visualizer:
 
 
 def on_screen(joint: VisualJoint) -> float:
-    """Screen units per SI unit: mm for a prismatic joint, degrees for the others."""
+    """The factor to screen units: [mm/m] for a prismatic joint, [deg/rad] for the others."""
     return 1e3 if joint.is_prismatic else math.degrees(1.0)
 
 

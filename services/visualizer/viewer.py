@@ -51,7 +51,7 @@ def command(program: Path, viewer: ViewerSection, mode: ViewerMode, memory: str)
 
 
 def address(viewer: ViewerSection, mode: ViewerMode) -> str:
-    """Where a person finds the view."""
+    """The address of the view, for a person."""
     stream = f"rerun+http://{viewer.host}:{viewer.port}/proxy"
     if mode is ViewerMode.WEB:
         return f"http://{viewer.host}:{viewer.web_port}/?url={quote(stream, safe='')}"

@@ -1,4 +1,4 @@
-"""What a board keeps for good: its configuration, and the credentials that it was provisioned with.
+"""The flash of a board: its configuration and its provisioned credentials.
 
 The file is readable by its owner only, and nothing of the credentials is ever logged.
 """
@@ -12,7 +12,7 @@ import msgspec
 
 
 class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """How the device reaches its network; a virtual one has no use for the Wi-Fi's."""
+    """The credentials of the device's network; a virtual device ignores those of the Wi-Fi."""
 
     device: str = ""  # empty: the configuration's name
     wifi_ssid: str = ""

@@ -30,7 +30,7 @@ KEEP_ALIVE = 5  # [s]
 
 @dataclass(frozen=True)
 class BrokerAddress:
-    """Where the broker is, and how it is spoken to."""
+    """The address, credentials and TLS context of a broker."""
 
     host: str
     port: int
@@ -125,7 +125,7 @@ class DeviceLink:
         self._client.loop_stop()
 
     def break_off(self) -> None:
-        """Vanish without a word, as a device that loses its power or its Wi-Fi; the broker says the last will."""
+        """Disconnects without a farewell, as a device that loses power or Wi-Fi; the broker sends the last will."""
         self._is_broken_off = True
         wire = self._client.socket()
         if isinstance(wire, socket.socket):

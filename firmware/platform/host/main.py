@@ -67,7 +67,7 @@ def _serial_line(folder: Path, inbox: queue.SimpleQueue[Item]) -> SerialLine:
 
 
 def idle(inbox: queue.SimpleQueue[Item], readiness: Readiness) -> None:
-    """Be ready and do nothing until asked to stop: a real board plays the arm."""
+    """Stays ready and idle until shutdown: a real board drives the arm."""
     log.info("the deployment has a board: this virtual one stands aside")
     readiness.ready()
     while True:

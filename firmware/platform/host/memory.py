@@ -1,4 +1,4 @@
-"""What the virtual ESP32 remembers over a restart, as a real one does in its flash.
+"""The joint positions that the virtual ESP32 stores over a restart, as a real one does in its flash.
 
 Written at rest and once when motion starts, never while moving: so a device that finds "moving" was cut off in a
 motion, and does not know where its joints are.
@@ -23,7 +23,7 @@ class StoredPosition(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BootState(msgspec.Struct, frozen=True, kw_only=True):
-    """How the device starts."""
+    """The state that the device boots with."""
 
     steps: tuple[int, ...]
     shaft: tuple[int, ...]
@@ -40,7 +40,7 @@ class PositionStore:
         self._written: StoredPosition | None = None
 
     def wake(self, reference: tuple[int, ...]) -> BootState:
-        """Where the joints are: at `reference` [steps] on the very first start, else where they were left."""
+        """The boot positions: `reference` [steps] on the very first start, else the stored ones."""
         try:
             memory = msgspec.json.decode(self._path.read_bytes(), type=StoredPosition)
         except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""The board's way to its broker: which one, whether it is reached, and how it is lost."""
+"""The connection of the board to its broker."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Network:
         self._link.start()
 
     def break_off(self) -> None:
-        """Vanish without a word; `join` comes back."""
+        """Disconnects without a farewell; `join` connects again."""
         if self._link is not None:
             self._link.break_off()
         self._link, self.is_connected = None, False
@@ -60,7 +60,7 @@ class Network:
             self._link.close(self._offline_status)
 
     def publish(self, frame: OutFrame) -> None:
-        """What is said while there is no broker is lost: state and status come again."""
+        """Publishes a frame; without a broker it is dropped, because state and status are repeated."""
         if self._link is not None and self.is_connected and frame.kind in REPORTS:
             self._link.publish(frame.kind, frame.payload)
 

@@ -1,4 +1,4 @@
-"""A board in real time: what arrives goes in, steps are made as the clock says, reports go out."""
+"""A virtual board in real time: receives frames, advances the firmware by the clock, sends reports."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class VirtualEsp32:
         self._wires.close()
 
     def _stop_motion(self) -> None:
-        """Only a device that stands knows where it will wake up."""
+        """Stops the motion, because the positions are valid over a restart only at rest."""
         self._device.halt()
         deadline = time.monotonic() + LONGEST_STOP
         while self._device.moving and time.monotonic() < deadline:

@@ -1,4 +1,4 @@
-"""What a virtual board says, on all its wires: MQTT, and a serial line if it has one."""
+"""The links of a virtual board: MQTT, and a serial line if it has one."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Wires:
             self._line.close()
 
     def publish(self, device: Device, now: float) -> None:
-        """Send all that the device has said, and ten times a second where its shafts are."""
+        """Sends the device's frames, and its shaft positions ten times a second; `now` in [s] monotonic."""
         if now >= self._next_shaft:
             self._next_shaft = now + SHAFT_PERIOD
             report = device.shaft_report()

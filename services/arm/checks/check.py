@@ -95,7 +95,7 @@ def _files(folder: Path, robot: RobotFile) -> list[Finding]:
 
 
 def _cross_checks(folder: Path) -> list[Finding]:
-    """What only shows when all of it is put together."""
+    """Checks that need the whole description."""
     try:
         arm = load_arm(folder)
         device_config(arm)

@@ -1,4 +1,4 @@
-"""What another reader, yourdfpy, says of the same URDF: every mesh opened, and the tool where we put it."""
+"""A cross-check of the URDF by yourdfpy: every mesh loads, and the tool pose is equal."""
 
 from __future__ import annotations
 

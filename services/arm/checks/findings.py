@@ -1,4 +1,4 @@
-"""What a check of a robot's folder finds."""
+"""The findings of a check of a robot's folder."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class Severity(StrEnum):
-    """An error must be mended before anything moves; a warning is odd, and said."""
+    """An error must be corrected before the arm moves; a warning is reported only."""
 
     ERROR = "error"
     WARNING = "warning"

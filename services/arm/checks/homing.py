@@ -69,7 +69,7 @@ def _speeds(homing: Homing, speed: SpeedLimits, thing: str) -> list[Finding]:
 def _places(
     drive: StepperJoint, homing: Homing, limit: Limit, speed: SpeedLimits, thing: str, unit: str
 ) -> list[Finding]:
-    """Where the switch closes, how far the joint runs on, and where it stands in the end."""
+    """Checks the switch position, the braking distance after it, and the final position."""
     sign = _sign(homing)
     lower, upper = _mechanics(drive, limit)
     if not lower <= homing.position <= upper:
@@ -92,7 +92,7 @@ def _places(
 
 
 def _travel(homing: Homing, limit: Limit, thing: str, unit: str) -> list[Finding]:
-    """Whether the switch is found from the far end, in time."""
+    """Checks that the switch is reached from the far end, within max_travel and timeout."""
     findings = []
     far = limit.lower if homing.direction is HomingDirection.UPPER else limit.upper
     travel = abs(homing.position - far)

@@ -121,7 +121,7 @@ def _against_mechanics(drive: StepperJoint, limit: Limit, thing: str, unit: str)
 
 
 def _pulses(drive: StepperJoint, driver: Driver, tick_hz: int, thing: str) -> list[Finding]:
-    """Whether the device's tick and the driver's inputs can follow the joint's fastest pulses."""
+    """Checks that the device's tick and the driver's inputs support the joint's highest step rate."""
     try:
         rate = float(speed_limits(drive).step_rate)
     except DescriptionError:

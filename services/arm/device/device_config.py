@@ -1,4 +1,4 @@
-"""From the arm's description to what its device is told."""
+"""The device configuration, made from the arm's description."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DEFAULT_TRAVEL_FACTOR = 1.1  # how far a joint looks for its switch, where robot
 
 
 def device_config(arm: Arm) -> DeviceConfig:
-    """What robot.toml asks of the device; raises `DescriptionError` with the thing, its value and the remedy."""
+    """The device configuration of an arm; raises `DescriptionError` with the thing, its value and the remedy."""
     _require_counts(arm)
     device = arm.device
     return DeviceConfig(

@@ -1,4 +1,4 @@
-"""Switches, outputs and sensors as the device is told of them."""
+"""Switches, outputs and sensors of the device configuration."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ NAME = re.compile(rf"[A-Za-z0-9_-]{{1,{MAX_NAME}}}")
 
 
 def nearest(value: Fraction) -> int:
-    """The nearest whole number, halves upwards."""
+    """The nearest integer (dimensionless), halves upwards."""
     return math.floor(value + Fraction(1, 2))
 
 

@@ -1,4 +1,4 @@
-"""The frames of the last ten seconds: tf2's promises, except that waiting wakes and does not poll."""
+"""The frame buffer of the last ten seconds: as tf2's Buffer, but `wait` is notified and does not poll."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why a frame cannot be looked up: one class a reason, and every text has the times."""
+"""The errors of a frame look-up: one class per reason, and every text has the times."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The samples of one frame in its parent over time."""
+"""The time cache of one frame: its poses in the parent frame over time, as tf2's TimeCache."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class TimeCache:
         self.poses: list[Rigid] = []
 
     def insert(self, stamp: int, pose: Rigid, window: int) -> bool:
-        """Keep the sample in its place in time; False where it is older than the window."""
+        """Insert the pose ([m], quaternion) at `stamp` [ns]; False where it is older than `window` [ns]."""
         stamps = self.stamps
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)

@@ -15,7 +15,7 @@ _NEARLY_PARALLEL = 1.0 - 1e-9  # cosine above which slerp is linear to rounding
 
 
 def rotate(rotation: Quaternion, point: Point) -> Point:
-    """The point turned by the rotation: v + 2 w (q x v) + 2 q x (q x v)."""
+    """The point [m] rotated by the unit quaternion: v + 2 w (q x v) + 2 q x (q x v)."""
     x, y, z, w = rotation
     a, b, c = point
     u, v, t = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
@@ -23,7 +23,7 @@ def rotate(rotation: Quaternion, point: Point) -> Point:
 
 
 def multiply(first: Quaternion, second: Quaternion) -> Quaternion:
-    """Hamilton product: the rotation `second`, then `first`."""
+    """Hamilton product of unit quaternions (x, y, z, w): the rotation `second`, then `first`."""
     x, y, z, w = first
     a, b, c, d = second
     return (
@@ -35,14 +35,14 @@ def multiply(first: Quaternion, second: Quaternion) -> Quaternion:
 
 
 def compose(outer: Rigid, inner: Rigid) -> Rigid:
-    """a_T_b and b_T_c as a_T_c."""
+    """a_T_c of a_T_b and b_T_c; translations in [m], unit quaternions."""
     (ox, oy, oz), rotation = outer
     px, py, pz = rotate(rotation, inner[0])
     return (ox + px, oy + py, oz + pz), multiply(rotation, inner[1])
 
 
 def inverse(transform: Rigid) -> Rigid:
-    """a_T_b as b_T_a."""
+    """b_T_a of a_T_b; translation in [m], unit quaternion."""
     x, y, z, w = transform[1]
     back = (-x, -y, -z, w)
     px, py, pz = rotate(back, transform[0])
@@ -66,7 +66,7 @@ def slerp(first: Quaternion, second: Quaternion, share: float) -> Quaternion:
 
 
 def interpolate(first: Rigid, second: Rigid, share: float) -> Rigid:
-    """Linear in translation, slerp in rotation."""
+    """Interpolates at `share` in [0, 1]: linear in translation [m], slerp in rotation."""
     (x, y, z), (a, b, c) = first[0], second[0]
     point = (x + share * (a - x), y + share * (b - y), z + share * (c - z))
     return point, slerp(first[1], second[1], share)
@@ -92,7 +92,7 @@ def from_axis_angle(axis: Point, angle: float) -> Quaternion:
 
 
 def to_message(rigid: Rigid) -> Transform:
-    """The transform as it travels."""
+    """The message of the transform ([m], quaternion)."""
     return Transform(translation=rigid[0], rotation=rigid[1])
 
 

@@ -1,4 +1,4 @@
-"""Where the child of a joint stands in its parent, and whole chains of them: light, without pinocchio."""
+"""Forward kinematics of single joints and whole chains in plain Python, without pinocchio."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
 
 
 def origin_of(joint: UrdfJoint) -> Rigid:
-    """The joint's frame in its parent at position zero."""
+    """The joint's frame in its parent at position zero: translation [m] and unit quaternion."""
     return joint.origin.xyz, from_rpy(*joint.origin.rpy)
 
 
@@ -42,7 +42,7 @@ def complete(model: UrdfModel, positions: Mapping[str, float]) -> dict[str, floa
 
 
 def link_transforms(model: UrdfModel, positions: Mapping[str, float]) -> dict[str, Rigid]:
-    """Every link's pose in the root link; joints without a position stand at zero."""
+    """Every link's pose in the root link ([m], quaternion) at `positions` [rad] or [m]; absent joints are at zero."""
     known = complete(model, positions)
     children = {joint.child for joint in model.joints}
     poses = {name: IDENTITY for name in model.link_names if name not in children}

@@ -1,4 +1,4 @@
-"""Which pairs of links need no collision check, found by sampling: neighbours, always in touch, never near.
+"""The allowed collision matrix by sampling: adjacent links, links always in collision, links never in collision.
 
 As MoveIt's setup assistant does it, but what seems never to be near is also searched for nearer configurations.
 """
@@ -108,7 +108,7 @@ def _limits(arm: Arm) -> tuple[Array, Array]:
 
 
 def are_adjacent(arm: Arm, first: str, second: str) -> bool:
-    """Whether one joint is between two links; links without a shape in between do not count."""
+    """True if one joint is between two links; links without a shape in between do not count."""
     return second in _neighbours(arm, first) or first in _neighbours(arm, second)
 
 

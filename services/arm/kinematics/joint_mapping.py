@@ -1,4 +1,4 @@
-"""Between the arm's joint order and pinocchio's configuration: order, continuous joints and mimics."""
+"""The mapping between the arm's joints and pinocchio's configuration: order, continuous joints and mimics."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class JointMapping:
         return q
 
     def fold(self, jacobian: Vector) -> Vector:
-        """pinocchio's Jacobian (6, nv) as one with the arm's joints as columns (6, n)."""
+        """pinocchio's Jacobian (6, nv) with the arm's joints as columns (6, n): [m/s], [rad/s] per joint rate."""
         if self._is_same:
             return jacobian
         folded: Vector = jacobian @ self._fold

@@ -1,4 +1,4 @@
-"""Where the links are, how the tool moves with the joints, and whether the arm touches itself. By pinocchio."""
+"""Forward kinematics, Jacobian and self-collisions of the arm, by pinocchio."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the arm touches itself: coal on the URDF's primitives, without the pairs that the SRDF excuses."""
+"""Self-collision checks by coal on the URDF's collision geometry, without the pairs that the SRDF disables."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class SelfCollisionChecker:
 
     @property
     def geometry_count(self) -> int:
-        """How many shapes there are; never zero."""
+        """The number of collision shapes; never zero."""
         return int(self._geometry.ngeoms)
 
     @property
@@ -90,7 +90,7 @@ def load_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
 
 
 def _add_pairs(arm: Arm, model: pin.Model, geometry: pin.GeometryModel) -> list[LinkPair]:
-    """Check every pair of shapes on different links that is not excused; returns the links' names in the same order."""
+    """Adds every pair of shapes on different links that is not disabled; returns the link names in the same order."""
     links = [model.frames[shape.parentFrame].name for shape in geometry.geometryObjects]
     pairs: list[LinkPair] = []
     for first in range(len(links)):
@@ -116,7 +116,7 @@ def reach_of(arm: Arm, model: pin.Model, geometry: pin.GeometryModel) -> Array:
 
 
 def driver_of(arm: Arm, model: pin.Model, index: int) -> tuple[int, float]:
-    """The arm's joint that moves pinocchio's joint `index`, and how much for each of its units, through mimics."""
+    """The arm's joint that drives pinocchio's joint `index`, and the ratio of their motions (through mimic joints)."""
     joint, scale = arm.model.joint(model.names[index]), 1.0
     while joint.mimic is not None:
         scale *= abs(joint.mimic.multiplier)
@@ -132,7 +132,7 @@ def _joint_reach(arm: Arm, model: pin.Model, geometry: pin.GeometryModel, joint:
 
 
 def shape_reach(arm: Arm, model: pin.Model, shape: pin.GeometryObject, joint: int) -> float:
-    """How far at most [m] any point of a shape moves per unit of pinocchio's `joint`, which carries it."""
+    """An upper bound [m/rad] or [m/m] of the motion of any point of a shape per unit of pinocchio's `joint`."""
     if _slides(model, joint):
         return 1.0
     shape.geometry.computeLocalAABB()
@@ -145,12 +145,12 @@ def shape_reach(arm: Arm, model: pin.Model, shape: pin.GeometryObject, joint: in
 
 
 def _radius(shape: pin.GeometryObject) -> float:
-    """How far a shape reaches from its own origin [m]."""
+    """An upper bound of the distance of a shape's points from its own origin [m]."""
     return float(np.linalg.norm(shape.geometry.aabb_center)) + float(shape.geometry.aabb_radius)
 
 
 def _travel(arm: Arm, model: pin.Model, joint: int) -> float:
-    """How far a sliding joint can move [m]; 0 for a turning one."""
+    """The travel of a prismatic joint [m]; 0 for a revolute one."""
     if not _slides(model, joint):
         return 0.0
     limit = arm.model.joint(model.names[joint]).limit

@@ -1,4 +1,4 @@
-"""A robot's folder as one typed `Arm`: URDF, SRDF and robot.toml, held against each other."""
+"""A robot's folder as one typed `Arm`: URDF, SRDF and robot.toml, checked against each other."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Joint:
         return min(max(position, self.lower), self.upper)
 
     def is_within(self, position: float) -> bool:
-        """Whether `position` [rad] or [m] is within the limits."""
+        """True if `position` [rad] or [m] is within the limits."""
         return self.lower <= position <= self.upper
 
 
@@ -88,7 +88,7 @@ class Arm:
         return (*self.named_states, *self.partial_states)
 
     def named_state(self, name: str, standing: Sequence[float]) -> tuple[float, ...] | None:
-        """Its values; joints that it does not name stand as in `standing`. None where there is no such state."""
+        """Joint values (n,) [rad] or [m] of a named state; absent joints as in `standing`. None if unknown."""
         if name in self.named_states:
             return self.named_states[name]
         values = self.partial_states.get(name)
@@ -97,7 +97,7 @@ class Arm:
         return tuple(values.get(joint, value) for joint, value in zip(self.joint_names, standing, strict=True))
 
     def collisions_are_disabled(self, first: str, second: str) -> bool:
-        """Whether the SRDF says that this pair of links is not to be checked."""
+        """True if the SRDF disables the collision check of this pair of links."""
         return frozenset((first, second)) in self.disabled_collisions
 
 

@@ -68,7 +68,7 @@ def unknown_keys(data: dict[str, object], text: str) -> list[UnknownKey]:
 
 
 def not_finite(data: object, path: Keys = ()) -> list[tuple[Keys, float]]:
-    """Every NaN and infinity, which TOML allows, with where it stands."""
+    """Every NaN and infinity in the TOML data with its key path; the values are dimensionless."""
     match data:
         case dict():
             return [found for key, value in data.items() for found in not_finite(value, (*path, key))]
@@ -89,7 +89,7 @@ def where_of(error: msgspec.ValidationError, text: str) -> str:
 
 
 def exact_ratio(text: str, where: str) -> Fraction:
-    """ "46.656" or "380/21" as a positive fraction; raises `DescriptionError` naming `where`."""
+    """ "46.656" or "380/21" as a positive ratio (dimensionless); raises `DescriptionError` naming `where`."""
     try:
         if "e" in text.lower():
             raise ValueError("an exponent may be longer than any memory")

@@ -32,7 +32,7 @@ class Group:
 
 @dataclass(frozen=True)
 class SrdfModel:
-    """What the SRDF says; `disabled` are pairs of links."""
+    """The content of an SRDF; `disabled` are pairs of links."""
 
     name: str
     groups: tuple[Group, ...]

@@ -34,7 +34,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class Limit:
-    """What the URDF allows a joint: [rad] or [m], per second; effort in [N m] or [N]."""
+    """The limits of a joint in the URDF: [rad] or [m], per second; effort in [N m] or [N]."""
 
     lower: float
     upper: float

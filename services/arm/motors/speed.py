@@ -1,4 +1,4 @@
-"""The speed rule: so many turns a minute at the output shaft, reached in so many seconds."""
+"""Speed limits from robot.toml: revolutions per minute of the output shaft, ramp time and jerk time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ RANGES = {  # of what a builder can mean
 
 @dataclass(frozen=True)
 class SpeedLimits:
-    """What the rule allows one joint, in steps (exact) and in its own unit."""
+    """The speed limits of one joint, in steps (exact) and in its own unit."""
 
     step_rate: Fraction  # [steps/s]
     step_acceleration: Fraction  # [steps/s^2]

@@ -17,9 +17,9 @@ Q8 = 256  # the wire's positions are 1/256 steps
 
 @dataclass(frozen=True)
 class StepScale:
-    """How many motor steps a joint's travel is; absolute positions only, so nothing accumulates.
+    """The ratio of motor steps to a joint's travel; positions are absolute, so errors do not accumulate.
 
-    The sign of a motor that turns the other way is the device's matter and not in here.
+    The sign of an inverted motor is applied by the device, not here.
     """
 
     steps_per_turn: Fraction  # [steps/rev] of the output shaft, exact

@@ -1,4 +1,4 @@
-"""The client's side of an action: send, follow, cancel, and a clear end in bounded time."""
+"""The client side of an action: send, feedback, cancel, and a result in bounded time."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class ActionClient(Generic[G, F, R]):
         timeout: float = 2.0,
         attached: bool = False,
     ) -> GoalHandle[F, R]:
-        """Blocks for the decision; raises `GoalRefused`, `Refused` (not a goal at all) or `NoAnswer`.
+        """Sends a goal, blocks up to `timeout` [s] for the decision; raises `GoalRefused`, `Refused`, `NoAnswer`.
 
         An `attached` goal is cancelled by the server when this node disappears, by its end or by the network's.
         """
@@ -77,11 +77,11 @@ class ActionClient(Generic[G, F, R]):
         return handle
 
     def cancel_all(self, timeout: float = 2.0) -> tuple[str, ...]:
-        """Cancels every goal of the server, whoever sent it; the ids of those that are being cancelled."""
+        """Cancels all goals of all clients; returns the ids of those being cancelled. Blocks up to `timeout` [s]."""
         return requests.call(self._bus, keys.cancel_request(self.action), CancelRequest(), timeout).canceling
 
     def tick(self) -> None:
-        """Looks whether the server still lives; a pause of our own does not count against it."""
+        """Checks that the server is alive; a pause of this process itself does not count."""
         now = time.monotonic()
         slept = now - self._ticked > 5 * self.TICK
         self._ticked = now

@@ -29,7 +29,7 @@ ASK_TIMEOUT = 1.0  # [s]
 
 @dataclass(frozen=True)
 class ActionOutcome(Generic[R]):
-    """How a goal ended."""
+    """The final status and result of a goal."""
 
     status: GoalStatusCode
     result: R
@@ -65,7 +65,7 @@ class GoalHandle(Generic[F, R]):
 
     @property
     def is_over(self) -> bool:
-        """Whether the result is here, or the server is lost."""
+        """True if the result has arrived or the server is lost."""
         return self.outcome is not None or self.lost is not None
 
     @property
@@ -125,7 +125,7 @@ class GoalHandle(Generic[F, R]):
         self._lose(f"{self.action.server} has been restarted and does not know the goal any more")
 
     def tick(self, now: float) -> None:
-        """Counts the server's silence, except while the router is away."""
+        """Detects a silent server; `now` in [s] monotonic. The router's absence does not count."""
         if not self._accepted or self.is_over:
             return
         if not self._bus.is_connected:

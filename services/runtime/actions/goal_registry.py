@@ -1,4 +1,4 @@
-"""The goals that an action's server knows, and their results for as long as they are kept."""
+"""The goals of an action's server, with results kept for two minutes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MAX_RESULT_WAIT = 5.0  # [s] that the answer to a result request may be held bac
 
 @dataclass
 class GoalRecord:
-    """What the server knows of a goal."""
+    """The server's record of a goal."""
 
     goal_id: str
     client: str
@@ -43,7 +43,7 @@ class GoalRecord:
         self.waiting.clear()
 
     def answer_overdue(self, now: float) -> None:
-        """Tells those who have waited long enough that it has not ended."""
+        """Answers the result requests that are due at `now` [s] monotonic with the present status."""
         for each in [each for each in self.waiting if now >= each[0]]:
             self.waiting.remove(each)
             each[1].reply(ResultResponse(status=self.status))
@@ -74,7 +74,7 @@ class GoalRegistry:
 
     @property
     def statuses(self) -> GoalStatuses:
-        """What clients are told of all of them."""
+        """The status message of all goals."""
         goals = tuple(
             GoalStatus(goal_id=goal.goal_id, client=goal.client, status=goal.status) for goal in self._goals.values()
         )

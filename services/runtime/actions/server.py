@@ -1,4 +1,4 @@
-"""The server's side of an action: decisions, feedback, results that are kept, and a heartbeat."""
+"""The server side of an action: decisions, feedback, kept results, heartbeat."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MAX_EARLY_CANCELS = 256  # such cancels that are remembered
 
 @dataclass(frozen=True)
 class GoalDecision:
-    """Whether a goal is accepted; if not, the action's own code and a reason that names the thing."""
+    """The decision on a goal; a refusal has the action's own code and a reason that names the thing."""
 
     accepted: bool
     code: int = 0
@@ -83,7 +83,7 @@ class ActionServer(Generic[G, F, R]):
         self.beat()
 
     def feedback(self, goal_id: str, feedback: F) -> None:
-        """Tells the clients how the goal stands."""
+        """Publishes feedback of a goal."""
         self._feedback.put(GoalFeedback(goal_id=goal_id, feedback=msgspec.Raw(encode(feedback))))
 
     def executing(self, goal_id: str) -> None:

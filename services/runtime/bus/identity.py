@@ -1,4 +1,4 @@
-"""A node's name is its own: the second of two nodes with one name does not start."""
+"""Unique node names: the second of two nodes with one name does not start."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ALIVE = "@alive"
 
 @dataclass(frozen=True)
 class Identity:
-    """Who this process is among those that may bear `name`; the one that started first keeps it."""
+    """The identity of this process among those with the same `name`; the one that started first keeps the name."""
 
     name: str
     started: int  # [ns] UNIX

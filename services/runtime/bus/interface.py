@@ -1,4 +1,4 @@
-"""The bus as the node sees it: bytes under keys. `ZenohBus` and `MemoryBus` keep this contract.
+"""The bus interface: bytes under keys. `ZenohBus` and `MemoryBus` implement it.
 
 Keys are relative to the robot. Callbacks come on threads of the bus: they must only put into an
 inbox and return. A bus delivers its own publications only to subscriptions that ask for them.
@@ -51,7 +51,7 @@ class Query(Protocol):
 
 
 class Declaration(Protocol):
-    """Something that the bus does until it is closed."""
+    """A declaration at the bus that lasts until it is closed."""
 
     def close(self) -> None: ...
 
@@ -67,11 +67,11 @@ class Bus(Protocol):
 
     @property
     def is_connected(self) -> bool:
-        """Whether messages can leave now; False while the router is away."""
+        """True if messages can be sent now; False without a router."""
         ...
 
     def require_reconnection(self) -> None:
-        """Call once a second; raises `BusError` where the router is there but this bus does not find back to it."""
+        """Call once a second; raises `BusError` if the router listens but this session stays disconnected."""
         ...
 
     def publish(self, key: str, schema: str, delivery: Delivery, writer: str = "") -> Publication:
@@ -97,7 +97,7 @@ class Bus(Protocol):
         ...
 
     def wait_served(self, key: str, timeout: float) -> bool:
-        """Whether somebody serves `key`, waiting up to `timeout` [s] for it."""
+        """True if a node serves `key`; waits up to `timeout` [s] for it."""
         ...
 
     def ask(

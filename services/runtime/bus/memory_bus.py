@@ -66,6 +66,7 @@ class MemoryBus:
         return service
 
     def wait_served(self, key: str, timeout: float) -> bool:
+        """True if a node serves `key`; waits up to `timeout` [s] for it."""
         with self.network.served:
             return self.network.served.wait_for(lambda: key in self.network.services and self.is_connected, timeout)
 
@@ -78,6 +79,7 @@ class MemoryBus:
         on_answer: Callable[[BusReply | None], None],
         urgent: bool = False,
     ) -> None:
+        """Sends one request; `on_answer` is called with None after `timeout` [s]."""
         with self.network.lock:
             service = self.network.services.get(key) if self.is_connected else None
         if service is None:

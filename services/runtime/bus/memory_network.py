@@ -1,4 +1,4 @@
-"""What the in-memory buses of one robot share: who hears, writes, answers and lives.
+"""The shared state of the in-memory buses of one robot: subscriptions, publications, queryables, liveliness tokens.
 
 `MemoryNetwork.is_connected = False` is a router that is away: LATEST is lost, EVERY and LATCHED
 wait, requests find nobody.
@@ -70,7 +70,7 @@ class MemoryPublication:
 
 @dataclass(eq=False)
 class MemoryQueryable:
-    """Who answers the requests of one key."""
+    """A queryable: the server of the requests of one key."""
 
     bus: MemoryBus
     key: str
@@ -85,7 +85,7 @@ class MemoryQueryable:
 
 @dataclass(eq=False)
 class MemoryToken:
-    """A sign of life."""
+    """A liveliness token."""
 
     bus: MemoryBus
     key: str
@@ -117,6 +117,7 @@ class MemoryQuery:
     def __init__(
         self, arrival: Arrival, client: str, timeout: float, on_answer: Callable[[BusReply | None], None]
     ) -> None:
+        """`timeout` in [s]; `on_answer` is called once, with None after it."""
         self.arrival, self.client = arrival, client
         self._on_answer = on_answer
         self._lock = threading.Lock()
@@ -140,7 +141,7 @@ class MemoryQuery:
 
 
 class MemoryNetwork:
-    """What the buses of one robot share."""
+    """The state that the buses of one robot share."""
 
     def __init__(self) -> None:
         self.lock = threading.RLock()

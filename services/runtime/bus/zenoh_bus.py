@@ -129,6 +129,7 @@ class ZenohBus:
         )
 
     def wait_served(self, key: str, timeout: float) -> bool:
+        """True if a node serves `key`; waits up to `timeout` [s] for it."""
         with self._lock:
             monitor = self._monitors.get(key)
             if monitor is None:
@@ -144,6 +145,7 @@ class ZenohBus:
         on_answer: Callable[[BusReply | None], None],
         urgent: bool = False,
     ) -> None:
+        """Sends one request; `on_answer` is called with None after `timeout` [s]."""
         answers: list[BusReply] = []
 
         def on_reply(reply: zenoh.Reply) -> None:
@@ -192,7 +194,7 @@ class ZenohBus:
 
 
 def router_answers(host: str, port: int, timeout: float = 0.5) -> bool:
-    """Whether something listens at the router's address."""
+    """True if a TCP connection to the router's address opens within `timeout` [s]."""
     try:
         socket.create_connection((host, port), timeout=timeout).close()
     except OSError:

@@ -1,4 +1,4 @@
-"""What a Zenoh session declares, in the shape of the bus's contract."""
+"""The declarations of a Zenoh session as the bus interface has them."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class ZenohQuery:
 
 
 class ServerMonitor:
-    """Knows whether somebody serves a key."""
+    """Monitors whether a node serves a key."""
 
     def __init__(self, session: zenoh.Session, key: str) -> None:
         self._served = threading.Event()
@@ -71,6 +71,7 @@ class ServerMonitor:
             self._served.clear()
 
     def wait(self, timeout: float) -> bool:
+        """True if a node serves the key; waits up to `timeout` [s] for it."""
         return self._served.wait(timeout)
 
 

@@ -1,4 +1,4 @@
-"""The thread of logic: steps at their deadlines, what is due now and then, and between them the inbox.
+"""The event loop: steps at their deadlines, periodic tasks, and between them the queued tasks.
 
 The deadline is looked at before every message, so a flood cannot starve the step; at least one
 message is handled after every step, so a slow step cannot starve the inbox.
@@ -18,7 +18,7 @@ from services.runtime.process.shutdown import ShutdownRequest
 
 @dataclass
 class LoopFigures:
-    """What a loop did since the last report."""
+    """The figures of a loop since the last report."""
 
     steps: int = 0
     late_max: float = 0.0  # [s]
@@ -28,6 +28,7 @@ class Schedule:
     """Deadlines at `start + k / rate`; those that a long step slept through are left out."""
 
     def __init__(self, rate: float, start: float) -> None:
+        """`rate` in [Hz], `start` in [s] monotonic; raises ValueError for a rate of 0 or less."""
         if not rate > 0.0:
             raise ValueError(f"rate {rate} Hz: it must be above 0")
         self._start, self._rate, self._count = start, rate, 0
@@ -39,12 +40,12 @@ class Schedule:
         return self._start + self._count / self._rate
 
     def begin(self, now: float) -> None:
-        """Notes how late the step that begins at `now` is."""
+        """Records how late the step that begins at `now` [s] is."""
         self.figures.steps += 1
         self.figures.late_max = max(self.figures.late_max, now - self.deadline)
 
     def end(self, now: float) -> None:
-        """Moves on to the first deadline after `now`."""
+        """Advances to the first deadline after `now` [s]."""
         self._count = max(self._count + 1, int((now - self._start) * self._rate) + 1)
 
     def take_figures(self) -> LoopFigures:
@@ -59,7 +60,7 @@ TICK = 0.05  # [s] between two looks of `wait_for`
 
 @dataclass
 class PeriodicTask:
-    """Something that is due every `period` [s]."""
+    """A task that is due every `period` [s]."""
 
     period: float
     task: Task
@@ -87,7 +88,7 @@ class Loop:
         self._periodic_tasks = [each for each in self._periodic_tasks if each.task != task]
 
     def take_figures(self) -> LoopFigures:
-        """What `spin` did since the last call."""
+        """The figures of `spin` since the last call."""
         return self._schedule.take_figures() if self._schedule else LoopFigures()
 
     def spin(self, step: Callable[[int], object], rate: float) -> None:
@@ -105,13 +106,13 @@ class Loop:
                     self._run_once(now, schedule.deadline)
 
     def wait(self, seconds: float) -> None:
-        """Handles the inbox for so long, or until asked to stop."""
+        """Handles queued tasks for `seconds` [s], or until shutdown is requested."""
         self.wait_for(lambda: False, seconds)
 
     def wait_for(self, is_done: Callable[[], bool], timeout: float, on_tick: Task | None = None) -> bool:
         """Handles the inbox until `is_done()`; False after `timeout` [s]. `on_tick` is called 20 times a second.
 
-        While another thread runs the loop, this one only looks on.
+        While another thread runs the loop, this one only checks `is_done`.
         """
         end = time.monotonic() + timeout
         if self._thread is not None and self._thread != threading.get_ident():
@@ -138,7 +139,7 @@ class Loop:
         return True
 
     def _run_once(self, now: float, until: float) -> None:
-        """What is due, then one message, waiting for it until `until`."""
+        """Runs the periodic tasks that are due, then one queued task; waits for it until `until` [s] monotonic."""
         due = now + IDLE_TIMEOUT
         for periodic in self._periodic_tasks:
             if now >= periodic.due:

@@ -1,6 +1,6 @@
-"""The one inbox of a node: threads of the bus put in, the thread of logic takes out.
+"""The task queue of a node: threads of the bus put tasks in, the event loop takes them out.
 
-What waits here is bounded: a LATEST box holds one message, an EVERY box a fixed number, and every
+All queues are bounded: a LATEST queue holds one message, an EVERY queue a fixed number, and every
 message that does not fit is counted.
 """
 
@@ -21,7 +21,7 @@ Task = Callable[[], None]
 
 
 class TaskQueue:
-    """A queue of things to do in the thread of logic, and a short one that goes before it."""
+    """A FIFO queue of tasks for the event loop, and a second one with priority."""
 
     def __init__(self) -> None:
         self._tasks: SimpleQueue[Task] = SimpleQueue()
@@ -50,7 +50,7 @@ class TaskQueue:
 
 
 class ArrivalQueue(Protocol):
-    """Where the arrivals of one key wait."""
+    """The queue of the arrivals of one key."""
 
     dropped: int
 
@@ -60,7 +60,7 @@ class ArrivalQueue(Protocol):
 
 
 class LatestQueue:
-    """Room for one arrival: a newer one replaces it."""
+    """A queue of length one: a newer arrival replaces the older one."""
 
     def __init__(self, inbox: TaskQueue, handle: Callable[[Arrival], None]) -> None:
         self._inbox, self._handle = inbox, handle
@@ -87,7 +87,7 @@ class LatestQueue:
 
 
 class EveryQueue:
-    """Room for many arrivals in order: one that does not fit is lost, and counted.
+    """A bounded FIFO queue: an arrival that does not fit is dropped and counted.
 
     Each has a task of its own in the inbox; without one they wait to be handled together, and wake nobody.
     """
@@ -134,7 +134,7 @@ def _nothing() -> None:
 
 
 class Worker:
-    """Does tasks in order, in a thread that starts with the first."""
+    """Runs tasks in order, in a thread that starts with the first."""
 
     def __init__(self) -> None:
         self._tasks: SimpleQueue[Task | None] = SimpleQueue()

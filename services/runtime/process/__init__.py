@@ -1,1 +1,1 @@
-"""What a process needs beside its node: logs, readiness, ports, shutdown."""
+"""Process support: logs, readiness file, port checks, shutdown."""

@@ -1,4 +1,4 @@
-"""Whether the ports of a deployment are free, and who has one that is not."""
+"""Port checks: refuses a port that another process listens on, and names that process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""SIGTERM and SIGINT: the first asks for a clean stop, and a process that does not follow is ended."""
+"""Shutdown by SIGTERM and SIGINT: the first requests a clean stop, a process that does not stop in time is ended."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SIGNALS = (signal.SIGTERM, signal.SIGINT)
 
 
 class ShutdownRequest:
-    """Whether the process has been asked to stop; safe to set in a signal handler."""
+    """The request that the process shuts down; safe to set in a signal handler."""
 
     def __init__(self) -> None:
         self.is_set = False
@@ -33,7 +33,7 @@ class ShutdownRequest:
             each()
 
     def wait(self, timeout: float) -> bool:
-        """Whether it is set, after waiting up to `timeout` [s] for it; for one thread."""
+        """True if it is set; waits up to `timeout` [s] for it. For one thread only."""
         if not self.is_set:
             with suppress(Empty):
                 self._wake.get(timeout=timeout)

@@ -1,4 +1,4 @@
-"""Requests as their client sees them: a question with one answer."""
+"""The client side of a request: one question, one reply."""
 
 from __future__ import annotations
 
@@ -20,10 +20,13 @@ SERVER_APPEARANCE_TIMEOUT = 1.0  # [s] that a client waits for a server to appea
 
 
 class PendingCall(Generic[Q, R]):
-    """A question that was sent, and its answer when it comes."""
+    """A request that was sent, and its reply."""
 
     def __init__(self, bus: Bus, request: Request[Q, R], question: Q, timeout: float, wake: Task) -> None:
-        """`wake` is called when it comes, from another thread; raises `NoAnswer` where nobody serves the request."""
+        """Sends the request, with `timeout` [s] for its reply; `wake` is then called from another thread.
+
+        Raises `NoAnswer` where no node serves the request.
+        """
         self._bus, self._request, self._wake = bus, request, wake
         self._timeout = timeout
         self._answers: SimpleQueue[BusReply | None] = SimpleQueue()
@@ -34,7 +37,7 @@ class PendingCall(Generic[Q, R]):
 
     @property
     def is_over(self) -> bool:
-        """Whether `response` would not block."""
+        """True if `response` returns without blocking."""
         return not self._answers.empty()
 
     def response(self) -> R:
@@ -70,7 +73,7 @@ def response_in(request: Request[Q, R], answer: BusReply) -> R:
 
 
 def _silent(bus: Bus, request: Request[Q, R], timeout: float) -> str:
-    """Who is known to serve may be forgotten a moment after the router has gone: so its absence is looked for first."""
+    """The text for a missing reply; a missing router is checked first, because it also hides the servers."""
     if not bus.is_connected:
         return _away(request)
     return f"{request.server} did not answer {request.key} within {timeout:g} s: is it busy, or gone?"

@@ -1,4 +1,4 @@
-"""Requests as their server sees them: limits for each client, and a way past all that waits for the urgent ones."""
+"""The server side of a request: limits per client, and priority for urgent requests."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class PendingGroup(Generic[R]):
 
 
 class WaitingRequests:
-    """Counts the requests that wait, by client, so that one client's flood leaves room for the others."""
+    """Counts the waiting requests per client and limits them, so that one client cannot block the others."""
 
     def __init__(self, key: str) -> None:
         self._key = key
@@ -91,7 +91,7 @@ class WaitingRequests:
         self._lock = threading.Lock()
 
     def refusal(self, client: str) -> str:
-        """Takes a place for `client`; or, if there is none, says why."""
+        """Counts one more request of `client`; returns the reason if its limit is reached, else an empty text."""
         with self._lock:
             if self._of[client] >= MAX_WAITING_OF_A_CLIENT:
                 return f"{self._key}: {MAX_WAITING_OF_A_CLIENT} requests are waiting already, all of this client"
@@ -134,7 +134,7 @@ class RequestServer(Generic[Q, R]):
         self._declaration.close()
 
     def refuse_waiting(self, reason: str) -> None:
-        """Refuses what has arrived by now and was not handled yet: something that overtook it has made it void."""
+        """Refuses the requests that have arrived but are not handled yet, because an urgent request made them void."""
         self._void_before, self._void_reason = time.monotonic(), reason
 
     def _on_query(self, query: Query) -> None:
@@ -156,7 +156,7 @@ class RequestServer(Generic[Q, R]):
             self._handle(question, pending)
 
     def _question(self, query: Query, pending: PendingQuery[R]) -> Q | None:
-        """What is asked; None where it cannot be read, which the caller has been told then."""
+        """The decoded question; None where it cannot be decoded, after a refusal was sent."""
         try:
             return from_arrival(self.request.request, query.arrival)
         except BadMessage as error:
@@ -180,7 +180,7 @@ class UrgentServer(RequestServer[Q, R]):
     """Answers the requests of one key before everything else that waits in the node.
 
     Requests are read where they arrive, and equal ones that wait are handled once, for all their callers: repeating
-    one costs nothing and fills no room.
+    one costs nothing.
     """
 
     def __init__(
@@ -206,7 +206,7 @@ class UrgentServer(RequestServer[Q, R]):
             PendingQuery[R](query).refuse("busy", refusal)
 
     def _join(self, question: Q, query: Query) -> str:
-        """Has `question` handled; not empty where its caller cannot be answered with the others."""
+        """Queues `question`; returns the reason where its caller cannot be answered with the others."""
         with self._lock:
             group = self._groups.get(question)
             if group is None:

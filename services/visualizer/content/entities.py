@@ -1,4 +1,4 @@
-"""Where things stand in the viewer's tree."""
+"""The entity paths of the viewer."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LOG = "log"
 
 
 def attached(root: str, link: str) -> str:
-    """What a link of the arm under `root` carries; `link` as in `VisualModel.paths`."""
+    """The entity of the objects attached to a link of the arm under `root`; `link` as in `VisualModel.paths`."""
     return f"{root}/{link}/carried"
 
 

@@ -1,4 +1,4 @@
-"""What has been said since the last batch: log records, events of the device, and shafts that leave their counters."""
+"""The event log since the last batch: log records, events of the device, and lost steps."""
 
 from __future__ import annotations
 

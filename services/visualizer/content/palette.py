@@ -1,4 +1,4 @@
-"""One meaning, one colour: measured is solid and warm, commanded is light and blue."""
+"""The colours of the view: measured is solid and warm, commanded is light and blue."""
 
 from __future__ import annotations
 

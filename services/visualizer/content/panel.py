@@ -41,7 +41,7 @@ def shaft_errors(shaft: ShaftPositions | None) -> dict[str, int]:
 
 
 def is_lost(error: int) -> bool:
-    """Whether a shaft is farther from its counter [steps] than a motor that holds its load may be."""
+    """True if a shaft is farther from its counter [steps] than a motor that holds its load may be."""
     return abs(error) > LOST
 
 

@@ -1,4 +1,4 @@
-"""The planning scene as it is drawn: objects, what is attached, and in red what touches where a plan was refused."""
+"""The planning scene as it is drawn: objects, attached objects, and in red the contacts of a refused plan."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ class SceneView:
         self._is_new = False
 
     def on_scene(self, message: PlanningScene) -> None:
-        """What stands around the arm and what it carries."""
+        """The planning scene: objects and attached objects."""
         self._scene, self._is_new = message, True
 
     def on_contacts(self, message: Contacts) -> None:
-        """What touches in the configuration that was refused last."""
+        """The contacts of the configuration that was refused last."""
         self._contacts, self._is_new = message, True
 
     def on_motion(self) -> None:
@@ -70,7 +70,7 @@ class SceneView:
         self._drawn, self._is_new = {}, True
 
     def take(self, now: int) -> list[Update]:
-        """What has changed since; `now` in ns UNIX."""
+        """The updates since the last call; `now` in [ns] UNIX."""
         if not self._is_new:
             return []
         self._is_new = False

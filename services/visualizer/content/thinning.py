@@ -1,4 +1,4 @@
-"""Samples of one source between two batches; while nothing changes, only two a second are kept."""
+"""Thinning of one source's samples between two batches; while nothing changes, only two a second are kept."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class ThinnedSeries:
 
     @property
     def newest(self) -> tuple[float, ...] | None:
-        """The newest row, kept or not."""
+        """The newest row (width,) in the [unit] of its source, kept or not."""
         return None if self._last is None else self._last[1]
 
     def add(self, stamp: int, row: Sequence[float]) -> None:
-        """A sample; one that is not newer than the last is left out."""
+        """A row (width,) at `stamp` [ns]; one that is not newer than the last is left out."""
         sample = stamp, tuple(row)
         if not 0 <= stamp <= LAST_STAMP:
             return

@@ -1,4 +1,4 @@
-"""What the core wants shown: typed columns for entities, without a word of Rerun. Times are ns UNIX."""
+"""The updates of the view: typed columns for entities, independent of Rerun. Times are in [ns] UNIX."""
 
 from __future__ import annotations
 

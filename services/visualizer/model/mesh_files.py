@@ -1,4 +1,4 @@
-"""Where the mesh files of a robot lie."""
+"""Mesh files of the robot and of the scene."""
 
 from __future__ import annotations
 

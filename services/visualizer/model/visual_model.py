@@ -34,7 +34,7 @@ class Visual:
 
 @dataclass(frozen=True)
 class VisualJoint:
-    """How a link hangs on its parent."""
+    """A joint: the motion of a link relative to its parent."""
 
     name: str
     kind: str  # as in URDF: revolute, continuous, prismatic, fixed
@@ -95,14 +95,14 @@ class VisualModel:
         return max(heights, default=0.0)
 
     def positions(self, joint: VisualJoint, rows: Array, names: list[str]) -> Array:
-        """The column of `joint` in rows (n, len(names)), by its mimic where it has one."""
+        """The positions (n,) [rad] or [m] of `joint` from rows (n, len(names)), by its mimic where it has one."""
         if joint.mimic is None:
             return np.asarray(rows[:, names.index(joint.name)])
         leader, multiplier, offset = joint.mimic
         return np.asarray(rows[:, names.index(leader)] * multiplier + offset)
 
     def link_positions(self, link: str, rows: Array, names: list[str]) -> Array:
-        """The origin of `link` in the root's frame, (n, 3), for joint positions (n, len(names))."""
+        """The origin of `link` in the root's frame, (n, 3) [m], for joint positions (n, len(names)) [rad] or [m]."""
         points = np.zeros((len(rows), 3))
         above = {joint.child: joint for joint in self.joints}
         while link != self.root:

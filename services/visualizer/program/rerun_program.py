@@ -1,4 +1,4 @@
-"""The rerun program itself: its Python wrapper, when killed, would leave it running."""
+"""The rerun program as a child process, without its Python wrapper, which leaves it running when killed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the viewer that was connected is still the same one.
+"""The connection to the viewer: detects that a viewer appears, ends, or is replaced.
 
 Rerun's stream does not say when its viewer is gone, and a new viewer knows nothing of the arm. So a plain socket
 is kept open to the viewer's port: the kernel closes it the moment the viewer ends.
@@ -15,7 +15,7 @@ RETRY = 1.0  # [s]
 
 @dataclass
 class ViewerConnection:
-    """Follows the life of whoever listens at host:port."""
+    """Monitors the viewer at host:port."""
 
     host: str
     port: int
@@ -29,7 +29,7 @@ class ViewerConnection:
 
     @property
     def is_alive(self) -> bool:
-        """Whether the viewer found by `is_new` is still there."""
+        """True if the viewer found by `is_new` is still connected."""
         if self._socket is None:
             return False
         try:

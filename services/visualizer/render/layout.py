@@ -1,4 +1,4 @@
-"""What a person sees first: the arm, what it does, and how exactly, on one screen."""
+"""The layout (blueprint) of the view: the arm, its joints, its step errors and the device, on one screen."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ JOINTS_PER_PAGE = 3  # rows of plots that stay readable
 
 
 def blueprint(model: VisualModel, window: float, trail: float) -> rrb.Blueprint:
-    """The layout for this arm; `window` and `trail` in s."""
+    """The layout for this arm; `window` and `trail` in [s]."""
     scene = rrb.Vertical(
         _scene(model, trail),
         rrb.Horizontal(_panel(), rrb.Vertical(_modes(window), _log(), row_shares=[5, 9]), column_shares=[11, 8]),

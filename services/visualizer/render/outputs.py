@@ -1,4 +1,4 @@
-"""Where batches go: to the viewer while there is one, and to a recording where one was asked for."""
+"""The outputs of the visualizer: the viewer while there is one, and a recording on request."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Outputs:
         self._problem = ""
 
     def step(self, core: Visualizer, now: int, monotonic: float) -> str:
-        """Send a batch; returns why not everything that is wanted can be shown, or an empty text."""
+        """Sends a batch; `now` in [ns] UNIX, `monotonic` in [s]. Returns why an output is missing, or an empty text."""
         self._open_recording(core)
         self._follow_viewer(core, monotonic)
         updates = core.step(now)

@@ -39,6 +39,7 @@ class Sink:
     def __init__(
         self, stream: rr.RecordingStream, model: VisualModel, folder: Path, window: float, trail: float
     ) -> None:
+        """`window` [s] of the plots and `trail` [s] of the tool's path; `folder` holds the robot's meshes."""
         self._stream = stream
         self._model = model
         self._folder = folder  # of the robot: meshes stand relative to it
