@@ -6,7 +6,6 @@ import math
 import re
 import tomllib
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 from typing import get_args, get_origin, get_type_hints
 
@@ -16,9 +15,6 @@ from schemas.robot import RobotFile
 from services.arm.errors import DescriptionError, suggestion
 
 Keys = tuple[str | int, ...]
-
-MAX_RATIO = Fraction(10**9)
-MIN_RATIO = 1 / MAX_RATIO
 
 
 @dataclass(frozen=True)
@@ -86,21 +82,6 @@ def where_of(error: msgspec.ValidationError, text: str) -> str:
     words = re.findall(r"\w+", place[1]) if place else []
     line = line_of(tuple(int(word) if word.isdecimal() else word for word in words), text) if words else 0
     return f", line {line}" if line else ""
-
-
-def exact_ratio(text: str, where: str) -> Fraction:
-    """ "46.656" or "380/21" as a positive ratio (dimensionless); raises `DescriptionError` naming `where`."""
-    try:
-        if "e" in text.lower():
-            raise ValueError("an exponent may be longer than any memory")
-        ratio = Fraction(text.replace(" ", ""))
-    except (ValueError, ZeroDivisionError) as error:
-        raise DescriptionError(f'{where}: "{text}" is neither a decimal nor a fraction like "380/21"') from error
-    if ratio <= 0:
-        raise DescriptionError(f"{where}: a ratio of {text} is not positive; turn the direction with `inverted`")
-    if not MIN_RATIO <= ratio <= MAX_RATIO:
-        raise DescriptionError(f"{where}: a ratio of {text} is not within 1/1000000000 to 1000000000")
-    return ratio
 
 
 def dotted(path: Keys) -> str:

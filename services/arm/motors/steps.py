@@ -9,10 +9,11 @@ from functools import cached_property
 
 from schemas.robot import StepperJoint, Transmission
 from services.arm.errors import DescriptionError
-from services.arm.model.robot_file import exact_ratio
 
 TAU = 2.0 * math.pi
 Q8 = 256  # the wire's positions are 1/256 steps
+MAX_RATIO = Fraction(10**9)
+MIN_RATIO = 1 / MAX_RATIO
 
 
 @dataclass(frozen=True)
@@ -89,3 +90,18 @@ def travel_per_turn(drive: StepperJoint) -> float:
                     f"it is {drive.pinion_radius}"
                 )
             return TAU * drive.pinion_radius
+
+
+def exact_ratio(text: str, where: str) -> Fraction:
+    """ "46.656" or "380/21" as a positive ratio (dimensionless); raises `DescriptionError` naming `where`."""
+    try:
+        if "e" in text.lower():
+            raise ValueError("an exponent may be longer than any memory")
+        ratio = Fraction(text.replace(" ", ""))
+    except (ValueError, ZeroDivisionError) as error:
+        raise DescriptionError(f'{where}: "{text}" is neither a decimal nor a fraction like "380/21"') from error
+    if ratio <= 0:
+        raise DescriptionError(f"{where}: a ratio of {text} is not positive; turn the direction with `inverted`")
+    if not MIN_RATIO <= ratio <= MAX_RATIO:
+        raise DescriptionError(f"{where}: a ratio of {text} is not within 1/1000000000 to 1000000000")
+    return ratio
