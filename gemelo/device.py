@@ -17,8 +17,8 @@ from schemas.device import (
     DeviceState,
     DeviceStatus,
     DeviceStopRequest,
-    PressKind,
-    PressRequest,
+    InjectKind,
+    InjectRequest,
     ReferenceCommand,
     ResetCommand,
     StopKind,
@@ -28,7 +28,7 @@ from schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURATION,
     DEVICE_CONFIGURE,
-    DEVICE_PRESS,
+    DEVICE_INJECT,
     DEVICE_STATE,
     DEVICE_STATUS,
     DEVICE_STOP,
@@ -168,14 +168,14 @@ class Device:
 
         >>> arm.device.inject("sensor", "ultra", 0.25)
         """
-        kinds = [kind.value for kind in PressKind]
+        kinds = [kind.value for kind in InjectKind]
         if what not in kinds:
             raise BadArgument(f'there is no "{what}" to inject{suggestion(what, kinds)}')
-        self._require_target(PressKind(what), target)
+        self._require_target(InjectKind(what), target)
         if self.status.online and not self.status.virtual:
             raise Refused(f"{self.status.device} is a real device: only a virtual one takes this", check="device")
-        request = PressRequest(press=PressKind(what), target=target, value=number("value", value))
-        answer = self._session.call(DEVICE_PRESS, request, TO_ANSWER)
+        request = InjectRequest(kind=InjectKind(what), target=target, value=number("value", value))
+        answer = self._session.call(DEVICE_INJECT, request, TO_ANSWER)
         self._session.changed()
         if not answer.accepted:
             raise Refused(f"refused: {answer.reason}", check="device")
@@ -197,13 +197,13 @@ class Device:
             raise Refused(f"{what} refused: {answer.reason}{mode}", check="device", subject=what)
         return answer.mode
 
-    def _require_target(self, kind: PressKind, target: str) -> None:
+    def _require_target(self, kind: InjectKind, target: str) -> None:
         arm = self._session.description
         known = {
-            PressKind.SWITCH: [each.name for each in arm.inputs],
-            PressKind.BLOCK: list(arm.joint_names),
-            PressKind.SLIP: list(arm.joint_names),
-            PressKind.SENSOR: [each.name for each in arm.sensors],
+            InjectKind.SWITCH: [each.name for each in arm.inputs],
+            InjectKind.BLOCK: list(arm.joint_names),
+            InjectKind.SLIP: list(arm.joint_names),
+            InjectKind.SENSOR: [each.name for each in arm.sensors],
         }.get(kind)
         if known is None and target:
             raise BadArgument(f'"{kind}" is done to the whole device, not to "{target}"')

@@ -48,7 +48,7 @@ class DeviceStatus(Message, frozen=True, kw_only=True):
     queue_capacity: int = 0  # [knots]
     config_crc32: int = 0  # of the configuration that the device works with; 0: none yet
     wanted_crc32: int = 0  # of the one that robot.toml asks for
-    virtual: bool = False  # its switches can be pressed by a request
+    virtual: bool = False  # inputs and failures can be injected
 
 
 class DeviceState(Message, frozen=True, kw_only=True):
@@ -218,7 +218,7 @@ class ShaftPositions(Message, frozen=True, kw_only=True):
     position: Vector = ()  # [rad] or [m] of the shaft
 
 
-class PressKind(StrEnum):
+class InjectKind(StrEnum):
     """The inputs and failures that can be injected into a virtual device."""
 
     ESTOP = "estop"  # value 1 pressed, 0 released
@@ -232,15 +232,15 @@ class PressKind(StrEnum):
     DRIFT = "drift"  # value [ppm] by which its clock is fast
 
 
-class PressRequest(Message, frozen=True, kw_only=True):
-    """A press; only a virtual device takes it."""
+class InjectRequest(Message, frozen=True, kw_only=True):
+    """An injected input or failure; only a virtual device takes it."""
 
-    press: PressKind = PressKind.ESTOP
+    kind: InjectKind = InjectKind.ESTOP
     target: str = ""
     value: float = 1.0
 
 
-class PressResponse(Message, frozen=True, kw_only=True):
+class InjectResponse(Message, frozen=True, kw_only=True):
     """The virtual device's answer to an injection."""
 
     accepted: bool = False

@@ -22,8 +22,8 @@ from schemas.device import (
     DeviceState,
     DeviceStatus,
     DeviceStopRequest,
-    PressRequest,
-    PressResponse,
+    InjectRequest,
+    InjectResponse,
     SensorReadings,
     ShaftPositions,
 )
@@ -179,8 +179,8 @@ DEVICE_STOP = Request(
 DEVICE_CONFIGURE = Request(
     "device/configure", ConfigureRequest, ConfigureResponse, GATEWAY, "give the device its configuration anew"
 )
-DEVICE_PRESS = Request(
-    "device/press", PressRequest, PressResponse, GATEWAY, "press a virtual device's buttons, block its joints"
+DEVICE_INJECT = Request(
+    "device/inject", InjectRequest, InjectResponse, GATEWAY, "inject inputs and failures into a virtual device"
 )
 
 REQUESTS: tuple[Request[Message, Message], ...] = (
@@ -192,7 +192,7 @@ REQUESTS: tuple[Request[Message, Message], ...] = (
     DEVICE_COMMAND,
     DEVICE_STOP,
     DEVICE_CONFIGURE,
-    DEVICE_PRESS,
+    DEVICE_INJECT,
 )
 
 FOLLOW_JOINT_TRAJECTORY = Action(

@@ -17,7 +17,7 @@ class OutFrame(NamedTuple):
 
 
 class PlatformRequest(NamedTuple):
-    """PROVISION or PRESS, as it came over the serial line."""
+    """PROVISION or INJECT, as it came over the serial line."""
 
     kind: JsonFrame
     text: bytes

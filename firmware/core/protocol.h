@@ -25,7 +25,7 @@ enum class FrameType : uint8_t {
     Event,
     Provision,
     ProvisionAck,
-    Press,  // virtual devices only
+    Inject,  // virtual devices only
     Shaft,  // virtual devices only
 };
 

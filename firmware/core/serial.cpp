@@ -74,7 +74,7 @@ void SerialPort::take_frame(uint64_t received_us, uint64_t now_us) {
         case FrameType::Config:
             return machine_->receive_config(Arrival{text, text_size, false, received_us}, now_us);
         case FrameType::Provision:
-        case FrameType::Press:
+        case FrameType::Inject:
             return other_ == nullptr ? machine_->count_bad_frame() : other_(context_, frame.type(), text, text_size);
         default:
             if (is_sign_of_life(frame.type())) wire_ = Wire::Serial;

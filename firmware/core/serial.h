@@ -14,7 +14,7 @@ namespace gemelo {
 
 class SerialPort {
   public:
-    // What is none of the core's business: PROVISION and PRESS, as JSON.
+    // What is none of the core's business: PROVISION and INJECT, as JSON.
     using Other = void (*)(void* context, FrameType type, const uint8_t* text, size_t size);
     // The most that wrap() makes.
     static constexpr size_t kLargestReport = cobs_bound(kHeaderSize + JsonWriter::kSize + kCrcSize);

@@ -271,7 +271,7 @@ TEST(SerialPort, TakesAConfigurationInAFrameAndAnswersInOne) {
 
 TEST(SerialPort, HandsOnWhatIsThePlatforms) {
     Line line;
-    line.hear(packet(json_frame(FrameType::Provision, "{}")) + packet(json_frame(FrameType::Press, "{\"a\":1}")));
+    line.hear(packet(json_frame(FrameType::Provision, "{}")) + packet(json_frame(FrameType::Inject, "{\"a\":1}")));
     ASSERT_EQ(line.others.size(), 2u);
     EXPECT_EQ(line.others[0], std::make_pair(FrameType::Provision, std::string("{}")));
     EXPECT_EQ(line.others[1].second, "{\"a\":1}");

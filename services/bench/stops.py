@@ -18,14 +18,14 @@ from paho.mqtt.client import Client, MQTTMessage
 from schemas.device import (
     ConfigureRequest,
     DeviceStopRequest,
-    PressKind,
-    PressRequest,
+    InjectKind,
+    InjectRequest,
     StopKind,
 )
 from schemas.joints import JointState
 from schemas.message import encode
 from schemas.motion import FollowJointTrajectoryGoal
-from schemas.topics import DEVICE_CONFIGURE, DEVICE_PRESS, DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES
+from schemas.topics import DEVICE_CONFIGURE, DEVICE_INJECT, DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile, rounded
 from services.bench.latency import sharp_start
 from services.bench.stack import Running, Stacks
@@ -121,8 +121,8 @@ class Caller:
 
     def leave_unanswered(self) -> None:
         """Sends a configuration and twenty presses, which a frozen device does not answer."""
-        for request in (ConfigureRequest(), *(PressRequest(press=PressKind.SENSOR) for _ in range(20))):
-            key = (DEVICE_CONFIGURE if isinstance(request, ConfigureRequest) else DEVICE_PRESS).key
+        for request in (ConfigureRequest(), *(InjectRequest(kind=InjectKind.SENSOR) for _ in range(20))):
+            key = (DEVICE_CONFIGURE if isinstance(request, ConfigureRequest) else DEVICE_INJECT).key
             self.bus.ask(key, type(request).__name__, encode(request), PATIENCE, lambda answer: None)
 
     def close(self) -> None:

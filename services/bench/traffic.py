@@ -30,8 +30,8 @@ from schemas.device import (
     ConfigureRequest,
     DeviceCommandRequest,
     DeviceStopRequest,
-    PressKind,
-    PressRequest,
+    InjectKind,
+    InjectRequest,
     ResetCommand,
     StopKind,
 )
@@ -42,7 +42,7 @@ from schemas.planning import PlanRequest
 from schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURE,
-    DEVICE_PRESS,
+    DEVICE_INJECT,
     DEVICE_STOP,
     FOLLOW_JOINT_TRAJECTORY,
     JOINT_TARGETS,
@@ -61,7 +61,7 @@ REQUESTS: dict[str, tuple[tuple[str, Message], ...]] = {
     "requests": (
         (DEVICE_COMMAND.key, DeviceCommandRequest(command=ResetCommand())),
         (DEVICE_CONFIGURE.key, ConfigureRequest()),
-        (DEVICE_PRESS.key, PressRequest(press=PressKind.SENSOR)),
+        (DEVICE_INJECT.key, InjectRequest(kind=InjectKind.SENSOR)),
         (f"{FOLLOW_JOINT_TRAJECTORY.key}/goal", GOAL),
         (PLAN.key, PlanRequest()),
     ),

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from schemas.device import PressKind, PressRequest
-from schemas.topics import DEVICE_PRESS
+from schemas.device import InjectKind, InjectRequest
+from schemas.topics import DEVICE_INJECT
 from services.cli.device_snapshot import DeviceView
 from services.cli.errors import CommandError, ExitCode, unknown, usage
 from services.cli.parser import Choices, Options, Parser
@@ -62,10 +62,10 @@ class Press:
 
     follows: tuple[str, ...]
     about: str
-    request: Callable[[Arm, Sequence[str]], PressRequest]
+    request: Callable[[Arm, Sequence[str]], InjectRequest]
 
 
-def request_of(arm: Arm, word: str, rest: Sequence[str]) -> PressRequest:
+def request_of(arm: Arm, word: str, rest: Sequence[str]) -> InjectRequest:
     """The request that the words ask for; raises `CommandError` with the right form."""
     if word not in PRESSES:
         raise unknown("thing to press", word, PRESSES)
@@ -81,7 +81,7 @@ def press(session: Session, word: str, rest: Sequence[str]) -> ExitCode:
     status = DeviceView(session).require_status()
     if status.online and not status.virtual:
         raise CommandError(f"{status.device} is a real device: press it by hand; only a virtual one takes requests")
-    answer = session.node.call(DEVICE_PRESS, request, timeout=TIMEOUT)
+    answer = session.node.call(DEVICE_INJECT, request, timeout=TIMEOUT)
     if not answer.accepted:
         raise CommandError(f"press refused: {answer.reason}")
     print(f"{' '.join([word, *rest])}: done")
@@ -107,45 +107,45 @@ def seconds(text: str) -> float:
     return value
 
 
-def _switch(arm: Arm, rest: Sequence[str]) -> PressRequest:
+def _switch(arm: Arm, rest: Sequence[str]) -> InjectRequest:
     name = require_name("input", rest[0], arm.inputs)
     if rest[1] not in HELD:
         raise usage(f'a switch is held on, held off, or left on auto, not "{rest[1]}"')
-    return PressRequest(press=PressKind.SWITCH, target=name, value=HELD[rest[1]])
+    return InjectRequest(kind=InjectKind.SWITCH, target=name, value=HELD[rest[1]])
 
 
-def _joint(kind: PressKind, value: float) -> Callable[[Arm, Sequence[str]], PressRequest]:
-    return lambda arm, rest: PressRequest(press=kind, target=joint_of(arm, rest[0]).name, value=value)
+def _joint(kind: InjectKind, value: float) -> Callable[[Arm, Sequence[str]], InjectRequest]:
+    return lambda arm, rest: InjectRequest(kind=kind, target=joint_of(arm, rest[0]).name, value=value)
 
 
-def _slip(arm: Arm, rest: Sequence[str]) -> PressRequest:
-    return PressRequest(press=PressKind.SLIP, target=joint_of(arm, rest[0]).name, value=number(rest[1], "steps"))
+def _slip(arm: Arm, rest: Sequence[str]) -> InjectRequest:
+    return InjectRequest(kind=InjectKind.SLIP, target=joint_of(arm, rest[0]).name, value=number(rest[1], "steps"))
 
 
-def _sensor(arm: Arm, rest: Sequence[str]) -> PressRequest:
+def _sensor(arm: Arm, rest: Sequence[str]) -> InjectRequest:
     name = require_name("sensor", rest[0], arm.sensors)
-    return PressRequest(press=PressKind.SENSOR, target=name, value=number(rest[1], f"sensor {name}"))
+    return InjectRequest(kind=InjectKind.SENSOR, target=name, value=number(rest[1], f"sensor {name}"))
 
 
-def _timed(kind: PressKind) -> Callable[[Arm, Sequence[str]], PressRequest]:
-    return lambda arm, rest: PressRequest(press=kind, value=seconds(rest[0]))
+def _timed(kind: InjectKind) -> Callable[[Arm, Sequence[str]], InjectRequest]:
+    return lambda arm, rest: InjectRequest(kind=kind, value=seconds(rest[0]))
 
 
 PRESSES = {
-    "estop": Press((), "press the emergency stop", lambda arm, rest: PressRequest(press=PressKind.ESTOP, value=1.0)),
-    "release": Press((), "release it", lambda arm, rest: PressRequest(press=PressKind.ESTOP, value=0.0)),
-    "block": Press(("JOINT",), "hold the joint's shaft fast", _joint(PressKind.BLOCK, 1.0)),
-    "free": Press(("JOINT",), "let it go", _joint(PressKind.BLOCK, 0.0)),
+    "estop": Press((), "press the emergency stop", lambda arm, rest: InjectRequest(kind=InjectKind.ESTOP, value=1.0)),
+    "release": Press((), "release it", lambda arm, rest: InjectRequest(kind=InjectKind.ESTOP, value=0.0)),
+    "block": Press(("JOINT",), "hold the joint's shaft fast", _joint(InjectKind.BLOCK, 1.0)),
+    "free": Press(("JOINT",), "let it go", _joint(InjectKind.BLOCK, 0.0)),
     "slip": Press(("JOINT", "STEPS"), "push the shaft on by steps that the counter does not see", _slip),
     "switch": Press(("INPUT", "on|off|auto"), "hold a switch pressed, or open, or leave it to the arm", _switch),
     "sensor": Press(("SENSOR", "VALUE"), "give a sensor its reading", _sensor),
-    "reboot": Press((), "restart the device", lambda arm, rest: PressRequest(press=PressKind.REBOOT)),
-    "offline": Press(("TIME",), "take its network away for so long", _timed(PressKind.OFFLINE)),
-    "freeze": Press(("TIME",), "let its path task hang for so long", _timed(PressKind.FREEZE)),
+    "reboot": Press((), "restart the device", lambda arm, rest: InjectRequest(kind=InjectKind.REBOOT)),
+    "offline": Press(("TIME",), "take its network away for so long", _timed(InjectKind.OFFLINE)),
+    "freeze": Press(("TIME",), "let its path task hang for so long", _timed(InjectKind.FREEZE)),
     "drift": Press(
         ("PPM",),
         "make its clock fast by so many parts per million",
-        lambda arm, rest: PressRequest(press=PressKind.DRIFT, value=number(rest[0], "ppm")),
+        lambda arm, rest: InjectRequest(kind=InjectKind.DRIFT, value=number(rest[0], "ppm")),
     ),
 }
 

@@ -31,7 +31,7 @@ class JsonFrame(IntEnum):
     EVENT = 13
     PROVISION = 14
     PROVISION_ACK = 15
-    PRESS = 16
+    INJECT = 16
     SHAFT = 17
 
 

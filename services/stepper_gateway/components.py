@@ -5,7 +5,7 @@ from __future__ import annotations
 from services.arm.model.description import Arm
 from services.stepper_gateway.device.command_handler import CommandHandler
 from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.device.press_handler import PressHandler
+from services.stepper_gateway.device.injection_handler import InjectionHandler
 from services.stepper_gateway.device.sensors import SensorRelay
 from services.stepper_gateway.goals.goal_executor import GoalExecutor
 from services.stepper_gateway.moment import Moment
@@ -26,7 +26,7 @@ class Components:
         self.streaming = TargetFollower(self.device, self.controller)
         self.command_handler = CommandHandler(self.device, self.controller)
         self.sensors = SensorRelay(self.device)
-        self.presses = PressHandler(self.device)
+        self.injections = InjectionHandler(self.device)
 
     def abort_all(self, reason: str, moment: Moment) -> None:
         """Nothing of what was under way is continued."""

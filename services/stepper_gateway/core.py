@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceStatus, DeviceStopRequest, PressRequest
+from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceStatus, DeviceStopRequest, InjectRequest
 from schemas.joints import JointTargets
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.scene import PlanningScene
@@ -129,9 +129,9 @@ class GatewayCore:
         self.device.configuration.ask(ticket, self.device.unreachable_reason(moment), moment)
         return self._finish(moment)
 
-    def on_press(self, request: PressRequest, ticket: int, moment: Moment) -> list[Output]:
-        """A press of a virtual device; its answer comes as an `Answer` with this ticket."""
-        self._components.presses.ask(request, ticket, moment)
+    def on_inject(self, request: InjectRequest, ticket: int, moment: Moment) -> list[Output]:
+        """An injection into a virtual device; its answer comes as an `Answer` with this ticket."""
+        self._components.injections.ask(request, ticket, moment)
         return self._finish(moment)
 
     def step(self, moment: Moment) -> list[Output]:
@@ -149,7 +149,7 @@ class GatewayCore:
         self._components.stop_foreign_motion(moment)
         self._components.command_handler.step(moment)
         device.configuration.step(unreachable_reason, moment)
-        self._components.presses.step(moment)
+        self._components.injections.step(moment)
         self._components.sensors.step(unreachable_reason, moment)
         self.controller.pump(moment)
         return self._finish(moment)

@@ -12,8 +12,8 @@ from schemas.device import (
     DeviceCommandRequest,
     DeviceCommandResponse,
     DeviceStopRequest,
-    PressRequest,
-    PressResponse,
+    InjectRequest,
+    InjectResponse,
 )
 from schemas.joints import JointTargets
 from schemas.motion import (
@@ -24,7 +24,7 @@ from schemas.motion import (
 from schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURE,
-    DEVICE_PRESS,
+    DEVICE_INJECT,
     DEVICE_STOP,
     FOLLOW_JOINT_TRAJECTORY,
     JOINT_TARGETS,
@@ -69,7 +69,7 @@ class Shell:
         self._commands = node.serve_later(DEVICE_COMMAND, self._on_command)
         node.serve_later(DEVICE_STOP, self._on_stop)
         node.serve_later(DEVICE_CONFIGURE, self._on_configure)
-        node.serve_later(DEVICE_PRESS, self._on_press)
+        node.serve_later(DEVICE_INJECT, self._on_inject)
 
     def use(self, link: Link) -> None:
         self._link = link
@@ -129,8 +129,8 @@ class Shell:
     def _on_configure(self, _request: ConfigureRequest, pending: Pending[ConfigureResponse]) -> None:
         self._carry_out(self._core.on_configure(self._ticket(pending), self._moment()))
 
-    def _on_press(self, request: PressRequest, pending: Pending[PressResponse]) -> None:
-        self._carry_out(self._core.on_press(request, self._ticket(pending), self._moment()))
+    def _on_inject(self, request: InjectRequest, pending: Pending[InjectResponse]) -> None:
+        self._carry_out(self._core.on_inject(request, self._ticket(pending), self._moment()))
 
     def _ticket(self, pending: Pending[Any]) -> int:
         ticket = next(self._tickets)

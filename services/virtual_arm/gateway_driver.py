@@ -19,8 +19,8 @@ from schemas.device import (
     DeviceCommandResponse,
     DeviceState,
     DeviceStopRequest,
-    PressRequest,
-    PressResponse,
+    InjectRequest,
+    InjectResponse,
     StopKind,
 )
 from schemas.joints import JointTargets
@@ -68,7 +68,7 @@ class GatewayDriver(ABC):
         self.feedback: list[FollowJointTrajectoryFeedback] = []
         self.answers: dict[int, DeviceCommandResponse] = {}  # by ticket, like the next two
         self.configured: dict[int, ConfigureResponse] = {}
-        self.pressed: dict[int, PressResponse] = {}
+        self.pressed: dict[int, InjectResponse] = {}
         self.log: list[str] = []
         self._on_message = on_message
 
@@ -164,9 +164,9 @@ class GatewayDriver(ABC):
         """Sends the device its configuration; the answer comes in `configured`."""
         self.carry_out(self.core.on_configure(ticket, self.moment))
 
-    def press(self, request: PressRequest, ticket: int = 1) -> None:
+    def press(self, request: InjectRequest, ticket: int = 1) -> None:
         """Does something to the virtual device's world; the answer comes in `pressed`."""
-        self.carry_out(self.core.on_press(request, ticket, self.moment))
+        self.carry_out(self.core.on_inject(request, ticket, self.moment))
 
     def receive(self, kind: Kind, payload: bytes, retained: bool = False) -> None:
         """Hands the gateway a payload as if it came over the wire."""
@@ -192,7 +192,7 @@ class GatewayDriver(ABC):
                     self.answers[ticket] = response
                 case Answer(ticket, ConfigureResponse() as response):
                     self.configured[ticket] = response
-                case Answer(ticket, PressResponse() as response):
+                case Answer(ticket, InjectResponse() as response):
                     self.pressed[ticket] = response
                 case LogLine(_, text):
                     self.log.append(text)

@@ -19,9 +19,9 @@ from schemas.device import (
     DeviceStatus,
     DeviceStopRequest,
     HomeCommand,
+    InjectRequest,
+    InjectResponse,
     OutputCommand,
-    PressRequest,
-    PressResponse,
     SensorReadings,
     SpeedCommand,
     StopKind,
@@ -31,7 +31,7 @@ from schemas.topics import (
     DEVICE_CONFIGURATION,
     DEVICE_CONFIGURE,
     DEVICE_EVENTS,
-    DEVICE_PRESS,
+    DEVICE_INJECT,
     DEVICE_STATE,
     DEVICE_STATUS,
     DEVICE_STOP,
@@ -49,7 +49,7 @@ class PretendDevice:
     def __init__(self, node: Node, arm: Arm) -> None:
         self.arm, self._node = arm, node
         self.asked: list[DeviceCommand | StopKind] = []
-        self.pressed: list[PressRequest] = []
+        self.pressed: list[InjectRequest] = []
         self.steps_off: dict[str, int] = {}
         self.homing_fault = DeviceFault.NONE
         self.state = DeviceState(
@@ -62,7 +62,7 @@ class PretendDevice:
         node.serve(DEVICE_COMMAND, self._on_command)
         node.serve(DEVICE_STOP, self._on_stop)
         node.serve(DEVICE_CONFIGURE, self._on_configure)
-        node.serve(DEVICE_PRESS, self._on_press)
+        node.serve(DEVICE_INJECT, self._on_inject)
         self._states, self._events = node.publisher(DEVICE_STATE), node.publisher(DEVICE_EVENTS)
         self._statuses, self._sensors = node.publisher(DEVICE_STATUS), node.publisher(SENSORS)
         self._configurations = node.publisher(DEVICE_CONFIGURATION)
@@ -142,6 +142,6 @@ class PretendDevice:
         self.tell()
         return ConfigureResponse(accepted=True, crc32=self.configuration.crc32)
 
-    def _on_press(self, request: PressRequest) -> PressResponse:
+    def _on_inject(self, request: InjectRequest) -> InjectResponse:
         self.pressed.append(request)
-        return PressResponse(accepted=request.target != "efector_joint", reason="it does not slip")
+        return InjectResponse(accepted=request.target != "efector_joint", reason="it does not slip")

@@ -17,8 +17,8 @@ from schemas.device import (
     DeviceFault,
     DeviceMode,
     DeviceStatus,
-    PressKind,
-    PressRequest,
+    InjectKind,
+    InjectRequest,
     StopKind,
 )
 from services.cli import device, device_config, device_monitor, device_status
@@ -253,17 +253,17 @@ def test_a_moving_arm_is_not_configured(session, rm1_device):
 @pytest.mark.parametrize(
     ("words", "request_"),
     [
-        ("estop", PressRequest(press=PressKind.ESTOP, value=1.0)),
-        ("release", PressRequest(press=PressKind.ESTOP, value=0.0)),
-        ("block q1", PressRequest(press=PressKind.BLOCK, target="brazo_joint", value=1.0)),
-        ("free brazo_joint", PressRequest(press=PressKind.BLOCK, target="brazo_joint", value=0.0)),
-        ("slip brazo_joint -40", PressRequest(press=PressKind.SLIP, target="brazo_joint", value=-40.0)),
-        ("switch limit_q2 auto", PressRequest(press=PressKind.SWITCH, target="limit_q2", value=-1.0)),
-        ("sensor bateria 7.1", PressRequest(press=PressKind.SENSOR, target="bateria", value=7.1)),
-        ("reboot", PressRequest(press=PressKind.REBOOT)),
-        ("offline 2", PressRequest(press=PressKind.OFFLINE, value=2.0)),
-        ("freeze 0.5", PressRequest(press=PressKind.FREEZE, value=0.5)),
-        ("drift -100", PressRequest(press=PressKind.DRIFT, value=-100.0)),
+        ("estop", InjectRequest(kind=InjectKind.ESTOP, value=1.0)),
+        ("release", InjectRequest(kind=InjectKind.ESTOP, value=0.0)),
+        ("block q1", InjectRequest(kind=InjectKind.BLOCK, target="brazo_joint", value=1.0)),
+        ("free brazo_joint", InjectRequest(kind=InjectKind.BLOCK, target="brazo_joint", value=0.0)),
+        ("slip brazo_joint -40", InjectRequest(kind=InjectKind.SLIP, target="brazo_joint", value=-40.0)),
+        ("switch limit_q2 auto", InjectRequest(kind=InjectKind.SWITCH, target="limit_q2", value=-1.0)),
+        ("sensor bateria 7.1", InjectRequest(kind=InjectKind.SENSOR, target="bateria", value=7.1)),
+        ("reboot", InjectRequest(kind=InjectKind.REBOOT)),
+        ("offline 2", InjectRequest(kind=InjectKind.OFFLINE, value=2.0)),
+        ("freeze 0.5", InjectRequest(kind=InjectKind.FREEZE, value=0.5)),
+        ("drift -100", InjectRequest(kind=InjectKind.DRIFT, value=-100.0)),
     ],
 )
 def test_words_become_presses(arm, words, request_):
@@ -274,7 +274,7 @@ def test_words_become_presses(arm, words, request_):
 def test_every_kind_of_press_has_its_word(arm):
     values = {"JOINT": "q1", "STEPS": "1", "INPUT": "estop", "on|off|auto": "on", "SENSOR": "ultra"}
     kinds = {request_of(arm, word, [values.get(f, "1") for f in each.follows]).press for word, each in PRESSES.items()}
-    assert kinds == set(PressKind)
+    assert kinds == set(InjectKind)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from bench_firmware import FIRST, LAST, Row, command, heartbeat, smooth, traj
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion
 
-from schemas.device import DeviceCommandKind, PressKind
+from schemas.device import DeviceCommandKind, InjectKind
 from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 from tests.optional import need
 
@@ -174,9 +174,9 @@ class Bed:
         self.publish("cmd", command(cmd, self._commands, boot=boot, argument=argument))
         return self.answer("cmd/ack")[13]
 
-    def press(self, kind: PressKind, target: str = "", value: float = 1.0) -> None:
+    def press(self, kind: InjectKind, target: str = "", value: float = 1.0) -> None:
         """Ask for it; `event` says what came of it."""
-        self.publish("press", json.dumps({"press": kind, "target": target, "value": value}).encode())
+        self.publish("inject", json.dumps({"kind": kind, "target": target, "value": value}).encode())
 
     def shaft(self) -> dict[str, list[int]]:
         """What the device says of its shafts next."""

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from firmware.bindings.device import Device
-from firmware.bindings.press import press
-from schemas.device import DeviceCommandKind, DeviceMode, PressKind, PressRequest
+from firmware.bindings.injection import inject
+from schemas.device import DeviceCommandKind, DeviceMode, InjectKind, InjectRequest
 from schemas.device_config import DeviceConfig, JointConfig
 from schemas.robot import Motor
 
@@ -113,9 +113,9 @@ class Bench:
         assert ack is not None
         return ack.code
 
-    def press(self, kind: PressKind, target: str = "", value: float = 1.0) -> None:
+    def press(self, kind: InjectKind, target: str = "", value: float = 1.0) -> None:
         """Do something to the device's world."""
-        press(self.device, PressRequest(press=kind, target=target, value=value))
+        inject(self.device, InjectRequest(kind=kind, target=target, value=value))
 
     def run_until(self, mode: DeviceMode, seconds: float) -> None:
         """Let time pass until the device is in that mode; at most so long."""

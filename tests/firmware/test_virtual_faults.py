@@ -11,7 +11,7 @@ import zlib
 import msgspec
 from bed_firmware import Bed, wait_for
 
-from schemas.device import DeviceCommandKind, DeviceMode, PressKind
+from schemas.device import DeviceCommandKind, DeviceMode, InjectKind
 from schemas.device_config import DeviceConfig, config_text
 from services.arm.device.device_config import device_config
 from services.arm.model.description import Arm
@@ -31,29 +31,29 @@ def slower(arm: Arm) -> DeviceConfig:
 
 def test_a_pressed_e_stop_stops_the_device_and_is_told(bed: Bed):
     bed.start_device()
-    bed.press(PressKind.ESTOP)
-    assert bed.event("pressed")["detail"] == "estop 1"
+    bed.press(InjectKind.ESTOP)
+    assert bed.event("injected")["detail"] == "estop 1"
     assert mode_of(bed) == DeviceMode.ESTOP
-    bed.press(PressKind.ESTOP, value=0.0)
-    bed.event("pressed")
+    bed.press(InjectKind.ESTOP, value=0.0)
+    bed.event("injected")
     wait_for(lambda: bed.order(DeviceCommandKind.RESET) == OK, "the reset")
     assert mode_of(bed) == DeviceMode.UNREFERENCED
 
 
 def test_a_press_that_cannot_be_is_refused_with_the_reason(bed: Bed):
     bed.start_device()
-    bed.press(PressKind.BLOCK, "q7")
-    assert bed.event("press_refused")["detail"] == "there is no joint 'q7'; there is q1, q2, q3"
-    bed.publish("press", b"\xff\x00{")
-    assert "this is no press" in str(bed.event("press_refused")["detail"])
-    bed.publish("press", b'{"press": "dance"}')
-    assert "dance" in str(bed.event("press_refused")["detail"])
+    bed.press(InjectKind.BLOCK, "q7")
+    assert bed.event("inject_refused")["detail"] == "there is no joint 'q7'; there is q1, q2, q3"
+    bed.publish("inject", b"\xff\x00{")
+    assert "this is no injection" in str(bed.event("inject_refused")["detail"])
+    bed.publish("inject", b'{"kind": "dance"}')
+    assert "dance" in str(bed.event("inject_refused")["detail"])
 
 
 def test_a_slip_is_seen_at_the_shaft_and_not_in_the_counter_also_after_a_restart(bed: Bed):
     bed.start_device()
-    bed.press(PressKind.SLIP, "q1", 24.0)
-    bed.event("pressed")
+    bed.press(InjectKind.SLIP, "q1", 24.0)
+    bed.event("injected")
     report = bed.shaft()
     assert (report["steps"], report["shaft"]) == ([0, 0, 0], [24, 0, 0])
     assert bed.end_device(signal.SIGTERM) == 0
@@ -69,7 +69,7 @@ def test_a_device_that_is_reset_while_moving_wakes_up_without_its_place_where_it
     assert bed.move(3000, 2.5)[20] == OK
     bed.event("started")
     time.sleep(0.3)
-    bed.press(PressKind.REBOOT)
+    bed.press(InjectKind.REBOOT)
     wait_for(lambda: bed.status["online"] is True and bed.status["boot_id"] != before, "the next boot")
     assert bed.status["referenced"] is False
     assert bed.status["reset_cause"] == "lost_while_moving"
@@ -81,9 +81,9 @@ def test_a_device_that_is_reset_while_moving_wakes_up_without_its_place_where_it
 def test_an_e_stop_that_is_pressed_stays_pressed_over_a_reset(bed: Bed):
     bed.start_device()
     before = bed.status["boot_id"]
-    bed.press(PressKind.ESTOP)
+    bed.press(InjectKind.ESTOP)
     bed.event("estop")
-    bed.press(PressKind.REBOOT)
+    bed.press(InjectKind.REBOOT)
     wait_for(lambda: bed.status["online"] is True and bed.status["boot_id"] != before, "the next boot")
     assert mode_of(bed) == DeviceMode.ESTOP
 
@@ -91,7 +91,7 @@ def test_an_e_stop_that_is_pressed_stays_pressed_over_a_reset(bed: Bed):
 def test_a_reset_at_rest_forgets_nothing(bed: Bed):
     bed.start_device()
     before = bed.status["boot_id"]
-    bed.press(PressKind.REBOOT)
+    bed.press(InjectKind.REBOOT)
     wait_for(lambda: bed.status["online"] is True and bed.status["boot_id"] != before, "the next boot")
     assert bed.status["referenced"] is True
     assert bed.status["reset_cause"] == "reset_button"
@@ -102,8 +102,8 @@ def test_a_device_without_wifi_holds_by_itself_and_comes_back_as_the_same(bed: B
     before = bed.status["boot_id"]
     bed.beat()
     assert bed.move(4000, 2.5)[20] == OK
-    bed.press(PressKind.OFFLINE, value=2.0)
-    assert bed.event("pressed")["detail"] == "offline 2"
+    bed.press(InjectKind.OFFLINE, value=2.0)
+    assert bed.event("injected")["detail"] == "offline 2"
     wait_for(lambda: bed.status["online"] is False, "the last will")
     wait_for(lambda: bed.status["online"] is True, "the device's return")
     assert bed.status["boot_id"] == before
@@ -115,14 +115,14 @@ def test_a_frozen_slot_task_is_a_fault_of_a_moving_device(bed: Bed):
     bed.beat()
     assert bed.move(4000, 2.5)[20] == OK
     bed.event("started")
-    bed.press(PressKind.FREEZE, value=0.3)
+    bed.press(InjectKind.FREEZE, value=0.3)
     assert bed.event("fault")["detail"] == "no new slot for 3 ms"
 
 
 def test_a_clock_that_drifts_is_fast_by_as_much(bed: Bed):
     bed.start_device()
-    bed.press(PressKind.DRIFT, value=10_000.0)
-    bed.event("pressed")
+    bed.press(InjectKind.DRIFT, value=10_000.0)
+    bed.event("injected")
 
     def device_time() -> float:
         bed.heard.pop("state", None)

@@ -16,7 +16,7 @@ from bed_firmware import Bed, SerialPort, wait_for
 from bench_firmware import BOOT, FIRST, LAST, command, heartbeat, seal, smooth, traj
 
 from firmware.bindings.device import Device
-from schemas.device import DeviceCommandKind, DeviceMode, PressKind
+from schemas.device import DeviceCommandKind, DeviceMode, InjectKind
 from schemas.device_config import DeviceConfig, config_text
 from services.arm.device.device_config import device_config
 from services.arm.model.description import Arm
@@ -121,9 +121,9 @@ def test_both_wires_live_at_once(bed: Bed, line: SerialPort):
     assert struct.unpack("<Q", line.answer(SYNC_R)[8:16]) == (77,)
     bed.publish("sync", sync(78))
     assert struct.unpack("<Q", bed.answer("sync/r")[8:16]) == (78,)
-    line.send_json(JsonFrame.PRESS, {"press": PressKind.SLIP, "target": "q1", "value": 16.0})
-    assert line.json(JsonFrame.EVENT)["event"] == "pressed"
-    assert bed.event("pressed")["detail"] == "slip q1 16"
+    line.send_json(JsonFrame.INJECT, {"kind": InjectKind.SLIP, "target": "q1", "value": 16.0})
+    assert line.json(JsonFrame.EVENT)["event"] == "injected"
+    assert bed.event("injected")["detail"] == "slip q1 16"
     assert bed.end_device(signal.SIGTERM) == 0
     assert not (bed.folder / "run/virtual_esp32.tty").is_symlink()
 

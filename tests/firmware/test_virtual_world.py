@@ -7,8 +7,8 @@ import random
 import pytest
 from bench_firmware import Bench
 
-from firmware.bindings.press import PressRefused
-from schemas.device import DeviceCommandKind, DeviceMode, PressKind
+from firmware.bindings.injection import InjectRefused
+from schemas.device import DeviceCommandKind, DeviceMode, InjectKind
 from schemas.device_config import DeviceConfig, HomingConfig, InputConfig, InputRole, JointConfig
 from services.arm.device.device_config import device_config
 from services.arm.model.description import Arm
@@ -81,7 +81,7 @@ def test_homing_proves_steps_that_were_lost(rm1: Arm, slip: int):
     bench = rm1_bench(rm1)
     assert bench.move((2000, 40, 60), 3.0) == OK
     bench.run(1500)
-    bench.press(PressKind.SLIP, "q1", slip)
+    bench.press(InjectKind.SLIP, "q1", slip)
     bench.run(2500)
     assert bench.device.steps == (2000, 40, 60)  # what the counter believes
     assert bench.device.shaft == (2000 + slip, 40, 60)
@@ -113,12 +113,12 @@ def test_a_motor_that_is_asked_for_more_than_it_has_loses_cycles_and_only_the_sh
 
 def test_a_joint_that_is_held_fast_loses_its_steps(rm1: Arm):
     bench = rm1_bench(rm1)
-    bench.press(PressKind.BLOCK, "q1")
+    bench.press(InjectKind.BLOCK, "q1")
     assert bench.move((1003, 10, 10), 2.0) == OK
     bench.run(3000)
     assert bench.device.steps == (1003, 10, 10)
     assert bench.device.shaft == (0, 10, 10)
-    bench.press(PressKind.BLOCK, "q1", 0.0)
+    bench.press(InjectKind.BLOCK, "q1", 0.0)
     bench.run(1000)
     assert bench.device.shaft == (1003 % CYCLE, 10, 10)
 
@@ -130,7 +130,7 @@ def test_the_e_stop_silences_a_moving_arm_within_a_tick_and_wants_a_person(rm1: 
     assert bench.move((4000, 50, 50), 4.0) == OK
     bench.run(2000)
     before = bench.device.steps
-    bench.press(PressKind.ESTOP)
+    bench.press(InjectKind.ESTOP)
     bench.device.advance(bench.device.now_us + 40)  # two ticks
     stood = bench.device.steps
     assert abs(stood[0] - before[0]) <= 1
@@ -142,7 +142,7 @@ def test_the_e_stop_silences_a_moving_arm_within_a_tick_and_wants_a_person(rm1: 
     assert bench.device.outputs == ()
     assert bench.details("estop") == ["estop"]
     assert bench.order(RESET) == ESTOP_PRESSED
-    bench.press(PressKind.ESTOP, value=0.0)
+    bench.press(InjectKind.ESTOP, value=0.0)
     bench.run(10)
     assert bench.order(RESET) == OK
     assert bench.order(HOME) == NOT_ARMED
@@ -155,7 +155,7 @@ def test_the_e_stop_silences_a_moving_arm_within_a_tick_and_wants_a_person(rm1: 
 def test_a_disarmed_arm_can_be_turned_by_hand_and_must_home_again(rm1: Arm):
     bench = rm1_bench(rm1)
     assert bench.order(DISARM) == OK
-    bench.press(PressKind.SLIP, "q2", 25)
+    bench.press(InjectKind.SLIP, "q2", 25)
     bench.run(100)
     assert bench.device.steps == (0, 0, 0)
     assert bench.device.shaft == (0, 25, 0)
@@ -171,7 +171,7 @@ def test_a_shaft_that_reaches_a_limit_switch_outside_homing_is_a_fault(rm1: Arm)
     bench = rm1_bench(rm1)
     switch = bench.device.config.joints[0].homing
     assert switch is not None
-    bench.press(PressKind.SLIP, "q1", switch.position_q8 // 256)
+    bench.press(InjectKind.SLIP, "q1", switch.position_q8 // 256)
     bench.run(10)
     assert bench.device.mode == DeviceMode.FAULT
     assert bench.details("fault") == ["limit_q1"]
@@ -179,12 +179,12 @@ def test_a_shaft_that_reaches_a_limit_switch_outside_homing_is_a_fault(rm1: Arm)
 
 def test_a_switch_that_never_closes_is_a_fault_of_homing_and_works_again_once_it_does(rm1: Arm):
     bench = rm1_bench(rm1, shaft=(0, 0, 400), referenced=False)
-    bench.press(PressKind.SWITCH, "limit_q3", 0.0)
+    bench.press(InjectKind.SWITCH, "limit_q3", 0.0)
     bench.run(10)
     assert bench.order(HOME, argument=4) == OK
     bench.run_until(DeviceMode.FAULT, 120.0)
     assert bench.details("fault") == ["q3: its switch was not found"]
-    bench.press(PressKind.SWITCH, "limit_q3", -1.0)
+    bench.press(InjectKind.SWITCH, "limit_q3", -1.0)
     bench.run(10)
     assert bench.order(RESET) == OK
     assert bench.order(HOME, argument=4) == OK
@@ -194,7 +194,7 @@ def test_a_switch_that_never_closes_is_a_fault_of_homing_and_works_again_once_it
 
 def test_a_switch_that_stays_closed_is_a_fault_of_homing(rm1: Arm):
     bench = rm1_bench(rm1, referenced=False)
-    bench.press(PressKind.SWITCH, "limit_q3")
+    bench.press(InjectKind.SWITCH, "limit_q3")
     bench.run(10)
     assert bench.order(RESET) == OK  # a limit switch that closes by itself is a fault already
     assert bench.order(HOME, argument=4) == OK
@@ -206,7 +206,7 @@ def test_a_slot_task_that_hangs_stops_the_pulses_and_is_a_fault(rm1: Arm):
     bench = rm1_bench(rm1)
     assert bench.move((4000, 0, 0), 4.0) == OK
     bench.run(2000)
-    bench.press(PressKind.FREEZE, value=0.5)
+    bench.press(InjectKind.FREEZE, value=0.5)
     bench.device.advance(bench.device.now_us + 4_000)
     stood = bench.device.steps
     bench.run(1000)
@@ -219,7 +219,7 @@ def test_sensors_read_what_they_are_given(rm1: Arm):
     bench = rm1_bench(rm1)
     assert bench.sensors["ultra"] == pytest.approx(20.0, abs=0.1)
     assert bench.sensors["bateria"] == pytest.approx(7.4, abs=0.01)
-    bench.press(PressKind.SENSOR, "bateria", 6.3)
+    bench.press(InjectKind.SENSOR, "bateria", 6.3)
     bench.run(200)
     assert bench.sensors["bateria"] == pytest.approx(6.3, abs=0.002)
     assert bench.sensors["ultra"] == pytest.approx(20.0, abs=0.1)
@@ -228,25 +228,25 @@ def test_sensors_read_what_they_are_given(rm1: Arm):
 @pytest.mark.parametrize(
     ("kind", "target", "value", "reason"),
     [
-        (PressKind.BLOCK, "q9", 1.0, "there is no joint 'q9'; there is q1, q2, q3"),
-        (PressKind.SWITCH, "estopp", 1.0, "there is no input 'estopp'"),
-        (PressKind.SWITCH, "limit_q1", 2.0, "the value 2 is none of -1, 0, 1"),
-        (PressKind.SENSOR, "baterie", 1.0, "there is ultra, bateria"),
-        (PressKind.FREEZE, "", 1e9, "not 0 to 60"),
-        (PressKind.SLIP, "q1", 1e12, "not -1e[+]06 to 1e[+]06"),
-        (PressKind.REBOOT, "", 1.0, "only the virtual ESP32's process"),
+        (InjectKind.BLOCK, "q9", 1.0, "there is no joint 'q9'; there is q1, q2, q3"),
+        (InjectKind.SWITCH, "estopp", 1.0, "there is no input 'estopp'"),
+        (InjectKind.SWITCH, "limit_q1", 2.0, "the value 2 is none of -1, 0, 1"),
+        (InjectKind.SENSOR, "baterie", 1.0, "there is ultra, bateria"),
+        (InjectKind.FREEZE, "", 1e9, "not 0 to 60"),
+        (InjectKind.SLIP, "q1", 1e12, "not -1e[+]06 to 1e[+]06"),
+        (InjectKind.REBOOT, "", 1.0, "only the virtual ESP32's process"),
     ],
 )
 def test_a_press_that_cannot_be_is_refused_with_what_could_be(
-    rm1: Arm, kind: PressKind, target: str, value: float, reason: str
+    rm1: Arm, kind: InjectKind, target: str, value: float, reason: str
 ):
     bench = rm1_bench(rm1)
-    with pytest.raises(PressRefused, match=reason):
+    with pytest.raises(InjectRefused, match=reason):
         bench.press(kind, target, value)
     assert bench.device.shaft == (0, 0, 0)
 
 
 def test_a_device_without_an_e_stop_says_so():
     bench = Bench(six_joints())
-    with pytest.raises(PressRefused, match="no e-stop"):
-        bench.press(PressKind.ESTOP)
+    with pytest.raises(InjectRefused, match="no e-stop"):
+        bench.press(InjectKind.ESTOP)

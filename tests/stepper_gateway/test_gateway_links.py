@@ -209,11 +209,11 @@ def test_the_device_hears_everything_once_and_in_order(peer: Peer, bench: Bench)
     beats = [encode(Heartbeat(session=1, counter=i)) for i in range(100)]
     assert bench.link.send(Kind.CONFIG, TEXT)
     assert all(bench.link.send(Kind.HB, beat) for beat in beats)
-    assert bench.link.send(Kind.PRESS, TEXT)
+    assert bench.link.send(Kind.INJECT, TEXT)
     assert bench.until(lambda: len(peer.heard()) >= 102)
     assert [payload for kind, payload in peer.heard() if kind == Kind.HB] == beats
     assert (Kind.CONFIG, TEXT) in peer.heard()
-    assert (Kind.PRESS, TEXT) in peer.heard()
+    assert (Kind.INJECT, TEXT) in peer.heard()
 
 
 def test_a_wire_that_is_cut_says_so_sends_nothing_and_comes_back_empty(peer: Peer, bench: Bench) -> None:

@@ -14,8 +14,8 @@ from schemas.actions import GoalStatusCode
 from schemas.device import (
     ConfigureRequest,
     DeviceCommandRequest,
-    PressKind,
-    PressRequest,
+    InjectKind,
+    InjectRequest,
     ReferenceCommand,
     ResetCommand,
     ResumeCommand,
@@ -27,7 +27,7 @@ from schemas.scene import PlanningScene
 from schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURE,
-    DEVICE_PRESS,
+    DEVICE_INJECT,
     FOLLOW_JOINT_TRAJECTORY,
     JOINT_STATES,
     JOINT_TARGETS,
@@ -125,7 +125,7 @@ def test_a_client_moves_cancels_streams_and_commands(running: Running) -> None:
     assert answer.accepted
     running.until(lambda: running.here.position == (0.0, 0.0, 0.0))
     assert running.client.call(DEVICE_CONFIGURE, ConfigureRequest(), 8.0).accepted
-    pressed = running.client.call(DEVICE_PRESS, PressRequest(press=PressKind.ESTOP), 5.0)
+    pressed = running.client.call(DEVICE_INJECT, InjectRequest(kind=InjectKind.ESTOP), 5.0)
     assert pressed.accepted, pressed.reason
     answer = running.client.call(DEVICE_COMMAND, DeviceCommandRequest(command=ResetCommand()), 3.0)
     assert "release it" in answer.reason

@@ -10,7 +10,7 @@ import pytest
 
 from schemas.actions import GoalStatusCode
 from schemas.deployment import Deployment, DeviceKind, SerialSection, Wire
-from schemas.device import DeviceMode, PressKind, PressRequest
+from schemas.device import DeviceMode, InjectKind, InjectRequest
 from services.stepper_gateway.main import open_link, serial_device
 from tests.stepper_gateway.processes import DEVICE, Processes
 from tests.stepper_gateway.wired import WiredGateway
@@ -36,9 +36,9 @@ def test_a_move_and_everything_that_is_json_over_a_cable(cabled: Processes) -> N
         assert gateway.move_to(NEAR).accepted
         assert gateway.finish()[0] == GoalStatusCode.SUCCEEDED
         assert gateway.configure().accepted
-        assert gateway.answer_to_press(PressRequest(press=PressKind.SENSOR, target="bateria", value=7.5)).accepted
+        assert gateway.answer_to_press(InjectRequest(kind=InjectKind.SENSOR, target="bateria", value=7.5)).accepted
         assert gateway.run(3.0, lambda: bool(gateway.published["sensors"] and gateway.published["device/shaft"]))
-        assert gateway.answer_to_press(PressRequest(press=PressKind.ESTOP)).accepted
+        assert gateway.answer_to_press(InjectRequest(kind=InjectKind.ESTOP)).accepted
         assert gateway.run(2.0, lambda: gateway.state.mode == DeviceMode.ESTOP)
         assert gateway.core.bad_frames == 0
         trips = sorted(ack.round_trip for ack in gateway.published["command_acks"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceMode, PressKind, PressRequest, StopKind
+from schemas.device import DeviceMode, InjectKind, InjectRequest, StopKind
 from services.stepper_gateway.links.frames import Command, decode
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.virtual_arm import VirtualArm
@@ -95,10 +95,10 @@ def test_a_stop_reaches_a_boot_that_the_gateway_has_not_met_yet() -> None:
 
 def test_a_stop_leaves_at_once_with_a_configuration_and_twenty_presses_unanswered() -> None:
     rig = moving()
-    rig.lost = {Kind.CONFIG, Kind.PRESS}
+    rig.lost = {Kind.CONFIG, Kind.INJECT}
     rig.ask_configuration(500)
     for number in range(20):
-        rig.press(PressRequest(press=PressKind.ESTOP), 1000 + number)
+        rig.press(InjectRequest(kind=InjectKind.ESTOP), 1000 + number)
     before = rig.now
     rig.ask(StopKind.STOP, 7)
     assert [at for at, kind, _ in rig.sent if kind == Kind.CMD] == [before]

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from schemas.device import PressRequest, PressResponse
+from schemas.device import InjectRequest, InjectResponse
 from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.links.mqtt import MqttLink
 from services.virtual_arm.gateway_driver import GatewayDriver, Kind, Moment
@@ -59,7 +59,7 @@ class WiredGateway(GatewayDriver):
         """Asks for a jerk-limited move from where the arm is."""
         return self.goal(move(self.published["joint_states"][-1].position, end), goal_id)
 
-    def answer_to_press(self, request: PressRequest) -> PressResponse:
+    def answer_to_press(self, request: InjectRequest) -> InjectResponse:
         """The answer of the virtual device."""
         self.press(request)
         assert self.run(8.0, lambda: 1 in self.pressed)

@@ -17,7 +17,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 log = logging.getLogger("virtual_esp32")
 
 PREFIX = "gemelo/v1"
-COMMANDS = {"traj": 1, "cmd": 1, "hb": 0, "sync": 0, "config": 1, "press": 1}  # QoS of the subscription
+COMMANDS = {"traj": 1, "cmd": 1, "hb": 0, "sync": 0, "config": 1, "inject": 1}  # QoS of the subscription
 REPORTS = {  # QoS of the publication
     "traj/ack": 0, "cmd/ack": 1, "sync/r": 0, "state": 0, "event": 1, "status": 1,
     "config/ack": 1, "sensors": 0, "shaft": 0,

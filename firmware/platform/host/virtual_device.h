@@ -17,7 +17,7 @@ struct OutFrame {
     std::vector<uint8_t> payload;
 };
 
-// PROVISION or PRESS, as JSON, as it came over the line.
+// PROVISION or INJECT, as JSON, as it came over the line.
 struct Request {
     FrameType type;
     std::string text;

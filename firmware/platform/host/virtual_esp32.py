@@ -10,12 +10,12 @@ from functools import partial
 
 from firmware.bindings.device import Device
 from firmware.bindings.frames import PlatformRequest
+from firmware.bindings.injection import InjectRefused, inject, read_injection, within
 from firmware.bindings.parsers import ProvisionRefused
-from firmware.bindings.press import PressRefused, press, read_press, within
 from firmware.platform.host.board import Board, DeviceClock, provision, provision_answer
 from firmware.platform.host.link import Connected, Disconnected, Item, MqttMessage, SerialBytes, ShutdownRequested
 from firmware.platform.host.wires import Wires, say_event
-from schemas.device import PressKind, PressRequest
+from schemas.device import InjectKind, InjectRequest
 from services.runtime.process.readiness import Readiness
 from services.runtime.serial_frames import JsonFrame
 
@@ -119,17 +119,17 @@ class VirtualEsp32:
         self._advance(item.monotonic)
         received_us = self._clock.at(item.monotonic)
         match item.kind:
-            case "press":
+            case "inject":
                 if not item.retained:
-                    self._press(item.payload)
+                    self._inject(item.payload)
             case "config":
                 self._device.receive_config(item.payload, item.retained, received_us)
             case _:
                 self._device.receive(item.payload, item.retained, received_us)
 
     def _on_request(self, request: PlatformRequest) -> None:
-        if request.kind is JsonFrame.PRESS:
-            self._press(request.text)
+        if request.kind is JsonFrame.INJECT:
+            self._inject(request.text)
         else:
             self._provision(request.text)
 
@@ -143,31 +143,31 @@ class VirtualEsp32:
         self._device.say(JsonFrame.PROVISION_ACK, provision_answer())
         self._start_anew(cause)
 
-    def _press(self, text: bytes) -> None:
-        """A press is answered by an event, whatever comes of it."""
+    def _inject(self, text: bytes) -> None:
+        """Carries out an injection; an event answers it in any case."""
         try:
-            request = read_press(text)
+            request = read_injection(text)
             self._carry_out(request)
-        except PressRefused as error:
-            say_event(self._device, "press_refused", str(error))
+        except InjectRefused as error:
+            say_event(self._device, "inject_refused", str(error))
         else:
-            words = (request.press, request.target, f"{request.value:g}")
-            say_event(self._device, "pressed", " ".join(word for word in words if word))
+            words = (request.kind, request.target, f"{request.value:g}")
+            say_event(self._device, "injected", " ".join(word for word in words if word))
 
-    def _carry_out(self, request: PressRequest) -> None:
+    def _carry_out(self, request: InjectRequest) -> None:
         """Do it; what keeps the answer from being said is done a little later."""
         now = time.monotonic()
-        match request.press:
-            case PressKind.REBOOT:
+        match request.kind:
+            case InjectKind.REBOOT:
                 self._later.append((now + REPLY_TIME, partial(self._reboot, "reset_button")))
-            case PressKind.OFFLINE:
+            case InjectKind.OFFLINE:
                 away = within(request, LONGEST_OFFLINE)
                 self._later.append((now + REPLY_TIME, self._wires.network.break_off))
                 self._later.append((now + REPLY_TIME + away, self._join))
-            case PressKind.DRIFT:
+            case InjectKind.DRIFT:
                 self._clock.drift(now, within(request, LARGEST_DRIFT, -LARGEST_DRIFT))
             case _:
-                press(self._device, request)
+                inject(self._device, request)
 
     def _reboot(self, cause: str) -> None:
         self._board.remember(self._device)

@@ -15,7 +15,7 @@ log = logging.getLogger("virtual_esp32")
 
 SHAFT_PERIOD = 0.1  # [s]
 LOGGED_WITH_TIME = ("fault", "estop", "hold", "underrun")
-LOGGED = ("homed", "configured", "pressed", "press_refused")
+LOGGED = ("homed", "configured", "injected", "inject_refused")
 
 
 class Wires:

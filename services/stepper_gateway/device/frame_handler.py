@@ -27,7 +27,7 @@ RENEWED = (
     "were sent under its session; it has begun a fresh session"
 )
 LOST = (DeviceMode.FAULT, DeviceMode.ESTOP, DeviceMode.UNREFERENCED, DeviceMode.HOMING, DeviceMode.BOOT)
-TROUBLE = ("fault", "hold", "late", "underrun", "estop", "homing_stopped", "text_lost", "press_refused")
+TROUBLE = ("fault", "hold", "late", "underrun", "estop", "homing_stopped", "text_lost", "inject_refused")
 MOTION = {"started": "from", "finished": "at"}  # how the place of a motion's event is introduced
 BY_A_PERSON = "command"  # the detail of what somebody has asked for
 
@@ -92,7 +92,7 @@ class FrameHandler:
         publish_event(event, self._device, moment)
         if event.event in STOPPED:
             self._on_stopped(event, moment)
-        self._components.presses.on_event(event)
+        self._components.injections.on_event(event)
 
     def _on_stopped(self, event: EventReport, moment: Moment) -> None:
         """The device slows down by itself; where it misses heartbeats that were sent, it gets a fresh session."""

@@ -22,11 +22,11 @@ class Kind(StrEnum):
     CONFIG = "config"
     CONFIG_ACK = "config/ack"
     SENSORS = "sensors"
-    PRESS = "press"
+    INJECT = "inject"
     SHAFT = "shaft"
 
 
-TO_DEVICE = (Kind.TRAJ, Kind.CMD, Kind.HB, Kind.SYNC, Kind.CONFIG, Kind.PRESS)
+TO_DEVICE = (Kind.TRAJ, Kind.CMD, Kind.HB, Kind.SYNC, Kind.CONFIG, Kind.INJECT)
 FROM_DEVICE = tuple(kind for kind in Kind if kind not in TO_DEVICE)
 
 

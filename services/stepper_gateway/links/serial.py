@@ -29,7 +29,7 @@ TEXTS = {
     JsonFrame.SENSORS: Kind.SENSORS,
     JsonFrame.STATUS: Kind.STATUS,
     JsonFrame.EVENT: Kind.EVENT,
-    JsonFrame.PRESS: Kind.PRESS,
+    JsonFrame.INJECT: Kind.INJECT,
     JsonFrame.SHAFT: Kind.SHAFT,
 }
 FRAMES = {kind: frame for frame, kind in TEXTS.items()}  # of the kinds that are JSON

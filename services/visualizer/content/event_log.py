@@ -10,7 +10,7 @@ from services.visualizer.content import entities
 from services.visualizer.content.thinning import LAST_STAMP
 from services.visualizer.content.updates import LogLines, Update
 
-EVENT_LEVELS = {"fault": "ERROR", "estop": "ERROR", "homing_stopped": "WARNING", "press_refused": "WARNING"}
+EVENT_LEVELS = {"fault": "ERROR", "estop": "ERROR", "homing_stopped": "WARNING", "inject_refused": "WARNING"}
 
 
 class EventLog:

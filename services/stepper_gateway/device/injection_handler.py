@@ -1,4 +1,4 @@
-"""Presses: what a person does to a virtual device's world, one at a time, each answered by the device itself."""
+"""Injections into a virtual device, one at a time, each answered by the device itself."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import msgspec
 from msgspec.structs import replace
 
-from schemas.device import PressKind, PressRequest, PressResponse
+from schemas.device import InjectKind, InjectRequest, InjectResponse
 from services.arm.errors import suggestion
 from services.arm.model.description import Arm
 from services.stepper_gateway.device.gateway_device import GatewayDevice
@@ -18,25 +18,25 @@ from services.stepper_gateway.links.reports import EventReport
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Answer
 
-DONE, REFUSED = "pressed", "press_refused"
+DONE, REFUSED = "injected", "inject_refused"
 
 
-class Press(NamedTuple):
+class PendingInjection(NamedTuple):
     """One that waits for its answer."""
 
-    request: PressRequest
+    request: InjectRequest
     ticket: int
     deadline: float  # [s] monotonic
 
 
-class PressHandler:
-    """The device's event does not say which press it answers, so the next one is sent after it."""
+class InjectionHandler:
+    """The device's event does not say which injection it answers, so the next one is sent after it."""
 
     def __init__(self, device: GatewayDevice) -> None:
         self._device = device
-        self._waiting: deque[Press] = deque()
+        self._waiting: deque[PendingInjection] = deque()
 
-    def ask(self, request: PressRequest, ticket: int, moment: Moment) -> None:
+    def ask(self, request: InjectRequest, ticket: int, moment: Moment) -> None:
         """Have it done, or answer at once why not."""
         try:
             if reason := self._device.unreachable_reason(moment):
@@ -50,43 +50,45 @@ class PressHandler:
             translated = replace(request, target=target_of(request, self._device.arm))
         except GoalRejected as rejected:
             return self._answer(ticket, False, rejected.reason)
-        self._waiting.append(Press(translated, ticket, moment.monotonic + self._device.parameters.command_timeout))
+        self._waiting.append(
+            PendingInjection(translated, ticket, moment.monotonic + self._device.parameters.command_timeout)
+        )
         if len(self._waiting) == 1:
             self._send()
 
     def on_event(self, event: EventReport) -> None:
         """The device has done the oldest one, or refused it."""
         if event.event in (DONE, REFUSED) and self._waiting:
-            press = self._waiting.popleft()
+            injection = self._waiting.popleft()
             done = event.event == DONE
-            self._answer(press.ticket, done, "" if done else event.detail)
+            self._answer(injection.ticket, done, "" if done else event.detail)
             self._send()
 
     def step(self, moment: Moment) -> None:
         """Give up what was not answered in time."""
         while self._waiting and moment.monotonic >= self._waiting[0].deadline:
-            press = self._waiting.popleft()
-            self._answer(press.ticket, False, f"the device has not answered {press.request.press} in time")
+            injection = self._waiting.popleft()
+            self._answer(injection.ticket, False, f"the device has not answered {injection.request.kind} in time")
             self._send()
 
     def _send(self) -> None:
         if self._waiting:
-            self._device.out.send(Kind.PRESS, msgspec.json.encode(self._waiting[0].request))
+            self._device.out.send(Kind.INJECT, msgspec.json.encode(self._waiting[0].request))
 
     def _answer(self, ticket: int, accepted: bool, reason: str) -> None:
-        self._device.out.put(Answer(ticket, PressResponse(accepted=accepted, reason=reason)))
+        self._device.out.put(Answer(ticket, InjectResponse(accepted=accepted, reason=reason)))
 
 
-def target_of(request: PressRequest, arm: Arm) -> str:
+def target_of(request: InjectRequest, arm: Arm) -> str:
     """The target as the device knows it, which calls joints by their wire names; raises `GoalRejected`."""
-    match request.press:
-        case PressKind.BLOCK | PressKind.SLIP:
+    match request.kind:
+        case InjectKind.BLOCK | InjectKind.SLIP:
             wire_names = {joint.name: joint.wire_name for joint in arm.joints}
             wire_names |= {joint.wire_name: joint.wire_name for joint in arm.joints}
             return wire_names[_known(request.target, tuple(wire_names), "joint")]
-        case PressKind.SWITCH:
+        case InjectKind.SWITCH:
             return _known(request.target, tuple(switch.name for switch in arm.inputs), "input")
-        case PressKind.SENSOR:
+        case InjectKind.SENSOR:
             return _known(request.target, tuple(sensor.name for sensor in arm.sensors), "sensor")
         case _:
             return request.target

@@ -8,77 +8,77 @@ from collections.abc import Iterable
 import msgspec
 
 from firmware.bindings.device import Device
-from schemas.device import PressKind, PressRequest
+from schemas.device import InjectKind, InjectRequest
 from schemas.device_config import InputRole
 
 LONGEST_FREEZE = 60.0  # [s]
 FURTHEST_SLIP = 1_000_000  # [steps]
 
 
-class PressRefused(ValueError):
+class InjectRefused(ValueError):
     """It cannot be done; the message says why, and what could be."""
 
 
-def read_press(text: bytes) -> PressRequest:
-    """The JSON of `press`; raises PressRefused."""
+def read_injection(text: bytes) -> InjectRequest:
+    """The JSON of `inject`; raises InjectRefused."""
     try:
-        return msgspec.json.decode(text, type=PressRequest)
+        return msgspec.json.decode(text, type=InjectRequest)
     except msgspec.DecodeError as error:
-        raise PressRefused(f"this is no press: {error}") from error
+        raise InjectRefused(f"this is no injection: {error}") from error
 
 
-def press(device: Device, request: PressRequest) -> None:
-    """Do it to the device; raises PressRefused."""
+def inject(device: Device, request: InjectRequest) -> None:
+    """Do it to the device; raises InjectRefused."""
     if not math.isfinite(request.value):
-        raise PressRefused(f"{request.press}: the value {request.value} is not finite")
-    match request.press:
-        case PressKind.ESTOP:
+        raise InjectRefused(f"{request.kind}: the value {request.value} is not finite")
+    match request.kind:
+        case InjectKind.ESTOP:
             _press_estop(device, _choice(request, {0: False, 1: True}))
-        case PressKind.SWITCH:
+        case InjectKind.SWITCH:
             state = _choice(request, {-1: None, 0: False, 1: True})
             device.press_input(_index("input", request.target, (i.name for i in device.config.inputs)), state)
-        case PressKind.BLOCK:
+        case InjectKind.BLOCK:
             device.block(_joint(device, request), bool(_choice(request, {0: False, 1: True})))
-        case PressKind.SLIP:
+        case InjectKind.SLIP:
             device.slip(_joint(device, request), round(within(request, FURTHEST_SLIP, -FURTHEST_SLIP)))
-        case PressKind.SENSOR:
+        case InjectKind.SENSOR:
             names = (sensor.name for sensor in device.config.sensors)
             device.set_sensor(_index("sensor", request.target, names), request.value)
-        case PressKind.FREEZE:
+        case InjectKind.FREEZE:
             device.freeze(within(request, LONGEST_FREEZE))
         case _:
-            raise PressRefused(f"{request.press}: only the virtual ESP32's process can do that, a device alone cannot")
+            raise InjectRefused(f"{request.kind}: only the virtual ESP32's process can do that, a device alone cannot")
 
 
 def _press_estop(device: Device, pressed: bool | None) -> None:
     buttons = [i for i, wired in enumerate(device.config.inputs) if wired.role is InputRole.ESTOP]
     if not buttons:
-        raise PressRefused('estop: this device has no e-stop; robot.toml wants an [[input]] with role = "estop"')
+        raise InjectRefused('estop: this device has no e-stop; robot.toml wants an [[input]] with role = "estop"')
     for button in buttons:
         # Released is what the contact does by itself.
         device.press_input(button, True if pressed else None)
 
 
-def _joint(device: Device, request: PressRequest) -> int:
+def _joint(device: Device, request: InjectRequest) -> int:
     return _index("joint", request.target, (joint.name for joint in device.config.joints))
 
 
 def _index(kind: str, name: str, names: Iterable[str]) -> int:
     known = list(names)
     if name not in known:
-        raise PressRefused(f"there is no {kind} {name!r}; there is {', '.join(known) or 'none'}")
+        raise InjectRefused(f"there is no {kind} {name!r}; there is {', '.join(known) or 'none'}")
     return known.index(name)
 
 
-def _choice(request: PressRequest, choices: dict[int, bool | None]) -> bool | None:
+def _choice(request: InjectRequest, choices: dict[int, bool | None]) -> bool | None:
     if request.value not in choices:
         values = ", ".join(str(choice) for choice in choices)
-        raise PressRefused(f"{request.press}: the value {request.value:g} is none of {values}")
+        raise InjectRefused(f"{request.kind}: the value {request.value:g} is none of {values}")
     return choices[int(request.value)]
 
 
-def within(request: PressRequest, most: float, least: float = 0.0) -> float:
-    """The value in [unit] of its kind, if it is within these bounds; raises PressRefused."""
+def within(request: InjectRequest, most: float, least: float = 0.0) -> float:
+    """The value in [unit] of its kind, if it is within these bounds; raises InjectRefused."""
     if not least <= request.value <= most:
-        raise PressRefused(f"{request.press}: the value {request.value:g} is not {least:g} to {most:g}")
+        raise InjectRefused(f"{request.kind}: the value {request.value:g} is not {least:g} to {most:g}")
     return request.value

@@ -7,15 +7,15 @@ from contextlib import closing
 
 import pytest
 
-from schemas.device import DeviceMode, PressKind, PressRequest
-from services.stepper_gateway.device.press_handler import target_of
+from schemas.device import DeviceMode, InjectKind, InjectRequest
+from services.stepper_gateway.device.injection_handler import target_of
 from services.stepper_gateway.goals.rejections import GoalRejected
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.processes import Processes
 from tests.stepper_gateway.wired import WiredGateway
 
-ESTOP = PressRequest(press=PressKind.ESTOP)
+ESTOP = InjectRequest(kind=InjectKind.ESTOP)
 
 
 def virtual(rig: VirtualArm) -> VirtualArm:
@@ -32,7 +32,7 @@ def say(rig: VirtualArm, event: str, detail: str = "") -> None:
 
 
 def presses(rig: VirtualArm) -> list[str]:
-    return [json.loads(payload)["press"] for _, kind, payload in rig.sent if kind == Kind.PRESS]
+    return [json.loads(payload)["kind"] for _, kind, payload in rig.sent if kind == Kind.INJECT]
 
 
 def test_a_real_device_is_not_pressed_by_a_request() -> None:
@@ -48,12 +48,12 @@ def test_a_real_device_is_not_pressed_by_a_request() -> None:
 def test_presses_go_out_one_at_a_time_and_each_gets_its_own_answer() -> None:
     rig = virtual(VirtualArm())
     rig.press(ESTOP, 1)
-    rig.press(PressRequest(press=PressKind.SWITCH, target="limit_q1"), 2)
+    rig.press(InjectRequest(kind=InjectKind.SWITCH, target="limit_q1"), 2)
     assert presses(rig) == ["estop"]
-    say(rig, "pressed")
+    say(rig, "injected")
     assert rig.pressed[1].accepted
     assert presses(rig) == ["estop", "switch"]
-    say(rig, "press_refused", "no such switch")
+    say(rig, "inject_refused", "no such switch")
     assert (rig.pressed[2].accepted, rig.pressed[2].reason) == (False, "no such switch")
 
 
@@ -77,28 +77,28 @@ def test_an_absent_device_is_not_pressed() -> None:
 @pytest.mark.parametrize(
     ("press", "target", "known"),
     [
-        (PressKind.BLOCK, "antebrazo_joint", "q2"),
-        (PressKind.SLIP, "q3", "q3"),
-        (PressKind.SWITCH, "limit_q1", "limit_q1"),
-        (PressKind.SENSOR, "ultra", "ultra"),
-        (PressKind.REBOOT, "", ""),
+        (InjectKind.BLOCK, "antebrazo_joint", "q2"),
+        (InjectKind.SLIP, "q3", "q3"),
+        (InjectKind.SWITCH, "limit_q1", "limit_q1"),
+        (InjectKind.SENSOR, "ultra", "ultra"),
+        (InjectKind.REBOOT, "", ""),
     ],
 )
-def test_a_target_is_said_as_the_device_knows_it(press: PressKind, target: str, known: str) -> None:
-    assert target_of(PressRequest(press=press, target=target), rm1()) == known
+def test_a_target_is_said_as_the_device_knows_it(press: InjectKind, target: str, known: str) -> None:
+    assert target_of(InjectRequest(kind=press, target=target), rm1()) == known
 
 
 @pytest.mark.parametrize(
     ("press", "target", "nearest"),
     [
-        (PressKind.BLOCK, "antebraso_joint", "antebrazo_joint"),
-        (PressKind.SWITCH, "limt_q1", "limit_q1"),
-        (PressKind.SENSOR, "baterya", "bateria"),
+        (InjectKind.BLOCK, "antebraso_joint", "antebrazo_joint"),
+        (InjectKind.SWITCH, "limt_q1", "limit_q1"),
+        (InjectKind.SENSOR, "baterya", "bateria"),
     ],
 )
-def test_a_target_that_is_not_there_is_refused_with_the_nearest(press: PressKind, target: str, nearest: str) -> None:
+def test_a_target_that_is_not_there_is_refused_with_the_nearest(press: InjectKind, target: str, nearest: str) -> None:
     with pytest.raises(GoalRejected, match=f'did you mean "{nearest}"'):
-        target_of(PressRequest(press=press, target=target), rm1())
+        target_of(InjectRequest(kind=press, target=target), rm1())
 
 
 def test_the_virtual_devices_own_process_is_pressed_released_and_blocked(processes: Processes) -> None:
@@ -107,10 +107,10 @@ def test_the_virtual_devices_own_process_is_pressed_released_and_blocked(process
         assert gateway.answer_to_press(ESTOP).accepted
         assert gateway.run(2.0, lambda: gateway.state.mode == DeviceMode.ESTOP)
         assert gateway.state.inputs == ("estop",)
-        assert gateway.answer_to_press(PressRequest(press=PressKind.ESTOP, value=0.0)).accepted
+        assert gateway.answer_to_press(InjectRequest(kind=InjectKind.ESTOP, value=0.0)).accepted
         assert gateway.run(2.0, lambda: gateway.state.inputs == ())
-        assert gateway.answer_to_press(PressRequest(press=PressKind.SLIP, target="brazo_joint", value=25.0)).accepted
+        assert gateway.answer_to_press(InjectRequest(kind=InjectKind.SLIP, target="brazo_joint", value=25.0)).accepted
         assert gateway.run(2.0, lambda: gateway.published["device/shaft"][-1].shaft[0] == 25)
-        refused = gateway.answer_to_press(PressRequest(press=PressKind.DRIFT, value=1e9))
+        refused = gateway.answer_to_press(InjectRequest(kind=InjectKind.DRIFT, value=1e9))
         assert not refused.accepted
         assert refused.reason
