@@ -45,7 +45,7 @@ BEAT = 1.0  # [s] between two touches of the readiness file
 
 
 class Node:
-    """One node: one inbox, and one thread of logic in which every handler and the step run.
+    """One node: one task queue, and one thread of logic in which every handler and the step run.
 
     A node does not hear its own publications unless a subscription asks for it (`own=True`).
     """
@@ -135,7 +135,7 @@ class Node:
     ) -> R:
         """Asks and blocks; raises `Refused`, or `NoAnswer` after `timeout` [s] at most.
 
-        With `on_tick` the inbox is handled meanwhile, and `on_tick` called 20 times a second: for scripts.
+        With `on_tick` queued tasks are handled meanwhile, and `on_tick` called 20 times a second: for scripts.
         """
         pending_call = requests.PendingCall(self._bus, request, question, timeout, self._loop.tasks.wake)
         if on_tick is not None:
@@ -199,7 +199,7 @@ class Node:
         return time.monotonic()
 
     def spin(self, step: Callable[[int], object] = lambda now: None, rate: float = 50.0) -> None:
-        """Calls `step(now [ns])` at `rate` [Hz], with the inbox between, until SIGTERM, SIGINT or `stop()`.
+        """Calls `step(now [ns])` at `rate` [Hz], with queued tasks between, until SIGTERM, SIGINT or `stop()`.
 
         What a handler or the step raises is logged and ends the spin.
         """

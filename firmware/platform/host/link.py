@@ -113,19 +113,19 @@ class DeviceLink:
         """Send a report; what cannot be sent now is dropped by paho or the caller, never blocks."""
         self._client.publish(self._topic + kind, payload, qos=REPORTS[kind], retain=kind == "status")
 
-    def close(self, offline: bytes) -> None:
+    def close(self, offline_status: bytes) -> None:
         """Leave a retained status behind and end; waits at most a second for the broker."""
         if self._client.is_connected():
-            sent = self._client.publish(self._topic + "status", offline, qos=1, retain=True)
+            sent = self._client.publish(self._topic + "status", offline_status, qos=1, retain=True)
             try:
                 sent.wait_for_publish(timeout=1.0)
             except RuntimeError as error:
-                log.warning("the broker did not take our offline: %s", error)
+                log.warning("the broker did not take our last status: %s", error)
         self._client.disconnect()
         self._client.loop_stop()
 
     def break_off(self) -> None:
-        """Disconnects without a farewell, as a device that loses power or Wi-Fi; the broker sends the last will."""
+        """Disconnects without a status, as a device that loses power or Wi-Fi; the broker sends the last will."""
         self._is_broken_off = True
         wire = self._client.socket()
         if isinstance(wire, socket.socket):

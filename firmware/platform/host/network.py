@@ -49,7 +49,7 @@ class Network:
         self._link.start()
 
     def break_off(self) -> None:
-        """Disconnects without a farewell; `join` connects again."""
+        """Disconnects without a status; `join` connects again."""
         if self._link is not None:
             self._link.break_off()
         self._link, self.is_connected = None, False
@@ -78,7 +78,7 @@ class Network:
 
 
 def offline_status(name: str, boot_id: int) -> bytes:
-    """The last will, and the offline."""
+    """The JSON of the status of an offline device: the last will."""
     return json.dumps({"online": False, "device": name, "boot_id": boot_id}).encode()
 
 

@@ -76,7 +76,7 @@ class GoalHandle(Generic[F, R]):
     def wait(self, timeout: float, on_tick: Task | None = None) -> ActionOutcome[R]:
         """The outcome; raises `ServerLost` within 3 s of the server's end, `NoAnswer` after `timeout` [s].
 
-        Handles the node's inbox meanwhile, so not for handlers of a node that spins: those look at
+        Handles the node's task queue meanwhile, so not for handlers of a node that spins: those look at
         `outcome`. `on_tick` is called 20 times a second. A node asked to stop raises SystemExit.
         """
         self._heard = time.monotonic()

@@ -1,7 +1,7 @@
 """The bus interface: bytes under keys. `ZenohBus` and `MemoryBus` implement it.
 
-Keys are relative to the robot. Callbacks come on threads of the bus: they must only put into an
-inbox and return. A bus delivers its own publications only to subscriptions that ask for them.
+Keys are relative to the robot. Callbacks come on threads of the bus: they must only put into a
+task queue and return. A bus delivers its own publications only to subscriptions that ask for them.
 """
 
 from __future__ import annotations

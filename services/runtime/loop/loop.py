@@ -1,7 +1,7 @@
 """The event loop: steps at their deadlines, periodic tasks, and between them the queued tasks.
 
 The deadline is looked at before every message, so a flood cannot starve the step; at least one
-message is handled after every step, so a slow step cannot starve the inbox.
+message is handled after every step, so a slow step cannot starve the queue.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class Loop:
         self.wait_for(lambda: False, seconds)
 
     def wait_for(self, is_done: Callable[[], bool], timeout: float, on_tick: Task | None = None) -> bool:
-        """Handles the inbox until `is_done()`; False after `timeout` [s]. `on_tick` is called 20 times a second.
+        """Handles queued tasks until `is_done()`; False after `timeout` [s]. `on_tick` is called 20 times a second.
 
         While another thread runs the loop, this one only checks `is_done`.
         """

@@ -62,8 +62,8 @@ class ArrivalQueue(Protocol):
 class LatestQueue:
     """A queue of length one: a newer arrival replaces the older one."""
 
-    def __init__(self, inbox: TaskQueue, handle: Callable[[Arrival], None]) -> None:
-        self._inbox, self._handle = inbox, handle
+    def __init__(self, tasks: TaskQueue, handle: Callable[[Arrival], None]) -> None:
+        self._tasks, self._handle = tasks, handle
         self._lock = threading.Lock()
         self._waiting: Arrival | None = None
         self.dropped = 0
@@ -74,7 +74,7 @@ class LatestQueue:
             self._waiting = arrival
             self.dropped += replaces
         if not replaces:
-            self._inbox.put(self._deliver)
+            self._tasks.put(self._deliver)
 
     def on_miss(self, count: int) -> None:
         self.dropped += count
@@ -89,11 +89,11 @@ class LatestQueue:
 class EveryQueue:
     """A bounded FIFO queue: an arrival that does not fit is dropped and counted.
 
-    Each has a task of its own in the inbox; without one they wait to be handled together, and wake nobody.
+    Each has a task of its own in the task queue; without a queue they are handled together by `deliver_all`.
     """
 
-    def __init__(self, inbox: TaskQueue | None, handle: Callable[[Arrival], None]) -> None:
-        self._inbox, self._handle = inbox, handle
+    def __init__(self, tasks: TaskQueue | None, handle: Callable[[Arrival], None]) -> None:
+        self._tasks, self._handle = tasks, handle
         self._lock = threading.Lock()
         self._waiting: deque[Arrival] = deque()
         self._bytes = 0
@@ -107,8 +107,8 @@ class EveryQueue:
                 return
             self._waiting.append(arrival)
             self._bytes += size
-        if self._inbox is not None:
-            self._inbox.put(self._deliver)
+        if self._tasks is not None:
+            self._tasks.put(self._deliver)
 
     def on_miss(self, count: int) -> None:
         with self._lock:
