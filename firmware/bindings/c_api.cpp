@@ -90,7 +90,7 @@ int gemelo_say(VirtualDevice* device, uint8_t type, const uint8_t* text, size_t 
     return device->say(static_cast<gemelo::FrameType>(type), text, size);
 }
 
-// Whether the text can be taken; if not, `reason` (128 bytes) says why. `is_factory_reset` if it asks for that.
+// True if the text is valid; if not, `reason` (128 bytes) says why. `is_factory_reset` if it asks for that.
 int gemelo_check_provision(const char* text, size_t size, int* is_factory_reset, char* reason) {
     gemelo::Credentials credentials;
     gemelo::Refusal refusal;

@@ -1,4 +1,4 @@
-// Whether the path between two knots stays within a joint's limits; the knots themselves are known to.
+// Checks that the path between two knots, which are within a joint's limits, stays within them.
 #pragma once
 
 #include <stdint.h>

@@ -1,4 +1,4 @@
-// A TRAJ frame: its fields, and whether its knots may be played.
+// A TRAJ frame: its fields, and the checks of its knots.
 #pragma once
 
 #include <stdint.h>

@@ -22,7 +22,7 @@ class InputWatch {
     // Sees nothing until begin().
     void blind() { mask_ = Levels{}; }
 
-    // Whether a pin is not as the active inputs have it; if not, there is nothing to read.
+    // True if a pin differs from the active inputs; otherwise there is nothing to read.
     bool differs(const Levels& levels) const {
         return (((levels.low ^ expected_.low) & mask_.low) | ((levels.high ^ expected_.high) & mask_.high)) != 0;
     }

@@ -20,7 +20,7 @@ class JsonReader {
 
     // `bracket` is '{' or '['.
     bool open(char bracket);
-    // Whether another member or entry follows; eats the comma, or the closing bracket.
+    // True if another member or entry follows; consumes the comma, or the closing bracket.
     bool next(char closing_bracket);
     // A member's name and the colon.
     bool key(char* out, size_t capacity);

@@ -26,7 +26,7 @@ enum class FrameType : uint8_t {
     Provision,
     ProvisionAck,
     Inject,  // virtual devices only
-    Shaft,  // virtual devices only
+    Shaft,   // virtual devices only
 };
 
 enum class Code : uint8_t {

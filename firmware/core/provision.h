@@ -1,4 +1,4 @@
-// What a person tells a device over its serial line, once: the JSON of `provision` in PROTOCOL.md.
+// The credentials of a device, sent once over its serial line: the JSON of `provision` in PROTOCOL.md.
 #pragma once
 
 #include <stddef.h>

@@ -14,7 +14,7 @@ namespace gemelo {
 
 class SerialPort {
   public:
-    // What is none of the core's business: PROVISION and INJECT, as JSON.
+    // Frames that the platform handles: PROVISION and INJECT, as JSON.
     using Other = void (*)(void* context, FrameType type, const uint8_t* text, size_t size);
     // The most that wrap() makes.
     static constexpr size_t kLargestReport = cobs_bound(kHeaderSize + JsonWriter::kSize + kCrcSize);
@@ -25,7 +25,7 @@ class SerialPort {
     // A frame has come over MQTT: a sign of life there moves what is said there.
     void yield_to_mqtt(const Arrival& arrival);
 
-    // Whether this output, now, goes over this line; whether over MQTT.
+    // True if this output goes over this line now; true if it goes over MQTT.
     bool carries(Output output) const;
     bool leaves_to_mqtt(Output output) const;
 

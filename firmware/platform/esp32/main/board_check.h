@@ -1,4 +1,4 @@
-// Whether this chip can do what a configuration asks: checked before it is applied.
+// Checks that this chip supports a configuration, before it is applied.
 #pragma once
 
 #include "chip.h"

@@ -1,4 +1,4 @@
-// What a person tells the board over the serial wire, once: its name, its network, its broker. No answer tells it
+// The credentials of the board, sent once over the serial line: its name, its network, its broker. No answer tells it
 // again.
 #pragma once
 

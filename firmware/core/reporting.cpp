@@ -1,4 +1,4 @@
-// What the machine tells of itself.
+// The machine's reports: state, status, sensors, events.
 #include "machine.h"
 #include "phrase.h"
 

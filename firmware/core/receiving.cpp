@@ -1,4 +1,4 @@
-// What arrives: chunks of knots, heartbeats and clock questions.
+// Received frames: chunks of knots, heartbeats and clock synchronisation.
 #include "bytes.h"
 #include "machine.h"
 
@@ -71,7 +71,7 @@ bool Machine::is_duplicate(const Chunk& chunk) const {
     return chunk.stream() != 0 && chunk.stream() == streams_.stream() && chunk.seq() < streams_.next_seq();
 }
 
-// Whether this chunk is the one that is wanted now.
+// Checks that this chunk is the expected one.
 Verdict Machine::judge_place(const Chunk& chunk) const {
     const Verdict not_ready{Code::NotReady, kNoJoint, 0, static_cast<int32_t>(mode_), 0};
     const Verdict wrong_stream{Code::WrongStream, kNoJoint, 0, 0, 0};
