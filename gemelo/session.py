@@ -25,6 +25,7 @@ Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 
 PATIENCE = 2.0  # [s] for the first message of a topic, and for one that is late
+ON_ITS_WAY = 0.3  # [s] that a message may be which was measured before the last change
 IDLE_RATE = 1.0  # [Hz] of the thread's own step, which does nothing: messages wake it
 CLOSING = 1.0  # [s] that the thread may take to end
 _numbers = count(1)
@@ -39,6 +40,7 @@ class Session:
         self.news = threading.Condition()  # notified after every message that was handled
         self._latest: dict[str, Latest[Any]] = {}
         self._changed = 0.0  # [s] monotonic: what is asked from now on must have been heard after this
+        self._changed_unix = 0  # [ns] the same moment, after which it should also have been measured
         self._pid = os.getpid()
         self._failure: BaseException | None = None
         try:
@@ -85,6 +87,11 @@ class Session:
         def is_there() -> bool:
             return latest.message is not None if topic.rate is None else is_fresh()
 
+        def was_measured_since() -> bool:
+            return is_there() and getattr(latest.message, "stamp", self._changed_unix) >= self._changed_unix
+
+        if topic.rate is not None:
+            self.wait_for(was_measured_since, ON_ITS_WAY)  # not for ever: the clocks of two hosts may differ
         if not self.wait_for(is_there, PATIENCE) or latest.message is None:
             raise Lost(
                 f"nothing heard of {topic.key} for {PATIENCE:g} s: is {topic.writer} running? `gemelo node list`"
@@ -93,7 +100,7 @@ class Session:
 
     def changed(self) -> None:
         """Something has moved or was switched: what was heard before is no longer fresh."""
-        self._changed = time.monotonic()
+        self._changed, self._changed_unix = time.monotonic(), time.time_ns()
 
     def notify(self) -> None:
         """Wakes who waits; from any thread."""
