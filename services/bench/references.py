@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from schemas.frames import Transform
 from schemas.scene import BoxShape, CylinderShape, PlanningScene, Shape
-from services.arm.kinematics.joint_mapping import Configuration
+from services.arm.kinematics.joint_mapping import JointMapping
 from services.arm.model.description import Arm
 from services.bench.figures import NotMeasured
 from services.bench.problems.problem_sets import ALLOWED
@@ -41,7 +41,7 @@ class CoalChecker:
     def __post_init__(self) -> None:
         self._model = pin.buildModelFromUrdf(str(self.arm.urdf_path))
         self._data = self._model.createData()
-        self._configuration = Configuration(self.arm, self._model)
+        self._configuration = JointMapping(self.arm, self._model)
         kind = pin.GeometryType.COLLISION
         folder = [str(self.arm.folder)]
         self._geometry = pin.buildGeomFromUrdf(self._model, str(self.arm.urdf_path), kind, package_dirs=folder)

@@ -123,11 +123,11 @@ def print_matrix(folder: Path, write: bool) -> ExitCode:
 
 def plan_of(text: str, verdicts: list[LinkPairData]) -> tuple[dict[tuple[str, str], str], list[str]]:
     """The pairs that the SRDF is to have with their reasons, and each change as a line; a person's reasons stay."""
-    from services.arm.kinematics.collision_matrix import Reason
+    from services.arm.kinematics.collision_matrix import DisabledReason
     from services.arm.model.srdf_edit import entries
 
     present = {entry.pair: entry.reason for entry in entries(text)}
-    ours = {str(reason) for reason in Reason}
+    ours = {str(reason) for reason in DisabledReason}
     found = {frozenset(verdict.pair): verdict for verdict in verdicts}
     wanted: dict[tuple[str, str], str] = {}
     lines = []
