@@ -41,7 +41,7 @@ def state_check_us() -> Figure:
         samples.append((time.thread_time() - started) / BATCH * 1e6)
     reference = {
         "pinocchio + coal, same scene": coal_us(arm),
-        "services.arm.kinematics.kinematics, self only": self_us(arm),
+        "services.arm.kinematics, self only": self_us(arm),
         "motion core, one posture a call": single_us(core, rows),
         "rm1, motion core": batch_us(rm1()),
         "rm1, pinocchio + coal, same scene": coal_us(rm1()),

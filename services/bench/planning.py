@@ -115,6 +115,7 @@ PYTHON_TIMEOUT = 400.0  # [s]
 PROGRAM = """
 import sys
 sys.modules["services.planner.native.binding"] = None
+from services.bench.planning import print_runs
 print_runs(int(sys.argv[1]))
 """
 
