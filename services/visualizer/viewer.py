@@ -26,6 +26,7 @@ from services.visualizer.program.viewer_connection import ViewerConnection
 
 PERIOD = 0.5  # [s] between two looks at the child
 CUT_OFF = "viewer: a sender ended or was cut off in the midst of a message; a visualizer comes back by itself"
+LATE_HISTORY = "16MB"  # chosen: some minutes of the twin; static data, such as the arm's meshes, stays
 EARLY = 5.0  # [s] a native viewer that ends sooner had no display that it could use
 
 
@@ -40,14 +41,14 @@ def resolved(mode: ViewerMode, environ: Mapping[str, str], platform: str = sys.p
 def command(program: Path, viewer: ViewerSection, mode: ViewerMode, memory: str) -> list[str]:
     """The command line of the program.
 
-    A page that is opened late is sent the newest data first and what comes live before the past, which it fills in
-    behind: a browser that draws slowly would else play hours before it shows the arm as it is.
+    A page that is opened late is sent the newest data first, what comes live before the past, and of that only
+    `LATE_HISTORY`: a browser that draws slowly would else play hours before it shows the arm as it is.
     """
     common = [str(program), "--bind", viewer.host, "--port", str(viewer.port)]
+    limits = ["--memory-limit", memory, "--server-memory-limit", LATE_HISTORY]
     if mode is ViewerMode.WEB:
-        return [*common, "--serve-web", "--web-viewer-port", str(viewer.web_port), "--newest-first",
-                "--server-memory-limit", memory]  # fmt: skip
-    return [*common, "--memory-limit", memory, "--server-memory-limit", "64MB", "--hide-welcome-screen"]
+        return [*common, "--serve-web", "--web-viewer-port", str(viewer.web_port), "--newest-first", *limits]
+    return [*common, *limits, "--hide-welcome-screen"]
 
 
 def address(viewer: ViewerSection, mode: ViewerMode) -> str:

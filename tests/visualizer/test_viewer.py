@@ -218,6 +218,7 @@ def test_the_program_is_always_bound_and_limited(tmp_path):
         line = " ".join(command(tmp_path / "rerun", ViewerSection(), mode, "1GB"))
         assert "--bind 127.0.0.1 --port 9876" in line
         assert "memory-limit 1GB" in line
+        assert "server-memory-limit 16MB" in line
     assert "window" in address(ViewerSection(), ViewerMode.NATIVE)
 
 
