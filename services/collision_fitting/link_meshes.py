@@ -76,4 +76,4 @@ def _require_solid(vertices: Array, where: str) -> None:
     across = np.linalg.svd(vertices - vertices.mean(axis=0), full_matrices=False)[2]
     thickness = float(np.ptp(vertices @ across.T, axis=0).min())
     if thickness < FLAT * longest:
-        raise DescriptionError(f"{where} is flat ({1000.0 * thickness:.2g} mm thick): it bounds no solid")
+        raise DescriptionError(f"{where} is flat ({round(1000.0 * thickness, 6):.2g} mm thick): it bounds no solid")

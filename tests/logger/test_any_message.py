@@ -78,7 +78,7 @@ URDF = """<robot name="r"><link name="a"/><link name="b"/>
 HANDLERS = {
     "joint_states": "on_joint_state", "joint_commands": "on_joint_command", "step_errors": "on_step_errors",
     "planned_path": "on_planned_path", "device/status": "on_device_status", "device/state": "on_device_state",
-    "device/events": "journal.on_event", "log": "journal.on_log",
+    "device/events": "event_log.on_event", "log": "event_log.on_log",
 }  # fmt: skip
 
 

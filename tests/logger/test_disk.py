@@ -99,12 +99,12 @@ def test_an_unwritable_folder_is_said_once_and_nothing_is_lost(rig):
     rig.write(START + RETRY)
     assert len(rig.warnings) == 1
     assert "log_dir" in rig.warnings[0]
-    assert rig.disk.trouble
+    assert rig.disk.problem
     rig.folder.unlink()
     rig.write(START + 2 * RETRY)
     rig.disk.close()
     assert rig.topics(rig.recordings()[0]) == ["joint_states"] * 20
-    assert not rig.disk.trouble
+    assert not rig.disk.problem
     assert rig.logger.losses.sentence == ""
 
 
