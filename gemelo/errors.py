@@ -1,4 +1,4 @@
-"""What can go wrong: each error is one sentence for a person, and fields for a program."""
+"""The errors of the API: each is one sentence for a person, and fields for a program."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where links are, from the frames of the last ten seconds."""
+"""Poses of links, from the frames of the last ten seconds."""
 
 from __future__ import annotations
 

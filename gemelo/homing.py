@@ -1,4 +1,4 @@
-"""How a homing goes, from what the device says of it."""
+"""The progress of a homing, from the reports of the device."""
 
 from __future__ import annotations
 

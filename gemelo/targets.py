@@ -1,4 +1,4 @@
-"""Where to and how, as arguments: what a person writes is checked here and becomes the planner's goal and motion."""
+"""Targets as arguments: checked here, and turned into the goal and the motion of a plan request."""
 
 from __future__ import annotations
 

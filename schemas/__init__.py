@@ -1,1 +1,1 @@
-"""What is said: every message on the bus, and the table of keys. Imports nothing of ours."""
+"""Every message on the bus, and the table of keys. Imports nothing of ours."""

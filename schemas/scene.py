@@ -1,4 +1,4 @@
-"""What stands around the arm, what it carries, and what may touch what."""
+"""The planning scene: the objects around the arm, what it carries, and which pairs may touch."""
 
 from __future__ import annotations
 

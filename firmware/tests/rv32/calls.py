@@ -1,4 +1,4 @@
-"""What the core asks of others, and what its step interrupt is made of, as read from the machine code."""
+"""The calls of the firmware core to the platform, and its step interrupt, as read from the machine code."""
 
 from __future__ import annotations
 

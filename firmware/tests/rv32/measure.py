@@ -1,4 +1,4 @@
-"""What the core costs on the chip, and whether it makes the same steps there as on the host."""
+"""The cost of the firmware core on the chip, and a comparison of its steps there with those on the host."""
 
 from __future__ import annotations
 
