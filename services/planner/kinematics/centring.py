@@ -33,11 +33,12 @@ class Centring:
         self._weight = np.array([2.0 / (upper - lower) for lower, upper in spans])  # 0 without limits
 
     def is_redundant(self, target: Target, solution: Array) -> bool:
-        """True if the joints can move there without the tool leaving its target."""
+        """True if the joints can move at `solution` (n,) [rad] or [m] without the tool leaving its target."""
         return len(self._free_motions(target, solution)) > 0
 
     def centred(self, target: Target, solution: Array) -> Array:
-        """A solution whose joints stand nearer to the middle, reached by self-motion; this one if there is none."""
+        """Joint values (n,) [rad] or [m] nearer to the middles of their ranges, reached from `solution` (n,) by
+        self-motion; `solution` itself where no self-motion brings them nearer."""
         for _ in range(STEPS):
             motions = self._free_motions(target, solution)
             if not len(motions):
@@ -54,13 +55,15 @@ class Centring:
         return solution
 
     def drawn(self, target: Target, solution: Array, near: Array) -> Array:
-        """The solution, and what its self-motion, straight as at a singularity, does to come near to `near`."""
+        """Joint values (n,) [rad] or [m]: `solution` (n,), moved towards `near` (n,) along its self-motion, which is
+        taken as straight."""
         motions = self._free_motions(target, solution)
         moved: Array = solution + (motions @ (near - solution)) @ motions
         return moved
 
     def eccentricity(self, positions: Array) -> float:
-        """How far the joints are from their middles: the sum of squares, each 1 at a limit."""
+        """Distance of the joint values (n,) [rad] or [m] from the middles of their ranges: a dimensionless sum of
+        squares, to which a joint at a limit adds 1 and a joint without limits 0."""
         return float(np.sum(((positions - self._middle) * self._weight) ** 2))
 
     def _free_motions(self, target: Target, positions: Array) -> Array:

@@ -39,9 +39,11 @@ class ClosedForm:
         self.turns = FullTurns(arm)
 
     def configurations(self, position: Array, rotation: Array, near: Array) -> tuple[list[Array], list[Array]]:
-        """The exact ones within the limits, with every full turn, in no order; and what EAIK calls least squares.
+        """Exact solutions (n,) [rad] within the limits, with every full turn, in no order; and EAIK's least-squares
+        ones.
 
-        Those are out of reach, or, where axes coincide, a solution that lacks one turn.
+        `position` (3,) [m] and `rotation` (3, 3) are the tool's in the base frame; joints without limits stay near
+        `near` (n,). Least-squares solutions are out of reach, or, where axes coincide, lack one turn.
         """
         branches, is_guess = self.branches(position, rotation)
         return self.turns.within_limits(branches[~is_guess], near), [
@@ -49,7 +51,10 @@ class ClosedForm:
         ]
 
     def branches(self, position: Array, rotation: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """EAIK's answers (m, n), whatever the limits, and which of them are least squares alone."""
+        """EAIK's solutions (m, n) [rad], whatever the limits, and (m,) True for those that are least squares only.
+
+        `position` (3,) [m] and `rotation` (3, 3) are the tool's in the base frame.
+        """
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = rotation, position
         answer = self._robot.calculate_IK(pose)
@@ -120,9 +125,11 @@ def _agrees(arm: Arm, kinematics: Kinematics, robot: Robot, order: list[int]) ->
 
 
 def completed(target: Target, kinematics: Kinematics, guess: Array) -> list[Array]:
-    """`guess` with the turn that is missing made by one joint or another; none where more than one turn is missing.
+    """Joint values (n,) [rad] or [m]: `guess` (n,) with the missing turn of the tool made by one joint; empty if more
+    is missing.
 
-    A configuration that is out of reach has its orientation right and its position wrong, and is left soonest.
+    Each joint that can make it gives one result. A configuration that is out of reach has its orientation right and its
+    position wrong, and is rejected first.
     """
     far, away = target.misses(kinematics.tool(guess))
     if away < ROTATION_TOLERANCE:

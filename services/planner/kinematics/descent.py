@@ -43,12 +43,13 @@ class Descent:
         self._identity = np.eye(len(arm.joints))
 
     def clip(self, positions: Array) -> Array:
-        """The nearest configuration within the limits."""
+        """The nearest joint values (n,) [rad] or [m] within the limits."""
         clipped: Array = np.minimum(np.maximum(positions, self._lower), self._upper)
         return clipped
 
     def descend(self, target: Target, start: Array) -> Attempt:
-        """The nearest local optimum from `start`: exact where it can be, else at the edge of the tolerances."""
+        """The nearest local optimum from `start` (n,) [rad] or [m]: exact where it can be, else at the edge of the
+        tolerances."""
         attempt = self._descend(
             target, start, lambda q: target.error_and_jacobian(self._kinematics, q), target.is_exact
         )

@@ -115,5 +115,7 @@ class Goals:
         return from_message(links[goal.frame])
 
     def shown_point(self, goal: PoseGoal, start: Start, configuration: Array, deadline: Deadline) -> Vector:
-        """Where the tool is in `configuration`, in the goal's form; a mere point is reachable as printed."""
+        """The tool's pose in `configuration` (n,) [rad] or [m], in the goal's form and frame: position (3,) [m], then
+        the orientation or the direction, if the goal has one. A position alone is rounded to a point that can be
+        reached."""
         return self._unreachable.shown(goal, configuration, self.frame(goal, start), deadline)

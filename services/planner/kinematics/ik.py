@@ -55,8 +55,9 @@ class InverseKinematics:
         return self._closed is not None
 
     def solutions(self, target: Target, near: Array, deadline: Deadline) -> Iterator[Array]:
-        """Distinct joint values that meet the target: all of the closed form, the nearest first; where that gives none,
-        what `near` leads to and its mirror images, then batches, each nearest first."""
+        """Distinct joint values (n,) [rad] or [m] that meet the target: all of the closed form, the nearest to `near`
+        (n,) first; where that gives none, what `near` leads to and its mirror images, then batches, each nearest
+        first."""
         found: list[Array] = []
         for positions in chain(self._closed_form_solutions(target, near), self._at_limits(target, near, found)):
             if self._is_new(positions, found, SAME):
@@ -68,7 +69,8 @@ class InverseKinematics:
             yield from self._searched(target, near, deadline, starts)
 
     def nearest(self, target: Target, near: Array, deadline: Deadline) -> list[Array]:
-        """Configurations that bring the tool as near to the target as their start allows, the best one first."""
+        """Joint values (n,) [rad] or [m] that bring the tool as near to the target as their start allows, the best
+        first; the starts are `near` (n,) and points spread over the limits."""
         attempts = [self.descend(target, near), *self._attempts(target, near, deadline)]
         return [attempt.positions for attempt in sorted(attempts, key=lambda attempt: attempt.error)]
 
@@ -77,7 +79,7 @@ class InverseKinematics:
         return float(np.max(np.abs(first - second) / self._speed))
 
     def descend(self, target: Target, start: Array) -> Attempt:
-        """The nearest local optimum from `start`."""
+        """The nearest local optimum from `start` (n,) [rad] or [m]."""
         return self._descent.descend(target, start)
 
     def _closed_form_solutions(self, target: Target, near: Array) -> Iterator[Array]:

@@ -40,8 +40,8 @@ class FullTurns:
         return configurations
 
     def nearly(self, branches: Array) -> tuple[Array, Array]:
-        """The branches (m, n) with the full turns that bring them nearest to the limits, and by how much (m,) they
-        miss those."""
+        """The branches (m, n) [rad] or [m] with the full turns that bring them nearest to the limits, and (m,) [rad] or
+        [m] by how much the worst joint of each exceeds its limits."""
         middle, half = 0.5 * (self._lower + self._upper), 0.5 * (self._upper - self._lower)
         middle = np.where(np.isfinite(middle), middle, 0.0)
         away = branches - middle

@@ -39,8 +39,8 @@ class KinematicRequests:
         checker: DistanceChecker | None = None,
         deadline: Deadline = NEVER,
     ) -> IkResponse:
-        """The configurations for a pose, the nearest first, or why there is none; `checker` says what they must not
-        touch."""
+        """The configurations [rad] or [m] for a pose, the nearest to `request.near` or the present state first, or the
+        refusal; `age` [s] is of `present`. With `avoid_collisions`, `checker` says which of them touch something."""
         try:
             _require_count(request.solutions)
             near = self._standing(request.near, present, age)
@@ -57,7 +57,8 @@ class KinematicRequests:
         return IkResponse(code=PlanCode.SUCCESS, name=self._arm.joint_names, solutions=tuple(nearest_first))
 
     def fk(self, request: FkRequest, present: JointState | None, age: float = 0.0) -> FkResponse:
-        """The poses of the links asked for, or why there are none; limits do not matter here."""
+        """The poses of the requested links in the base frame, or the refusal; `age` [s] is of `present`. The limits of
+        joints that the request names are not checked."""
         try:
             positions = self._completed(request, present, age)
             poses = self._kinematics.link_poses(positions)

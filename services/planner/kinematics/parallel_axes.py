@@ -46,7 +46,8 @@ class ParallelAxes:
         self._upper, self._fore = elbow - self._shoulder, self._seen(pose.position) - elbow
 
     def configurations(self, position: Array, near: Array) -> list[Array]:
-        """Those within the limits, with every full turn, in no order; the shoulder stays where it may turn freely."""
+        """Joint values (3,) [rad] and [m] within the limits, with every full turn, in no order, for the tool's
+        `position` (3,) [m] in the base frame. Where the shoulder may turn freely, it stays as in `near` (3,)."""
         out, upper, fore = self._seen(position) - self._shoulder, self._upper, self._fore
         if not math.hypot(out.real, out.imag) <= 2.0 * (abs(upper) + abs(fore)):  # whose square may be no number
             return []

@@ -43,7 +43,8 @@ def target_of(goal: PoseGoal, frame: Rigid) -> Target:
 
 
 def as_goal(goal: PoseGoal, pose: Pose, frame: Rigid) -> Vector:
-    """`pose` (in the base) in the form of `goal` and its frame: position, then the orientation or the direction."""
+    """`pose` (in the base) in the form of `goal` and in `frame`: position (3,) [m], then the quaternion x y z w, the
+    unit direction (3,), or nothing."""
     back = inverse(frame)
     x, y, z = pose.position.tolist()
     point = compose(back, ((x, y, z), IDENTITY[1]))[0]

@@ -50,7 +50,8 @@ class Target:
         return self.position_tolerance > POSITION_TOLERANCE or self.rotation_tolerance > ROTATION_TOLERANCE
 
     def error_and_jacobian(self, kinematics: Kinematics, positions: Array) -> tuple[Array, Array]:
-        """What is missing, (3,) or (6,), turns weighted, and how the joints change that, (3, n) or (6, n)."""
+        """What is missing, (3,) or (6,) [m], turns weighted by `metres_per_radian`, and how the joints (n,) [rad] or
+        [m] change that, (3, n) or (6, n)."""
         pose, jacobian = kinematics.tool_and_jacobian(positions)
         missing = self.position - pose.position
         if not self.has_turn:
@@ -63,7 +64,8 @@ class Target:
         return np.concatenate((missing, self.metres_per_radian * self.turn(pose.rotation))), weighted
 
     def beyond_tolerances(self, error: Array, jacobian: Array) -> tuple[Array, Array]:
-        """The same for what is missing to the edge of the tolerances; zero within them."""
+        """The error (3,) or (6,) [m] and its Jacobian (3, n) or (6, n), as of `error_and_jacobian`, reduced to what is
+        missing to the edge of the tolerances; zero within them."""
         error, jacobian = error.copy(), jacobian.copy()
         _shrink(error, jacobian, slice(0, 3), EDGE * self.position_tolerance)
         if self.has_turn:
@@ -84,16 +86,18 @@ class Target:
         return float(np.linalg.norm(self.position - pose.position)), float(np.linalg.norm(self.turn(pose.rotation)))
 
     def is_exact(self, error: Array) -> bool:
-        """True if nothing is missing but rounding."""
+        """True if `error` (3,) or (6,) [m], as of `error_and_jacobian`, is within the tolerances of an exact
+        solution."""
         return self._is_within(error, POSITION_TOLERANCE, ROTATION_TOLERANCE)
 
     def is_at_edge(self, error: Array) -> bool:
-        """True if nothing is missing to the edge of the tolerances, given `beyond_tolerances`."""
+        """True if `error` (3,) or (6,) [m], as of `beyond_tolerances`, is within the share 1 - `EDGE` of the
+        tolerances."""
         position = max(POSITION_TOLERANCE, (1.0 - EDGE) * self.position_tolerance)
         return self._is_within(error, position, max(ROTATION_TOLERANCE, (1.0 - EDGE) * self.rotation_tolerance))
 
     def is_met(self, error: Array) -> bool:
-        """True if what is missing is within the tolerances."""
+        """True if `error` (3,) or (6,) [m], as of `error_and_jacobian`, is within the tolerances."""
         position = max(POSITION_TOLERANCE, self.position_tolerance)
         return self._is_within(error, position, max(ROTATION_TOLERANCE, self.rotation_tolerance))
 

@@ -41,7 +41,8 @@ class UnreachableRefusals:
         self._task_space, self._collisions = able, collisions
 
     def refusal(self, goal: PoseGoal, target: Target, frame: Rigid, near: Array, deadline: Deadline) -> PlanRefused:
-        """What is missing: the place, or there the orientation."""
+        """The refusal for a position out of reach, or for an orientation that the arm cannot have there, with the
+        nearest pose; `near` (n,) [rad] or [m] is the start, `frame` the goal's frame in the base."""
         place = Target(target.position, position_tolerance=target.position_tolerance)
         best = self._nearest_free(place, near, deadline)
         pose = self._kinematics.tool(best)
@@ -53,7 +54,9 @@ class UnreachableRefusals:
         return out_of_reach(self._arm, target.position.tolist(), pose.position.tolist(), shown, self._held(best))
 
     def shown(self, goal: PoseGoal, configuration: Array, frame: Rigid, deadline: Deadline) -> Vector:
-        """Where the tool is in `configuration`, in the goal's form; a mere point is reachable as printed."""
+        """The tool's pose in `configuration` (n,) [rad] or [m], in the goal's form and in `frame`: position (3,) [m],
+        then the orientation or the direction, if the goal has one. A position alone is rounded to a point that can be
+        reached."""
         pose = self._kinematics.tool(configuration)
         if goal.orientation or goal.tool_axis:
             return as_goal(goal, pose, frame)
