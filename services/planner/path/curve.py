@@ -39,8 +39,8 @@ class Derivatives(NamedTuple):
 
 
 def spline_rows(control: Array, rows: int) -> Array:
-    """(m, n) configurations along the uniform cubic B-spline of `control` (k, n), `rows` in each span, ends
-    included."""
+    """Configurations (m, n) [rad] or [m] along the uniform cubic B-spline of `control` (k, n), `rows` in each span,
+    both ends included."""
     powers = _powers(control)
     u = np.linspace(0.0, 1.0, rows, endpoint=False)
     values = np.stack((np.ones_like(u), u, u * u, u**3), axis=1)
@@ -74,18 +74,19 @@ class Curve:
 
     @property
     def knots(self) -> Array:
-        """(k + 1,) lengths at which pieces begin and end."""
+        """Lengths (k + 1,) [s at full speed] at which pieces begin and end."""
         return self._part_length[::PARTS]
 
     def at(self, lengths: Array) -> Derivatives:
-        """At `lengths` (m,) from the run's start."""
+        """The curve and its derivatives (m, n) at `lengths` (m,) [s at full speed] from the run's start."""
         piece, u = self._locate(np.clip(lengths, 0.0, self.length))
         return self._derivatives(piece, u)
 
     def cut(self, parts: int, shares: Array) -> tuple[Array, Derivatives]:
-        """(k parts,) lengths of the pieces' even parts, `parts` a divisor of PARTS, and the curve inside each of them.
+        """Lengths (k * parts,) [s at full speed] of the pieces' even parts, `parts` a divisor of PARTS, and the curve
+        inside them.
 
-        It is looked at where the parameter is at `shares` (m,) of a part, by rows.
+        The curve is evaluated where the parameter is at `shares` (m,), 0 to 1, of each part; one row for each of them.
         """
         lengths = np.diff(self._part_length[:: PARTS // parts])
         u = ((np.arange(parts)[:, None] + shares) / parts).reshape(-1)

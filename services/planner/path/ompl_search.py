@@ -74,7 +74,7 @@ class _Problem:
         self.information.setup()
 
     def set_ends(self, start: Array, goals: Array, seed: int) -> None:
-        """What is asked; from here on OMPL's random numbers begin anew."""
+        """Sets `start` (n,) and `goals` (k, n) [rad] or [m]; from here on OMPL's random numbers begin anew."""
         from ompl import util
 
         util.noOutputHandler()
@@ -89,7 +89,7 @@ class _Problem:
         self._definition.setOptimizationObjective(self._base.PathLengthOptimizationObjective(self.information))
 
     def tree(self, planner_id: str, deadline: Deadline) -> Array:
-        """The path of a planner that grows trees or batches."""
+        """Corners (m, n) [rad] or [m] of the path of a planner that grows trees or batches; raises `PathNotFound`."""
         from ompl import geometric
 
         planner = getattr(geometric, planner_id)(self.information)
@@ -107,7 +107,8 @@ class _Problem:
         )
 
     def roadmap(self, deadline: Deadline) -> Array:
-        """The path on a roadmap. OMPL grows it; its own `solve` waits for a thread that waits for Python, for ever."""
+        """Corners (m, n) [rad] or [m] of the path on a roadmap; raises `PathNotFound`. OMPL grows the roadmap only: its
+        `solve` waits for a thread that waits for Python, for ever."""
         from ompl import geometric
 
         planner = geometric.PRM(self.information)

@@ -20,8 +20,11 @@ class PathCurve(Protocol):
     """Continuous in its second derivative; `knots` (j,) are where its third one jumps."""
 
     @property
-    def knots(self) -> Array: ...
-    def at(self, along: Array) -> Derivatives: ...
+    def knots(self) -> Array:
+        """Ascending lengths (j,), in the unit of length of the path."""
+
+    def at(self, along: Array) -> Derivatives:
+        """The values (m, k) and their derivatives by the length, at lengths (m,) within the knots and in their unit."""
 
 
 class CubicSpline:
@@ -35,7 +38,7 @@ class CubicSpline:
         self._slopes = self._solved(np.diff(values, axis=0) / self._h)
 
     def at(self, along: Array) -> Derivatives:
-        """At lengths (m,) within the knots."""
+        """The values (m, k) and their derivatives by the length, at lengths (m,) within the knots and in their unit."""
         index = np.clip(np.searchsorted(self.knots, along, side="right") - 1, 0, len(self.knots) - 2)
         h, x = self._h[index], (along - self.knots[index])[:, None]
         start, slope = self._values[index], self._slopes[index]
@@ -79,7 +82,8 @@ class RoundedLines:
         self.knots = np.unique(np.concatenate((self.marks, inner)))
 
     def at(self, along: Array) -> Derivatives:
-        """At lengths (m,) within the knots."""
+        """The joint values (m, n) [rad] or [m] and their derivatives by the length, at lengths (m,) within the
+        knots."""
         leg = np.clip(np.searchsorted(self._corners, along, side="right") - 1, 0, len(self._directions) - 1)
         first = self._directions[leg].copy()
         value = self._configurations[leg] + (along - self._corners[leg])[:, None] * first
@@ -129,11 +133,13 @@ def _end_slope(knots: Array, values: Array) -> Array:
 
 
 def cut(before: float, after: float, blend: float) -> float:
-    """How far from a corner between two legs the path may leave them; 0 where it has to stop there."""
+    """Length from a corner at which the path may leave its two legs, of lengths `before` and `after`; all are in the
+    same unit. 0 where the path has to stop at the corner."""
     radius = min(blend, 0.5 * before, 0.5 * after)
     return radius if radius > NO_LENGTH else 0.0
 
 
 def blending(u: float | Array) -> float | Array:
-    """The integral of the step 3 u^2 - 2 u^3 from 0 to u: how far the second direction has taken over."""
+    """The integral of the step 3 u^2 - 2 u^3 from 0 to u, dimensionless: how far the second direction has taken
+    over."""
     return u * u * u * (1.0 - 0.5 * u)

@@ -21,9 +21,10 @@ SHARED = 2  # control points from one corner to the next, where these share the 
 
 
 def shorten(corners: Array, validity: ValidityChecker, seed: int, deadline: Deadline) -> Array:
-    """The polyline (m, n) with straight cuts between random places on it, for as long as there is time.
+    """The polyline (m, n) [rad] or [m] with straight cuts between random places on it, until the deadline or until cuts
+    fail.
 
-    At last it loses the corners that it can do without: two that nearly coincide let the arm creep around them.
+    At last the corners that are not needed are removed: two that nearly coincide would slow the arm down.
     """
     random = np.random.default_rng(seed)
     fruitless = 0
@@ -38,7 +39,8 @@ def shorten(corners: Array, validity: ValidityChecker, seed: int, deadline: Dead
 
 
 def smooth(corners: Array, validity: ValidityChecker, deadline: Deadline) -> Array:
-    """Control points (k, n) of a uniform cubic B-spline along the polyline, free as a whole.
+    """Control points (k, n) [rad] or [m] of a uniform cubic B-spline along the polyline `corners` (m, n), free as a
+    whole.
 
     Every corner keeps its own control point, with one before and one after it on its edges; where the curve touches,
     they come nearer to the corner, and at last the curve goes to the corner itself and stops there.
@@ -64,7 +66,7 @@ def continued(corners: Array, end: Array, validity: ValidityChecker) -> Array:
 
 
 def stopping(corners: Array) -> Array:
-    """As `smooth`, stopping at every corner: the polyline itself."""
+    """Control points (3 m, n) [rad] or [m] of the curve that stops at every corner (m, n): the polyline itself."""
     return np.repeat(corners, 3, axis=0)
 
 

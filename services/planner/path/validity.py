@@ -18,7 +18,9 @@ ROWS = 24  # configurations in a span of a curve, between which it is looked at 
 class TouchingCheck(Protocol):
     """Coal, as a `World`, or the native planner where it can tell and coal in doubt, as `CollisionChecker`."""
 
-    def touching(self, positions: Array, margin: float) -> Array | None: ...
+    def touching(self, positions: Array, margin: float) -> Array | None:
+        """A configuration (n,) [rad] or [m] on the polyline through `positions` (m, n) that does not keep `margin` [m],
+        or None."""
 
 
 class ValidityChecker:
@@ -36,5 +38,5 @@ class ValidityChecker:
         return self._checker.touching(np.array((start, goal)), self._margin) is None
 
     def is_curve_free(self, control: Array) -> bool:
-        """True if the uniform cubic B-spline of the control points (k, n) keeps the margin."""
+        """True if the uniform cubic B-spline of the control points (k, n) [rad] or [m] keeps the margin."""
         return self._checker.touching(spline_rows(control, ROWS), self._margin) is None
