@@ -74,9 +74,10 @@ class Continuation:
     def follow(
         self, path: ToolPath, start: Array, max_step: float, jump: float, deadline: Deadline
     ) -> FollowedPath | StopReason:
-        """As far as it goes from `start`, which is at the path's beginning; 0 for the default step and jump.
+        """Joint values along `path` from `start` (n,) [rad] or [m] at its beginning, up to the first `StopReason`.
 
-        A path of less than four configurations of the finest spacing is none.
+        `max_step` [m] of path length and `jump` [rad] or [m] of a joint between two configurations: 0 for the defaults.
+        The result is a `StopReason` where the path can be followed for less than four of the finest spacings.
         """
         spacing = min(max_step or SPACING, path.length / LEAST_CONFIGURATIONS)
         if path.length / spacing > MOST_CONFIGURATIONS:
@@ -93,7 +94,7 @@ class Continuation:
     def shortened(
         self, path: ToolPath, followed: FollowedPath, length: float, stop: StopReason, deadline: Deadline
     ) -> FollowedPath | StopReason:
-        """The path up to `length`, because of `stop`."""
+        """The followed path up to `length` [m] from its start, with `stop` as the reason for its end."""
         kept = int(np.searchsorted(followed.lengths, length - FINEST))
         guess = followed.curve.at(np.array([length])).value[0, : followed.configurations.shape[1]]
         last = self.solver.solve(path.at(length), guess)
@@ -246,7 +247,7 @@ class Continuation:
 
 
 def is_same(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:
-    """Configurations that differ by no more than rounding."""
+    """True if two configurations (n,) [rad] or [m] differ by no more than rounding."""
     return float(np.abs(np.subtract(one, other)).max()) <= SAME
 
 

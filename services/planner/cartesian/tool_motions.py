@@ -52,7 +52,8 @@ class ToolMotions:
     def plan(
         self, request: PlanRequest, start: Start, limits: JointLimits, margin: float, deadline: Deadline
     ) -> CartesianPath:
-        """The timed path, to be verified; raises `PlanRefused`."""
+        """The timed path from `start` (n,) [rad] or [m], not yet verified, that keeps `margin` [m]; raises
+        `PlanRefused`."""
         tool = _tool_limits(request.motion)
         require_tool_limits(tool)
 

@@ -27,10 +27,15 @@ class Piece(Protocol):
     """A smooth part of the path; `length` is [m] where it moves more than it turns, `metres` those of the tool."""
 
     @property
-    def length(self) -> float: ...
+    def length(self) -> float:
+        """Length [m], or `METRES_PER_RADIAN` times the turn if that is longer."""
+
     @property
-    def metres(self) -> float: ...
-    def at(self, along: float) -> Pose: ...
+    def metres(self) -> float:
+        """Length [m] of the tool's translation."""
+
+    def at(self, along: float) -> Pose:
+        """Pose of the tool in the base after the length `along` [m] of this piece."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +52,11 @@ class Straight:
         return self.length * float(np.linalg.norm(self.twist[:3]))
 
     def at(self, along: float) -> Pose:
-        """Pose of the tool in the base after the length `along` of this piece."""
+        """Pose of the tool in the base after the length `along` [m] of this piece."""
         return moved(self.start, along * self.twist)
 
     def part(self, begin: float, end: float) -> Straight:
-        """The path between two lengths of it."""
+        """The line between the lengths `begin` and `end` [m] of this piece."""
         return Straight(self.at(begin), self.twist, end - begin)
 
 
@@ -69,7 +74,8 @@ class Corner:
 
     @property
     def length(self) -> float:
-        """Length of the piece, from where it leaves the first line to where it joins the second."""
+        """Length [m] of the piece, from where it leaves the first line to where it joins the second; turns are
+        weighted."""
         return 2.0 * self.radius
 
     @property
@@ -79,7 +85,7 @@ class Corner:
         return float(np.linalg.norm(np.diff(rows, axis=0), axis=1).sum())
 
     def at(self, along: float) -> Pose:
-        """Pose of the tool in the base after the length `along` of this piece."""
+        """Pose of the tool in the base after the length `along` [m] of this piece."""
         turned = self.length * blending(along / self.length)
         offset = (along - self.radius) * self.coming + turned * (self.leaving - self.coming)
         return moved(self.corner, offset)
@@ -106,7 +112,7 @@ class Arc:
         return max(self.metres, METRES_PER_RADIAN * float(np.linalg.norm(self.turn)))
 
     def at(self, along: float) -> Pose:
-        """Pose of the tool in the base after the length `along` of this piece."""
+        """Pose of the tool in the base after the length `along` [m] of this piece."""
         share = along / self.length
         spoke = pin.exp3(share * self.angle * self.normal) @ (self.start.position - self.centre)
         return Pose(self.centre + spoke, pin.exp3(share * self.turn) @ self.start.rotation)
@@ -122,19 +128,19 @@ class ToolPath:
         self.metres = sum(piece.metres for piece in pieces)
 
     def at(self, along: float) -> Pose:
-        """The pose at a length in [0, length]."""
+        """Pose of the tool in the base at `along` [m], a length in [0, length]."""
         index, begin = self._locate(along)
         return self._pieces[index].at(min(along - begin, self._pieces[index].length))
 
     def metres_to(self, along: float) -> float:
-        """[m] that the tool has moved there."""
+        """Length [m] of the tool's translation up to the length `along` [m] of the path."""
         index, begin = self._locate(along)
         piece = self._pieces[index]
         return sum(other.metres for other in self._pieces[:index]) + piece.metres * (along - begin) / piece.length
 
     @property
     def marks(self) -> list[float]:
-        """The lengths at which pieces meet."""
+        """The lengths [m] at which pieces meet."""
         return self._ends[:-1]
 
     def _locate(self, along: float) -> tuple[int, float]:
@@ -170,5 +176,6 @@ def straight(start: Pose, end: Pose) -> Straight:
 
 
 def moved(pose: Pose, offset: Array) -> Pose:
-    """By metres and a rotation vector, both along the base's axes."""
+    """`pose` after a translation (3,) [m] and a rotation vector (3,) [rad], one above the other in `offset` (6,), both
+    along the base's axes."""
     return Pose(pose.position + offset[:3], pin.exp3(offset[3:]) @ pose.rotation)

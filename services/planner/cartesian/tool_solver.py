@@ -31,7 +31,8 @@ class ToolSolver:
         self._kinematics, self._holds_turn = kinematics, holds_turn
 
     def solve(self, pose: Pose, guess: Array) -> Array | None:
-        """The configuration near `guess` that has the tool there, limits apart; None where there is none."""
+        """Joint values (n,) [rad] or [m] near `guess` (n,) with the tool at `pose` in the base frame, joint limits
+        ignored; None where Newton's method finds none."""
         configuration = guess
         for _ in range(ITERATIONS):
             step, missing, left = self._newton(pose, configuration)
