@@ -20,16 +20,22 @@ class DistanceChecker(Protocol):
     """Distances of the arm to itself, or to everything around it as well."""
 
     @property
-    def reach(self) -> Array: ...  # (n,) how far any point moves at most per unit of a joint
+    def reach(self) -> Array:
+        """(n,) [m/rad] or [m/m] that any point of the arm moves at most per unit of each joint."""
 
-    def distance(self, positions: Sequence[float] | Array) -> float: ...
-    def pairs_within(self, positions: Sequence[float] | Array, margin: float = 0.0) -> list[tuple[str, str]]: ...
+    def distance(self, positions: Sequence[float] | Array) -> float:
+        """Distance [m] of the nearest pair that is checked, at joint values (n,) [rad] or [m]."""
+
+    def pairs_within(self, positions: Sequence[float] | Array, margin: float = 0.0) -> list[tuple[str, str]]:
+        """Names of the pairs nearer than `margin` [m] at joint values (n,) [rad] or [m]."""
 
 
 class PathChecker(DistanceChecker, Protocol):
     """And of whole paths, pair by pair."""
 
-    def touching(self, positions: Array, margin: float) -> Array | None: ...
+    def touching(self, positions: Array, margin: float) -> Array | None:
+        """A configuration (n,) [rad] or [m] on the polyline through `positions` (m, n) that does not keep `margin` [m],
+        or None."""
 
 
 def first_collision(checker: DistanceChecker, positions: Array, margin: float) -> Array | None:

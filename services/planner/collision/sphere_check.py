@@ -45,13 +45,13 @@ class SphereCheck(Protocol):
     """A fast check in a world, with `margin` [m] to keep; joint values are (n,) or (m, n) [rad] or [m]."""
 
     def planner(self, world: World, margin: float) -> NativePlanner | None:
-        """The native planner in this world, or None if it is not built."""
+        """The native planner in this world, to keep `margin` [m], or None if it is not built."""
 
     def is_free(self, world: World, positions: Positions, margin: float) -> bool:
-        """True if the configuration (n,) surely keeps the margin."""
+        """True if the configuration (n,) [rad] or [m] surely keeps `margin` [m]."""
 
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
-        """What can be said of the polyline through `rows` (m, n), m >= 2."""
+        """What is certain of the polyline through `rows` (m, n) [rad] or [m], m >= 2, with `margin` [m] to keep."""
 
 
 class NativeCheck:
@@ -75,7 +75,8 @@ class NativeCheck:
         return bool(self.planner(world, margin).free(np.array([positions]))[0])
 
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
-        """The verdict of the spheres on the polyline through `rows` (m, n), and what they leave open."""
+        """The result of the spheres for the polyline through `rows` (m, n) [rad] or [m] with `margin` [m] to keep, and
+        the stretches that they leave unresolved."""
         planner = self.planner(world, margin)
         if planner.path_free(rows):
             return Resolution()
@@ -95,15 +96,15 @@ class ExactShapesOnly:
     """Where the native planner is not built: nothing is known before coal looks."""
 
     def planner(self, world: World, margin: float) -> None:
-        """None: there is no native planner."""
+        """None, whatever the margin [m]: there is no native planner."""
         return None
 
     def is_free(self, world: World, positions: Positions, margin: float) -> bool:
-        """False: nothing is known."""
+        """False for every configuration (n,) [rad] or [m]: nothing is known."""
         return False
 
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
-        """The whole polyline (m, n), unresolved."""
+        """The whole polyline through `rows` (m, n) [rad] or [m], unresolved."""
         return Resolution(unresolved=(rows,))
 
 
@@ -129,7 +130,7 @@ def show_scene(planner: NativePlanner, world: World) -> None:
 
 
 def rows_between(rows: Array, begin: float, end: float) -> Array:
-    """(k, n) the part of the polyline through `rows` (m, n) from one fractional row number to another."""
+    """The part (k, n) [rad] or [m] of the polyline through `rows` (m, n) from one fractional row number to another."""
     begin, end = max(begin, 0.0), min(end, len(rows) - 1.0)
     ends = [(1.0 - place % 1.0) * rows[int(place)] + place % 1.0 * rows[math.ceil(place)] for place in (begin, end)]
     return np.vstack((ends[0], rows[int(begin) + 1 : math.ceil(end)], ends[1]))

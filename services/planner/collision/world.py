@@ -106,7 +106,8 @@ class World:
 
     @property
     def is_dear(self) -> NDArray[np.bool_]:
-        """(pairs,) where a look takes as long as a thousand others: meshes of many triangles."""
+        """(pairs,) True for each pair of shapes whose meshes have more than `MANY` triangles together: one distance
+        takes as long as a thousand others."""
         sizes = [0 if mesh is None else len(mesh.faces) for mesh in self._geometry.meshes]
         return np.array([sizes[one] + sizes[other] > MANY for one, other in self._geometry.pairs], dtype=bool)
 

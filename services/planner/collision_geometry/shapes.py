@@ -38,7 +38,8 @@ class TriangleMesh:
 
     @property
     def arrays(self) -> tuple[Array, NDArray[np.int32]]:
-        """Vertices and faces as the native planner wants them; raises ValueError for a vertex that is not finite."""
+        """Vertices (v, 3) [m] and faces (f, 3) as contiguous arrays for the native planner; raises ValueError for a
+        vertex that is not finite."""
         vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
         if not np.isfinite(vertices).all():
             raise ValueError("a vertex of the mesh is not finite")

@@ -23,7 +23,7 @@ class Solid(Hashable, Protocol):
         """(...) [m] to the surface from inside; below 0 outside."""
 
     def nearest(self, points: Array) -> Array:
-        """The points themselves, or where they are outside the nearest ones of the solid."""
+        """(..., 3) [m] the points themselves, or the nearest ones of the solid to those outside."""
 
 
 @dataclass(frozen=True)
