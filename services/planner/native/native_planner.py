@@ -86,23 +86,26 @@ class NativePlanner:
         return tuple(self._scene.held)
 
     def free(self, positions: ArrayLike) -> NDArray[np.bool_]:
-        """(rows,) whether each row of `positions` (rows, n) keeps the margin to itself and everything else."""
+        """(rows,) True for each row of `positions` (rows, n) [rad] or [m] that keeps the margin to itself and
+        everything else; raises ValueError for another shape."""
         return motion.are_free(self._scene.world, self._kernel, self._rows(positions), self.margin)
 
     def edge_free(self, start: ArrayLike, goal: ArrayLike) -> bool:
-        """True if the whole straight line of the joints keeps the margin, between samples too."""
+        """True if the whole straight line of the joints from `start` to `goal`, (n,) [rad] or [m], keeps the margin,
+        between samples too."""
         return self.path_free(np.vstack((self._row(start), self._row(goal))))
 
     def path_free(self, rows: ArrayLike) -> bool:
-        """True if the polyline through `rows` (m, n) keeps the margin everywhere."""
+        """True if the polyline through `rows` (m, n) [rad] or [m] keeps the margin everywhere."""
         return self._look(self._rows(rows), 1)
 
     def spline_free(self, control: ArrayLike) -> bool:
-        """True if the uniform cubic B-spline of the control points (k, n) keeps the margin everywhere."""
+        """True if the uniform cubic B-spline of the control points (k, n) [rad] or [m] keeps the margin everywhere."""
         return self._look(self._rows(control), 3)
 
     def unresolved_intervals(self, rows: ArrayLike) -> Array:
-        """(k, 2) from where to where, in rows, the polyline through `rows` (m, n) is not known to keep the margin."""
+        """Intervals (k, 2) of fractional row numbers in which the polyline through `rows` (m, n) [rad] or [m] is not
+        known to keep the margin."""
         return motion.unresolved_intervals(self._scene.world, self._kernel, self._rows(rows), self.margin, FINEST)
 
     def touching(self, rows: ArrayLike) -> Array | None:
@@ -131,7 +134,8 @@ class NativePlanner:
         return None if first < 0 else ContactPair(compiled_scene.name_of(first), compiled_scene.name_of(second))
 
     def first_contact(self, positions: ArrayLike) -> ContactPair | None:
-        """Two that do not keep the margin, None where the configuration is free."""
+        """The names of two that do not keep the margin at the joint values (n,) [rad] or [m]; None where the
+        configuration is free."""
         compiled_scene = self._scene
         touches, first, second = motion.first_contact(
             compiled_scene.world, self._kernel, self._row(positions), self.margin

@@ -57,7 +57,8 @@ class FreePath:
         return len(self.control) - 3
 
     def at(self, parameters: Array) -> tuple[Array, Array, Array]:
-        """Positions (m, n), first and second derivatives by the parameter, at `parameters` (m,)."""
+        """Positions (m, n) [rad] or [m], first and second derivatives by the parameter, at the dimensionless
+        `parameters` (m,) from 0 to k - 3."""
         span = np.clip(np.floor(parameters).astype(int), 0, self.spans - 1)
         u = (parameters - span)[:, None]
         v = 1.0 - u
@@ -73,6 +74,6 @@ class FreePath:
 
 
 def sum_of(weights: tuple[Array, ...], points: list[Array]) -> Array:
-    """(m, n) the sum of points (m, n), each times its weight (m, 1)."""
+    """The sum (m, n) of points (m, n), each times its dimensionless weight (m, 1)."""
     total: Array = np.sum([weight * point for weight, point in zip(weights, points, strict=True)], axis=0)
     return total

@@ -55,7 +55,7 @@ def _placed(shape: CollisionShape, bulge: float) -> SphereCover:
 
 @lru_cache(maxsize=256)
 def cover_of(solid: Solid, bulge: float = BULGE) -> SphereCover:
-    """The spheres of a convex solid in its own frame."""
+    """The spheres [m] of a convex solid in its own frame, which reach at most `bulge` [m] beyond it."""
     if isinstance(solid, Capsule) and solid.half_length == 0.0:
         return SphereCover(np.array([[0.0, 0.0, 0.0, solid.radius]]), 0.0)
     cells = cells_of(solid, FINENESS * bulge)
@@ -66,9 +66,9 @@ def cover_of(solid: Solid, bulge: float = BULGE) -> SphereCover:
 
 
 def mesh_cover(vertices: Array, faces: NDArray[np.int32], bulge: float = BULGE) -> SphereCover:
-    """The spheres of a mesh: of what its surface encloses and of the surface.
+    """The spheres [m] of what the mesh `vertices` (v, 3) [m], `faces` (f, 3) encloses, and of its surface.
 
-    The bulge is a bound here: of a cell at the surface only the cell is known.
+    The bulge [m] is larger for a large mesh, and is a bound here: of a cell at the surface only the cell is known.
     """
     longest = float(np.ptp(vertices, axis=0).max())
     pitch = max(MESH_FINENESS * bulge, longest / MOST_MESH_CELLS)
@@ -109,10 +109,10 @@ def cells_of(solid: Solid, pitch: float) -> Array:
 
 
 def medial(solid: Solid, pitch: float) -> Array:
-    """(k, 3) points of a lattice at the solid's medial axis: any sphere of the same bulge is in one around them.
+    """Points (k, 3) [m] of a lattice, at most `pitch` [m] apart along each axis, at the solid's medial axis.
 
-    Away from the nearest point of the surface the depth grows by as much as one moves, and so spheres grow around one
-    another, until a second point of the surface is as near.
+    Any sphere of the same bulge is in one around them: away from the nearest point of the surface the depth grows by as
+    much as one moves, and so spheres grow around one another, until a second point of the surface is as near.
     """
     counts = np.ceil(2.0 * solid.half / pitch).astype(int) | 1  # odd: some points are on planes of symmetry
     steps = 2.0 * solid.half / counts
