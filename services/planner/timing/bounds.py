@@ -48,10 +48,12 @@ def acceleration_bound(path: PathDerivatives, limits: QuantityLimits, speed: Arr
 
 
 def jerk_bound(path: PathDerivatives, limits: QuantityLimits, speed: Array, crossed: Array) -> Array:
-    """(m, k) the highest j at `speed` (m, 1), where the term 3 q_ss v a takes `crossed` (m, k) of the jerk limit."""
+    """(m, k) the highest jerk j along the path, in its unit of length per s^3, at `speed` (m, 1), where the term 3 q_ss
+    v a takes `crossed` (m, k) of the jerk limit."""
     return np.asarray((limits.jerk - path.third * speed**3 - crossed) / path.first)
 
 
 def crossing_term(path: PathDerivatives, speed: Array, acceleration: Array | float) -> Array:
-    """(m, k) the jerk 3 q_ss v a of accelerating in a bend, at `speed` (m, 1) and `acceleration` (m, 1)."""
+    """(m, k) the jerk 3 q_ss v a of accelerating in a bend, in the quantities' own units per s^3, at `speed` (m, 1) and
+    `acceleration` (m, 1)."""
     return np.asarray(3.0 * path.second * speed * acceleration)

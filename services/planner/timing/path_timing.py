@@ -51,9 +51,15 @@ class Law(Protocol):
     """The path's length by time, from rest to rest."""
 
     @property
-    def duration(self) -> float: ...
-    def at(self, times: Array) -> tuple[Array, Array, Array]: ...
-    def times(self, lengths: Array, spacing: float) -> Array: ...
+    def duration(self) -> float:
+        """Time [s] from rest to rest."""
+
+    def at(self, times: Array) -> tuple[Array, Array, Array]:
+        """Length, speed and acceleration (m,) along the path at `times` (m,) [s]."""
+
+    def times(self, lengths: Array, spacing: float) -> Array:
+        """Ascending times [s] of the trajectory's points, from 0 to the end; `spacing` [s] is the wanted interval
+        between them."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +73,13 @@ class Demand:
 
     @cached_property
     def speeds(self) -> Array:
-        """(m,) that each row allows."""
+        """The highest speed (m,) at each row, in the path's unit of length per s."""
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return _least(speed_bound(self.path, self.limits, CENTRIPETAL, JERK_OF_SPEED))
 
     def rows(self, edges: Array) -> NDArray[np.int64]:
-        """(j, 2) which of them are in each stretch between edges, from one up to another."""
+        """(j, 2) first row and row after the last one in each stretch between `edges` (j + 1,), which are in the path's
+        unit of length."""
         inside = 0.5 * ASIDE * float(self.along[-1])
         return np.searchsorted(self.along, np.column_stack((edges[:-1] + inside, edges[1:] - inside)))
 
@@ -95,7 +102,8 @@ def law_along(
 
 
 def demand_of(curve: PathCurve, limits: JointLimits, tool: tuple[float, float], marks: Array) -> Demand:
-    """What `curve` asks of the joints, and of the tool."""
+    """The derivatives of `curve` and the limits of the joints and of the tool; `tool` is its speed [m/s] and
+    acceleration [m/s^2], 0 for no limit, `marks` are lengths of the curve."""
     end, joints = float(curve.knots[-1]), len(limits.velocity)
     aside, marks = ASIDE * end, _apart(marks, NEAR * end)
     inside = [np.linspace(low, high, 4 * PARTS + 1) for low, high in pairwise(marks.tolist())]

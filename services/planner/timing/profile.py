@@ -44,7 +44,8 @@ class JointLimits:
 
 
 def joint_limits(arm: Arm, velocity_scaling: float = 1.0, acceleration_scaling: float = 1.0) -> JointLimits:
-    """The arm's limits; the acceleration's scaling slows the jerk as well, so that its ramp keeps its duration."""
+    """The arm's limits (n,), in [rad] or [m] per s, s^2 and s^3; the scalings are dimensionless. The acceleration's
+    scaling applies to the jerk as well, so that its ramp keeps its duration."""
     return JointLimits(
         velocity=velocity_scaling * np.array([joint.velocity for joint in arm.joints]),
         acceleration=acceleration_scaling * np.array([joint.acceleration for joint in arm.joints]),
@@ -55,7 +56,7 @@ def joint_limits(arm: Arm, velocity_scaling: float = 1.0, acceleration_scaling: 
 def straight_line(
     names: Sequence[str], start: Sequence[float], goal: Sequence[float], limits: JointLimits
 ) -> JointTrajectory:
-    """From rest to rest, `start` and `goal` exact to the bit; raises `NoProfile`.
+    """From rest to rest, `start` and `goal` (n,) [rad] or [m] exact to the bit; raises `NoProfile`.
 
     The points stand wherever the profile's jerk changes, and between, so that the quintic through them IS the profile.
     """
@@ -63,7 +64,8 @@ def straight_line(
 
 
 def stop_and_go(names: Sequence[str], corners: Sequence[Sequence[float]], limits: JointLimits) -> JointTrajectory:
-    """From corner to corner, each leg as `straight_line`, at rest at all of them; raises `NoProfile`."""
+    """From corner to corner (n,) [rad] or [m], each leg as `straight_line`, at rest at all of them; raises
+    `NoProfile`."""
     points = [_rest(corners[0], 0.0)]
     for start, goal in pairwise(corners):
         points += _leg(start, goal, limits, points[-1].time_from_start)

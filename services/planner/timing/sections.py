@@ -62,7 +62,8 @@ def sections_of(run: Curve, limits: JointLimits) -> list[Section]:
 
 
 def boundary_speeds(sections: list[Section]) -> list[float]:
-    """Steady speeds between the sections, that can be reached from rest and brought to rest."""
+    """Steady speeds at the ends of the sections, one more than sections: dimensionless, path length [s at full speed]
+    per s. They can be reached from rest and brought to rest."""
     speeds = [0.0, *(min(one.speed, other.speed) for one, other in pairwise(sections)), 0.0]
     for index, section in enumerate(sections[:-1]):
         speeds[index + 1] = min(speeds[index + 1], _reachable(speeds[index], section))

@@ -28,7 +28,8 @@ MOST = 4000
 
 
 def time_optimal_path(names: Sequence[str], control: Array, limits: JointLimits) -> JointTrajectory:
-    """As `timing.timed_path`, as fast as velocities and accelerations allow; raises `NoProfile`."""
+    """The trajectory along the B-spline of `control` (k, n) [rad] or [m], as `timing.timed_path`, but without jerk
+    limits; raises `NoProfile`."""
     return along_runs(names, control, limits, _run_states, with_jerk=False)
 
 

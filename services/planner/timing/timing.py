@@ -42,7 +42,8 @@ class States(NamedTuple):
 
 
 def states_along(run: Curve, limits: JointLimits, times: Array, lengths: Array, speeds: Array, bends: Array) -> States:
-    """Of the joints, where the path's length, speed and acceleration (m,) are these."""
+    """Joint states at `times` (m,) [s], where the length [s at full speed], the speed (dimensionless) and the
+    acceleration [1/s] along the path are `lengths`, `speeds` and `bends` (m,)."""
     derivatives = run.at(lengths)
     first, second, scale = derivatives.first, derivatives.second, limits.velocity
     velocities = first * speeds[:, None]
@@ -51,7 +52,8 @@ def states_along(run: Curve, limits: JointLimits, times: Array, lengths: Array, 
 
 
 def timed_path(names: Sequence[str], control: Array, limits: JointLimits) -> JointTrajectory:
-    """From rest to rest along the uniform cubic B-spline of `control` (k, n), both ends exact; raises `NoProfile`.
+    """From rest to rest along the uniform cubic B-spline of `control` (k, n) [rad] or [m], both ends exact; raises
+    `NoProfile`.
 
     At corners it stops. Raises `TurnsOnTheSpot` where the curve does so without a corner.
     """
@@ -65,7 +67,8 @@ def along_runs(
     timed: Callable[[Curve, JointLimits], States],
     with_jerk: bool = True,
 ) -> JointTrajectory:
-    """Every smooth run of the curve, timed from rest to rest, one after the other, as fast as the limits allow."""
+    """The trajectory through every smooth run of the curve of `control` (k, n) [rad] or [m], each timed by `timed` from
+    rest to rest, as fast as the limits allow; raises `NoProfile`."""
     require_short(float((np.abs(np.diff(control, axis=0)) / limits.velocity).max(axis=1).sum()))
     runs: list[States] = []
     clock = 0.0
@@ -91,7 +94,7 @@ def at_limits(states: States, limits: JointLimits, with_jerk: bool) -> States:
 
 
 def at_speed(states: States, scale: float) -> States:
-    """The same path at `scale` times the speed."""
+    """The same path at `scale` times the speed; `scale` is dimensionless."""
     times, positions, velocities, accelerations = states
     return States(times / scale, positions, velocities * scale, accelerations * scale * scale)
 

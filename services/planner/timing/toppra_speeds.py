@@ -46,6 +46,7 @@ class _Task:
     tool: tuple[float, float]
 
     def speeds(self) -> Array:
+        """The speeds (m,) [1/s] at the grid; raises `NoProfile`."""
         toppra = load_toppra()
         unit, joints = self._unit(), len(self.limits.velocity)
         scale = np.abs(self.first[:, :joints]).max(axis=0)
@@ -124,6 +125,7 @@ def _classes() -> _Classes:
 
         @property
         def path_interval(self) -> Array:
+            """(2,) the first and the last length, dimensionless."""
             return self._grid[[0, -1]]
 
         @property
