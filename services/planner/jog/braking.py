@@ -34,7 +34,7 @@ class Braking:
         self._shares = np.arange(1, PIECES + 1)[:, None] / PIECES
 
     def towards(self, present: Array, wanted: Array) -> Array:
-        """The velocity after a period on the straight path from `present` to `wanted`.
+        """The velocity (n,) or (m, n) [rad/s] or [m/s] after a period on the straight line from `present` to `wanted`.
 
         All joints change in proportion, so that braking keeps the direction of the motion.
         """

@@ -47,7 +47,8 @@ class JogInterpreter:
         self._speeds = np.array([joint.velocity for joint in self._arm.joints])
 
     def wanted(self, command: JogCommand, positions: Array) -> Wanted:
-        """Of the arm at `positions`; raises `BadJog`."""
+        """The joint velocities [rad/s] or [m/s] of the command, for the arm at `positions` (n,) [rad] or [m]; raises
+        `BadJog`."""
         has_twist = bool(command.linear or command.angular)
         if command.name and has_twist:
             raise BadJog("a jog command has joints and a twist: give one of them")

@@ -32,7 +32,7 @@ class Obstacles:
         self._here: Array = np.zeros(len(world.reach))
 
     def move_to(self, positions: Array) -> None:
-        """The arm is here now."""
+        """Sets the arm's configuration (n,) [rad] or [m]."""
         self._here = positions
         self._nearness.move_to(positions)
 
@@ -45,7 +45,7 @@ class Obstacles:
         return most, None if most == 1.0 else self._said(pairs, self._nearness.distances(pairs))
 
     def obstacle_ahead(self, velocity: Array) -> JogLimit | None:
-        """What comes too near something on the way to rest.
+        """The limit by what comes too near while the arm brakes from `velocity` (n,) [rad/s] or [m/s], or None.
 
         Conservative advancement, pair by pair; two that are nearer than they should be already may only come away.
         """

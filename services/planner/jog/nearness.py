@@ -30,7 +30,7 @@ class Nearness:
         self._here: Array | None = None
 
     def move_to(self, configuration: Array) -> None:
-        """From now on it is about this configuration."""
+        """Sets the configuration (n,) [rad] or [m] that the answers are about from now on."""
         if self._here is None:
             self._least = self._world.least_distances(configuration)
         else:
@@ -51,7 +51,7 @@ class Nearness:
         return self._least[pairs]
 
     def are_dear(self, pairs: Pairs) -> NDArray[np.bool_]:
-        """(k,) whether a look at them takes too long to be done often."""
+        """(k,) True for each pair of shapes whose distance takes too long to be computed often."""
         return self._is_dear[pairs]
 
     def distances_at(self, configuration: Array, pairs: Pairs) -> Array:

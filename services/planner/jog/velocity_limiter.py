@@ -48,7 +48,8 @@ class VelocityLimiter:
         self._share = 1.0  # of the wanted velocity that was free the last time something was in the way
 
     def allowed(self, positions: Array, velocity: Array, wanted: Array, singular: Singular | None = None) -> Allowed:
-        """The velocity of the next tick on the way from `velocity` to `wanted`, where it may be."""
+        """The velocity (n,) [rad/s] or [m/s] of the next tick between `velocity` and `wanted`, (n,), from which the arm
+        at `positions` (n,) [rad] or [m] can still stop."""
         if not np.any(wanted):
             return Allowed(self._next(velocity, wanted, 0.0))
         share, limit = self._within_limits(positions, velocity, wanted)
