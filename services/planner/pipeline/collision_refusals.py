@@ -59,7 +59,8 @@ class CollisionRefusals:
         return PlanRefused(refused.code, msgspec.structs.replace(refused.refusal, nearest_free=shown))
 
     def line(self, start: Start, goal: Start, margin: float) -> PlanRefused:
-        """The refusal of a straight line on which something touches, where it does so first."""
+        """The refusal of the straight joint path from `start` to `goal`, (n,) [rad] or [m], that does not keep `margin`
+        [m], with the first configuration that touches."""
         found = first_collision(self._checker, np.array((start, goal)), margin)
         touching = np.array(goal) if found is None else found
         named = ", ".join(self._arm.state_names)
@@ -67,19 +68,22 @@ class CollisionRefusals:
         return self.refusal(PlanCode.PLANNING_FAILED, "on the straight way to the goal", touching, margin, (), remedy)
 
     def path(self, touching: Array, margin: float) -> PlanRefused:
-        """The refusal of the paths that were found and came too near to something once they had their time."""
+        """The refusal of found paths that do not keep `margin` [m] once they are timed; `touching` (n,) [rad] or [m] is
+        on one."""
         remedy = "ask with another seed or planner_id; if it stays, report this as a defect"
         return self.refusal(PlanCode.PLANNING_FAILED, "on the way that was found", touching, margin, (), remedy)
 
     def waypoints(self, touching: Array, margin: float) -> PlanRefused:
-        """The refusal of the straight lines from waypoint to waypoint."""
+        """The refusal of the straight lines from waypoint to waypoint, on which `touching` (n,) [rad] or [m] does not
+        keep `margin` [m]."""
         remedy = "give waypoints that lead around it, or ask for a free motion"
         return self.refusal(PlanCode.PLANNING_FAILED, "on the way by the waypoints", touching, margin, (), remedy)
 
     def refusal(
         self, code: PlanCode, where: str, configuration: Array, margin: float, nearest: Vector, remedy: str
     ) -> PlanRefused:
-        """The refusal of a configuration in which the plan's world touches the arm, with the names of both."""
+        """The refusal of `configuration` (n,) [rad] or [m], which does not keep `margin` [m] in the plan's world, with
+        the names of both; `nearest` is in the goal's own form."""
         world = self._checker.world
         pairs = world.pairs_within(configuration, margin + ROUNDING) or [("?", "?")]
         standing = tuple(configuration.tolist())

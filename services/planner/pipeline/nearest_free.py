@@ -52,7 +52,8 @@ def nearest_free(arm: Arm, checker: CollisionChecker, start: Start, deadline: De
 
 
 def jog_words(arm: Arm, reach: Array, start: Start, configuration: Start) -> str:
-    """The command that moves from `start` to `configuration`; `reach` as a world's."""
+    """The command that moves from `start` to `configuration`, (n,) [rad] or [m]; `reach` (n,) [m/rad] or [m/m] as a
+    world's."""
     moves = [after - before for before, after in zip(start, configuration, strict=True)]
     fastest = max(abs(move) / joint.velocity for joint, move in zip(arm.joints, moves, strict=True))
     needed = max(LEAST_SECONDS, float(np.abs(moves) @ reach) / CONTACT_SPEED, fastest / SHARE)

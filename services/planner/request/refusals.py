@@ -47,7 +47,7 @@ def timed_out() -> PlanRefused:
 
 
 def scaling_refused(which: str, value: float) -> PlanRefused:
-    """0 is not 1: it is refused."""
+    """The refusal of the scaling `which`, whose dimensionless `value` is not in (0, 1] or too small."""
     must = f"below {LEAST_SCALING:g} no way ends" if 0.0 < value < 1.0 else "it must be above 0 and at most 1"
     return PlanRefused(
         PlanCode.INVALID_GOAL_CONSTRAINTS,
@@ -86,7 +86,8 @@ def malformed(code: PlanCode, subject: str, message: str, remedy: str, check: st
 
 
 def beyond_limit(arm: Arm, joint: Joint, value: float, nearest: Vector) -> PlanRefused:
-    """A goal beyond a joint's limit."""
+    """The refusal of a goal whose `value` [rad] or [m] is beyond the joint's limit; `nearest` [rad] or [m] has all
+    joints of the goal within their limits."""
     limit = joint.clamp(value)
     side = "above its upper" if value > joint.upper else "below its lower"
     off = f"{abs(value - limit):.4g} {joint.unit}"  # value and limit may look alike in few digits
@@ -106,7 +107,7 @@ def beyond_limit(arm: Arm, joint: Joint, value: float, nearest: Vector) -> PlanR
 
 
 def start_beyond_limit(joint: Joint, value: float) -> PlanRefused:
-    """The arm stands, or is said to stand, where it must not be."""
+    """The refusal of a start whose `value` [rad] or [m] is beyond the joint's limit."""
     limit = joint.clamp(value)
     return PlanRefused(
         PlanCode.INVALID_ROBOT_STATE,
@@ -123,7 +124,8 @@ def start_beyond_limit(joint: Joint, value: float) -> PlanRefused:
 
 
 def moving_start(joint: Joint, velocity: float, limit: float) -> PlanRefused:
-    """Plans begin at rest."""
+    """The refusal of a start in which the joint's `velocity` is above `limit`, both [rad/s] or [m/s]: plans begin at
+    rest."""
     return PlanRefused(
         PlanCode.INVALID_ROBOT_STATE,
         Refusal(
@@ -139,7 +141,8 @@ def moving_start(joint: Joint, velocity: float, limit: float) -> PlanRefused:
 
 
 def stale_state(age: float | None, limit: float) -> PlanRefused:
-    """Nobody knows where the arm is now."""
+    """The refusal where the newest joint state has an `age` [s] above `limit` [s], or None has come: the present
+    configuration is not known."""
     told = "no joint state has come yet" if age is None else f"the newest joint state is {age:.3f} s old"
     return PlanRefused(
         PlanCode.ROBOT_STATE_STALE,
@@ -164,7 +167,8 @@ def in_collision(
     configuration: Vector = (),
     objects: Mapping[str, str] | None = None,
 ) -> PlanRefused:
-    """Two links, or a link and one of the scene's `objects` (their kinds by name), would touch in `configuration`."""
+    """The refusal of `configuration` (n,) [rad] or [m], in which two links, or a link and one of the scene's `objects`
+    (their kinds by name), do not keep `margin` [m]; `nearest` is in the goal's own form."""
     known = objects or {}
     shown = [[f"{known[name]} {name}" if name in known else name for name in pair] for pair in pairs]
     named = " and ".join(f"{first} with {second}" for first, second in shown)
@@ -228,7 +232,8 @@ def not_verified(why: str) -> PlanRefused:
 
 
 def out_of_reach(arm: Arm, goal: Point, nearest: Point, shown: Vector, held: Sequence[str]) -> PlanRefused:
-    """No configuration brings the tool there; `shown` is the nearest point in the goal's own frame."""
+    """The refusal of a tool position `goal` (3,) [m] in the base frame; `nearest` (3,) [m] in the base frame can be
+    reached, and `shown` is the same in the goal's own form and frame."""
     missing = [a - b for a, b in zip(goal, nearest, strict=True)]
     distance = sum(value * value for value in missing) ** 0.5
     axis = max(range(3), key=lambda index: abs(missing[index]))

@@ -62,7 +62,7 @@ def _values(arm: Arm, state: JointState) -> dict[str, float]:
 
 
 def require_unwound(code: PlanCode, joint: Joint, value: float) -> None:
-    """Raises `PlanRefused` for a joint without limits that has turned, or is to turn, too often."""
+    """Raises `PlanRefused` if the joint has no limits and `value` [rad] is more than `MOST_TURNED` from 0."""
     if math.isinf(joint.upper) and abs(value) > MOST_TURNED:
         raise malformed(
             code,
@@ -74,7 +74,7 @@ def require_unwound(code: PlanCode, joint: Joint, value: float) -> None:
 
 
 def require_parallel(names: Sequence[str], positions: Sequence[float], where: str) -> None:
-    """As many positions as names, and no name twice; raises `PlanRefused`."""
+    """Raises `PlanRefused` unless there is one position [rad] or [m] for every name, and no name twice."""
     if len(names) != len(positions):
         raise malformed(
             PlanCode.INVALID_GOAL_CONSTRAINTS,

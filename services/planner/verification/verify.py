@@ -118,7 +118,8 @@ def require_jerk(arm: Arm, samples: Samples, limits: JointLimits) -> None:
 
 
 def require_ends(trajectory: JointTrajectory, start: tuple[float, ...], goal: tuple[float, ...]) -> None:
-    """Exactly from the start to the goal, at rest at both, and never back in time; raises `BadTrajectory`."""
+    """Raises `BadTrajectory` unless the trajectory leads exactly from `start` to `goal`, (n,) [rad] or [m], at rest at
+    both, with increasing times."""
     for before, after in pairwise(point.time_from_start for point in trajectory.points):
         if not before < after:
             raise BadTrajectory(f"the trajectory goes from {before:.6f} s to {after:.6f} s")
