@@ -34,7 +34,7 @@ class Goal(msgspec.Struct, frozen=True, kw_only=True):
     p99: float | None = None
 
     def is_met(self, median: float, p99: float) -> bool:
-        """True if neither bound is exceeded."""
+        """True if neither bound is exceeded; both values are in the figure's unit."""
         return median <= _or_infinity(self.median) and p99 <= _or_infinity(self.p99)
 
     def __str__(self) -> str:
@@ -56,7 +56,8 @@ def of_samples(
     reference: Mapping[str, float] | None = None,
     note: str = "",
 ) -> Figure:
-    """Median and 99th percentile of `samples`, compared with `goal`; raises NotMeasured if there are no samples."""
+    """Median and 99th percentile of `samples`, compared with `goal`, all in the figure's unit; raises NotMeasured if
+    there are no samples."""
     if not samples:
         raise NotMeasured("there was not a single sample")
     median, p99 = quantile(samples, 0.5), quantile(samples, 0.99)
@@ -77,7 +78,7 @@ def quantile(samples: Sequence[float], share: float) -> float:
 
 
 def rounded(value: float) -> float:
-    """`value` to four significant digits, which is more than the repeatability of any figure."""
+    """`value`, in any unit, to four significant digits, which is more than the repeatability of any figure."""
     return float(f"{value:.4g}")
 
 

@@ -43,7 +43,8 @@ def cost() -> Cost:
 
 
 def instructions(what: str, prototype: dict[str, float]) -> Figure:
-    """Instructions of one "tick" or "slot" with 6 joints in a plain move; means and maxima are references."""
+    """The number of instructions of one "tick" or "slot" with 6 joints in a plain move; means and maxima are
+    references, as are the numbers in `prototype`."""
     measured = cost()
     means = {f"{joints} joints mean": measured.figures[f"{what}_{joints}_mean"] for joints in (3, 6)}
     most = {f"{joints} joints most": measured.figures[f"{what}_{joints}_max"] for joints in (3, 6)}

@@ -128,6 +128,7 @@ def move_accept_to_first_step_ms(stacks: Stacks) -> Figure:
     states = running.node.latest(JOINT_STATES)
 
     def took(trajectory: JointTrajectory) -> float:
+        """Time [ms] from acceptance to the first step; raises NotMeasured without a first step."""
         started.clear()
         accepted = follow(running, trajectory)
         if not started:
@@ -196,6 +197,7 @@ def first_step_due(arm: Arm, trajectory: JointTrajectory) -> float:
     scales = [arm.joint(name).steps for name in trajectory.joint_names]
 
     def counts(moment: float) -> tuple[int, ...]:
+        """Positions [steps], rounded to whole ones, at `moment` [s]."""
         positions = sampler.at(moment)[0]
         return tuple(math.floor(s.to_steps(p) + 0.5) for s, p in zip(scales, positions, strict=True))
 

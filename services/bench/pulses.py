@@ -196,6 +196,7 @@ def knot_at(speeds: Sequence[float], time: float, ramp: float, at_rest: bool) ->
     """The knot at `time` [s] for joints of `speeds` [steps/s]; `ramp` [s] is the duration of each ramp."""
 
     def travelled(t: float) -> tuple[float, float]:
+        """Distance [s at full speed] and speed [share of full speed] at `t` [s], up to the end of the cruise."""
         up = min(t, ramp)
         done = up / 2 - ramp / (2 * math.pi) * math.sin(math.pi * up / ramp)
         return done + max(t - ramp, 0.0), 0.5 - 0.5 * math.cos(math.pi * up / ramp)

@@ -106,6 +106,8 @@ class PlainOmpl:
         self._information.setup()
 
     def solving_ms(self, start: JointValues, goal: JointValues, seed: int) -> float | None:
+        """Time [ms] until a shortened path from `start` to `goal`, (n,) [rad] or [m], is found; None if none is within
+        `ALLOWED`."""
         self._util.RNG.setSeed(seed + 1)
         began = time.perf_counter()
         definition = self._base.ProblemDefinition(self._information)
@@ -149,6 +151,8 @@ class Roboplan:
         self._planner = rrt.RRT(self._scene, options)
 
     def solving_ms(self, start: JointValues, goal: JointValues, seed: int) -> float | None:
+        """Time [ms] until a shortened path from `start` to `goal`, (n,) [rad] or [m], is found; None if none is within
+        `ALLOWED`."""
         names = self._scene.getJointNames()
         ends = [self._core.JointConfiguration(names, np.array(values)) for values in (start, goal)]
         self._planner.setRngSeed(seed)

@@ -116,7 +116,7 @@ class PlainLines:
         return (time.perf_counter() - began) * 1e3
 
     def rows(self, request: PlanRequest) -> Array:
-        """(m, n) configurations along the line; raises ValueError without a start or a pose goal."""
+        """Configurations (m, n) [rad] or [m] along the line; raises ValueError without a start or a pose goal."""
         if request.start is None or not isinstance(request.goal, PoseGoal):
             raise ValueError("a plain line is asked for with a start and a tool position")
         rows = [np.array(request.start.position)]

@@ -85,5 +85,6 @@ def trial(planner: Planner, problem: Problem, planner_id: str) -> Trial:
 
 
 def spread(name: str, values: Sequence[float], *shares: float) -> dict[str, float]:
-    """Quantiles of `values` by "<name>, p<percent>", the form of a figure's references; empty without values."""
+    """Quantiles of `values`, in their unit, by "<name>, p<percent>", the form of a figure's references; `shares` are 0
+    to 1. Empty without values."""
     return {f"{name}, p{100 * share:.0f}": quantile(values, share) for share in shares if values}

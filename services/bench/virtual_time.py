@@ -73,7 +73,8 @@ def lost_of_45000_at_25hz() -> Figure:
 
 
 def swinging(arm: Arm, seconds: float) -> JointTrajectory:
-    """All joints from zero to both sides and back to zero, at rest at both ends; points with velocities."""
+    """All joints from zero to twice their amplitudes and back to zero, again and again for `seconds` [s], at rest at
+    both ends; points with velocities."""
     amplitudes = [amplitude_of(arm, index) for index in range(len(arm.joints))]
     rate = math.tau / SWING
     points = []

@@ -44,7 +44,8 @@ class Spheres:
         self._core = core
 
     def touching(self, positions: Array, margin: float) -> Array | None:
-        """The first of `positions` (m, n) if the path through them is not free, else None."""
+        """The first of `positions` (m, n) [rad] or [m] if the path through them is not free, else None; the core's own
+        margin is kept instead of `margin` [m]."""
         return None if self._core.path_free(positions) else np.asarray(positions[0])
 
 
@@ -69,7 +70,8 @@ def shortest(arm: Arm, checker: CollisionChecker, start: Array, goals: Array) ->
 
 
 def tightened(rows: Array, speeds: Array, seed: int, validity: ValidityChecker, pushes: int) -> Array:
-    """The polyline `rows` (m, n) shortened: a corner is added on every edge, then corners are moved at random."""
+    """The polyline `rows` (m, n) [rad] or [m] shortened: a corner is added on every edge, then corners are moved at
+    random; `speeds` (n,) [rad/s] or [m/s] are the joints' velocity limits."""
     if len(rows) == 2:
         return rows
     random = np.random.default_rng(seed)

@@ -82,7 +82,7 @@ class Maker:
                 return configuration
 
     def problem(self, start: tuple[float, ...], goal: tuple[float, ...], is_pose: bool) -> Problem | None:
-        """The problem from `start` to `goal`; None if no path between them is known."""
+        """The problem from `start` to `goal`, (n,) [rad] or [m]; None if no path between them is known."""
         begin, end = np.array(start), np.array(goal)
         known = self.any_path(begin, end)
         if known is None:
@@ -93,7 +93,7 @@ class Maker:
         return Problem(start, goal, is_pose, round(path_length(rows, self._speeds), DIGITS), found_by)
 
     def any_path(self, start: Array, goal: Array) -> tuple[Array, str] | None:
-        """Any free polyline (m, n) and what found it; None if no path is known."""
+        """Any free polyline (m, n) [rad] or [m] and what found it; None if no path is known."""
         if self._validity.is_line_free(start, goal):
             return np.array([start, goal]), "straight"
         if self._grid and not self._grid.is_connected(start, goal):
@@ -109,7 +109,8 @@ class Maker:
         return (np.array([start, goal]), "grid") if self._grid else None
 
     def better(self, start: Array, goals: list[Array]) -> list[tuple[Array, str]]:
-        """The straight line to the nearest goal, else the shortest path of long searches, each with what found it."""
+        """The shortest straight line to a goal, if one is free, and the shortest path of long searches, unless that
+        line ends at the nearest goal: polylines (m, n) [rad] or [m], each with what found it."""
         lines = [np.array([start, goal]) for goal in goals if self._validity.is_line_free(start, goal)]
         lines.sort(key=lambda line: path_length(line, self._speeds))
         least = min(path_length(np.array([start, goal]), self._speeds) for goal in goals)

@@ -81,7 +81,8 @@ def request_of(problem: Problem, arm: Arm, kinematics: Kinematics, planner_id: s
 
 
 def tool_pose(arm: Arm, kinematics: Kinematics, positions: tuple[float, ...]) -> PoseGoal:
-    """The tool's position at these joint values, with its orientation if the arm can choose it (six joints)."""
+    """The tool's position [m] in the base frame at the joint values (n,) [rad] or [m], with its orientation if the arm
+    can choose it (six joints)."""
     pose = kinematics.link_poses(positions)[arm.tool_frame]
     return PoseGoal(position=pose.translation, orientation=pose.rotation if len(arm.joints) >= 6 else ())
 
