@@ -38,6 +38,7 @@ class _Pieces:
     body: Numbers
 
     def only(self, which: NDArray[np.bool_]) -> _Pieces:
+        """The triangles for which `which` (f,) is True; corners in [m]."""
         return _Pieces(self.corners[which], self.body[which])
 
 

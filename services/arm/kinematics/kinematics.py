@@ -67,7 +67,8 @@ class Kinematics:
         return self.tool_and_jacobian(positions)[1]
 
     def tool_and_jacobian(self, positions: Positions) -> tuple[Pose, Array]:
-        """Both for the price of one."""
+        """The tool's pose in the base frame and the Jacobian (6, n) as of `jacobian`, at joint values (n,) [rad] or
+        [m]; one computation gives both."""
         q = self._configuration.to_pinocchio(positions)
         jacobian = pin.computeFrameJacobian(self._model, self._data, q, self._tool, pin.LOCAL_WORLD_ALIGNED)
         placement = self._in_base(pin.updateFramePlacement(self._model, self._data, self._tool))
