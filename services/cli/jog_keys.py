@@ -40,7 +40,8 @@ class SpeedyJoint(NamedJoint, Protocol):
     """A joint with its velocity limit [rad/s] or [m/s]."""
 
     @property
-    def velocity(self) -> float: ...
+    def velocity(self) -> float:
+        """Velocity limit [rad/s] or [m/s]."""
 
 
 class JogKeys:

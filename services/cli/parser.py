@@ -110,7 +110,7 @@ def positive_integer(text: str) -> int:
 
 
 def positive_number(text: str) -> float:
-    """An argument's type: a finite number above 0."""
+    """An argument's type: a finite number above 0, in the unit that the option names."""
     value = float(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not above 0 and finite")

@@ -72,7 +72,8 @@ def snapshot(
     status: DeviceStatus | None,
     tool: tuple[float, ...] | None,
 ) -> Snapshot:
-    """The `Snapshot` of the messages received so far; None for one that was not."""
+    """The `Snapshot` of the messages received so far, None for one that was not; `tool` is (3,) [m] in the base
+    frame."""
     states, errors = states or JointState(), errors or StepErrors()
     position = dict(zip(states.name, states.position, strict=False))
     velocity = dict(zip(states.name, states.velocity, strict=False))

@@ -57,7 +57,7 @@ def _is_scalar(value: object) -> bool:
 
 
 def _is_flat(value: object) -> bool:
-    """Whether `value` fits on one line: empty, or a sequence of scalars."""
+    """True if `value` fits on one line: empty, or a sequence of scalars."""
     if isinstance(value, list | tuple):
         return all(_is_scalar(item) for item in value)
     return not _is_scalar(value) and not _fields(value)
@@ -107,5 +107,5 @@ def _escaped(character: str) -> str:
 
 
 def _needs_quotes(text: str) -> bool:
-    """Whether a text of several lines would not survive as a block."""
+    """True if a text of several lines would not survive as a block."""
     return text != text.strip() or not all(line.isprintable() for line in text.split("\n"))
