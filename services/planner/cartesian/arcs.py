@@ -23,7 +23,7 @@ FARTHEST = 1e6  # [m]
 
 
 def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
-    """From start through `interim` (3,) to end; raises `PlanRefused`."""
+    """The arc from `start` through `interim` (3,) [m] in the base frame to `end`; raises `PlanRefused`."""
     to_interim, to_end = interim - start.position, end.position - start.position
     _require_way("interim", interim, start.position, end.position)
     normal = np.cross(to_interim, to_end)
@@ -37,7 +37,7 @@ def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
 
 
 def arc_about(start: Pose, centre: Array, end: Pose) -> Arc:
-    """The shorter one about `centre` (3,); raises `PlanRefused`."""
+    """The shorter arc from `start` to `end` about `centre` (3,) [m] in the base frame; raises `PlanRefused`."""
     _require_way("center", centre, start.position, end.position)
     first, last = start.position - centre, end.position - centre
     radii = float(np.linalg.norm(first)), float(np.linalg.norm(last))

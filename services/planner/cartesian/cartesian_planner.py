@@ -66,10 +66,11 @@ class CartesianPlanner:
         self._continuation = Continuation(arm, kinematics, holds_turn)
 
     def plan(self, paths: Sequence[ToolPath], start: Start, end: Start | None, terms: CartesianTerms) -> CartesianPath:
-        """Along the paths one after the other, at rest between them; raises `PlanRefused`, and what `terms.deadline`
-        raises.
+        """The path of the joints from `start` (n,) [rad] or [m] along `paths`, at rest between them; raises
+        `PlanRefused`, and what `terms.deadline` raises.
 
-        Where it comes to `end` but for rounding, it ends there to the bit. On a path that moves no joint it stands.
+        Where the path leads to `end` (n,) but for rounding, it ends there to the bit. A path that moves no joint gives
+        a plan that stands still.
         """
         whole, before = sum(path.length for path in paths), 0.0
         metres = sum(path.metres for path in paths)

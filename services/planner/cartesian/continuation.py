@@ -105,7 +105,7 @@ class Continuation:
         return self._refined(path, lengths, configurations, stop, deadline)
 
     def ending(self, followed: FollowedPath, end: Array) -> FollowedPath:
-        """The same, with `end` (n,) as its last configuration where that is where it leads."""
+        """The same path, with `end` (n,) [rad] or [m] as its last configuration if it leads there but for rounding."""
         if not is_same(followed.configurations[-1], end):
             return followed
         configurations = np.vstack((followed.configurations[:-1], end))

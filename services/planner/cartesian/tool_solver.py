@@ -45,7 +45,8 @@ class ToolSolver:
         return None
 
     def manipulability(self, configuration: Array) -> float:
-        """The smallest singular value of what is held of the tool, turns counted as the path counts them."""
+        """The smallest singular value of the held rows of the Jacobian at `configuration` (n,) [rad] or [m], turns
+        weighted by `METRES_PER_RADIAN`."""
         jacobian = self._kinematics.jacobian(configuration)
         held = WEIGHTS * jacobian if self._holds_turn else jacobian[:3]
         return float(np.linalg.svd(held, compute_uv=False)[-1])

@@ -87,9 +87,10 @@ def closed_form(arm: Arm, kinematics: Kinematics) -> ClosedForm | None:
 
 
 def turns_about(direction: Array, axis: Array, rotation: Array, count: int) -> list[Array]:
-    """`count` rotations (3, 3), evenly spread, that bring the tool's `axis` along `direction`.
+    """`count` rotations (3, 3), evenly spread, that bring the tool's unit `axis` (3,) along the unit `direction` (3,)
+    in the base frame.
 
-    The first one keeps the tool's present `rotation` about it as well as it can.
+    The first one keeps the tool's present `rotation` (3, 3) about it as well as it can.
     """
     across = any_normal(axis)
     wanted = rotation @ across

@@ -47,7 +47,7 @@ class Goals:
     def candidates(
         self, goal: Goal, start: Start, deadline: Deadline, standing: Start | None = None
     ) -> Iterator[Start]:
-        """Configurations that fulfil the goal, lazily; raises `PlanRefused` where there is none.
+        """Configurations (n,) [rad] or [m] that fulfil the goal, lazily; raises `PlanRefused` where there is none.
 
         A link's frame is where the arm has it when it stands in `standing`: at the start, where that is absent.
         """
@@ -106,7 +106,8 @@ class Goals:
         raise self._unreachable.refusal(goal, target, frame, near, deadline)
 
     def frame(self, goal: PoseGoal, start: Start) -> Rigid:
-        """The goal's frame in the base."""
+        """The goal's frame in the base, with the joints at `start` (n,) [rad] or [m]; raises `PlanRefused` for an
+        unknown frame."""
         if goal.frame in ("", self._arm.base_frame):
             return IDENTITY
         links = self._kinematics.link_poses(start)

@@ -27,7 +27,8 @@ class FullTurns:
         self._period = np.array([math.tau if joint.unit == "rad" else NEVER for joint in arm.joints])
 
     def within_limits(self, branches: Array, near: Array) -> list[Array]:
-        """The branches (m, n) or one of them (n,) with every full turn; joints without limits as near as they can."""
+        """The branches (m, n) or one of them (n,), [rad] or [m], with every full turn within the limits; joints without
+        limits as near to `near` (n,) as they can be."""
         branches = np.atleast_2d(branches)
         lower = np.where(np.isinf(self._lower), near - 0.5 * self._period, self._lower)
         upper = np.where(np.isinf(self._upper), near + 0.5 * self._period, self._upper)
@@ -61,7 +62,7 @@ _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)
 
 
 def spread(arm: Arm, count: int) -> list[Array]:
-    """The first points (n,) of Halton's sequence within one turn of every joint."""
+    """The first `count` points (n,) [rad] or [m] of Halton's sequence within one turn of every joint."""
     lower, upper = one_turn(arm)
     bases = [_PRIMES[joint % len(_PRIMES)] for joint in range(len(arm.joints))]
     shares = (np.array([_radical_inverse(index, base) for base in bases]) for index in range(1, count + 1))

@@ -49,7 +49,8 @@ def spline_rows(control: Array, rows: int) -> Array:
 
 
 def smooth_runs(control: Array, scale: Array) -> list[Curve]:
-    """The parts of the curve between its corners, at which it has to stop; values are divided by `scale` (n,)."""
+    """The parts of the curve of `control` (k, n) [rad] or [m] between its corners, at which it has to stop; values are
+    divided by `scale` (n,)."""
     pieces = _straightened(control / scale)
     lengths = np.linalg.norm(pieces[:, 1:].sum(axis=1), axis=1)
     pieces = pieces[lengths > SMALLEST * max(float(lengths.sum()), 1.0)]

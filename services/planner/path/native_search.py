@@ -26,11 +26,12 @@ REASONS = {"START_TOUCHES": SearchFailure.START_TOUCHES, "GOAL_TOUCHES": SearchF
 
 
 def native_path(core: NativePlanner, start: Array, goals: Array, seed: int, deadline: Deadline) -> Path:
-    """From `start` (n,) to one of `goals` (m, n): the shortest of as many as `ENOUGH` checks find; raises
-    `PathNotFound`.
+    """A path from `start` (n,) to one of `goals` (m, n), [rad] or [m]: the shortest of as many as `ENOUGH` checks find;
+    raises `PathNotFound`.
 
     Searched, shortened and smoothed by the native planner. The same seed gives the same path where the time does not
-    end it."""
+    end it.
+    """
     best = _path(core, start, goals, seed, deadline)
     spent = best.effort.checks
     while spent < ENOUGH and not deadline.has_passed():

@@ -27,8 +27,8 @@ TRIED = 3  # of them, the nearest, to which the straight path is looked at
 def nearby_free(
     arm: Arm, core: NativePlanner, configuration: Array, validity: ValidityChecker, seed: int, deadline: Deadline
 ) -> Array | None:
-    """`configuration` (n,) itself where the native planner lets it move, else a near one where it does, None where none
-    was found."""
+    """`configuration` (n,) [rad] or [m] itself where the native planner lets it move, else a near one where it does;
+    None where none was found."""
     if _can_move(core, configuration):
         return configuration
     for rows in _around(arm, configuration, seed):

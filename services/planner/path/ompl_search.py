@@ -35,7 +35,7 @@ AROUND = math.pi  # [rad] about start and goals that a joint without limits is s
 def ompl_corners(
     arm: Arm, planner_id: str, start: Array, goals: Array, validity: ValidityChecker, seed: int, deadline: Deadline
 ) -> Array:
-    """Corners (m, n) of a polyline from `start` (n,) to one of `goals` (k, n), exact at both ends; raises
+    """Corners (m, n) [rad] or [m] of a polyline from `start` (n,) to one of `goals` (k, n), exact at both ends; raises
     `PathNotFound`."""
     problem = _Problem(arm, validity, np.vstack((start, goals)))
     problem.set_ends(start, goals, seed)

@@ -36,10 +36,10 @@ class Path:
 
     @property
     def start(self) -> Start:
-        """Where it begins, to the bit."""
+        """Joint values (n,) [rad] or [m] at which the path begins, to the bit."""
         return tuple(self.control[0].tolist())
 
     @property
     def goal(self) -> Start:
-        """Where it ends, to the bit."""
+        """Joint values (n,) [rad] or [m] at which the path ends, to the bit."""
         return tuple(self.control[-1].tolist())

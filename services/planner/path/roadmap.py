@@ -23,7 +23,8 @@ def shortest_path(
     scale: Array,
     is_line_free: Callable[[Array, Array], bool],
 ) -> Array | None:
-    """Corners (m, n) from `start` to one of `goals`, or None; distances are divided by `scale` (n,)."""
+    """Corners (m, n) [rad] or [m] from `start` (n,) to one of `goals` (k, n), or None; distances are divided by `scale`
+    (n,)."""
     if len(places) == 0:
         return None
     rows = np.vstack((places, start, goals))

@@ -60,7 +60,8 @@ def smooth(corners: Array, validity: ValidityChecker, deadline: Deadline) -> Arr
 
 
 def continued(corners: Array, end: Array, validity: ValidityChecker) -> Array:
-    """The polyline from `end` (n,) straight to its first corner, or past it to the second where that is free."""
+    """The polyline (m, n) [rad] or [m] from `end` (n,) straight to its first corner, or past it to the second where
+    that is free."""
     is_needless = len(corners) > 1 and validity.is_line_free(end, corners[1])
     return np.vstack((end, corners[1:] if is_needless else corners))
 

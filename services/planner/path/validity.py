@@ -30,11 +30,11 @@ class ValidityChecker:
         self._checker, self._margin = checker, margin
 
     def is_free(self, configuration: Array) -> bool:
-        """True if the configuration (n,) keeps the margin."""
+        """True if the configuration (n,) [rad] or [m] keeps the margin."""
         return self.is_line_free(configuration, configuration)
 
     def is_line_free(self, start: Array, goal: Array) -> bool:
-        """True if the straight joint path between two configurations (n,) keeps the margin."""
+        """True if the straight joint path between two configurations (n,) [rad] or [m] keeps the margin."""
         return self._checker.touching(np.array((start, goal)), self._margin) is None
 
     def is_curve_free(self, control: Array) -> bool:
