@@ -44,8 +44,8 @@ def first_collision(checker: DistanceChecker, positions: Array, margin: float) -
 
 
 def last_free(checker: DistanceChecker, start: Array, goal: Array) -> Array:
-    """The last configuration (n,) on the straight line from `start` to `goal` before anything comes nearer than
-    allowed."""
+    """The last configuration (n,) [rad] or [m] on the straight line from `start` to `goal` before anything comes nearer
+    than allowed."""
     return _walk(checker, np.vstack((start, goal)), CLEARANCE + ROUNDING)[0]
 
 

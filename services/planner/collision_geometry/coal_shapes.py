@@ -48,7 +48,7 @@ def tree_of(mesh: TriangleMesh) -> coal.BVHModelOBBRSS:
 
 
 def is_inside(mesh: TriangleMesh, point: Array) -> bool:
-    """True if the surface goes around `point` (3,) in the mesh's frame, holes or not.
+    """True if the surface goes around `point` (3,) [m] in the mesh's frame, holes or not.
 
     By the generalised winding number (Jacobson et al. 2013) of the solid angles of its triangles (Van Oosterom and
     Strackee 1983); either orientation of the triangles counts.

@@ -73,17 +73,17 @@ class CollisionShape:
 
     @property
     def matrix(self) -> Array:
-        """(4, 4), the pose with its quaternion brought to length 1."""
+        """The pose as a homogeneous transform (4, 4), translation in [m], with its quaternion brought to length 1."""
         return matrix_of(self.pose)
 
     @property
     def rotation(self) -> Array:
-        """(3, 3)."""
+        """The rotation matrix (3, 3) of the pose."""
         return self.matrix[:3, :3]
 
 
 def matrix_of(pose: Rigid) -> Array:
-    """(4, 4) of a translation and a quaternion of any length but 0."""
+    """The homogeneous transform (4, 4), translation in [m], of a translation and a quaternion of any length but 0."""
     x, y, z, w = np.array(pose[1]) / np.linalg.norm(pose[1])
     matrix = np.eye(4)
     matrix[:3, :3] = [

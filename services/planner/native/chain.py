@@ -45,7 +45,7 @@ def frames_of(arm: Arm) -> Frames:
 
 
 def inverse_of(matrix: Array) -> Array:
-    """(4, 4) of a rigid transform."""
+    """The inverse (4, 4) of a rigid transform (4, 4), translation in its own unit."""
     inverse = np.eye(4)
     inverse[:3, :3] = matrix[:3, :3].T
     inverse[:3, 3] = -matrix[:3, :3].T @ matrix[:3, 3]
@@ -53,7 +53,7 @@ def inverse_of(matrix: Array) -> Array:
 
 
 def transform_row(matrix: Array) -> Array:
-    """(12,): the rotation by rows, then the translation."""
+    """The rotation by rows, then the translation, (12,), of a rigid transform (4, 4)."""
     return np.concatenate((matrix[:3, :3].reshape(9), matrix[:3, 3]))
 
 

@@ -109,8 +109,8 @@ class NativePlanner:
         return motion.unresolved_intervals(self._scene.world, self._kernel, self._rows(rows), self.margin, FINEST)
 
     def touching(self, rows: ArrayLike) -> Array | None:
-        """A configuration (n,) on the polyline through `rows` (m, n) that does not keep the margin, however much
-        bulges.
+        """A configuration (n,) [rad] or [m] on the polyline through `rows` (m, n) that does not keep the margin,
+        however much bulges.
 
         None where there is none, or where only the true shapes can tell.
         """

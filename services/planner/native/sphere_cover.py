@@ -40,7 +40,8 @@ class SphereCover:
 
 
 def cover_shapes(shapes: Sequence[CollisionShape], bulge: float) -> SphereCover:
-    """The spheres of several shapes in the frame that their poses are in; raises ValueError for one without an end."""
+    """The spheres [m] of several shapes, in the frame of their poses, for a bulge of at most `bulge` [m] but for large
+    meshes; raises ValueError for a shape without an end."""
     covers = [_placed(shape, bulge) for shape in shapes]
     return SphereCover(np.vstack([cover.spheres for cover in covers]), max(cover.bulge for cover in covers))
 
@@ -125,11 +126,12 @@ def medial(solid: Solid, pitch: float) -> Array:
 
 
 def lattice(half: Array, steps: Array) -> Array:
-    """(n, 3) centres of the cells that a box of `half` sizes is cut into."""
+    """Centres (n, 3) [m] of the cells of the sizes `steps` (3,) [m] that a box of the half sizes `half` (3,) [m] is cut
+    into."""
     axes = [np.arange(0.5 * steps[i] - half[i], half[i], steps[i]) for i in range(3)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def with_radii(points: Array, radii: Array) -> Array:
-    """(n, 4)."""
+    """Spheres (n, 4) [m]: `points` (n, 3) and `radii` (n,) side by side."""
     return np.ascontiguousarray(np.column_stack((points, radii)))
