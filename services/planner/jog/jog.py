@@ -74,7 +74,8 @@ class Jog:
 
     @property
     def commanded(self) -> tuple[Array, Array] | None:
-        """Position and velocity (n,) that the arm is to have now; None while it is not led."""
+        """Position [rad] or [m] and velocity [rad/s] or [m/s], (n,) each, that the arm is to have now; None while it is
+        not led."""
         return None if self._positions is None else (self._positions.copy(), self._velocity.copy())
 
     def set_world(self, world: World) -> None:
@@ -82,7 +83,7 @@ class Jog:
         self._limiter = VelocityLimiter(self._arm, world, self._braking)
 
     def on_command(self, command: JogCommand, now: float) -> None:
-        """The newest one counts."""
+        """Takes a command that has come at `now` [s]; the newest one counts."""
         if now - self._heard > SILENCE:
             self._interrupted_by = ""
         self._command, self._heard = command, now

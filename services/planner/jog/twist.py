@@ -64,7 +64,8 @@ class TwistSolver:
         return self._rows == 6
 
     def manipulability(self, positions: Array) -> float:
-        """Yoshikawa's (1985): the square root of det(J J^T), of the rows that count."""
+        """Yoshikawa's (1985) at joint values (n,) [rad] or [m]: the square root of det(J J^T), of the rows that count,
+        without weights."""
         jacobian = self._kinematics.jacobian(positions)[: self._rows]
         return float(np.sqrt(max(0.0, np.linalg.det(jacobian @ jacobian.T))))
 

@@ -29,8 +29,8 @@ class CollisionRefusals:
     def goal(
         self, asked: Goal, goal: Start, start: Start, deadline: Deadline, standing: Start | None = None
     ) -> PlanRefused:
-        """The refusal of a goal at which links touch, with the last free configuration on the way, in the goal's own
-        form.
+        """The refusal of the configuration `goal` (n,) [rad] or [m] at which links touch, with the last free one on the
+        straight line from `start` (n,), in the form of the goal `asked`.
 
         `standing` as in `Goals.candidates`.
         """
@@ -47,7 +47,8 @@ class CollisionRefusals:
         return self.refusal(PlanCode.GOAL_IN_COLLISION, "at the goal", np.array(goal), CLEARANCE, nearest, remedy)
 
     def start(self, start: Start, deadline: Deadline) -> PlanRefused:
-        """The refusal of a start in which something touches, with the nearest configuration that touches nothing."""
+        """The refusal of `start` (n,) [rad] or [m], in which something touches, with the nearest configuration that
+        touches nothing."""
         remedy, nearest = self._remedy(start), nearest_free(self._arm, self._checker, start, deadline)
         if nearest is not None and nearest.can_be_jogged:
             words = jog_words(self._arm, self._checker.reach, start, nearest.configuration)

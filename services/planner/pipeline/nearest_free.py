@@ -38,7 +38,8 @@ class FreeConfiguration:
 
 
 def nearest_free(arm: Arm, checker: CollisionChecker, start: Start, deadline: Deadline) -> FreeConfiguration | None:
-    """The nearest that can be jogged to, or else the nearest; None where there is none near."""
+    """The nearest free configuration to `start` (n,) [rad] or [m] that can be jogged to, or else the nearest; None
+    where there is none near."""
     nearest: FreeConfiguration | None = None
     for row in _around(arm, checker.reach, np.array(start)):
         if deadline.has_passed():

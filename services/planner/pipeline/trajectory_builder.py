@@ -57,7 +57,8 @@ class TrajectoryBuilder:
         self._limits, self._margin, self._watch = limits, margin, watch
 
     def line(self, start: Start, goal: Start) -> VerifiedTrajectory:
-        """The straight line of the joints; raises `TrajectoryTouches` or `PlanRefused`."""
+        """The straight line of the joints from `start` to `goal`, (n,) [rad] or [m]; raises `TrajectoryTouches` or
+        `PlanRefused`."""
         return self.verified(self._stopping(np.array((start, goal))), start, goal)
 
     def path(self, path: Path) -> VerifiedTrajectory:
@@ -93,8 +94,8 @@ class TrajectoryBuilder:
             return _timed(lambda: timed_path(names, control, self._limits))
 
     def verified(self, trajectory: JointTrajectory, start: Start, goal: Start) -> VerifiedTrajectory:
-        """Slower where the steppers cannot, then verified as it will be played; raises `TrajectoryTouches` or
-        `PlanRefused`."""
+        """The trajectory from `start` to `goal`, (n,) [rad] or [m], slowed where the steppers cannot follow it, then
+        verified as it will be executed; raises `TrajectoryTouches` or `PlanRefused`."""
         with self._watch.phase("verification"):
             samples = sample(trajectory)
             self._require_free(samples.positions)

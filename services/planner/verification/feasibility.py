@@ -137,8 +137,8 @@ def require_feasible(arm: Arm, trajectory: JointTrajectory) -> tuple[StepMargin,
 
 
 def feasible_scale(arm: Arm, trajectory: JointTrajectory) -> float:
-    """The largest time scale in (0, 1] at which the steppers can, by bisection; 0.0 where none above 1 % does, or none
-    in a time that a plan may take."""
+    """The largest dimensionless time scale in (0, 1] that the steppers can follow, by bisection; 0.0 where none above 1
+    % is, or none in a time that a plan may take."""
     slowest = max(SLOWEST, trajectory.points[-1].time_from_start / LONGEST)
     if slowest >= 1.0 or not _can(arm, slowed(trajectory, slowest)):
         return 0.0
@@ -154,7 +154,7 @@ def feasible_scale(arm: Arm, trajectory: JointTrajectory) -> float:
 
 
 def slowed(trajectory: JointTrajectory, scale: float) -> JointTrajectory:
-    """The same path at `scale` in (0, 1] of its speed."""
+    """The same path at the dimensionless `scale` in (0, 1] of its speed."""
     points = tuple(
         TrajectoryPoint(
             positions=point.positions,

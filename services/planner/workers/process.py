@@ -78,7 +78,8 @@ class Process:
                 self._told = scene
 
     def plan(self, assignment: Assignment, job: Job, seconds: float) -> PlanResponse:
-        """Raises `TimeoutError` after `seconds`, `Cancelled` or `WorkerDied`; it is replaced where it did not end."""
+        """The worker's response; raises `TimeoutError` after `seconds` [s], `Cancelled` or `WorkerDied`. A process that
+        did not end its job is replaced."""
         with self._replaced_where_it_fails():
             self._send(job)
             needs_toppra = job.request.timing is Timing.TIME_OPTIMAL
