@@ -118,7 +118,7 @@ def collision_checks_per_s() -> Figure:
 
 
 def straight_paths(rows: Array) -> list[Array]:
-    """Paths of (POINTS, n) configurations, each between two consecutive ones of `rows` (2 m, n)."""
+    """Paths of (POINTS, n) configurations [rad] or [m], each between two consecutive ones of `rows` (2 m, n)."""
     shares = np.linspace(0.0, 1.0, POINTS)[:, None]
     return [start + shares * (goal - start) for start, goal in zip(rows[::2], rows[1::2], strict=True)]
 

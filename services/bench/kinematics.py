@@ -95,7 +95,7 @@ def random_problems(arm: Arm, kinematics: Kinematics, count: int, is_full: bool)
 
 
 def solve(solver: InverseKinematics, problem: Problem) -> Array | None:
-    """The first solution (n,); None if there is none."""
+    """The first solution (n,) [rad] or [m]; None if there is none."""
     return next(solver.solutions(problem.target, problem.near, NEVER), None)
 
 
@@ -121,7 +121,8 @@ def solved(arm: Arm, count: int, is_full: bool = True, is_numeric: bool = False)
 
 
 def is_solved(arm: Arm, problem: Problem, answer: Array | None) -> bool:
-    """True if `answer` (n,) is within limits and meets the target, by kinematics other than the solver's."""
+    """True if `answer` (n,) [rad] or [m] is within limits and meets the target, by kinematics other than the
+    solver's."""
     if answer is None or not all(j.is_within(v) for j, v in zip(arm.joints, answer.tolist(), strict=True)):
         return False
     (x, y, z), reached = tool_of(arm, answer)

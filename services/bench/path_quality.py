@@ -49,7 +49,8 @@ def path_length_ratio() -> Figure:
 
 
 def length_ratio(trial: Trial, speeds: Array) -> float:
-    """Length of the planned path over the shortest known one; `speeds` (n,) are the velocity limits."""
+    """Length of the planned path over the shortest known one, dimensionless; `speeds` (n,) [rad/s] or [m/s] are the
+    velocity limits."""
     return path_length(trial.path, speeds) / trial.problem.length
 
 

@@ -60,7 +60,7 @@ class CoalChecker:
         self._geometry_data = self._geometry.createData()
 
     def is_free(self, configuration: Array) -> bool:
-        """True if no checked pair is in contact at `configuration` (n,)."""
+        """True if no checked pair is in contact at `configuration` (n,) [rad] or [m]."""
         q = self._configuration.to_pinocchio(configuration)
         return not pin.computeCollisions(self._model, self._data, self._geometry, self._geometry_data, q, True)
 
@@ -180,7 +180,7 @@ class Roboplan:
         self._scene.setCollisions(list(combinations(names, 2)), False)
 
     def is_free(self, configuration: Array) -> bool:
-        """True if roboplan finds no collision at `configuration` (n,)."""
+        """True if roboplan finds no collision at `configuration` (n,) [rad] or [m]."""
         return not self._scene.hasCollisions(configuration)
 
 

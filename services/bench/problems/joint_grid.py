@@ -34,7 +34,7 @@ class JointGrid:
         self._islands = islands(self._free, [self._joined(axis) for axis in range(len(self._axes))])
 
     def is_connected(self, start: Array, goal: Array) -> bool:
-        """True if a path along the grid joins the configurations `start` and `goal` (n,)."""
+        """True if a path along the grid joins the configurations `start` and `goal` (n,) [rad] or [m]."""
         return not self._islands_at(start).isdisjoint(self._islands_at(goal))
 
     def _islands_at(self, configuration: Array) -> set[int]:

@@ -50,7 +50,8 @@ class Spheres:
 
 
 def shortest(arm: Arm, checker: CollisionChecker, start: Array, goals: Array) -> tuple[Array, str] | None:
-    """A polyline (m, n) from `start` (n,) to one of `goals` (k, n), and what found it; None if none is found."""
+    """A polyline (m, n) [rad] or [m] from `start` (n,) to one of `goals` (k, n), and what found it; None if none is
+    found."""
     core = checker.native(CLEARANCE)
     if core is None:
         raise RuntimeError("the compiled motion core is needed to look for the shortest ways: run `make setup`")

@@ -121,7 +121,7 @@ class Maker:
         return paths
 
     def configurations(self, problem: Problem) -> list[Array]:
-        """Free configurations (n,) of the tool pose, the problem's own first."""
+        """Free configurations (n,) [rad] or [m] of the tool pose, the problem's own first."""
         goal = request_of(problem, self.arm, self.kinematics).goal
         found = Goals(self.arm, self.kinematics, self._around).candidates(goal, problem.start, NEVER)
         free = [np.array(each) for each in found if self._around.keeps(each, CLEARANCE)]
