@@ -57,7 +57,7 @@ class JogKeys:
         self.wants_to_leave = False
 
     def press(self, text: str, now: float) -> None:
-        """Takes the terminal's input, perhaps several keys; the last one counts."""
+        """Takes the terminal's input at `now` [s], perhaps several keys; the last one counts."""
         for key in _KEYS.findall(text):
             self._press("\x1b[" + key[2] if key.startswith("\x1bO") else key, now)
 

@@ -39,7 +39,7 @@ def _cost(shape: Fitted) -> float:
 
 
 def spread(points: Array) -> Array:
-    """(3, 3) whose rows are the axes along which points (n, 3) spread most and least."""
+    """Unit vectors as rows (3, 3): the axes along which points (n, 3) [m] spread, from most to least."""
     return np.asarray(np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2])
 
 

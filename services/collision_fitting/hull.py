@@ -18,7 +18,8 @@ FINENESS, LOOKS = 45, 3  # angles on either side of the best, in each of so many
 
 
 def corners_and_sides(points: Array) -> tuple[Array, Array]:
-    """The corners of the convex hull of `points` (n, 3), and the normals (k, 3) of its largest flat sides."""
+    """The corners (m, 3) [m] of the convex hull of `points` (n, 3) [m], and the unit normals (k, 3) of its largest flat
+    sides; all points and no normals where the points are flat."""
     points = np.unique(points, axis=0)
     thickness = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if len(points) < 4 or thickness[2] <= FLAT * thickness[0]:
@@ -34,7 +35,7 @@ def corners_and_sides(points: Array) -> tuple[Array, Array]:
 
 
 def smallest_ball(points: Array) -> tuple[Array, float]:
-    """Centre (d,) and radius of the smallest ball around points (n, d), however many lie on it.
+    """Centre (d,) and radius of the smallest ball around points (n, d), all [m], however many lie on it.
 
     That of few points and of the farthest one outside it, until there is none (Gaertner 1999).
     """

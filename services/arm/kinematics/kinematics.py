@@ -57,7 +57,7 @@ class Kinematics:
         return self._base.copy()
 
     def tool(self, positions: Positions) -> Pose:
-        """The tool's pose."""
+        """The tool's pose in the base frame at joint values (n,) [rad] or [m]."""
         pin.forwardKinematics(self._model, self._data, self._configuration.to_pinocchio(positions))
         placement = self._in_base(pin.updateFramePlacement(self._model, self._data, self._tool))
         return Pose(placement.translation.copy(), placement.rotation.copy())
@@ -79,7 +79,7 @@ class Kinematics:
         return Pose(placement.translation.copy(), placement.rotation.copy()), jacobian
 
     def link_poses(self, positions: Positions) -> dict[str, Transform]:
-        """Every link's pose."""
+        """Every link's pose in the base frame at joint values (n,) [rad] or [m]."""
         pin.framesForwardKinematics(self._model, self._data, self._configuration.to_pinocchio(positions))
         return {name: _message(self._in_base(self._data.oMf[index])) for name, index in self._links.items()}
 
