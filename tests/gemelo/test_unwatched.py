@@ -88,14 +88,16 @@ def test_a_script_that_ends_leaves_an_arm_that_rests(twin: Stack, arm: gemelo.Ar
 
 def test_ctrl_c_decelerates_and_then_raises(twin: Stack, arm: gemelo.Arm, goal: float) -> None:
     then = """
+    told = []
     try:
-        motion.wait()
+        motion.wait(on_progress=lambda motion: told or told.append(print("waits", flush=True)))
     except gemelo.Interrupted as interrupted:
         print(interrupted.stopped_at == motion.stopped_at, max(map(abs, arm.velocities.values())) < 1e-3, flush=True)
         raise
     """
     with script(twin, MOVES.format(goal=goal, more="", then=then)) as process:
         said(process)
+        assert said(process) == "waits"  # Ctrl-C before the wait is the script's own
         process.send_signal(signal.SIGINT)
         assert said(process) == "True True"
         code, _, errors = ended(process)
