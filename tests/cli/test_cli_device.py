@@ -273,7 +273,7 @@ def test_words_become_presses(arm, words, request_):
 
 def test_every_kind_of_press_has_its_word(arm):
     values = {"JOINT": "q1", "STEPS": "1", "INPUT": "estop", "on|off|auto": "on", "SENSOR": "ultra"}
-    kinds = {request_of(arm, word, [values.get(f, "1") for f in each.follows]).press for word, each in PRESSES.items()}
+    kinds = {request_of(arm, word, [values.get(f, "1") for f in each.follows]).kind for word, each in PRESSES.items()}
     assert kinds == set(InjectKind)
 
 
