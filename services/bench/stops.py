@@ -17,6 +17,7 @@ from paho.mqtt.client import Client, MQTTMessage
 
 from schemas.device import (
     ConfigureRequest,
+    DeviceCommandKind,
     DeviceStopRequest,
     InjectKind,
     InjectRequest,
@@ -43,7 +44,7 @@ FLOOD_SECONDS = 60.0  # at the most
 
 
 class Wire:
-    """Receives every command frame, with the number that its sender gave it."""
+    """Receives every STOP frame, with the number that its sender gave it."""
 
     def __init__(self, port: int, device: str) -> None:
         self._frames: SimpleQueue[tuple[int, float]] = SimpleQueue()
@@ -52,17 +53,20 @@ class Wire:
         self._client.on_message = self._on_message
 
     def _on_message(self, client: Client, userdata: object, message: MQTTMessage) -> None:
-        self._frames.put((int.from_bytes(message.payload[8:12], "little"), time.monotonic()))
+        arrived = time.monotonic()
+        if message.payload[20] == DeviceCommandKind.STOP:
+            self._frames.put((int.from_bytes(message.payload[8:12], "little"), arrived))
 
-    def next(self) -> float:
-        """Time [s monotonic] of the next frame with a new number; raises NotMeasured after PATIENCE."""
+    def next(self, since: float) -> float:
+        """Time [s monotonic] of the first frame with a new number after `since`; raises NotMeasured after PATIENCE."""
         while True:
             try:
                 number, at = self._frames.get(timeout=PATIENCE)
             except Empty:
                 raise NotMeasured("a stop did not reach the wire") from None
-            if number not in self._seen:
-                self._seen.add(number)
+            is_new = number not in self._seen
+            self._seen.add(number)
+            if is_new and at >= since:
                 return at
 
     def close(self) -> None:
@@ -86,7 +90,7 @@ class Caller:
         payload = encode(DeviceStopRequest(kind=StopKind.STOP))
         called = time.monotonic()
         self.bus.ask(DEVICE_STOP.key, DeviceStopRequest.__name__, payload, PATIENCE, answers.put, True)
-        seen = self.wire.next()
+        seen = self.wire.next(called)
         answers.get(timeout=2 * PATIENCE)  # a stop that is not answered yet would absorb the next one
         return (seen - called) * 1e3
 

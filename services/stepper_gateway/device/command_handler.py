@@ -52,6 +52,8 @@ class CommandHandler:
         try:
             if reason := self._device.unreachable_reason(moment) or self._objection(kind, goal_is_active):
                 raise invalid(reason)
+            if self._device.commands.is_full:
+                raise invalid("the device has not answered the commands before this one yet: wait a moment")
             arguments = arguments_of(request, self._device.arm)
         except GoalRejected as rejected:
             self._answer(ticket, False, rejected.reason)

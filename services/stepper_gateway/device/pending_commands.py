@@ -33,6 +33,7 @@ class Arguments:
 
 NO_ARGUMENTS = Arguments()
 STOPPING = (DeviceCommandKind.STOP, DeviceCommandKind.HOLD, DeviceCommandKind.DISARM)
+MOST_UNDER_WAY = 16  # commands that the device has not answered, but for stops; chosen: a person has one or two
 MOST_TICKETS = 256  # of one command: who asks for the same again is answered with the others
 
 
@@ -83,6 +84,11 @@ class PendingCommands:
         deadline = moment.monotonic + timeout
         command = PendingCommand(self._next_id, kind, arguments, tickets, deadline, not tickets, stream)
         self._pending.insert(self._place_of(command), command)
+
+    @property
+    def is_full(self) -> bool:
+        """True if no command but a stop may be added until the device has answered others."""
+        return sum(not command.is_stop for command in self._pending) >= MOST_UNDER_WAY
 
     def is_pending(self, kind: DeviceCommandKind) -> bool:
         return any(command.kind == kind for command in self._pending)
