@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceMode, InjectKind, InjectRequest, StopKind
+from schemas.device import DeviceCommandKind, DeviceMode, InjectKind, InjectRequest, SpeedCommand, StopKind
+from services.stepper_gateway.device.pending_commands import MOST_UNDER_WAY
 from services.stepper_gateway.links.frames import Command, decode
 from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.virtual_arm import VirtualArm
@@ -162,3 +163,15 @@ def test_disarm_is_refused_while_a_goal_moves_the_arm() -> None:
     rig.ask(StopKind.DISARM, 7)
     assert "cancel it or run `gemelo stop` before DISARM" in rig.answers[7].reason
     assert not commands(rig)
+
+
+def test_a_flood_of_commands_is_bounded_and_a_stop_goes_before_it() -> None:
+    rig = moving()
+    rig.lost = {Kind.CMD_ACK}
+    for ticket in range(1, 1001):
+        rig.ask(SpeedCommand(scale=1.0), ticket)
+    assert len(commands(rig)) == MOST_UNDER_WAY
+    assert "has not answered the commands before this one yet" in rig.answers[1000].reason
+    rig.ask(StopKind.STOP, 2000)
+    assert commands(rig)[-1].cmd == DeviceCommandKind.STOP
+    assert rig.run(2.0, lambda: stands(rig))
