@@ -32,7 +32,7 @@ from schemas.device import (
     DeviceStopRequest,
     InjectKind,
     InjectRequest,
-    ResetCommand,
+    SpeedCommand,
     StopKind,
 )
 from schemas.joints import JointTargets
@@ -59,13 +59,13 @@ WARM_UP = 1.0  # [s] until the flood has its full rate
 GOAL = GoalRequest(goal_id="flood", client="flood", goal=msgspec.Raw(encode(FollowJointTrajectoryGoal())))
 REQUESTS: dict[str, tuple[tuple[str, Message], ...]] = {
     "requests": (
-        (DEVICE_COMMAND.key, DeviceCommandRequest(command=ResetCommand())),
+        (DEVICE_COMMAND.key, DeviceCommandRequest(command=SpeedCommand())),
         (DEVICE_CONFIGURE.key, ConfigureRequest()),
         (DEVICE_INJECT.key, InjectRequest(kind=InjectKind.SENSOR)),
         (f"{FOLLOW_JOINT_TRAJECTORY.key}/goal", GOAL),
         (PLAN.key, PlanRequest()),
     ),
-    "commands": ((DEVICE_COMMAND.key, DeviceCommandRequest(command=ResetCommand())),),
+    "commands": ((DEVICE_COMMAND.key, DeviceCommandRequest(command=SpeedCommand())),),
     "holds": ((DEVICE_STOP.key, DeviceStopRequest(kind=StopKind.HOLD)),),
 }
 

@@ -175,3 +175,13 @@ def test_a_flood_of_commands_is_bounded_and_a_stop_goes_before_it() -> None:
     rig.ask(StopKind.STOP, 2000)
     assert commands(rig)[-1].cmd == DeviceCommandKind.STOP
     assert rig.run(2.0, lambda: stands(rig))
+
+
+def test_a_stop_that_is_asked_for_again_while_the_device_is_silent_is_sent_again_at_once() -> None:
+    rig = moving()
+    rig.device_is_on = False
+    rig.ask(StopKind.STOP, 7)
+    rig.run(0.03)
+    sent = len(commands(rig))
+    rig.ask(StopKind.STOP, 8)
+    assert len(commands(rig)) == sent + 1

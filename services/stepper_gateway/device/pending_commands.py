@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from schemas.device import DeviceCommandKind
@@ -10,6 +11,9 @@ from services.stepper_gateway.links.frames import ANY_BOOT, NEVER_EXPIRES, Comma
 from services.stepper_gateway.moment import Moment
 
 RETRY = 0.1  # [s]
+REPEAT = (
+    0.01  # [s] after which a stop that is asked for again is sent again at once; chosen: a flood costs 100 frames/s
+)
 TIME_TO_LIVE = 500_000  # [us]
 INTERNAL = 0  # ticket of the gateway's own commands
 EXCLUSIVE = (  # what a person has asked for would hit whatever is started before the answer
@@ -79,6 +83,8 @@ class PendingCommands:
         if under_way is not None and len(under_way.tickets) < MOST_TICKETS:
             under_way.tickets += tickets
             under_way.is_own |= not tickets
+            if moment.monotonic - under_way.sent >= REPEAT:
+                under_way.sent = -math.inf
             return
         self._next_id = self._next_id % 0xFFFFFFFF + 1
         deadline = moment.monotonic + timeout
