@@ -36,6 +36,8 @@ from services.arm.model.description import Arm as Description
 MARGIN = 2.0  # [s] that a planner may take beyond its allowed time before it counts as gone
 TO_CANCEL = 0.5  # [s] for its answer to a cancel
 KINEMATICS = 10.0  # [s] for ik and fk
+COMING_TO_REST = 1.0  # [s] chosen: the slowest joint of both arms stops from full speed in 0.6 s
+LOOK_AGAIN = 0.02  # [s] until the planner is asked again, about two of its joint states
 
 OnPlanProgress = Callable[[PlanProgress], object]
 
@@ -148,9 +150,18 @@ class SavedPlan(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def make_plan(session: Session, target: Target, look_up: LookUp, on_progress: OnPlanProgress | None = None) -> Plan:
-    """A verified trajectory; raises `Refused`, `BadArgument` or `Lost`. Ctrl-C ends it, and nothing moves."""
-    request = replace(request_of(session.description, target, look_up), request_id=uuid.uuid4().hex)
-    response = _ask(session, request, on_progress)
+    """A verified trajectory; raises `Refused`, `BadArgument` or `Lost`. Ctrl-C ends it, and nothing moves.
+
+    A plan begins at rest: an arm that is just coming to rest is waited for, `COMING_TO_REST` at most.
+    """
+    asked = request_of(session.description, target, look_up)
+    until = session.node.monotonic() + COMING_TO_REST
+    while True:
+        request = replace(asked, request_id=uuid.uuid4().hex)
+        response = _ask(session, request, on_progress)
+        if not _is_moving_start(response) or session.node.monotonic() > until:
+            break
+        session.wait_for(lambda: False, LOOK_AGAIN)  # the end of a jog, of a stream or of a stop
     if response.refusal is not None:
         raise refused(session.description, response.refusal, request, target, response.code)
     if not response.trajectory.points:
@@ -242,6 +253,10 @@ def _short(value: object) -> str:
 def _plain(target: Target) -> dict[str, object]:
     """What JSON can hold of it."""
     return {name: list(value) if isinstance(value, tuple) else value for name, value in target.items()}
+
+
+def _is_moving_start(response: PlanResponse) -> bool:
+    return response.refusal is not None and response.refusal.check == "moving start"
 
 
 def _ask(session: Session, request: PlanRequest, on_progress: OnPlanProgress | None) -> PlanResponse:

@@ -149,6 +149,21 @@ def test_streamed_targets_are_followed_and_a_refused_one_is_raised(arm: gemelo.A
     motion.wait()
 
 
+def test_a_plan_waits_for_an_arm_that_is_just_coming_to_rest_but_not_for_one_that_goes_on(arm: gemelo.Arm) -> None:
+    arm.move(named="home")
+    end = time.monotonic() + 10.0
+    while arm.joints["brazo_joint"] < 0.1 or not is_moving(arm):
+        assert time.monotonic() < end
+        arm.stream({"brazo_joint": 0.6})
+    assert arm.move(named="home").status.name == "SUCCEEDED"
+    motion = arm.start(named="left", speed=0.1)
+    while motion.progress < 0.05:
+        assert not motion.is_over
+    with pytest.raises(gemelo.Refused, match="moving start"):
+        arm.plan(named="home")
+    arm.stop()
+
+
 def stream_until_it_is_over(arm: gemelo.Arm, motion: gemelo.Motion) -> None:
     while not motion.is_over:
         arm.stream({"brazo_joint": 0.2})
