@@ -13,11 +13,11 @@ import gemelo
 
 PAGE = Path(__file__).with_name("api.md")
 SECTIONS = (  # title, names
-    ("Connecting", ("connect",)),
+    ("Connecting", ("connect", "robots", "load_robot", "Robot")),
     ("The arm", ("Arm",)),
     ("Where to and how", ("Target", "ToolGoal")),
-    ("Plans and motions", ("Plan", "Motion", "HomingReport")),
-    ("The scene", ("Scene",)),
+    ("Plans and motions", ("Plan", "Motion", "Configurations", "HomingProgress", "HomingReport")),
+    ("The scene", ("Scene", "load_mesh")),
     ("The device", ("Device",)),
     ("Errors", ("Error", "BadArgument", "Refused", "Aborted", "Canceled", "Lost", "Interrupted")),
     ("Units and poses", ("deg", "mm", "Pose")),

@@ -15,30 +15,38 @@ the arm decelerates on its path, unless the motion was started with `detached=Tr
 
 from __future__ import annotations
 
-from gemelo.arm import Arm
-from gemelo.connection import connect
-from gemelo.device import Device
-from gemelo.errors import Aborted, BadArgument, Canceled, Error, Interrupted, Lost, Refused
-from gemelo.homing import HomingReport
-from gemelo.motion import Motion
-from gemelo.planning import Plan
-from gemelo.scene import Scene
-from gemelo.targets import Target, ToolGoal
-from gemelo.units import Pose, deg, mm
-from schemas import topics
-from schemas.actions import GoalStatusCode
-from schemas.device import DeviceMode, StopKind
-from services.runtime.node import Node
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gemelo.arm import Arm
+    from gemelo.connection import connect, robots
+    from gemelo.device import Device
+    from gemelo.errors import Aborted, BadArgument, Canceled, Error, Interrupted, Lost, Refused
+    from gemelo.homing import HomingProgress, HomingReport
+    from gemelo.motion import Motion
+    from gemelo.planning import Configurations, Plan
+    from gemelo.robot_files import Robot, load_robot
+    from gemelo.scene import Scene
+    from gemelo.scene_files import load_mesh
+    from gemelo.targets import Target, ToolGoal
+    from gemelo.units import Pose, deg, mm
+    from schemas import topics
+    from schemas.actions import GoalStatusCode
+    from schemas.device import DeviceMode, StopKind
+    from services.runtime.node import Node
 
 __all__ = [
     "Aborted",
     "Arm",
     "BadArgument",
     "Canceled",
+    "Configurations",
     "Device",
     "DeviceMode",
     "Error",
     "GoalStatusCode",
+    "HomingProgress",
     "HomingReport",
     "Interrupted",
     "Lost",
@@ -47,12 +55,52 @@ __all__ = [
     "Plan",
     "Pose",
     "Refused",
+    "Robot",
     "Scene",
     "StopKind",
     "Target",
     "ToolGoal",
     "connect",
     "deg",
+    "load_mesh",
+    "load_robot",
     "mm",
+    "robots",
     "topics",
 ]
+
+# Each name is imported when it is first used: a program that needs one part, as the command line, loads no other.
+MODULES = {
+    "gemelo.arm": ("Arm",),
+    "gemelo.connection": ("connect", "robots"),
+    "gemelo.device": ("Device",),
+    "gemelo.errors": ("Aborted", "BadArgument", "Canceled", "Error", "Interrupted", "Lost", "Refused"),
+    "gemelo.homing": ("HomingProgress", "HomingReport"),
+    "gemelo.motion": ("Motion",),
+    "gemelo.planning": ("Configurations", "Plan"),
+    "gemelo.robot_files": ("Robot", "load_robot"),
+    "gemelo.scene": ("Scene",),
+    "gemelo.scene_files": ("load_mesh",),
+    "gemelo.targets": ("Target", "ToolGoal"),
+    "gemelo.units": ("Pose", "deg", "mm"),
+    "schemas.actions": ("GoalStatusCode",),
+    "schemas.device": ("DeviceMode", "StopKind"),
+    "services.runtime.node": ("Node",),
+}
+_MODULE_OF = {name: module for module, names in MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    """The public name, from its module (PEP 562)."""
+    if name in _MODULE_OF:
+        value: object = getattr(import_module(_MODULE_OF[name]), name)
+    elif name == "topics":
+        value = import_module("schemas.topics")
+    else:
+        raise AttributeError(f"module 'gemelo' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

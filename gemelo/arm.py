@@ -9,22 +9,21 @@ from typing import Self, Unpack
 from gemelo.device import Device, reference_command
 from gemelo.errors import BadArgument
 from gemelo.frames import Frames
-from gemelo.homing import HomingReport, home
+from gemelo.homing import HomingReport, OnHoming, home
 from gemelo.jog import Jogging, Streaming, jog_command
-from gemelo.motion import Motion, Motions
-from gemelo.planning import OnPlanProgress, Plan, find_configurations, find_poses, make_plan
+from gemelo.motion import Motion, Motions, OnMotion
+from gemelo.planning import Configurations, OnPlanProgress, Plan, find_configurations, find_poses, make_plan
 from gemelo.scene import Scene
 from gemelo.session import Session
-from gemelo.targets import Joints, Target, ToolGoal, Vector, Waypoint, as_target
+from gemelo.targets import Joints, Target, ToolGoal, Vector, Waypoint, as_target, ik_request, joint_state, request_of
 from gemelo.units import Pose
 from schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
-from schemas.planning import JogStatus
+from schemas.joints import JointState
+from schemas.planning import IkRequest, JogCommand, JogStatus, PlanRequest
 from schemas.topics import JOINT_STATES, SENSORS, STEP_ERRORS
 from services.arm.errors import suggestion
 from services.arm.model.description import Arm as Description
 from services.runtime.node import Node
-
-OnProgress = Callable[[Motion], object]
 
 
 class Arm:
@@ -240,14 +239,15 @@ class Arm:
         *,
         detached: bool = False,
         on_planning: OnPlanProgress | None = None,
-        on_progress: OnProgress | None = None,
+        on_progress: OnMotion | None = None,
+        on_cancel: OnMotion | None = None,
         **target: Unpack[Target],
     ) -> Motion:
         """Plans and goes there, and returns when the arm has arrived; the arguments are those of `gemelo.Target`.
 
         Raises `Refused` (nothing has moved), `Aborted`, `Lost` or `BadArgument`. At Ctrl-C the arm decelerates on its
         path, and `Interrupted` is raised when it rests. `detached`: it goes on when this script dies. `on_planning` and
-        `on_progress` are called while it is planned, and while it goes.
+        `on_progress` are called while it is planned, and while it goes; `on_cancel` once, when Ctrl-C has cancelled it.
 
         >>> arm.move(named="ready")
         <Motion rm1: named='ready', succeeded in ... s, ...>
@@ -257,19 +257,37 @@ class Arm:
         'SUCCEEDED'
         """
         plan = self.plan(on_progress=on_planning, **target)
-        return self._motions.start(plan, detached).wait(on_progress=on_progress)
+        return self._motions.run(plan, detached, on_progress, on_cancel)
 
-    def line(self, *, speed: float | None = None, detached: bool = False, **goal: Unpack[ToolGoal]) -> Motion:
+    def line(
+        self,
+        *,
+        speed: float | None = None,
+        detached: bool = False,
+        on_planning: OnPlanProgress | None = None,
+        on_progress: OnMotion | None = None,
+        on_cancel: OnMotion | None = None,
+        **goal: Unpack[ToolGoal],
+    ) -> Motion:
         """The tool on a straight line, at `speed` [m/s] at most; as `move` otherwise.
 
         >>> arm.move(named="ready").status.name
         'SUCCEEDED'
-        >>> arm.line(offset=(0.0, 0.0, -0.02), speed=0.05).status.name
-        'SUCCEEDED'
+        >>> shares = []
+        >>> arm.line(offset=(0.0, 0.0, -0.02), speed=0.05, on_progress=lambda motion: shares.append(motion.progress))
+        <Motion rm1: offset=(0, 0, -0.02), line=True, tool_speed=0.05, succeeded in ... s, ...>
+        >>> 0.0 < shares[0] <= shares[-1] <= 1.0
+        True
         """
         target = as_target(goal)
         target["line"] = True
-        return self.move(**_with_speed(target, speed), detached=detached)
+        return self.move(
+            **_with_speed(target, speed),
+            detached=detached,
+            on_planning=on_planning,
+            on_progress=on_progress,
+            on_cancel=on_cancel,
+        )
 
     def arc(
         self,
@@ -279,6 +297,9 @@ class Arm:
         to: Vector | Pose | None = None,
         speed: float | None = None,
         detached: bool = False,
+        on_planning: OnPlanProgress | None = None,
+        on_progress: OnMotion | None = None,
+        on_cancel: OnMotion | None = None,
         **goal: Unpack[ToolGoal],
     ) -> Motion:
         """The tool on an arc through (or about) a point (3,) [m] to `to`, at `speed` [m/s] at most.
@@ -299,9 +320,24 @@ class Arm:
             target["through"] = through
         if center is not None:
             target["center"] = center
-        return self.move(**_with_speed(target, speed), detached=detached)
+        return self.move(
+            **_with_speed(target, speed),
+            detached=detached,
+            on_planning=on_planning,
+            on_progress=on_progress,
+            on_cancel=on_cancel,
+        )
 
-    def path(self, waypoints: Sequence[Waypoint], *, detached: bool = False, **target: Unpack[Target]) -> Motion:
+    def path(
+        self,
+        waypoints: Sequence[Waypoint],
+        *,
+        detached: bool = False,
+        on_planning: OnPlanProgress | None = None,
+        on_progress: OnMotion | None = None,
+        on_cancel: OnMotion | None = None,
+        **target: Unpack[Target],
+    ) -> Motion:
         """Through the points in order: positions (3,) [m], poses, named states, joints by name; it stops at the last.
 
         Corners may be cut within `blend=` [m] of a point. With `line=True` the tool goes straight between them.
@@ -314,24 +350,48 @@ class Arm:
         target.update(_goal_of(waypoints[-1]))
         if len(waypoints) > 1:
             target["via"] = tuple(waypoints[:-1])
-        return self.move(**target, detached=detached)
+        return self.move(
+            **target, detached=detached, on_planning=on_planning, on_progress=on_progress, on_cancel=on_cancel
+        )
 
-    def plan(self, *, on_progress: OnPlanProgress | None = None, **target: Unpack[Target]) -> Plan:
+    def plan(
+        self,
+        request: PlanRequest | None = None,
+        *,
+        on_progress: OnPlanProgress | None = None,
+        **target: Unpack[Target],
+    ) -> Plan:
         """A verified trajectory, for `execute` or `start`; nothing moves. The arguments are those of `move`.
+
+        The planner's own message may be given instead of them, as `request`.
 
         >>> plan = arm.plan(named="left")
         >>> arm.execute(plan).status.name
         'SUCCEEDED'
+        >>> from schemas.planning import NamedGoal, PlanRequest
+        >>> arm.plan(PlanRequest(goal=NamedGoal(name="ready"))).duration > 0.0
+        True
         """
-        return make_plan(self._session, target, self._frames.look_up, on_progress)
+        if request is None:
+            request = request_of(self.description, target, self._frames.look_up)
+        elif target:
+            raise BadArgument(f"plan a request, or say where to: not both, as {next(iter(target))}= does")
+        return make_plan(self._session, request, target, on_progress)
 
-    def execute(self, plan: Plan, *, detached: bool = False, on_progress: OnProgress | None = None) -> Motion:
+    def execute(
+        self,
+        plan: Plan,
+        *,
+        detached: bool = False,
+        on_progress: OnMotion | None = None,
+        on_cancel: OnMotion | None = None,
+    ) -> Motion:
         """Goes along the plan, and returns when the arm has arrived. It must begin where the arm is.
 
         >>> arm.execute(arm.plan(named="lifted")).status.name
         'SUCCEEDED'
         """
-        return self.start(plan, detached=detached).wait(on_progress=on_progress)
+        return self._motions.run(plan, detached, on_progress, on_cancel)
 
     def start(self, plan: Plan | None = None, *, detached: bool = False, **target: Unpack[Target]) -> Motion:
         """As `execute` and `move`, but returns as soon as the arm goes; a motion that still runs is taken over.
@@ -346,16 +406,19 @@ class Arm:
             raise BadArgument("start a plan, or say where to: not both, not none")
         return self._motions.start(plan if plan is not None else self.plan(**target), detached)
 
-    def home(self, *joints: str, on_progress: Callable[[dict[str, str]], object] | None = None) -> HomingReport:
+    def home(
+        self, *joints: str, on_progress: OnHoming | None = None, on_cancel: Callable[[], object] | None = None
+    ) -> HomingReport:
         """The joints find their switches, all that have one if none is named; returns when they are home.
 
-        `on_progress` gets what each joint does, by name. At Ctrl-C the joints decelerate. Homing is the device's own
+        `on_progress` gets what each joint does, by name, at every change and 5 times a second between. At Ctrl-C the
+        joints decelerate, `on_cancel` is called, and `Interrupted` raised when they rest. Homing is the device's own
         motion: it goes on to its end when this script dies.
 
         >>> arm.home("efector_joint").homed
         ('efector_joint',)
         """
-        return home(self._session, joints, self.device.command, on_progress)
+        return home(self._session, joints, self.device.command, on_progress, on_cancel)
 
     def reference(self, joints: Joints | None = None) -> None:
         """Declares where the joints stand, [rad] or [m] by name; the others are at robot.toml's reference position.
@@ -363,10 +426,13 @@ class Arm:
         >>> where = arm.joints
         >>> arm.reference(where)
         """
-        self.device.command(reference_command(self._session, joints))
+        given = joint_state(self.description, joints, "joints") if joints is not None else JointState()
+        values = dict(zip(given.name, given.position, strict=True))
+        self.device.command(reference_command(self.description, values))
 
     def jog(
         self,
+        command: JogCommand | None = None,
         *,
         joints: Joints | None = None,
         twist: Vector | None = None,
@@ -379,17 +445,29 @@ class Arm:
         `twist`: (vx, vy, vz) [m/s], or with (wx, wy, wz) [rad/s] after it, along the axes of `frame`, the base's or the
         tool's. A command holds for 0.1 s: without `duration` [s] say it again and again, at 50 Hz; silence stops the
         arm. The answer is the planner's newest word, None before the first: how much of the speed is left, and what
-        limits it.
+        limits it. The planner's own message may be given instead of speeds, as `command`.
 
         >>> arm.jog(joints={"brazo_joint": 0.2}, duration=0.3).active
         False
         >>> arm.jog(twist=(0.0, 0.0, 0.02), duration=0.3).active
         False
         """
-        command = jog_command(self.description, joints, twist, frame)
+        if command is None:
+            command = jog_command(self.description, joints, twist, frame)
+        elif joints is not None or twist is not None or frame:
+            raise BadArgument("jog by a command, or by joints= or twist=: not both")
         if duration is None:
             return self._jogging.say(command)
         return self._jogging.hold(command, duration, on_progress)
+
+    def end_jog(self) -> JogStatus | None:
+        """Says no more `jog`, and returns when the arm rests: the planner's last word, None where nothing was said.
+
+        >>> arm.jog(joints={"brazo_joint": 0.1})
+        >>> arm.end_jog().active
+        False
+        """
+        return self._jogging.end()
 
     def stream(self, joints: Joints) -> None:
         """A target [rad] or [m] that the arm follows within its limits, now; the newest wins. No path is planned.
@@ -458,16 +536,27 @@ class Arm:
     # What could be
 
     def ik(
-        self, *, near: Joints | None = None, solutions: int = 1, touching: bool = False, **goal: Unpack[ToolGoal]
-    ) -> list[dict[str, float]]:
+        self,
+        request: IkRequest | None = None,
+        *,
+        near: Joints | None = None,
+        solutions: int = 1,
+        touching: bool = False,
+        **goal: Unpack[ToolGoal],
+    ) -> Configurations:
         """Joint values [rad] or [m] that bring the tool there, at most so many, nearest first; nothing moves.
 
-        Near to `near`, or to where the arm is; `touching`: also those at which links touch. Raises `Refused`.
+        Near to `near`, or to where the arm is; `touching`: also those at which links touch. The planner's own message
+        may be given instead, as `request`. Raises `Refused`.
 
         >>> arm.ik(position=(0.25, 0.15, 0.10))
         [{'brazo_joint': ..., 'antebrazo_joint': ..., 'efector_joint': ...}]
         """
-        return find_configurations(self._session, goal, self._frames.look_up, near, solutions, touching)
+        if request is None:
+            request = ik_request(self.description, goal, self._frames.look_up, near, solutions, touching)
+        elif goal or near is not None or solutions != 1 or touching:
+            raise BadArgument("ask with a request, or say where to: not both")
+        return find_configurations(self._session, request, goal)
 
     def fk(self, joints: Joints | None = None) -> Pose:
         """Where the tool is for joint values [rad] or [m]; joints that are not named stand as they do now.

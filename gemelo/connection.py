@@ -6,57 +6,64 @@ import socket
 import time
 from pathlib import Path
 
-from msgspec.structs import replace
-
 from gemelo.arm import Arm
-from gemelo.errors import BadArgument, Error, Lost
-from gemelo.session import Session
+from gemelo.errors import Error, Lost
+from gemelo.robot_files import Robot, load_robot
+from gemelo.session import Session, open_node
 from schemas.deployment import Deployment
-from services.arm.errors import suggestion
-from services.arm.model.description import load_arm
-from services.runtime.deployment import load_deployment, project_root
+from services.runtime.deployment import load_deployment
+from services.runtime.robots import robots_on
 
 GATEWAY = "stepper_gateway"
 LOOK_TIMEOUT = 1.0  # [s] of one look for the router
 LOOK_EVERY = 0.1  # [s] while the twin is awaited
 
 
-def connect(robot: str = "", *, deployment: str | Path | None = None, name: str = "", timeout: float = 0.0) -> Arm:
+def connect(
+    robot: str | Robot = "",
+    *,
+    deployment: str | Path | None = None,
+    name: str = "",
+    timeout: float = 0.0,
+    needs_gateway: bool = True,
+) -> Arm:
     """The arm of the deployment (the file `deployment`, $GEMELO_CONFIG, or deploy/local.toml), or another `robot`.
 
-    `robot`: a folder of urdf/ or a path to one. `name`: of this script's node; its file's name and process if left
-    out. `timeout` [s]: that the twin may take to be there. Raises `Lost` where it does not run, `Error` where its
-    files are wrong.
+    `robot`: a folder of urdf/, a path to one, or what `load_robot` has read. `name`: of this script's node; its file's
+    name and process if left out. `timeout` [s]: that the twin may take to be there. `needs_gateway=False` also takes
+    a twin that cannot move, for what the planner alone answers. Raises `Lost` where the twin does not run, `Error`
+    where its files are wrong.
 
     >>> with gemelo.connect() as second:
     ...     second.joints == arm.joints
     True
     """
     end = time.monotonic() + timeout
+    found = robot if isinstance(robot, Robot) else load_robot(robot, deployment=deployment)
+    _await_router(found.deployment, end)
+    node = open_node(found.deployment, found.description.name, name)
+    session = Session(found.deployment, found.description, node)
     try:
-        found = load_deployment(None if deployment is None else Path(deployment))
-        if robot:
-            found = replace(found, robot=str(_folder(robot)))
-        description = load_arm(Path(found.robot))
-    except (ValueError, OSError) as error:
-        raise error if isinstance(error, Error) else Error(str(error)) from error
-    _await_router(found, end)
-    session = Session(found, description, name)
-    try:
-        _await_gateway(session, end)
+        if needs_gateway:
+            _await_gateway(session, end)
     except BaseException:
         session.close()
         raise
     return Arm(session)
 
 
-def _folder(robot: str) -> Path:
-    """urdf/<robot>, or the path itself."""
-    for folder in (project_root() / "urdf" / robot, Path(robot)):
-        if (folder / "robot.toml").is_file():
-            return folder.resolve()
-    known = sorted(path.parent.name for path in (project_root() / "urdf").glob("*/robot.toml"))
-    raise BadArgument(f'there is no arm "{robot}"{suggestion(robot, known)}')
+def robots(deployment: str | Path | Deployment | None = None) -> tuple[str, ...]:
+    """The names of the arms that run on the deployment's router, sorted; none where no router answers.
+
+    >>> gemelo.robots()
+    ('rm1',)
+    """
+    if not isinstance(deployment, Deployment):
+        try:
+            deployment = load_deployment(None if deployment is None else Path(deployment))
+        except (ValueError, OSError) as error:
+            raise Error(str(error)) from error
+    return robots_on(deployment.router, GATEWAY)
 
 
 def _await_router(deployment: Deployment, end: float) -> None:
@@ -75,8 +82,8 @@ def _await_gateway(session: Session, end: float) -> None:
     robot, router = session.description.name, session.deployment.router
     while GATEWAY not in session.node.alive():
         if time.monotonic() > end:
-            raise Lost(
-                f"no {GATEWAY} of {robot} at the router {router.host}:{router.port}: does the twin run with another "
-                f"arm? GEMELO_ROBOT=urdf/{robot} make up"
-            )
+            others = robots(session.deployment)
+            hint = f'; there is {", ".join(others)}: gemelo.connect("{others[0]}")' if others else ""
+            hint = hint or f": start the twin with `GEMELO_ROBOT=urdf/{robot} make up`"
+            raise Lost(f"no {GATEWAY} of {robot} at the router {router.host}:{router.port}{hint}", others)
         time.sleep(LOOK_EVERY)

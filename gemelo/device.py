@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 from gemelo.errors import BadArgument, Lost, Refused
 from gemelo.homing import joint_name
 from gemelo.session import PATIENCE, Session
-from gemelo.targets import Joints, joint_state, number
+from gemelo.targets import number
 from schemas.device import (
     ArmCommand,
     ConfigureRequest,
     DeviceCommand,
     DeviceCommandRequest,
+    DeviceCommandResponse,
     DeviceConfiguration,
     DeviceFault,
     DeviceMode,
@@ -34,6 +37,7 @@ from schemas.topics import (
     DEVICE_STOP,
 )
 from services.arm.errors import suggestion
+from services.arm.model.description import Arm as Description
 
 TO_ANSWER = 3.0  # [s] for a command
 TO_CONFIGURE = 10.0  # [s]: a board may write it to its flash first
@@ -110,8 +114,6 @@ class Device:
         >>> arm.device.arm()
         """
         self.command(ArmCommand())
-        lead = max(joint.driver.enable_lead_ms for joint in self._session.description.joints) * 1e-3
-        self._session.wait_for(lambda: False, lead)
 
     def disarm(self) -> None:
         """Takes the current from the motors; every joint is unreferenced then, and an arm may sink.
@@ -139,25 +141,35 @@ class Device:
         """
         self.command(ResetCommand())
 
-    def configure(self) -> None:
+    def configure(self, before_disarm: Callable[[], object] | None = None) -> int:
         """Gives the device what robot.toml says of it, if it has anything else: it disarms, and is referenced no more.
 
-        >>> arm.device.configure()
+        `before_disarm` is called before the drivers of an armed device go off; what it raises ends this. Returns the
+        CRC-32 of the configuration that the device works with now.
+
+        >>> arm.device.configure() == arm.device.configuration.crc32
+        True
         """
         if self.configuration.accepted:
-            return
+            return self.configuration.crc32
         state = self.state
         if state.mode in MOVING:
             raise Refused(f"refused: the device is in {state.mode.name}: wait, or arm.stop()", check="device")
         if state.armed:
+            if before_disarm is not None:
+                before_disarm()
             self.disarm()
             self._session.wait_for(lambda: not self.state.armed, PATIENCE)
         answer = self._session.call(DEVICE_CONFIGURE, ConfigureRequest(), TO_CONFIGURE)
         if not answer.accepted:
             again = "; the drivers are off now: arm.device.arm()" if state.armed else ""
-            raise Refused(f"the device refused the configuration: {answer.reason}{again}", check="configuration")
+            raise Refused(
+                f"the device refused the configuration: {answer.reason}{again}", check="configuration",
+                reason=answer.reason,
+            )  # fmt: skip
         if state.armed:
             self.arm()
+        return answer.crc32
 
     def inject(self, what: str, target: str = "", value: float = 1.0) -> None:
         """Does to a virtual device what a hand or an accident could do; a real one refuses.
@@ -173,18 +185,26 @@ class Device:
             raise BadArgument(f'there is no "{what}" to inject{suggestion(what, kinds)}')
         self._require_target(InjectKind(what), target)
         if self.status.online and not self.status.virtual:
-            raise Refused(f"{self.status.device} is a real device: only a virtual one takes this", check="device")
+            raise Refused(f"{self.status.device} is a real device: only a virtual one takes this", check="virtual")
         request = InjectRequest(kind=InjectKind(what), target=target, value=number("value", value))
         answer = self._session.call(DEVICE_INJECT, request, TO_ANSWER)
         self._session.changed()
         if not answer.accepted:
-            raise Refused(f"refused: {answer.reason}", check="device")
+            raise Refused(f"refused: {answer.reason}", check="device", reason=answer.reason)
 
     def command(self, wanted: DeviceCommand | StopKind, what: str = "") -> DeviceMode:
-        """Sends a command; the mode that the device answered with. Raises `Refused` with its reason.
+        """As `send`; the mode that the device answered with.
 
         >>> arm.device.command(gemelo.StopKind.STOP).name
         'IDLE'
+        """
+        return self.send(wanted, what).mode
+
+    def send(self, wanted: DeviceCommand | StopKind, what: str = "") -> DeviceCommandResponse:
+        """Sends a command; the device's answer, for arming when the motors hold. Raises `Refused` with its reason.
+
+        >>> arm.device.send(gemelo.StopKind.STOP).accepted
+        True
         """
         what = what or (wanted.value if isinstance(wanted, StopKind) else str(wanted.__struct_config__.tag))
         if isinstance(wanted, StopKind):
@@ -194,8 +214,11 @@ class Device:
         self._session.changed()
         if not answer.accepted:
             mode = f" (device mode {answer.mode.name})" if f"mode {answer.mode.name}" not in answer.reason else ""
-            raise Refused(f"{what} refused: {answer.reason}{mode}", check="device", subject=what)
-        return answer.mode
+            raise Refused(f"{what} refused: {answer.reason}{mode}", check="device", subject=what, reason=answer.reason)
+        if isinstance(wanted, ArmCommand):
+            lead = max(joint.driver.enable_lead_ms for joint in self._session.description.joints) * 1e-3
+            self._session.wait_for(lambda: False, lead)
+        return answer
 
     def _require_target(self, kind: InjectKind, target: str) -> None:
         arm = self._session.description
@@ -211,11 +234,7 @@ class Device:
             raise BadArgument(f'"{kind}" needs a target; there is no "{target}"{suggestion(target, known)}')
 
 
-def reference_command(session: Session, joints: Joints | None) -> ReferenceCommand:
-    """Every joint named: those of `joints` [rad] or [m], the others at the reference position of robot.toml."""
-    arm = session.description
-    values = dict(zip(arm.joint_names, arm.reference_position, strict=True))
-    if joints is not None:
-        given = joint_state(arm, joints, "joints")
-        values.update(zip(given.name, given.position, strict=True))
-    return ReferenceCommand(name=tuple(values), position=tuple(values.values()))
+def reference_command(arm: Description, values: Mapping[str, float]) -> ReferenceCommand:
+    """The command with every joint named: at `values` [rad] or [m], the others at robot.toml's reference position."""
+    whole = {**dict(zip(arm.joint_names, arm.reference_position, strict=True)), **values}
+    return ReferenceCommand(name=tuple(whole), position=tuple(whole.values()))

@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from schemas.actions import GoalStatusCode
+from schemas.planning import Refusal
 
 if TYPE_CHECKING:
+    from gemelo.homing import HomingReport
+    from gemelo.motion import Motion
     from gemelo.targets import Target
 
 
@@ -31,6 +34,11 @@ class BadArgument(Error, ValueError):
     ...     print(error)
     joint "brazo_joint": 30 rad is beyond its limits, ... rad: if it is in degrees, write gemelo.deg(30)
     """
+
+    def __init__(self, reason: str, remedy: str = "") -> None:
+        super().__init__(f"{reason}: {remedy}" if remedy else reason)
+        self.reason = reason  # without the remedy
+        self.remedy = remedy  # what to write instead; empty where the reason says it
 
 
 class Refused(Error):
@@ -57,8 +65,12 @@ class Refused(Error):
         configuration: Mapping[str, float] | None = None,
         nearest_free: Mapping[str, float] | None = None,
         code: int = 0,
+        reason: str = "",
+        refusal: Refusal | None = None,
     ) -> None:
         super().__init__(message)
+        self.reason = reason or message  # without the remedy, in the words of the planner, the gateway or the device
+        self.refusal = refusal  # the planner's own message; None where another refuses
         self.check = check  # what was checked, as "reach", "joint limit", "collision"; empty where the device refuses
         self.subject = subject  # the joint, pair of links, or axis of the pose
         self.value = value  # of the subject, in the unit of the check
@@ -86,11 +98,15 @@ class Aborted(Error):
         status: GoalStatusCode = GoalStatusCode.ABORTED,
         code: int = 0,
         stopped_at: Mapping[str, float] | None = None,
+        motion: Motion | None = None,
+        homing: HomingReport | None = None,
     ) -> None:
         super().__init__(message)
         self.status = status  # ABORTED, PREEMPTED or CANCELED
         self.code = code  # FollowErrorCode
         self.stopped_at = dict(stopped_at or {})  # [rad] or [m] by joint, from the steps that were read back
+        self.motion = motion  # that ended
+        self.homing = homing  # how far it came, where it was a homing
 
 
 class Canceled(Aborted):
@@ -106,8 +122,13 @@ class Lost(Error):
 
     >>> gemelo.connect("parol6")
     Traceback (most recent call last):
-    gemelo.errors.Lost: no stepper_gateway of parol6 at the router ...
+    gemelo.errors.Lost: no stepper_gateway of parol6 at the router ...; there is rm1: gemelo.connect("rm1")
     """
+
+    def __init__(self, message: str, robots: tuple[str, ...] = (), motion: Motion | None = None) -> None:
+        super().__init__(message)
+        self.motion = motion  # of which nothing more is heard
+        self.robots = robots  # the arms that are on the router, where the one asked for is not
 
 
 class Interrupted(KeyboardInterrupt):
@@ -117,6 +138,14 @@ class Interrupted(KeyboardInterrupt):
     True
     """
 
-    def __init__(self, message: str, stopped_at: Mapping[str, float] | None = None) -> None:
+    def __init__(
+        self,
+        message: str,
+        stopped_at: Mapping[str, float] | None = None,
+        motion: Motion | None = None,
+        homing: HomingReport | None = None,
+    ) -> None:
         super().__init__(message)
         self.stopped_at = dict(stopped_at or {})  # [rad] or [m] by joint; empty where it is not known
+        self.motion = motion  # that was cancelled; None where nothing had moved
+        self.homing = homing  # how far it came, where it was a homing

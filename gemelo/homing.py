@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from gemelo.errors import Aborted, BadArgument, Interrupted, Refused
 from gemelo.session import Session
-from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommand, DeviceEvent, DeviceMode, DeviceState, HomeCommand, StopKind
 from schemas.device_faults import fault_text
 from schemas.robot import HomingDirection
@@ -22,9 +21,29 @@ WAITS, TO, OFF, HOME = "waits", "to its switch", "off its switch", "home"
 TO_BEGIN = 3.0  # [s] from the device's yes to its first word of homing
 LAST_WORDS = 0.5  # [s] for events that come after the state
 OFFLINE = 2.0  # [s] that the device may be away: a link that comes back, a clock that is synchronised anew
+TELL_EVERY = 0.2  # [s] while no joint begins another phase
 BRAKING = 5.0  # [s] beyond the time-outs of robot.toml
 
 Command = Callable[[DeviceCommand | StopKind], object]
+
+
+class HomingProgress(dict[str, str]):
+    """What each joint does, by name: "waits", "to its switch", "off its switch" or "home".
+
+    >>> told = []
+    >>> arm.home("efector_joint", on_progress=told.append).homed
+    ('efector_joint',)
+    >>> told[-1], abs(told[-1].steps_off["efector_joint"]) <= 1, told[-1].elapsed > 0.0
+    ({'efector_joint': 'home'}, True, True)
+    """
+
+    def __init__(self, phases: Mapping[str, str], steps_off: Mapping[str, int], elapsed: float) -> None:
+        super().__init__(phases)
+        self.steps_off = dict(steps_off)  # of joints that are home, and whose place had been known before
+        self.elapsed = elapsed  # [s]
+
+
+OnHoming = Callable[[HomingProgress], object]
 
 
 @dataclass(frozen=True)
@@ -39,6 +58,7 @@ class HomingReport:
     homed: tuple[str, ...]
     steps_off: dict[str, int]  # of joints whose place had been known before
     took: float  # [s]
+    reason: str = ""  # why not all are home, where an error carries the report
 
 
 class Homing:
@@ -55,6 +75,7 @@ class Homing:
 
     @property
     def homed(self) -> tuple[str, ...]:
+        """The joints that have found their switches."""
         return tuple(name for name, phase in self.phases.items() if phase == HOME)
 
     @property
@@ -64,6 +85,7 @@ class Homing:
 
     @property
     def is_done(self) -> bool:
+        """True if all joints are home."""
         return len(self.homed) == len(self.phases)
 
     @property
@@ -108,22 +130,22 @@ class Homing:
 
 
 def home(
-    session: Session, names: Iterable[str], command: Command, on_progress: Callable[[dict[str, str]], object] | None
+    session: Session,
+    names: Iterable[str],
+    command: Command,
+    on_progress: OnHoming | None,
+    on_cancel: Callable[[], object] | None,
 ) -> HomingReport:
     """Homes the joints named, or all that can; raises `Refused`, `Aborted`, `Interrupted` or `Lost`."""
     homing = Homing(session.description, homing_joints(session.description, names))
-    _require_ready(session.description, session.newest(DEVICE_STATE))
+    _require_ready(session)
     events = session.node.subscribe(DEVICE_EVENTS, homing.on_event)
     try:
         name = tuple(joint.name for joint in homing.joints)
         command(HomeCommand(name=name))
         states = session.node.subscribe(DEVICE_STATE, homing.on_state)
         try:
-            return _follow(session, homing, on_progress)
-        except KeyboardInterrupt:
-            command(StopKind.STOP)
-            session.wait_for(lambda: homing.is_over, BRAKING)
-            raise Interrupted(f"homing stopped by Ctrl-C; home: {', '.join(homing.homed) or 'none'}") from None
+            return _follow(session, homing, command, on_progress, on_cancel)
         finally:
             states.close()
     finally:
@@ -139,12 +161,16 @@ def homing_joints(arm: Description, names: Iterable[str]) -> list[Joint]:
             raise BadArgument(f'{arm.name} has no joint "{name}"{suggestion(name, arm.joint_names)}')
         asked.append(arm.joint(name))
     without = [joint.name for joint in asked if joint.drive.homing is None]
-    found = asked or [joint for joint in arm.joints if joint.drive.homing is not None]
-    if without or not found:
-        what = f'joint "{without[0]}" has' if without else "no joint has a switch:"
+    if without:
         raise Refused(
-            f"{what} no [joint.homing] in robot.toml, so it cannot home: declare where it stands, arm.reference(...)",
+            f'joint "{without[0]}" has no [joint.homing] in robot.toml, so it cannot home: '
+            f'declare where it stands, arm.reference({{"{without[0]}": ...}})',
             check="homing",
+        )
+    found = asked or [joint for joint in arm.joints if joint.drive.homing is not None]
+    if not found:
+        raise Refused(
+            "no joint has a [joint.homing] in robot.toml: declare where they stand, arm.reference()", check="homing"
         )
     return found
 
@@ -154,10 +180,15 @@ def joint_name(arm: Description, name: str) -> str:
     return next((joint.name for joint in arm.joints if name in (joint.name, joint.wire_name)), name)
 
 
-def _require_ready(arm: Description, state: DeviceState) -> None:
-    """Raises with the remedy where homing cannot begin."""
+def _require_ready(session: Session) -> None:
+    """Raises `Refused` with the remedy where homing cannot begin."""
+    status = session.newest(DEVICE_STATUS)
+    if not status.online:
+        reason = f"the device is offline: {status.reason or 'no reason is known'}"
+        raise Refused(f"homing refused: {reason}", check="device", reason=reason)
+    state = session.newest(DEVICE_STATE)
     if state.fault or state.mode in (DeviceMode.FAULT, DeviceMode.ESTOP):
-        about = fault_text(state.fault, joint_name(arm, state.fault_joint))
+        about = fault_text(state.fault, joint_name(session.description, state.fault_joint))
         raise Refused(f"homing refused: {about or state.mode.name}", check="device", remedy="arm.device.reset()")
     if not state.armed:
         remedy = "arm.device.arm(), then arm.home()"
@@ -166,36 +197,76 @@ def _require_ready(arm: Description, state: DeviceState) -> None:
         raise Refused(f"homing refused: the device is in {state.mode.name}: wait, or arm.stop()", check="device")
 
 
-def _follow(session: Session, homing: Homing, on_progress: Callable[[dict[str, str]], object] | None) -> HomingReport:
+def _follow(
+    session: Session,
+    homing: Homing,
+    command: Command,
+    on_progress: OnHoming | None,
+    on_cancel: Callable[[], object] | None,
+) -> HomingReport:
+    """The report if all are home; `Aborted` or `Interrupted` with it if not."""
     node = session.node
     began = node.monotonic()
-    status, state = session.latest(DEVICE_STATUS), session.latest(DEVICE_STATE)
-    told: dict[str, str] = {}
+    told = HomingProgress(homing.phases, {}, 0.0)
 
     def tell() -> None:
-        if on_progress is not None and told != homing.phases:
-            told.update(homing.phases)
-            on_progress(dict(homing.phases))
-
-    def trouble() -> str:
+        nonlocal told
         elapsed = node.monotonic() - began
-        if status.message is not None and not status.message.online and state.age() > OFFLINE:
-            return f"the device went offline: {status.message.reason}"
-        if state.age() > BRAKING:
-            return "the device has fallen silent"
-        if not homing.has_begun and elapsed > TO_BEGIN:
-            return "the device did not begin"
-        return f"it has not ended after {elapsed:.0f} s" if elapsed > homing.longest else ""
+        if on_progress is not None and (told != homing.phases or elapsed - told.elapsed >= TELL_EVERY):
+            told = HomingProgress(homing.phases, homing.steps_off, elapsed)
+            on_progress(told)
 
-    session.wait_for(lambda: homing.is_over or bool(trouble()), None, tell)
-    session.wait_for(lambda: homing.is_done or bool(homing.reason or trouble()), LAST_WORDS)
+    watch = Watch(session, homing)
+    is_interrupted = False
+    try:
+        session.wait_for(lambda: homing.is_over or bool(watch.trouble()), None, tell)
+    except KeyboardInterrupt:
+        is_interrupted = True
+        command(StopKind.STOP)
+        if on_cancel is not None:
+            on_cancel()
+        session.wait_for(lambda: homing.is_over, BRAKING, tell)
+    session.wait_for(lambda: homing.is_done or bool(homing.reason or watch.trouble()), LAST_WORDS)
     tell()
-    took = node.monotonic() - began
+    report = _report(homing, node.monotonic() - began, watch)
+    ended = f"homing ended after {report.took:.1f} s: {report.reason or 'all joints are home'}"
+    if is_interrupted:
+        raise Interrupted(ended, homing=report)
+    if report.reason:
+        raise Aborted(ended, homing=report)
+    return report
+
+
+def _report(homing: Homing, took: float, watch: Watch) -> HomingReport:
+    """How it ended, after `took` [s]."""
     if homing.is_done:
         return HomingReport(homing.homed, homing.steps_off, took)
     missing = ", ".join(name for name in homing.phases if name not in homing.homed)
-    reason = homing.reason or trouble() or f"the device ended it without {missing}"
-    raise Aborted(f"homing ended after {took:.1f} s: {reason}", GoalStatusCode.ABORTED)
+    reason = homing.reason or watch.trouble() or f"the device ended it without {missing}"
+    return HomingReport(homing.homed, homing.steps_off, took, reason)
+
+
+class Watch:
+    """Why a homing is waited for no longer."""
+
+    def __init__(self, session: Session, homing: Homing) -> None:
+        self._homing, self._node = homing, session.node
+        self._status, self._state = session.latest(DEVICE_STATUS), session.latest(DEVICE_STATE)
+        self._began = self._node.monotonic()
+
+    def trouble(self) -> str:
+        """The reason; empty if there is none."""
+        elapsed = self._node.monotonic() - self._began
+        status = self._status.message
+        if status is not None and not status.online and self._state.age() > OFFLINE:
+            return f"the device went offline: {status.reason}"
+        if self._state.age() > BRAKING:
+            return "the device has fallen silent: `gemelo device status`"
+        if not self._homing.has_begun and elapsed > TO_BEGIN:
+            return "the device did not begin: `gemelo device status`"
+        if elapsed > self._homing.longest:
+            return f"it has not ended after {elapsed:.0f} s: arm.stop(), `gemelo device status`"
+        return ""
 
 
 def _phase_of(joint: Joint, velocity: float) -> str:
@@ -209,5 +280,5 @@ def _phase_of(joint: Joint, velocity: float) -> str:
 def _stopped_text(detail: str) -> str:
     """Why the device broke off."""
     if detail == "heartbeat":
-        return "the device heard nothing from stepper_gateway for too long and stopped: home again"
-    return "it was stopped; the joints that were not home yet are unreferenced: home again"
+        return "the device heard nothing from stepper_gateway for too long and stopped: arm.home() again"
+    return "it was stopped; the joints that were not home yet are unreferenced: arm.home() again"

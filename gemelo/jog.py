@@ -45,7 +45,7 @@ class Jogging:
         if heard is None and now - self._began > ANSWER:
             raise Lost("the planner does not answer to jogging: is it running? `gemelo node list`")
         if heard is not None and not heard.active and heard.limited_by and now - self._began > PERIOD:
-            raise Refused(f"refused: {heard.limited_by}", check="jog")
+            raise Refused(f"refused: {heard.limited_by}", check="jog", reason=heard.limited_by)
         return heard
 
     def hold(
@@ -64,6 +64,10 @@ class Jogging:
             raise Interrupted("jogging stopped by Ctrl-C") from None
         return self.rest()
 
+    def end(self) -> JogStatus | None:
+        """As `rest`; None if nothing was said in this jog."""
+        return None if self._said == -math.inf else self.rest()
+
     def rest(self) -> JogStatus:
         """Waits until the planner leads no more; its last word."""
         newest = self._session.latest(JOG_STATUS)
@@ -77,7 +81,7 @@ class Jogging:
             raise Lost(f"the planner does not say within {REST:g} s that the jog has ended")
         self._session.changed()
         if newest.message.limited_by and not newest.message.limits:
-            raise Refused(f"refused: {newest.message.limited_by}", check="jog")
+            raise Refused(f"refused: {newest.message.limited_by}", check="jog", reason=newest.message.limited_by)
         return newest.message
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from gemelo.errors import Aborted, Canceled, Error, Interrupted, Lost, Refused
@@ -13,7 +14,6 @@ from schemas.motion import (
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
-    JointTolerance,
 )
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY
 from services.runtime import errors as runtime
@@ -21,6 +21,8 @@ from services.runtime.actions import ActionClient, ActionOutcome, GoalHandle
 
 Handle = GoalHandle[FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
 Client = ActionClient[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
+
+OnMotion = Callable[["Motion"], object]
 
 BRAKING = 10.0  # [s] that a cancelled motion may take to come to rest before it counts as lost
 
@@ -90,6 +92,15 @@ class Motion:
         return self._handle is not None and self._handle.is_over
 
     @property
+    def has_result(self) -> bool:
+        """True if the gateway has said how it ended.
+
+        >>> arm.move(named="left").has_result
+        True
+        """
+        return self._outcome is not None
+
+    @property
     def result(self) -> FollowJointTrajectoryResult:
         """How exactly it arrived: commanded and executed steps, final and largest following error [steps].
 
@@ -132,37 +143,57 @@ class Motion:
         if self._handle is not None:
             self._handle.cancel()
 
-    def wait(self, timeout: float | None = None, on_progress: Callable[[Motion], object] | None = None) -> Motion:
+    def wait(
+        self,
+        timeout: float | None = None,
+        on_progress: OnMotion | None = None,
+        on_cancel: OnMotion | None = None,
+    ) -> Motion:
         """Returns the motion when it has succeeded, or was cancelled by `cancel`; calls `on_progress` in between.
 
         Raises `Aborted`, `Canceled`, `Lost`, and TimeoutError after `timeout` [s]: then it goes on. At Ctrl-C the arm
-        decelerates, and `Interrupted` is raised when it rests.
+        decelerates, `on_cancel` is called meanwhile (a warning is logged if there is none), and `Interrupted` is raised
+        when it rests.
 
         >>> arm.start(named="left").wait(timeout=60.0).status.name
         'SUCCEEDED'
         """
-        try:
+        with self._braked_by_interrupt(on_cancel):
             is_over = self._await(timeout, on_progress)
-        except KeyboardInterrupt:
-            raise self._interrupted() from None
         if not is_over:
             raise TimeoutError(f"the motion has not ended within {timeout:g} s; it goes on: wait() again, or cancel()")
         self._session.changed()
         return self._ended()
+
+    @contextmanager
+    def _braked_by_interrupt(self, on_cancel: OnMotion | None) -> Iterator[None]:
+        """At Ctrl-C the arm decelerates, and `Interrupted` is raised when it rests; a second one leaves at once."""
+        try:
+            yield
+        except KeyboardInterrupt as error:
+            if self._wants_cancel or self.is_over or isinstance(error, Interrupted):
+                raise
+            if self._handle is None:
+                raise Interrupted("stopped by Ctrl-C before the motion began: nothing moves") from None
+            raise self._interrupted(on_cancel) from None
 
     def _send(self, client: Client, goal: FollowJointTrajectoryGoal) -> None:
         """Raises `Refused` with the gateway's reason, or `Lost`. Called once, by `start`."""
         try:
             self._handle = client.send(goal, lambda feedback: self._session.notify(), attached=not self.is_detached)
         except runtime.GoalRefused as error:
-            raise Refused(f"refused by {client.action.server}: {error}", check="execution", code=error.code) from error
+            raise Refused(
+                f"refused by {client.action.server}: {error}", check="execution", code=error.code, reason=str(error)
+            ) from error
         except runtime.Refused as error:
             raise Refused(str(error)) from error
         except (runtime.NoAnswer, runtime.BusError) as error:
             raise Lost(str(error)) from error
+        except KeyboardInterrupt:
+            raise Interrupted("stopped by Ctrl-C as the motion began: it is cancelled", motion=self) from None
         self._handle.on_end = self._session.notify
 
-    def _await(self, timeout: float | None, on_progress: Callable[[Motion], object] | None) -> bool:
+    def _await(self, timeout: float | None, on_progress: OnMotion | None) -> bool:
         told: list[Any] = [None]
 
         def tell() -> None:
@@ -172,29 +203,38 @@ class Motion:
 
         return self._session.wait_for(lambda: self.is_over, timeout, tell)
 
-    def _interrupted(self) -> Interrupted:
-        """Decelerates and waits for the rest; a second Ctrl-C leaves this at once."""
-        self._session.node.log.warning("Ctrl-C: the arm slows down on its path (again: leave without waiting)")
+    def _interrupted(self, on_cancel: OnMotion | None) -> Interrupted:
+        """Decelerates and waits for the rest; a second Ctrl-C leaves this at once. Raises `Lost`."""
         self.cancel()
+        if on_cancel is not None:
+            on_cancel(self)
+        else:
+            self._session.node.log.warning("Ctrl-C: the arm slows down on its path (again: leave without waiting)")
         if not self._session.wait_for(lambda: self.is_over, BRAKING):
-            return Interrupted(f"the arm was told to stop, but did not say within {BRAKING:g} s that it rests")
+            silent = f"the arm was told to stop, but did not say within {BRAKING:g} s that it rests"
+            return Interrupted(silent, motion=self)
         self._session.changed()
-        return Interrupted(f"stopped by Ctrl-C: {self!r}", self.stopped_at)
+        self._require_outcome()
+        return Interrupted(f"stopped by Ctrl-C: {self!r}", self.stopped_at, motion=self)
 
     def _ended(self) -> Motion:
-        handle = self._handle
-        assert handle is not None
-        if handle.outcome is None:
-            raise Lost(str(handle.lost))
-        status, result = handle.outcome.status, handle.outcome.result
+        outcome = self._require_outcome()
+        status, result = outcome.status, outcome.result
         if status is GoalStatusCode.SUCCEEDED or (status is GoalStatusCode.CANCELED and self._wants_cancel):
             return self
         kind = Canceled if status is GoalStatusCode.CANCELED else Aborted
         reason = f"{status.name.lower()} after {result.duration:.2f} s: {result.error_string or 'no reason was given'}"
-        raise kind(reason, status, result.error_code, self.stopped_at)
+        raise kind(reason, status, result.error_code, self.stopped_at, motion=self)
+
+    def _require_outcome(self) -> ActionOutcome[FollowJointTrajectoryResult]:
+        """How it ended; raises `Lost` where the gateway was lost before."""
+        assert self._handle is not None
+        if self._handle.outcome is None:
+            raise Lost(str(self._handle.lost), motion=self)
+        return self._handle.outcome
 
     def __repr__(self) -> str:
-        about = f"<Motion {self.plan.robot}: {words_of(self.plan.target)}, {self.status.name.lower()}"
+        about = f"<Motion {self.plan.robot}: {words_of(self.plan.target) or 'as requested'}, {self.status.name.lower()}"
         if self._outcome is None:
             return f"{about}, {self.progress:.0%}>"
         result = self._outcome.result
@@ -212,14 +252,23 @@ class Motions:
         self._client: Client | None = None
         self._started: list[Motion] = []
 
-    def start(self, plan: Plan, detached: bool, tolerance: tuple[JointTolerance, ...] = ()) -> Motion:
-        """Sends the plan's trajectory; raises `Refused` or `Lost`."""
-        client = self._client = self._client or self._session.node.action(FOLLOW_JOINT_TRAJECTORY)
+    def run(self, plan: Plan, detached: bool, on_progress: OnMotion | None, on_cancel: OnMotion | None) -> Motion:
+        """Sends the plan's trajectory and waits for its end; a Ctrl-C between the two cancels it as well."""
         motion = Motion(self._session, plan, detached)
+        with motion._braked_by_interrupt(on_cancel):
+            self._start(motion)
+            return motion.wait(on_progress=on_progress, on_cancel=on_cancel)
+
+    def start(self, plan: Plan, detached: bool) -> Motion:
+        """Sends the plan's trajectory; raises `Refused` or `Lost`."""
+        return self._start(Motion(self._session, plan, detached))
+
+    def _start(self, motion: Motion) -> Motion:
+        client = self._client = self._client or self._session.node.action(FOLLOW_JOINT_TRAJECTORY)
+        plan = motion.plan
         self._started = [each for each in self._started if not each.is_over] + [motion]
         goal = FollowJointTrajectoryGoal(
             trajectory=plan.trajectory,
-            goal_tolerance=tolerance,
             scene_version=plan.response.scene_version,
             scene_epoch=plan.response.scene_epoch,
         )

@@ -9,18 +9,21 @@ import uuid
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from queue import SimpleQueue
 
 import msgspec
 from msgspec.structs import replace
 
 from gemelo.errors import Error, Interrupted, Lost, Refused
 from gemelo.frames import pose_from
-from gemelo.session import Session
-from gemelo.targets import Joints, LookUp, Target, ToolGoal, as_target, ik_request, named_joints, request_of
+from gemelo.session import Session, answer_of
+from gemelo.targets import Joints, Target, ToolGoal, as_target, named_joints
 from gemelo.units import Pose
 from schemas.motion import JointTrajectory
 from schemas.planning import (
     FkRequest,
+    IkRequest,
+    IkResponse,
     JointGoal,
     PlanCancel,
     PlanProgress,
@@ -32,6 +35,7 @@ from schemas.planning import (
 )
 from schemas.topics import FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS
 from services.arm.model.description import Arm as Description
+from services.runtime.requests.client import PendingCall
 
 MARGIN = 2.0  # [s] that a planner may take beyond its allowed time before it counts as gone
 TO_CANCEL = 0.5  # [s] for its answer to a cancel
@@ -54,7 +58,7 @@ class Plan:
     """
 
     robot: str
-    target: Target  # the arguments that it was made of
+    target: Target  # the arguments that it was made of; empty where it was made of a `PlanRequest`
     response: PlanResponse  # everything that the planner has said
 
     @property
@@ -138,7 +142,7 @@ class Plan:
         return cls(saved.robot, Target(**saved.target), saved.response)  # type: ignore[typeddict-item]
 
     def __repr__(self) -> str:
-        return f"<Plan {self.robot}: {words_of(self.target)}, {self.duration:.2f} s>"
+        return f"<Plan {self.robot}: {words_of(self.target) or 'as requested'}, {self.duration:.2f} s>"
 
 
 class SavedPlan(msgspec.Struct, frozen=True, kw_only=True):
@@ -149,12 +153,25 @@ class SavedPlan(msgspec.Struct, frozen=True, kw_only=True):
     response: PlanResponse
 
 
-def make_plan(session: Session, target: Target, look_up: LookUp, on_progress: OnPlanProgress | None = None) -> Plan:
-    """A verified trajectory; raises `Refused`, `BadArgument` or `Lost`. Ctrl-C ends it, and nothing moves.
+class Configurations(list[dict[str, float]]):
+    """What `arm.ik` found: joint values [rad] or [m] by name, the nearest first, and how far each is.
+
+    >>> found = arm.ik(position=(0.25, 0.15, 0.10), solutions=2)
+    >>> len(found) == len(found.distances), found.distances[0] <= found.distances[-1]
+    (True, True)
+    """
+
+    def __init__(self, response: IkResponse) -> None:
+        super().__init__(dict(zip(response.name, found.position, strict=True)) for found in response.solutions)
+        self.response = response  # everything that the planner has said
+        self.distances = tuple(found.distance for found in response.solutions)  # [s] that the slowest joint takes
+
+
+def make_plan(session: Session, asked: PlanRequest, target: Target, on_progress: OnPlanProgress | None = None) -> Plan:
+    """A verified trajectory; raises `Refused` or `Lost`. Ctrl-C ends it, and nothing moves: `Interrupted`.
 
     A plan begins at rest: an arm that is just coming to rest is waited for, `COMING_TO_REST` at most.
     """
-    asked = request_of(session.description, target, look_up)
     until = session.node.monotonic() + COMING_TO_REST
     while True:
         request = replace(asked, request_id=uuid.uuid4().hex)
@@ -165,21 +182,18 @@ def make_plan(session: Session, target: Target, look_up: LookUp, on_progress: On
     if response.refusal is not None:
         raise refused(session.description, response.refusal, request, target, response.code)
     if not response.trajectory.points:
-        raise Refused(f"the planner answered {response.code.name} without a trajectory", code=response.code)
+        raise Refused(f"refused: the planner answered {response.code.name} without a trajectory", code=response.code)
     return Plan(session.description.name, target, response)
 
 
-def find_configurations(
-    session: Session, target: ToolGoal, look_up: LookUp, near: Joints | None, solutions: int, touching: bool
-) -> list[dict[str, float]]:
+def find_configurations(session: Session, request: IkRequest, target: ToolGoal) -> Configurations:
     """Joint values [rad] or [m] that bring the tool there, the nearest first; raises `Refused`."""
-    request = ik_request(session.description, target, look_up, near, solutions, touching)
     response = session.call(IK, request, KINEMATICS)
     if response.refusal is not None:
         raise refused(
             session.description, response.refusal, PlanRequest(goal=request.goal), as_target(target), response.code
         )
-    return [dict(zip(response.name, found.position, strict=True)) for found in response.solutions]
+    return Configurations(response)
 
 
 def find_poses(session: Session, joints: Joints | None, links: tuple[str, ...]) -> dict[str, Pose]:
@@ -208,6 +222,8 @@ def refused(arm: Description, refusal: Refusal, request: PlanRequest, target: Ta
         configuration=_by_joint(arm, refusal.configuration),
         nearest_free=_by_joint(arm, refusal.nearest_free),
         code=code,
+        reason=refusal.message,
+        refusal=refusal,
     )
 
 
@@ -220,7 +236,7 @@ def _nearest(arm: Description, refusal: Refusal, request: PlanRequest, target: T
     """The nearest goal that can, in the form of the target; empty where there is none."""
     values, goal = refusal.nearest, request.goal
     sizes = (3, 6, 7) if isinstance(goal, PoseGoal) else (len(arm.joints), len(getattr(goal, "name", ())))
-    if refusal.check in NOT_THE_GOAL or len(values) not in sizes:
+    if not values or refusal.check in NOT_THE_GOAL or len(values) not in sizes:
         return Target()
     kept = {name: value for name, value in target.items() if name not in GOALS}
     if isinstance(goal, PoseGoal):
@@ -260,28 +276,51 @@ def _is_moving_start(response: PlanResponse) -> bool:
 
 
 def _ask(session: Session, request: PlanRequest, on_progress: OnPlanProgress | None) -> PlanResponse:
-    heard: list[PlanProgress] = []
+    """The planner's answer; at Ctrl-C the plan is cancelled, and `Interrupted` raised with what the planner says."""
+    heard: SimpleQueue[PlanProgress] = SimpleQueue()
+    timeout = request.allowed_time + MARGIN
+    call: PendingCall[PlanRequest, PlanResponse] | None = None
 
-    def show(progress: PlanProgress) -> None:
-        if progress.request_id == request.request_id:
-            heard.append(progress)
+    def hear(progress: PlanProgress) -> None:
+        heard.put(progress)
+        session.notify()
 
     def tell() -> None:
-        while heard and on_progress is not None:
-            on_progress(heard.pop(0))
+        while on_progress is not None and not heard.empty():
+            progress = heard.get()
+            if progress.request_id == request.request_id:
+                on_progress(progress)
 
-    shown = session.node.subscribe(PLAN_PROGRESS, show) if on_progress is not None else None
+    shown = session.node.subscribe(PLAN_PROGRESS, hear) if on_progress is not None else None
     try:
-        return session.call(PLAN, request, request.allowed_time + MARGIN, tell if on_progress is not None else None)
+        call = session.ask(PLAN, request, timeout)
+        session.wait_for(lambda: call.is_over, timeout, tell)
+        return answer_of(call)
     except Lost:
         _cancel(session, request)  # it may be waiting behind the plans of others
         raise
     except KeyboardInterrupt:
-        _cancel(session, request)
-        raise Interrupted("the plan was cancelled: nothing moves") from None
+        raise _interrupted(session, request, call, tell) from None
     finally:
         if shown is not None:
             shown.close()
+
+
+def _interrupted(
+    session: Session,
+    request: PlanRequest,
+    call: PendingCall[PlanRequest, PlanResponse] | None,
+    tell: Callable[[], None],
+) -> Interrupted:
+    """Cancels, and waits for the planner's last word; a second Ctrl-C leaves at once."""
+    tell()
+    _cancel(session, request)
+    said = "the plan was cancelled"
+    with suppress(Lost, Refused):
+        if call is not None and session.wait_for(lambda: call.is_over, MARGIN, tell):
+            refusal = answer_of(call).refusal
+            said = refusal.message if refusal is not None else "cancelled when the plan was just made"
+    return Interrupted(f"{said}: nothing moves")
 
 
 def _cancel(session: Session, request: PlanRequest) -> None:

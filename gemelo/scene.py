@@ -6,9 +6,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import msgspec
-
-from gemelo.errors import BadArgument, Error, Refused
+from gemelo.errors import BadArgument, Refused
+from gemelo.scene_files import load_mesh, read_scene, write_scene
 from gemelo.session import PATIENCE, Session
 from gemelo.targets import Vector, number, point, quaternion, vector
 from schemas.frames import Transform
@@ -16,7 +15,6 @@ from schemas.scene import (
     AllowedPair,
     BoxShape,
     CylinderShape,
-    MeshShape,
     PlaneShape,
     PlanningScene,
     SceneAdd,
@@ -25,20 +23,20 @@ from schemas.scene import (
     SceneClear,
     SceneDetach,
     SceneDisallow,
+    SceneEdit,
     SceneMove,
     SceneObject,
     SceneRemove,
     SceneReplace,
     SceneRequest,
     SceneResize,
+    SceneResponse,
     Shape,
     SphereShape,
 )
 from schemas.topics import SCENE, SCENE_EDIT
-from services.runtime.deployment import project_root
 
 TO_ANSWER = 10.0  # [s] a mesh of many triangles takes the planner some
-LARGEST_MESH = 10.0  # [m]; what is larger was drawn in mm
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)
 
@@ -146,7 +144,7 @@ class Scene:
         >>> arm.scene.add_mesh("vice", "tests/gemelo/wedge.stl", at=(0.0, 0.5, 0.0), scale=0.001)
         >>> arm.scene.remove("vice")
         """
-        self._add(name, mesh_of(Path(path), scale), at, orientation, frame, attach, touch, padding)
+        self._add(name, load_mesh(path, scale), at, orientation, frame, attach, touch, padding)
 
     def remove(self, name: str) -> None:
         """Takes an object away; `Refused` where there is none of that name.
@@ -154,7 +152,7 @@ class Scene:
         >>> arm.scene.add_sphere("ball", radius=0.03, at=(0.3, 0.25, 0.1))
         >>> arm.scene.remove("ball")
         """
-        self._edit(SceneRequest(edit=SceneRemove(name=name)))
+        self.edit(SceneRemove(name=name))
 
     def move(self, name: str, at: Vector, orientation: Vector = UPRIGHT, *, frame: str = "") -> None:
         """Puts an object elsewhere: `at` (3,) [m], turned by `orientation`, in `frame` as it is now.
@@ -165,17 +163,17 @@ class Scene:
         (0.3, 0.3, 0.1)
         >>> arm.scene.remove("ball")
         """
-        self._edit(SceneRequest(edit=SceneMove(name=name, pose=_pose(at, orientation), frame=frame)))
+        self.edit(SceneMove(name=name, pose=_pose(at, orientation), frame=frame))
 
     def resize(self, name: str, shape: Shape) -> None:
-        """Gives an object another shape: `schemas.scene.BoxShape(size=...)` and its kin.
+        """Gives an object another shape: `schemas.scene.BoxShape(size=...)` and its kin, or `gemelo.load_mesh(...)`.
 
         >>> from schemas.scene import SphereShape
         >>> arm.scene.add_sphere("ball", radius=0.03, at=(0.3, 0.25, 0.1))
         >>> arm.scene.resize("ball", SphereShape(radius=0.02))
         >>> arm.scene.remove("ball")
         """
-        self._edit(SceneRequest(edit=SceneResize(name=name, shape=shape)))
+        self.edit(SceneResize(name=name, shape=shape))
 
     def attach(self, name: str, to: str, touch: Iterable[str] = ()) -> None:
         """From now on the link `to` carries the object, from where it is; it may touch the links `touch` too.
@@ -186,7 +184,7 @@ class Scene:
         True
         >>> arm.scene.remove("ball")
         """
-        self._edit(SceneRequest(edit=SceneAttach(name=name, link=to, touch_links=tuple(touch))))
+        self.edit(SceneAttach(name=name, link=to, touch_links=tuple(touch)))
 
     def detach(self, name: str) -> None:
         """Leaves a carried object where it is.
@@ -197,7 +195,7 @@ class Scene:
         False
         >>> arm.scene.remove("ball")
         """
-        self._edit(SceneRequest(edit=SceneDetach(name=name)))
+        self.edit(SceneDetach(name=name))
 
     def allow(self, first: str, second: str) -> None:
         """Lets two links or objects touch; "*" is any.
@@ -208,7 +206,7 @@ class Scene:
         [('ball', 'efector_link')]
         >>> arm.scene.remove("ball")
         """
-        self._edit(SceneRequest(edit=SceneAllow(pair=AllowedPair(first=first, second=second))))
+        self.edit(SceneAllow(pair=AllowedPair(first=first, second=second)))
 
     def disallow(self, first: str, second: str) -> None:
         """Takes an `allow` back.
@@ -220,7 +218,7 @@ class Scene:
         ()
         >>> arm.scene.remove("ball")
         """
-        self._edit(SceneRequest(edit=SceneDisallow(pair=AllowedPair(first=first, second=second))))
+        self.edit(SceneDisallow(pair=AllowedPair(first=first, second=second)))
 
     def clear(self) -> None:
         """Takes everything away.
@@ -229,7 +227,7 @@ class Scene:
         >>> arm.scene.objects
         {}
         """
-        self._edit(SceneRequest(edit=SceneClear()))
+        self.edit(SceneClear())
 
     def replace(self, scene: PlanningScene) -> None:
         """The whole scene at once.
@@ -238,7 +236,25 @@ class Scene:
         >>> arm.scene.clear()
         >>> arm.scene.replace(before)
         """
-        self._edit(SceneRequest(edit=SceneReplace(scene=scene)))
+        self.edit(SceneReplace(scene=scene))
+
+    def edit(self, edit: SceneEdit) -> SceneResponse:
+        """One change as the planner's own message; its answer has the new version. Raises `Refused`.
+
+        >>> from schemas.scene import SceneClear
+        >>> arm.scene.edit(SceneClear()).version == arm.scene.present.version
+        True
+        """
+        response = self._session.call(SCENE_EDIT, SceneRequest(edit=edit), TO_ANSWER)
+        if not response.accepted:
+            changed = edit.object if isinstance(edit, SceneAdd) else edit
+            raise Refused(
+                f"refused: {response.reason}", check="scene", subject=getattr(changed, "name", ""),
+                reason=response.reason,
+            )  # fmt: skip
+        heard = self._session.latest(SCENE).message
+        self._version, self._epoch = response.version, heard.epoch if heard is not None else 0
+        return response
 
     @contextmanager
     def restored(self) -> Iterator[None]:
@@ -281,22 +297,19 @@ class Scene:
         return {item.name: item for item in self.present.objects}
 
     def save(self, path: str | Path) -> None:
-        """Writes the scene as JSON, for `load` and `gemelo scene load`.
+        """Writes the scene as JSON, for `load` and `gemelo scene load`; raises `Error` where that cannot be.
 
         >>> arm.scene.save(folder + "/cell.json")
         """
-        Path(path).write_bytes(msgspec.json.format(msgspec.json.encode(self.present)) + b"\n")
+        write_scene(self.present, Path(path))
 
     def load(self, path: str | Path) -> None:
-        """Replaces the scene by a file's.
+        """Replaces the scene by a file's; raises `Error` where it holds none.
 
         >>> arm.scene.save(folder + "/cell.json")
         >>> arm.scene.load(folder + "/cell.json")
         """
-        try:
-            self.replace(msgspec.json.decode(Path(path).read_bytes(), type=PlanningScene))
-        except (OSError, ValueError) as error:
-            raise Error(f"{path} holds no scene: {error}") from error
+        self.replace(read_scene(Path(path)))
 
     def _add(
         self,
@@ -320,40 +333,7 @@ class Scene:
             touch_links=tuple(touch),
             padding=number("padding", padding),
         )
-        self._edit(SceneRequest(edit=SceneAdd(object=item)))
-
-    def _edit(self, request: SceneRequest) -> None:
-        response = self._session.call(SCENE_EDIT, request, TO_ANSWER)
-        if not response.accepted:
-            changed = request.edit.object if isinstance(request.edit, SceneAdd) else request.edit
-            raise Refused(f"refused: {response.reason}", check="scene", subject=getattr(changed, "name", ""))
-        heard = self._session.latest(SCENE).message
-        self._version, self._epoch = response.version, heard.epoch if heard is not None else 0
-
-
-def mesh_of(path: Path, scale: float) -> MeshShape:
-    """By its path where it lies in the project, as every process finds it there; else by its content."""
-    if not path.is_file():
-        raise BadArgument(f'there is no file "{path}"')
-    content = path.read_bytes()
-    _require_size(path, content, number("scale", scale))
-    inside = path.resolve()
-    if inside.is_relative_to(project_root()):
-        return MeshShape(path=str(inside.relative_to(project_root())), scale=(scale,) * 3)
-    return MeshShape(data=content, scale=(scale,) * 3)
-
-
-def _require_size(path: Path, content: bytes, scale: float) -> None:
-    """Refuses what is far too large; what is no mesh at all the planner says."""
-    from services.arm.stl import BadStl, read_stl  # numpy takes half of the time of `import gemelo`
-
-    try:
-        vertices = read_stl(content).vertices
-    except BadStl:
-        return
-    longest = scale * float((vertices.max(axis=0) - vertices.min(axis=0)).max())
-    if longest > LARGEST_MESH:
-        raise BadArgument(f'"{path}" would be {longest:.4g} m long: if it is drawn in mm, give scale=0.001')
+        self.edit(SceneAdd(object=item))
 
 
 def _pose(at: Vector, orientation: Vector) -> Transform:

@@ -7,7 +7,8 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from itertools import count
 from typing import Any, TypeVar
 
@@ -18,6 +19,7 @@ from schemas.topics import Request, Topic
 from services.arm.model.description import Arm as Description
 from services.runtime import errors as runtime
 from services.runtime.node import Node
+from services.runtime.requests.client import PendingCall
 from services.runtime.topics import Latest
 
 M = TypeVar("M", bound=Message)
@@ -34,19 +36,15 @@ _numbers = count(1)
 class Session:
     """The node, its thread, and the newest message of every topic that was asked for. Any thread may use it."""
 
-    def __init__(self, deployment: Deployment, description: Description, name: str = "") -> None:
-        """Raises `Lost` where the bus cannot be used."""
-        self.deployment, self.description = deployment, description
+    def __init__(self, deployment: Deployment, description: Description, node: Node) -> None:
+        """Takes over a `node` that does not spin yet, and closes it in the end."""
+        self.deployment, self.description, self._node = deployment, description, node
         self.news = threading.Condition()  # notified after every message that was handled
         self._latest: dict[str, Latest[Any]] = {}
         self._changed = 0.0  # [s] monotonic: what is asked from now on must have been heard after this
         self._changed_unix = 0  # [ns] the same moment, after which it should also have been measured
         self._pid = os.getpid()
         self._failure: BaseException | None = None
-        try:
-            self._node = Node(name or _node_name(), deployment, robot=description.name, log_level="warning")
-        except runtime.BusError as error:
-            raise Lost(str(error)) from error
         self._thread = threading.Thread(target=self._run, name=self._node.name, daemon=True)
         self._thread.start()
 
@@ -126,17 +124,15 @@ class Session:
             if on_news is not None:
                 on_news()
 
-    def call(self, request: Request[Q, R], question: Q, timeout: float, on_tick: Callable[[], None] | None = None) -> R:
-        """The answer; raises `Refused` with the server's reason, or `Lost` where there is none within `timeout` [s].
+    def call(self, request: Request[Q, R], question: Q, timeout: float) -> R:
+        """The answer; raises `Refused` with the server's reason, or `Lost` where there is none within `timeout` [s]."""
+        with _as_own_errors():
+            return self.node.call(request, question, timeout)
 
-        `on_tick` is called 100 times a second meanwhile.
-        """
-        try:
-            return self.node.call(request, question, timeout, on_tick)
-        except runtime.Refused as error:
-            raise Refused(str(error)) from error
-        except (runtime.NoAnswer, runtime.BusError) as error:
-            raise Lost(str(error)) from error
+    def ask(self, request: Request[Q, R], question: Q, timeout: float) -> PendingCall[Q, R]:
+        """Sends a question whose answer is awaited by `wait_for`, again after an interrupt too; raises `Lost`."""
+        with _as_own_errors():
+            return self.node.ask(request, question, timeout, self.notify)
 
     def close(self) -> None:
         """Leaves the bus; may be called twice."""
@@ -152,6 +148,29 @@ class Session:
         except BaseException as error:
             self._failure = error
         self.notify()
+
+
+def open_node(deployment: Deployment, robot: str, name: str = "") -> Node:
+    """A node on the robot's bus, named after the script if no `name` is given; raises `Lost` where it cannot be."""
+    with _as_own_errors():
+        return Node(name or _node_name(), deployment, robot=robot, log_level="warning")
+
+
+def answer_of(call: PendingCall[Q, R]) -> R:
+    """The answer that has come; raises `Refused` with the server's reason, or `Lost` where there is none."""
+    with _as_own_errors():
+        return call.response()
+
+
+@contextmanager
+def _as_own_errors() -> Iterator[None]:
+    """Raises the errors of the runtime as `Refused` and `Lost`."""
+    try:
+        yield
+    except runtime.Refused as error:
+        raise Refused(str(error)) from error
+    except (runtime.NoAnswer, runtime.BusError) as error:
+        raise Lost(str(error)) from error
 
 
 def _node_name() -> str:

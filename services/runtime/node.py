@@ -142,6 +142,15 @@ class Node:
             self._loop.wait_for(lambda: pending_call.is_over, timeout, on_tick)
         return pending_call.response()
 
+    def ask(
+        self, request: Request[Q, R], question: Q, timeout: float, on_answer: Callable[[], None]
+    ) -> requests.PendingCall[Q, R]:
+        """Asks and returns at once; `on_answer` is called from another thread when `response()` blocks no more.
+
+        `timeout` is in [s]. Raises `NoAnswer` where nobody serves the request.
+        """
+        return requests.PendingCall(self._bus, request, question, timeout, on_answer)
+
     def serve_action(self, action: Action[G, F, R], on_goal: OnGoal[G], on_cancel: OnCancel) -> ActionServer[G, F, R]:
         """Serves an action: `on_goal(goal_id, goal)` accepts or refuses, `on_cancel(goal_id)` says "" or why not."""
         clients = ClientWatch(self._watch_alive, lambda: self._bus.is_connected)

@@ -183,6 +183,14 @@ def test_the_nearest_goal_of_a_refusal_is_arguments_again(rm1: Description) -> N
     start = Refusal(check="start state", message="beyond", nearest=(0.2,), remedy="jog back")
     assert refused(rm1, start, asked, target, -18).nearest == {}
     assert str(refused(rm1, start, asked, target, -18)).endswith("beyond; jog back")
+    assert (error.reason, error.refusal) == ("too far", refusal)
+
+
+def test_a_refusal_without_a_nearest_goal_ends_with_its_remedy(rm1: Description) -> None:
+    refusal = Refusal(check="unknown link", message='rm1 has no link "x"', remedy="name another")
+    error = refused(rm1, refusal, PlanRequest(), Target(), -31)
+    assert error.nearest == {}
+    assert str(error) == 'refused (unknown link): rm1 has no link "x"; name another'
 
 
 def test_as_target_copies(rm1: Description) -> None:

@@ -235,8 +235,11 @@ def test_waiting_in_a_handler_is_refused_instead_of_hanging(arm: gemelo.Arm) -> 
 
 
 def test_another_arm_than_the_twin_s_is_named(twin: Stack) -> None:
-    with pytest.raises(gemelo.Lost, match="no stepper_gateway of parol6"):
+    with pytest.raises(
+        gemelo.Lost, match=r'no stepper_gateway of parol6 .*; there is rm1: gemelo\.connect\("rm1"\)'
+    ) as lost:
         gemelo.connect("parol6")
+    assert lost.value.robots == gemelo.robots() == ("rm1",)
     with pytest.raises(gemelo.BadArgument, match='there is no arm "parol"; did you mean "parol6"'):
         gemelo.connect("parol")
 

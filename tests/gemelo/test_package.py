@@ -97,10 +97,26 @@ def test_every_public_name_is_there() -> None:
     assert gemelo.__all__ == sorted(gemelo.__all__)
 
 
-def test_importing_it_loads_no_slow_library(root: Path) -> None:
-    code = "import gemelo, json, sys; print(json.dumps(sorted(sys.modules)))"
-    loaded = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
-    assert not SLOW & set(json.loads(loaded.stdout))
+def loaded_by(code: str, root: Path) -> set[str]:
+    """The modules that a script has loaded at its end."""
+    code = f"import gemelo, json, sys\n{code}\nprint(json.dumps(sorted(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
+    return set(json.loads(done.stdout))
+
+
+def test_using_every_public_name_loads_no_slow_library(root: Path) -> None:
+    assert not SLOW & loaded_by("for name in gemelo.__all__: getattr(gemelo, name)", root)
+
+
+def test_a_name_loads_its_own_part_alone(root: Path) -> None:
+    loaded = loaded_by("assert gemelo.mm(250) == 0.25", root)
+    assert "gemelo.units" in loaded
+    assert not {"gemelo.arm", "services.runtime.node"} & loaded
+
+
+def test_a_name_that_there_is_not_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="module 'gemelo' has no attribute 'conect'"):
+        gemelo.conect  # type: ignore[attr-defined]  # noqa: B018
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,52 @@
+"""The files of an arm: where it runs, and what it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from msgspec.structs import replace
+
+from gemelo.errors import BadArgument, Error
+from schemas.deployment import Deployment
+from services.arm.errors import suggestion
+from services.arm.model import description as descriptions
+from services.arm.model.description import Arm as Description
+from services.runtime.deployment import load_deployment, project_root
+
+
+class Robot(NamedTuple):
+    """An arm and where it runs, from their files.
+
+    >>> gemelo.load_robot().description.name
+    'rm1'
+    """
+
+    deployment: Deployment  # router, broker, folders
+    description: Description  # URDF, SRDF and robot.toml as one
+
+
+def load_robot(robot: str = "", *, deployment: str | Path | None = None) -> Robot:
+    """Reads the files of the arm that `connect` with the same arguments is for; asks nobody.
+
+    Raises `Error` where a file is wrong, `BadArgument` where there is no such arm.
+
+    >>> gemelo.load_robot("parol6").description.tool_frame
+    'tool_link'
+    """
+    try:
+        found = load_deployment(None if deployment is None else Path(deployment))
+        if robot:
+            found = replace(found, robot=str(_folder(robot)))
+        return Robot(found, descriptions.load_arm(project_root() / found.robot))
+    except (ValueError, OSError) as error:
+        raise error if isinstance(error, Error) else Error(str(error)) from error
+
+
+def _folder(robot: str) -> Path:
+    """urdf/<robot>, or the path itself."""
+    for folder in (project_root() / "urdf" / robot, Path(robot)):
+        if (folder / "robot.toml").is_file():
+            return folder.resolve()
+    known = sorted(path.parent.name for path in (project_root() / "urdf").glob("*/robot.toml"))
+    raise BadArgument(f'there is no arm "{robot}"{suggestion(robot, known)}')

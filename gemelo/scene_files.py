@@ -1,0 +1,68 @@
+"""The files of a scene: meshes to put into it, and whole scenes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+
+from gemelo.errors import BadArgument, Error
+from gemelo.targets import number
+from schemas.scene import MeshShape, PlanningScene
+from services.runtime.deployment import project_root
+
+LARGEST_MESH = 10.0  # [m]; what is larger was drawn in mm
+
+
+def load_mesh(path: str | Path, scale: float = 1.0) -> MeshShape:
+    """The shape of an STL file, `scale` [m] to its unit: by its path in the project, else by its content.
+
+    A path inside the project is found by every process there. Raises `BadArgument` where the file cannot be read, or
+    would be longer than 10 m.
+
+    >>> gemelo.load_mesh("tests/gemelo/wedge.stl", scale=0.001).scale
+    (0.001, 0.001, 0.001)
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise BadArgument(f'there is no file "{path}"')
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise BadArgument(f'"{path}" cannot be read: {error.strerror}') from error
+    _require_size(file, content, number("scale", scale))
+    inside = file.resolve()
+    if inside.is_relative_to(project_root()):
+        return MeshShape(path=str(inside.relative_to(project_root())), scale=(scale,) * 3)
+    return MeshShape(data=content, scale=(scale,) * 3)
+
+
+def _require_size(path: Path, content: bytes, scale: float) -> None:
+    """Refuses what is far too large; what is no mesh at all the planner says."""
+    from services.arm.stl import BadStl, read_stl  # numpy takes half of the time of `import gemelo`
+
+    try:
+        vertices = read_stl(content).vertices
+    except BadStl:
+        return
+    longest = scale * float((vertices.max(axis=0) - vertices.min(axis=0)).max())
+    if longest > LARGEST_MESH:
+        raise BadArgument(f'"{path}" would be {longest:.4g} m long', "if it is drawn in mm, give scale=0.001")
+
+
+def write_scene(scene: PlanningScene, path: Path) -> None:
+    """Writes the scene as JSON; raises `Error` where the file cannot be written."""
+    try:
+        path.write_bytes(msgspec.json.format(msgspec.json.encode(scene)) + b"\n")
+    except OSError as error:
+        raise Error(f"{path} cannot be written: {error.strerror}") from error
+
+
+def read_scene(path: Path) -> PlanningScene:
+    """The scene of a file; raises `Error` where it cannot be read, or holds none."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=PlanningScene)
+    except OSError as error:
+        raise Error(f"{path} cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise Error(f"{path} holds no scene: {error}") from error
