@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from schemas.actions import GoalStatusCode
 from schemas.message import Message
 from schemas.topics import ACTIONS, Action
 from services.cli.errors import CommandError, ExitCode, unknown, usage
-from services.cli.messages import fields_of, message_of
-from services.cli.move import LONGEST_HOLD, cancel_once
+from services.cli.messages import dump, fields_of, message_of
 from services.cli.parser import Choices, Options, Parser
-from services.cli.session import Robot, Session, connect
-from services.cli.terminal import two_stage_interrupt
+from services.cli.session import Session, connect
+from services.cli.terminal import CANCELLING, two_stage_interrupt
 from services.cli.text_table import table
-from services.cli.yaml import dump
 from services.runtime.errors import GoalRefused
+
+if TYPE_CHECKING:
+    from gemelo import Robot
+
+LONGEST_HOLD = 3600.0  # [s] that a person may hold the arm on its path
 
 
 def run_list(options: Options) -> ExitCode:
@@ -100,12 +103,19 @@ def send_goal(
         print(f"feedback:\n{indented(feedback)}---", flush=True)
 
     with two_stage_interrupt() as interrupt:
+
+        def cancel_once() -> None:
+            if interrupt.is_set and not interrupt.is_answered:
+                interrupt.is_answered = True
+                handle.cancel()
+                print(CANCELLING, flush=True)
+
         try:
             handle = client.send(goal, on_feedback=on_feedback if with_feedback else None)
         except GoalRefused as error:
             raise CommandError(f"refused by {action.server}: {error}") from error
         print(f"accepted: goal {handle.goal_id}", flush=True)
-        outcome = handle.wait(LONGEST_HOLD, on_tick=lambda: cancel_once(handle, interrupt, quiet=False))
+        outcome = handle.wait(LONGEST_HOLD, on_tick=cancel_once)
     print(f"result: {outcome.status.name}\n{indented(outcome.result) if outcome.result else ''}", end="")
     if outcome.status is GoalStatusCode.SUCCEEDED:
         return ExitCode.OK

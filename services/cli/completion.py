@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from services.cli.commands import COMMANDS
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Command, Options, Parser, complete
-from services.cli.session import Robot, load_robot
+from services.cli.session import load_robot
+
+if TYPE_CHECKING:
+    from gemelo import Robot
 
 _SCRIPT = """_gemelo() {{
     local here=${{COMP_WORDS[COMP_CWORD]}} words

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import gemelo
 from schemas.device import (
     ArmCommand,
     DeviceCommand,
-    DeviceCommandRequest,
-    DeviceCommandResponse,
-    DeviceStopRequest,
     OutputCommand,
     ReferenceCommand,
     ResetCommand,
@@ -18,17 +16,15 @@ from schemas.device import (
     SpeedCommand,
     StopKind,
 )
-from schemas.topics import DEVICE_COMMAND, DEVICE_STOP
-from services.cli.errors import CommandError, ExitCode, usage
+from services.cli.errors import CommandError, ExitCode, require_name, usage
 from services.cli.parser import Choices, Options, Parser
-from services.cli.robot_names import require_name
-from services.cli.session import Robot, Session, connect, load_robot
+from services.cli.session import connect_arm, load_robot
 from services.cli.units import parse_joints, share, show
 
 if TYPE_CHECKING:
-    from services.arm.model.description import Arm
+    from gemelo import Arm, Robot
+    from services.arm.model.description import Arm as Description
 
-TIMEOUT = 3.0  # [s]
 BY_NAME: dict[str, DeviceCommand | StopKind] = {
     "arm": ArmCommand(),
     "reset": ResetCommand(),
@@ -45,8 +41,8 @@ AFTERWARDS: dict[str, str] = {
 
 def run(options: Options) -> ExitCode:
     """Sends the command that the last word names."""
-    with connect() as session:
-        return command(session, options.command.words[-1])
+    with connect_arm() as arm:
+        return command(arm, options.command.words[-1])
 
 
 def reference_options(parser: Parser) -> None:
@@ -58,13 +54,13 @@ def reference_options(parser: Parser) -> None:
 
 def reference_choices(robot: Robot | None) -> Choices:
     """The joints, after --joints."""
-    return {} if robot is None else {"--joints": [f"{joint.name}=" for joint in robot.arm.joints]}
+    return {} if robot is None else {"--joints": [f"{joint.name}=" for joint in robot.description.joints]}
 
 
 def run_reference(options: Options) -> ExitCode:
     """Declares where the joints stand."""
-    with connect() as session:
-        return reference(session, options.joints)
+    with connect_arm() as arm:
+        return reference(arm, options.joints)
 
 
 def output_options(parser: Parser) -> None:
@@ -76,14 +72,14 @@ def output_options(parser: Parser) -> None:
 def run_output(options: Options) -> ExitCode:
     """Switches an output; a wrong name is refused before the stack is asked."""
     robot = load_robot()
-    require_name("output", options.output, robot.arm.outputs)
-    with connect(robot) as session:
-        return output(session, options.output, options.state == "on")
+    require_name("output", options.output, robot.description.outputs)
+    with connect_arm(robot) as arm:
+        return output(arm, options.output, options.state == "on")
 
 
 def output_choices(robot: Robot | None) -> Choices:
     """The outputs, then on and off."""
-    names = [output.name for output in robot.arm.outputs] if robot else []
+    names = [output.name for output in robot.description.outputs] if robot else []
     return {"": names, **dict.fromkeys(names, ("on", "off"))}
 
 
@@ -95,49 +91,43 @@ def speed_options(parser: Parser) -> None:
 def run_speed(options: Options) -> ExitCode:
     """Sets the speed; one that is out of range is refused before the stack is asked."""
     require_share(options.share)
-    with connect() as session:
-        return speed(session, options.share)
+    with connect_arm() as arm:
+        return speed(arm, options.share)
 
 
-def command(session: Session, name: str) -> ExitCode:
+def command(arm: Arm, name: str) -> ExitCode:
     """Sends a command of `BY_NAME` and prints the device's answer; raises `CommandError` if it refuses."""
-    code = _send(session, BY_NAME[name])
-    if name == "arm":
-        wait_for_drivers(session)
+    code = send(arm, BY_NAME[name])
     if name in AFTERWARDS:
         print(f"  {AFTERWARDS[name]}")
     return code
 
 
-def reference(session: Session, assignments: Sequence[str]) -> ExitCode:
+def reference(arm: Arm, assignments: Sequence[str]) -> ExitCode:
     """Declares where the joints stand now; those not named stand at robot.toml's reference position."""
-    request = reference_request(session.arm, assignments)
-    code = _send(session, request)
+    request = reference_request(arm.description, assignments)
+    code = send(arm, request)
     for name, position in zip(request.name, request.position, strict=True):
-        print(f"  {name} is at {show(position, session.arm.joint(name).unit)}")
+        print(f"  {name} is at {show(position, arm.description.joint(name).unit)}")
     return code
 
 
-def reference_request(arm: Arm, assignments: Sequence[str]) -> ReferenceCommand:
+def reference_request(arm: Description, assignments: Sequence[str]) -> ReferenceCommand:
     """The command with every joint named."""
-    values = {joint.name: joint.drive.reference_position for joint in arm.joints}
-    values.update(parse_joints(assignments, arm.joints))
-    return ReferenceCommand(name=tuple(values), position=tuple(values.values()))
+    from gemelo.device import reference_command
+
+    return reference_command(arm, parse_joints(assignments, arm.joints))
 
 
-def output(session: Session, name: str, is_on: bool) -> ExitCode:
+def output(arm: Arm, name: str, is_on: bool) -> ExitCode:
     """Switches the output `name` of robot.toml."""
-    require_name("output", name, session.arm.outputs)
-    return _send(
-        session,
-        OutputCommand(output=name, on=is_on),
-        f"output {name} {'on' if is_on else 'off'}",
-    )
+    require_name("output", name, arm.description.outputs)
+    return send(arm, OutputCommand(output=name, on=is_on), f"output {name} {'on' if is_on else 'off'}")
 
 
-def speed(session: Session, scale: float) -> ExitCode:
+def speed(arm: Arm, scale: float) -> ExitCode:
     """Sets how fast the device plays every path from now on: the time scale, 0 to 1."""
-    return _send(session, SpeedCommand(scale=require_share(scale)), f"speed {100.0 * scale:g} %")
+    return send(arm, SpeedCommand(scale=require_share(scale)), f"speed {100.0 * scale:g} %")
 
 
 def require_share(scale: float) -> float:
@@ -147,29 +137,12 @@ def require_share(scale: float) -> float:
     return scale
 
 
-def ask(session: Session, wanted: DeviceCommand | StopKind, what: str = "") -> DeviceCommandResponse:
-    """Sends what is `wanted` and returns the answer; raises `CommandError` with the device's reason if it refuses."""
-    if isinstance(wanted, StopKind):
-        answer = session.node.call(DEVICE_STOP, DeviceStopRequest(kind=wanted), timeout=TIMEOUT)
-    else:
-        answer = session.node.call(DEVICE_COMMAND, DeviceCommandRequest(command=wanted), timeout=TIMEOUT)
-    if not answer.accepted:
-        mode = f" (device mode {answer.mode.name})" if f"mode {answer.mode.name}" not in answer.reason else ""
-        raise CommandError(f"{what or _name(wanted)} refused: {answer.reason}{mode}")
-    return answer
-
-
-def wait_for_drivers(session: Session) -> None:
-    """Waits until drivers that were just energised accept steps: the next command may be a homing."""
-    session.node.wait(max(joint.driver.enable_lead_ms for joint in session.arm.joints) * 1e-3)
-
-
-def _send(session: Session, wanted: DeviceCommand | StopKind, what: str = "") -> ExitCode:
-    what = what or _name(wanted)
-    answer = ask(session, wanted, what)
+def send(arm: Arm, wanted: DeviceCommand | StopKind, what: str = "") -> ExitCode:
+    """Sends what is `wanted` and prints the device's answer; raises `CommandError` with its reason if it refuses."""
+    try:
+        answer = arm.device.send(wanted, what)
+    except gemelo.Refused as error:
+        raise CommandError(str(error)) from error
+    what = what or (wanted.value if isinstance(wanted, StopKind) else str(wanted.__struct_config__.tag))
     print(f"{what} done: device mode {answer.mode.name}{f'; {answer.reason}' if answer.reason else ''}")
     return ExitCode.OK
-
-
-def _name(wanted: DeviceCommand | StopKind) -> str:
-    return wanted.value if isinstance(wanted, StopKind) else str(wanted.__struct_config__.tag)

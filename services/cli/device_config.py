@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import msgspec
 
-from schemas.device import (
-    ArmCommand,
-    ConfigureRequest,
-    DeviceConfiguration,
-    DeviceMode,
-    DeviceState,
-    StopKind,
-)
-from schemas.topics import DEVICE_CONFIGURE
-from services.cli.device import ask, wait_for_drivers
-from services.cli.device_snapshot import DeviceView
-from services.cli.errors import CommandError, ExitCode
+import gemelo
+from schemas.device import DeviceConfiguration
+from services.cli.errors import CommandError, ExitCode, in_commands
 from services.cli.parser import Options, Parser, json_option
-from services.cli.session import Session, connect
+from services.cli.session import connect_arm
 from services.cli.terminal import confirm
 
-TO_ANSWER = 10.0  # [s] for a configuration: a board may write it to its flash first
+if TYPE_CHECKING:
+    from gemelo import Arm
+
 QUESTION = "The drivers go off (an arm that its motors hold up may sink) and every joint has to be referenced anew."
 
 
@@ -35,13 +30,13 @@ def add_options(parser: Parser) -> None:
 
 def run(options: Options) -> ExitCode:
     """Shows or pushes the configuration."""
-    with connect() as session:
-        return push(session, options.yes) if options.push else show(session, options.json)
+    with connect_arm() as arm:
+        return push(arm, options.yes) if options.push else show(arm, options.json)
 
 
-def show(session: Session, as_json: bool) -> ExitCode:
+def show(arm: Arm, as_json: bool) -> ExitCode:
     """Prints the configuration that robot.toml asks for, and its state on the device."""
-    wanted = _wanted(DeviceView(session))
+    wanted = arm.device.configuration
     if as_json:
         print(msgspec.json.encode(wanted).decode())
         return ExitCode.OK
@@ -50,45 +45,27 @@ def show(session: Session, as_json: bool) -> ExitCode:
     return ExitCode.OK
 
 
-def push(session: Session, yes: bool) -> ExitCode:
+def push(arm: Arm, yes: bool) -> ExitCode:
     """Disarms, configures and arms again; asks before the drivers go off. Raises `CommandError` if refused."""
-    view = DeviceView(session)
-    state, wanted = view.require_state(), _wanted(view)
+    wanted = arm.device.configuration
     if wanted.accepted:
         print(f"nothing to do: {_force(wanted)} (crc32 {wanted.crc32:08x})")
         return ExitCode.OK
-    _require_rest(state)
-    if state.armed:
-        confirm(QUESTION, yes)
-        ask(session, StopKind.DISARM)
-        view.wait_for(lambda: view.state.message is not None and not view.state.message.armed)
-    answer = session.node.call(DEVICE_CONFIGURE, ConfigureRequest(), timeout=TO_ANSWER)
-    if not answer.accepted:
-        again = "; the drivers are off now: `gemelo device arm`" if state.armed else ""
-        raise CommandError(f"the device refused the configuration: {answer.reason}{again}")
-    print(f"the device works with configuration {answer.crc32:08x}")
-    if state.armed:
-        ask(session, ArmCommand())
-        wait_for_drivers(session)
+    was_armed = arm.device.state.armed
+    try:
+        crc32 = arm.device.configure(before_disarm=lambda: confirm(QUESTION, yes))
+    except gemelo.Refused as error:
+        again = ", and push again" if error.check == "device" else ""
+        raise CommandError(f"{in_commands(str(error))}{again}") from error
+    print(f"the device works with configuration {crc32:08x}")
+    if was_armed:
         print("armed again; no joint is referenced: `gemelo home` or `gemelo reference`")
     else:
         print("disarmed; no joint is referenced: `gemelo device arm`, then `gemelo home` or `gemelo reference`")
     return ExitCode.OK
 
 
-def _wanted(view: DeviceView) -> DeviceConfiguration:
-    if not view.wait_for(lambda: view.configuration.message is not None):
-        raise CommandError("nobody says what robot.toml asks for: is stepper_gateway running?", ExitCode.NO_STACK)
-    assert view.configuration.message is not None
-    return view.configuration.message
-
-
 def _force(wanted: DeviceConfiguration) -> str:
     if wanted.accepted:
         return "in force: the device works with it"
     return f"NOT in force: {wanted.reason or 'the device has another'}"
-
-
-def _require_rest(state: DeviceState) -> None:
-    if state.mode in (DeviceMode.RUN, DeviceMode.HOLD, DeviceMode.HOMING):
-        raise CommandError(f"refused: the device is in {state.mode.name}: wait, or `gemelo stop`, and push again")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from gemelo.homing import joint_name
 from schemas.device import DeviceConfiguration, DeviceEvent, DeviceState, DeviceStatus
 from schemas.device_faults import fault_text
 from schemas.topics import DEVICE_CONFIGURATION, DEVICE_EVENTS, DEVICE_STATE, DEVICE_STATUS
@@ -15,7 +16,6 @@ from services.cli.device_snapshot import DeviceView, snapshot_of
 from services.cli.device_status import text_of
 from services.cli.errors import ExitCode
 from services.cli.parser import Options, Parser, json_option, positive_integer
-from services.cli.robot_names import joint_name
 from services.cli.session import Session, connect
 from services.cli.terminal import LiveBlock
 from services.cli.units import positive_seconds

@@ -7,19 +7,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import gemelo
 from schemas.device import InjectKind, InjectRequest
-from schemas.topics import DEVICE_INJECT
-from services.cli.device_snapshot import DeviceView
-from services.cli.errors import CommandError, ExitCode, unknown, usage
+from services.cli.errors import CommandError, ExitCode, joint_of, require_name, unknown, usage
 from services.cli.parser import Choices, Options, Parser
-from services.cli.robot_names import joint_of, require_name
-from services.cli.session import Robot, Session, connect, load_robot
+from services.cli.session import connect_arm, load_robot
 from services.cli.units import TIME, parse_quantity
 
 if TYPE_CHECKING:
-    from services.arm.model.description import Arm
+    from gemelo import Arm, Robot
+    from services.arm.model.description import Arm as Description
 
-TIMEOUT = 3.0  # [s]
 HELD = {"on": 1.0, "off": 0.0, "auto": -1.0}
 
 
@@ -33,9 +31,9 @@ def add_options(parser: Parser) -> None:
 def run(options: Options) -> ExitCode:
     """Presses; wrong words are refused before the stack is asked."""
     robot = load_robot()
-    request_of(robot.arm, options.what, options.rest)
-    with connect(robot) as session:
-        return press(session, options.what, options.rest)
+    request_of(robot.description, options.what, options.rest)
+    with connect_arm(robot) as arm:
+        return press(arm, options.what, options.rest)
 
 
 def choices(robot: Robot | None) -> Choices:
@@ -43,7 +41,7 @@ def choices(robot: Robot | None) -> Choices:
     words: dict[str, list[str]] = {"": list(PRESSES)}
     if robot is None:
         return words
-    arm = robot.arm
+    arm = robot.description
     parts = {
         "JOINT": arm.joint_names,
         "INPUT": tuple(each.name for each in arm.inputs),
@@ -62,10 +60,10 @@ class Press:
 
     follows: tuple[str, ...]
     about: str
-    request: Callable[[Arm, Sequence[str]], InjectRequest]
+    request: Callable[[Description, Sequence[str]], InjectRequest]
 
 
-def request_of(arm: Arm, word: str, rest: Sequence[str]) -> InjectRequest:
+def request_of(arm: Description, word: str, rest: Sequence[str]) -> InjectRequest:
     """The request that the words ask for; raises `CommandError` with the right form."""
     if word not in PRESSES:
         raise unknown("thing to press", word, PRESSES)
@@ -75,15 +73,13 @@ def request_of(arm: Arm, word: str, rest: Sequence[str]) -> InjectRequest:
     return press.request(arm, rest)
 
 
-def press(session: Session, word: str, rest: Sequence[str]) -> ExitCode:
-    """Sends the request and prints the device's answer; raises `CommandError` for a device that is not virtual."""
-    request = request_of(session.arm, word, rest)
-    status = DeviceView(session).require_status()
-    if status.online and not status.virtual:
-        raise CommandError(f"{status.device} is a real device: press it by hand; only a virtual one takes requests")
-    answer = session.node.call(DEVICE_INJECT, request, timeout=TIMEOUT)
-    if not answer.accepted:
-        raise CommandError(f"press refused: {answer.reason}")
+def press(arm: Arm, word: str, rest: Sequence[str]) -> ExitCode:
+    """Presses and prints that it is done; raises `CommandError` for a refusal, and a device that is not virtual."""
+    request = request_of(arm.description, word, rest)
+    try:
+        arm.device.inject(request.kind.value, request.target, request.value)
+    except gemelo.Refused as error:
+        raise CommandError(str(error) if error.check == "virtual" else f"press refused: {error.reason}") from error
     print(f"{' '.join([word, *rest])}: done")
     return ExitCode.OK
 
@@ -107,27 +103,27 @@ def seconds(text: str) -> float:
     return value
 
 
-def _switch(arm: Arm, rest: Sequence[str]) -> InjectRequest:
+def _switch(arm: Description, rest: Sequence[str]) -> InjectRequest:
     name = require_name("input", rest[0], arm.inputs)
     if rest[1] not in HELD:
         raise usage(f'a switch is held on, held off, or left on auto, not "{rest[1]}"')
     return InjectRequest(kind=InjectKind.SWITCH, target=name, value=HELD[rest[1]])
 
 
-def _joint(kind: InjectKind, value: float) -> Callable[[Arm, Sequence[str]], InjectRequest]:
+def _joint(kind: InjectKind, value: float) -> Callable[[Description, Sequence[str]], InjectRequest]:
     return lambda arm, rest: InjectRequest(kind=kind, target=joint_of(arm, rest[0]).name, value=value)
 
 
-def _slip(arm: Arm, rest: Sequence[str]) -> InjectRequest:
+def _slip(arm: Description, rest: Sequence[str]) -> InjectRequest:
     return InjectRequest(kind=InjectKind.SLIP, target=joint_of(arm, rest[0]).name, value=number(rest[1], "steps"))
 
 
-def _sensor(arm: Arm, rest: Sequence[str]) -> InjectRequest:
+def _sensor(arm: Description, rest: Sequence[str]) -> InjectRequest:
     name = require_name("sensor", rest[0], arm.sensors)
     return InjectRequest(kind=InjectKind.SENSOR, target=name, value=number(rest[1], f"sensor {name}"))
 
 
-def _timed(kind: InjectKind) -> Callable[[Arm, Sequence[str]], InjectRequest]:
+def _timed(kind: InjectKind) -> Callable[[Description, Sequence[str]], InjectRequest]:
     return lambda arm, rest: InjectRequest(kind=kind, value=seconds(rest[0]))
 
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from gemelo.homing import joint_name
 from schemas.device import DeviceConfiguration, DeviceState, DeviceStatus, SensorReadings
 from schemas.device_faults import FaultDescription, explain
 from schemas.topics import DEVICE_CONFIGURATION, DEVICE_STATE, DEVICE_STATUS, SENSORS
 from services.cli.errors import CommandError, ExitCode
-from services.cli.robot_names import joint_name
 from services.cli.session import Session, other_robots
 
 if TYPE_CHECKING:

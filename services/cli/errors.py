@@ -1,9 +1,15 @@
-"""Exit codes, the exception that ends a command with one sentence, and suggestions for mistyped names."""
+"""Exit codes, the exception that ends a command with one sentence, and names looked up with a suggestion."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 from enum import IntEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from schemas.robot import Input, Output, Sensor
+    from services.arm.model.description import Arm, Joint
 
 
 class ExitCode(IntEnum):
@@ -48,3 +54,38 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> CommandError:
     if guess is not None:
         return usage(f'no {kind} "{name}": did you mean "{guess}"?')
     return usage(f'no {kind} "{name}": there is {", ".join(known) if known else "none at all"}')
+
+
+def joint_of(arm: Arm, name: str) -> Joint:
+    """The joint of that name, or of that name on the wire; raises `CommandError` with the nearest name."""
+    for joint in arm.joints:
+        if name in (joint.name, joint.wire_name):
+            return joint
+    raise unknown("joint", name, arm.joint_names)
+
+
+def require_name(kind: str, name: str, parts: Sequence[Input] | Sequence[Output] | Sequence[Sensor]) -> str:
+    """Returns `name` if robot.toml has such a part; raises `CommandError` with the nearest name."""
+    known = [part.name for part in parts]
+    if not known:
+        raise usage(f"robot.toml has no [[{kind}]], so there is none to name")
+    if name not in known:
+        raise unknown(kind, name, known)
+    return name
+
+
+COMMAND_OF = (  # methods of `gemelo` that its sentences name, and the commands that do the same
+    (r"arm\.device\.arm\(\)", "`gemelo device arm`"),
+    (r"arm\.device\.reset\(\)", "`gemelo reset`"),
+    (r"arm\.home\(\)", "`gemelo home`"),
+    (r"arm\.stop\(\)", "`gemelo stop`"),
+    (r'arm\.reference\(\{"(\w+)": \.\.\.\}\)', r"`gemelo reference --joints \1=...`"),
+    (r"arm\.reference\(\)", "`gemelo reference`"),
+)
+
+
+def in_commands(text: str) -> str:
+    """A sentence of `gemelo`, with the commands in the place of its methods."""
+    for method, command in COMMAND_OF:
+        text = re.sub(method, command, text)
+    return text

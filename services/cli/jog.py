@@ -4,28 +4,27 @@ from __future__ import annotations
 
 import shutil
 import textwrap
+import time
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
-import msgspec
-
+import gemelo
 from schemas.planning import JogCommand, JogLimit, JogStatus
-from schemas.topics import JOG, JOG_STATUS, JOINT_STATES
+from schemas.topics import JOG_STATUS, JOINT_STATES
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.jog_keys import JogKeys, keyboard, require_terminal
 from services.cli.parser import Choices, Options, Parser
 from services.cli.request_text import degrees, joints_text, millimetres
-from services.cli.session import Robot, Session, connect, load_robot
+from services.cli.session import connect_arm, load_robot
 from services.cli.terminal import LiveBlock, two_stage_interrupt
 from services.cli.units import SPEED_OF, angular_speed, parse_joints, positive_seconds, show, speed
 
 if TYPE_CHECKING:
-    from services.arm.model.description import Arm
+    from gemelo import Arm, Robot
+    from services.arm.model.description import Arm as Description
 
-PERIOD = 0.02  # [s] between two commands
-ANSWER = 3.0  # [s] that the planner may take to its first answer
-REST = 5.0  # [s] that the arm may take to come to rest
-FIRST_STATE = 1.0  # [s]
+PERIOD = 0.02  # [s] between two commands while a key is held
 DRAWN = 0.1  # [s] between two drawings
 HELP = """Hold a key to move; letting go stops the arm.
   tool    w/s +x -x      a/d +y -y      q/e +z -z      t axes of the base, or of the tool
@@ -72,24 +71,24 @@ def run(options: Options) -> ExitCode:
     by_hand = not (options.joint or options.twist or options.turn)
     if by_hand and options.seconds is None:
         require_terminal("give --joint or --twist, and --for so many seconds")
-        with connect() as session:
-            return jog_by_hand(session)
+        with connect_arm() as arm:
+            return jog_by_hand(arm)
     if by_hand or options.seconds is None:
         raise usage("give --joint or --twist and --for so many seconds, or none of them to move with the keys")
     robot = load_robot()
-    command = command_of(robot.arm, options.joint, options.twist, options.turn, options.frame == "tool")
-    print(f"understood: {command_text(command, robot.arm)} for {options.seconds:g} s", flush=True)
-    with connect(robot) as session:
-        return jog_for(session, command, options.seconds)
+    command = command_of(robot.description, options.joint, options.twist, options.turn, options.frame == "tool")
+    print(f"understood: {command_text(command, robot.description)} for {options.seconds:g} s", flush=True)
+    with connect_arm(robot) as arm:
+        return jog_for(arm, command, options.seconds)
 
 
 def choices(robot: Robot | None) -> Choices:
     """The joints, after --joint."""
-    return {} if robot is None else {"--joint": [f"{joint.name}=" for joint in robot.arm.joints]}
+    return {} if robot is None else {"--joint": [f"{joint.name}=" for joint in robot.description.joints]}
 
 
 def command_of(
-    arm: Arm, joints: Sequence[str], twist: Sequence[float], turn: Sequence[float], in_tool: bool
+    arm: Description, joints: Sequence[str], twist: Sequence[float], turn: Sequence[float], in_tool: bool
 ) -> JogCommand:
     """The command for joint speeds as text, or for a twist of the tool along its own axes if `in_tool`.
 
@@ -103,7 +102,7 @@ def command_of(
     return JogCommand(linear=tuple(twist), angular=tuple(turn), frame=arm.tool_frame if in_tool else "")
 
 
-def command_text(command: JogCommand, arm: Arm) -> str:
+def command_text(command: JogCommand, arm: Description) -> str:
     """The command as a line, in degrees and millimetres a second."""
     if command.name:
         return joints_text(command.name, command.velocity, arm, "/s")
@@ -112,84 +111,72 @@ def command_text(command: JogCommand, arm: Arm) -> str:
     return f"{', '.join(parts)}, along the axes of {command.frame or 'the base'}"
 
 
-class Jogging:
-    """The stream of jog commands, and the planner's newest answer to it."""
+class Position:
+    """The newest position of tool and joints, as a line."""
 
-    def __init__(self, session: Session) -> None:
-        self.node, self.arm = session.node, session.arm
-        self._commands = self.node.publisher(JOG)
-        self._states = self.node.latest(JOINT_STATES)
-        self.status: JogStatus | None = None
-        self.limits: dict[tuple[str, str], JogLimit] = {}  # by check and subject, the newest of each
+    def __init__(self, arm: Arm) -> None:
         from services.arm.kinematics.kinematics import Kinematics  # loads numpy
 
-        self._kinematics = Kinematics(self.arm)
-        self.node.subscribe(JOG_STATUS, self._on_status)
-
-    def send(self, command: JogCommand) -> None:
-        """Publishes `command`, stamped with the present time."""
-        self._commands.put(msgspec.structs.replace(command, stamp=self.node.now()))
+        self._arm, self._kinematics = arm.description, Kinematics(arm.description)
+        self._states = arm.node.latest(JOINT_STATES)
 
     @property
-    def position_line(self) -> str:
-        """The position of tool and joints as a line."""
+    def line(self) -> str:
+        """`tool x 250.0  y 150.0  z 100.0 mm; brazo_joint 30.00 deg, ...`"""
         state = self._states.message
         found = {} if state is None else dict(zip(state.name, state.position, strict=False))
-        if any(name not in found for name in self.arm.joint_names):
+        if any(name not in found for name in self._arm.joint_names):
             return "no joint_states: is the stepper_gateway running?"
-        x, y, z = (1e3 * value for value in self._kinematics.tool([found[n] for n in self.arm.joint_names]).position)
-        joints = ", ".join(f"{joint.name} {show(found[joint.name], joint.unit, 2)}" for joint in self.arm.joints)
+        x, y, z = (1e3 * value for value in self._kinematics.tool([found[n] for n in self._arm.joint_names]).position)
+        joints = ", ".join(f"{joint.name} {show(found[joint.name], joint.unit, 2)}" for joint in self._arm.joints)
         return f"tool x {x:z.1f}  y {y:z.1f}  z {z:z.1f} mm; {joints}"
 
-    def await_state(self) -> None:
-        """Waits for the first joint state, at most `FIRST_STATE` [s]."""
-        end = self.node.monotonic() + FIRST_STATE
-        while self._states.message is None and self.node.monotonic() < end:
-            self.node.wait(PERIOD)
 
-    def _on_status(self, status: JogStatus) -> None:
-        self.status = status
-        self.limits |= {(limit.check, limit.subject): limit for limit in status.limits}
-
-
-def jog_for(session: Session, command: JogCommand, seconds: float) -> ExitCode:
+def jog_for(arm: Arm, command: JogCommand, seconds: float) -> ExitCode:
     """Sends `command` for `seconds`, waits until the arm rests and prints where.
 
     Raises `CommandError` with the reason if the planner refuses.
     """
-    jogging = Jogging(session)
-    with two_stage_interrupt() as interrupt:
-        began = jogging.node.monotonic()
-        while jogging.node.monotonic() - began < seconds and not interrupt.is_set:
-            jogging.send(command)
-            jogging.node.wait(PERIOD)
-            _require_answer(jogging, jogging.node.monotonic() - began)
-        _rest(jogging)
-    print(jogging.position_line)
-    for limit in jogging.limits.values():
+    position = Position(arm)
+    limits: dict[tuple[str, str], JogLimit] = {}  # by check and subject, the newest of each
+    code = ExitCode.OK
+
+    def collect(status: JogStatus) -> None:
+        limits.update({(limit.check, limit.subject): limit for limit in status.limits})
+
+    try:
+        last = arm.jog(command, duration=seconds, on_progress=collect)
+        collect(last or JogStatus())
+    except gemelo.Interrupted:
+        code = ExitCode.CANCELLED
+    except gemelo.Refused as error:
+        raise CommandError(str(error)) from error
+    print(position.line)
+    for limit in limits.values():
         print(f"limited by {limit.message}")
-    return ExitCode.CANCELLED if interrupt.is_set else ExitCode.OK
+    return code
 
 
-def jog_by_hand(session: Session) -> ExitCode:
+def jog_by_hand(arm: Arm) -> ExitCode:
     """Jogs while keys are held, until one that leaves."""
     with keyboard() as typed, two_stage_interrupt() as interrupt:
-        jogging, keys, block = Jogging(session), JogKeys(session.arm.joints, session.arm.tool_frame), LiveBlock()
+        position, status = Position(arm), arm.node.latest(JOG_STATUS)
+        keys, block = JogKeys(arm.description.joints, arm.tool_frame), LiveBlock()
         block.say(HELP)
-        jogging.await_state()
         drawn = 0.0
         while not (keys.wants_to_leave or interrupt.is_set):
-            now = jogging.node.monotonic()
-            keys.press(typed(), now)
+            now = time.monotonic()
+            keys.press(typed(PERIOD), now)
             command = keys.command(now)
             if command is not None:
-                jogging.send(command)
+                with suppress(gemelo.Refused):  # `status_lines` says why
+                    arm.jog(command)
             if now - drawn >= DRAWN:
                 drawn = now
-                block.draw(_folded([keys.line, jogging.position_line, *status_lines(jogging.status)]))
-            jogging.node.wait(PERIOD)
-        _rest(jogging)
-        block.say(jogging.position_line)
+                block.draw(_folded([keys.line, position.line, *status_lines(status.message)]))
+        with suppress(gemelo.Refused):
+            arm.end_jog()
+        block.say(position.line)
     return ExitCode.OK
 
 
@@ -209,18 +196,3 @@ def _folded(lines: Iterable[str]) -> str:
     """The lines wrapped to the width of the terminal: a remedy must not be cut off."""
     width = max(20, shutil.get_terminal_size().columns - 1)
     return "\n".join(part for line in lines for part in textwrap.wrap(line, width, subsequent_indent="  "))
-
-
-def _require_answer(jogging: Jogging, waited: float) -> None:
-    status = jogging.status
-    if status is None and waited > ANSWER:
-        raise CommandError("the planner does not answer: is it running? (`gemelo node list`)", ExitCode.NO_STACK)
-    if status is not None and not status.active and status.limited_by:
-        raise CommandError(f"refused: {status.limited_by}")
-
-
-def _rest(jogging: Jogging) -> None:
-    """Waits until the planner moves the arm no more, at most `REST` [s]."""
-    end = jogging.node.monotonic() + REST
-    while jogging.status is not None and jogging.status.active and jogging.node.monotonic() < end:
-        jogging.node.wait(PERIOD)

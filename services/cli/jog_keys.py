@@ -112,22 +112,25 @@ def require_terminal(remedy: str) -> None:
 
 
 @contextmanager
-def keyboard() -> Iterator[Callable[[], str]]:
-    """Yields a function that returns the keys typed since its last call; restores the terminal whatever happens."""
+def keyboard() -> Iterator[Callable[[float], str]]:
+    """Yields a function that returns the keys typed since its last call, and waits for the first at most so long [s].
+
+    Restores the terminal whatever happens.
+    """
     descriptor = sys.stdin.fileno()
     before = termios.tcgetattr(descriptor)
     signals = {number: signal.signal(number, _raise_interrupt) for number in (signal.SIGTERM, signal.SIGHUP)}
     try:
         tty.setcbreak(descriptor)
-        yield lambda: _typed(descriptor)
+        yield lambda timeout: _typed(descriptor, timeout)
     finally:
         termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
         for number, handler in signals.items():
             signal.signal(number, handler)
 
 
-def _typed(descriptor: int) -> str:
-    if not select.select([descriptor], [], [], 0.0)[0]:
+def _typed(descriptor: int, timeout: float) -> str:
+    if not select.select([descriptor], [], [], timeout)[0]:
         return ""
     read = os.read(descriptor, BYTES_AT_ONCE)
     return read.decode("utf-8", "ignore") if read else "\x04"  # the terminal is gone

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
 
+import gemelo
+from schemas.frames import Transform
 from schemas.joints import JointState
-from schemas.planning import FkRequest, FkResponse, IkRequest, IkResponse, PoseGoal
-from schemas.topics import FK, IK
-from services.cli.errors import CommandError, ExitCode
+from schemas.planning import FkResponse, IkRequest, IkResponse, PlanCode, PoseGoal
+from services.cli.errors import ExitCode
 from services.cli.move_request import oriented
 from services.cli.parser import Choices, Options, Parser, finite_number, json_option, positive_integer
-from services.cli.request_text import goal_text, joints_text, refusal_text
-from services.cli.session import Robot, Session, connect, load_robot
+from services.cli.request_text import goal_text, joints_text, refusal_error
+from services.cli.session import connect_arm, load_robot
 from services.cli.text_table import table
 from services.cli.units import SHOWN, angle, length, parse_joints, rotation
 
 if TYPE_CHECKING:
-    from services.arm.model.description import Arm
+    from gemelo import Arm, Configurations, Pose, Robot
+    from services.arm.model.description import Arm as Description
 
-PATIENCE = 10.0  # [s] that the planner may search
 XYZ = ("X", "Y", "Z")
 IK_EXAMPLES = """examples:
   gemelo ik --to 0.25 0.15 0.10
@@ -66,22 +68,27 @@ def _vector(parser: Parser, name: str, about: str) -> None:
 def run_ik(options: Options) -> ExitCode:
     """Asks the planner for configurations and prints them."""
     robot = load_robot()
-    request = ik_request(options, robot.arm)
+    request = ik_request(options, robot.description)
     if not options.json:
-        near = f"; near {joints_text(request.near.name, request.near.position, robot.arm)}" if request.near else ""
-        print(f"understood: {goal_text(request.goal, robot.arm)}{near}", flush=True)
-    with connect(robot) as session:
-        return ik(session, request, options.json)
+        near = (
+            f"; near {joints_text(request.near.name, request.near.position, robot.description)}" if request.near else ""
+        )
+        print(f"understood: {goal_text(request.goal, robot.description)}{near}", flush=True)
+    with connect_arm(robot) as arm:
+        return ik(arm, request, options.json)
 
 
 def ik_choices(robot: Robot | None) -> Choices:
     """The joints after --near, the links after --frame."""
     if robot is None:
         return {}
-    return {"--near": [f"{joint.name}=" for joint in robot.arm.joints], "--frame": robot.arm.model.link_names}
+    return {
+        "--near": [f"{joint.name}=" for joint in robot.description.joints],
+        "--frame": robot.description.model.link_names,
+    }
 
 
-def ik_request(options: Options, arm: Arm) -> IkRequest:
+def ik_request(options: Options, arm: Description) -> IkRequest:
     """The request in SI units."""
     near = parse_joints(options.near, arm.joints)
     goal = PoseGoal(
@@ -109,37 +116,41 @@ def fk_options(parser: Parser) -> None:
 def run_fk(options: Options) -> ExitCode:
     """Asks the planner for the poses of links and prints them."""
     robot = load_robot()
-    values = parse_joints(options.joints, robot.arm.joints)
-    request = FkRequest(name=tuple(values), position=tuple(values.values()), links=tuple(options.links))
+    values = parse_joints(options.joints, robot.description.joints)
     if values and not options.json:
-        print(f"understood: {joints_text(request.name, request.position, robot.arm)}", flush=True)
-    with connect(robot) as session:
-        return fk(session, request, options.json)
+        print(f"understood: {joints_text(values, values.values(), robot.description)}", flush=True)
+    with connect_arm(robot) as arm:
+        return fk(arm, values, options.links, options.json)
 
 
 def fk_choices(robot: Robot | None) -> Choices:
     """Joints to set, and links after --links."""
     if robot is None:
         return {}
-    return {"": [f"{joint.name}=" for joint in robot.arm.joints], "--links": robot.arm.model.link_names}
+    return {"": [f"{joint.name}=" for joint in robot.description.joints], "--links": robot.description.model.link_names}
 
 
-def ik(session: Session, request: IkRequest, as_json: bool) -> ExitCode:
+def ik(arm: Arm, request: IkRequest, as_json: bool) -> ExitCode:
     """Prints the configurations, the nearest first; raises `CommandError` with the planner's reason and remedy."""
-    response: IkResponse = session.node.call(IK, request, timeout=PATIENCE)
-    if response.refusal is not None:
-        raise CommandError(refusal_text(response.refusal, request.goal, session.arm))
-    print(as_text(response) if as_json else configurations_text(session.arm, response))
+    try:
+        found = arm.ik(request)
+    except gemelo.Refused as error:
+        raise refusal_error(error, request.goal, arm.description) from error
+    print(as_text(found.response) if as_json else configurations_text(arm.description, found))
     return ExitCode.OK
 
 
-def fk(session: Session, request: FkRequest, as_json: bool) -> ExitCode:
-    """Prints the poses of the links in the base frame; raises `CommandError` with the planner's reason."""
-    response: FkResponse = session.node.call(FK, request, timeout=PATIENCE)
-    if response.refusal is not None:
-        raise CommandError(f"refused ({response.refusal.check}): {response.refusal.message}; {response.refusal.remedy}")
-    print(as_text(response) if as_json else poses_text(response))
+def fk(arm: Arm, joints: dict[str, float], links: Sequence[str], as_json: bool) -> ExitCode:
+    """Prints the poses of the links, or of the tool, in the base frame for joint values [rad] or [m]."""
+    poses = arm.link_poses(joints or None, links or [arm.tool_frame])
+    print(as_text(_response_of(poses)) if as_json else poses_text(poses))
     return ExitCode.OK
+
+
+def _response_of(poses: dict[str, Pose]) -> FkResponse:
+    """The planner's message of the poses, for JSON."""
+    transforms = (Transform(translation=pose.position, rotation=pose.orientation) for pose in poses.values())
+    return FkResponse(code=PlanCode.SUCCESS, links=tuple(poses), poses=tuple(transforms))
 
 
 def as_text(response: IkResponse | FkResponse) -> str:
@@ -147,22 +158,19 @@ def as_text(response: IkResponse | FkResponse) -> str:
     return msgspec.json.encode(response).decode()
 
 
-def configurations_text(arm: Arm, response: IkResponse) -> str:
+def configurations_text(arm: Description, found: Configurations) -> str:
     """A table with a row for each configuration."""
-    units = [SHOWN[arm.joint(name).unit] for name in response.name]
-    headings = [f"{name} [{unit}]" for name, (unit, _) in zip(response.name, units, strict=True)]
+    units = [SHOWN[joint.unit] for joint in map(arm.joint, found.response.name)]
+    headings = [f"{name} [{unit}]" for name, (unit, _) in zip(found.response.name, units, strict=True)]
     rows = [
-        [*(f"{v * factor:z.4f}" for v, (_, factor) in zip(found.position, units, strict=True)), f"{found.distance:.3f}"]
-        for found in response.solutions
+        [*(f"{v * factor:z.4f}" for v, (_, factor) in zip(joints.values(), units, strict=True)), f"{distance:.3f}"]
+        for joints, distance in zip(found, found.distances, strict=True)
     ]
     return table([*headings, "away [s]"], rows)
 
 
-def poses_text(response: FkResponse) -> str:
+def poses_text(poses: dict[str, Pose]) -> str:
     """A table with a row for each link: position and unit quaternion in the base frame."""
     headings = ["link", "x [m]", "y [m]", "z [m]", "qx", "qy", "qz", "qw"]
-    rows = [
-        [link, *(f"{value:z.6f}" for value in (*pose.translation, *pose.rotation))]
-        for link, pose in zip(response.links, response.poses, strict=True)
-    ]
+    rows = [[link, *(f"{value:z.6f}" for value in (*pose.position, *pose.orientation))] for link, pose in poses.items()]
     return table(headings, rows)

@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
-from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal
-from schemas.planning import PlanRequest, PlanResponse
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY
+import gemelo
+from schemas.planning import PlanProgress, PlanRequest
 from services.cli.errors import CommandError, ExitCode
 from services.cli.move_report import MoveReport, PlanReport, report_of, summary
 from services.cli.move_request import request_from, require_alone
 from services.cli.parser import Choices, Options, Parser, finite_number
 from services.cli.plan_file import read_plan
-from services.cli.planning import make_plan
-from services.cli.request_text import request_text
-from services.cli.session import Robot, Session, connect, load_robot
-from services.cli.terminal import Interrupt, motion_progress, two_stage_interrupt
+from services.cli.request_text import refusal_error, request_text
+from services.cli.session import connect_arm, load_robot
+from services.cli.terminal import CANCELLING, LiveBlock, motion_progress
 from services.cli.units import acceleration, angle, length, rotation, seconds, share, speed
-from services.runtime.errors import GoalRefused
 
 if TYPE_CHECKING:
     from argparse import _ArgumentGroup as Group
 
-    from services.arm.model.description import Arm
-    from services.runtime.actions import GoalHandle
+    from gemelo import Arm, Motion, Plan, Robot
+    from services.arm.model.description import Arm as Description
 
-LONGEST_HOLD = 3600.0  # [s] that a person may hold the arm on its way
 XYZ = ("X", "Y", "Z")
 EXAMPLES = """examples:
   gemelo move --to 0.25 0.15 0.10
@@ -106,67 +102,96 @@ def run(options: Options) -> ExitCode:
     robot = load_robot()
     if options.execute is not None:
         require_alone(options)
-        plan = read_plan(options.execute, robot.arm)
-        with connect(robot) as session:
-            return execute(session, plan, options.json)
-    request = request_from(options, robot.arm)
+        plan = read_plan(options.execute, robot.description)
+        with connect_arm(robot) as arm:
+            return execute(arm, plan, options.json)
+    request = request_from(options, robot.description)
     if not options.json:
-        print(f"understood: {request_text(request, robot.arm)}", flush=True)
-    with connect(robot) as session:
-        return move(session, request, options.plan_only, options.json)
+        print(f"understood: {request_text(request, robot.description)}", flush=True)
+    with connect_arm(robot) as arm:
+        return move(arm, request, options.plan_only, options.json)
 
 
 def choices(robot: Robot | None) -> Choices:
     """The named states and joints, after their options."""
     if robot is None:
         return {}
-    return {"--named": robot.arm.state_names, "--joints": [f"{joint.name}=" for joint in robot.arm.joints]}
+    return {
+        "--named": robot.description.state_names,
+        "--joints": [f"{joint.name}=" for joint in robot.description.joints],
+    }
 
 
-def move(session: Session, request: PlanRequest, plan_only: bool, as_json: bool) -> ExitCode:
+def move(arm: Arm, request: PlanRequest, plan_only: bool, as_json: bool) -> ExitCode:
     """Plans and, unless `plan_only`, executes; prints one line or one JSON object at the end."""
-    plan = make_plan(session, request, quiet=as_json)
+    plan = make_plan(arm, request, quiet=as_json)
     if not plan_only:
-        return execute(session, plan, as_json)
-    report = PlanReport(robot=session.arm.name, planned_s=plan.planning_time, duration_s=plan.duration, response=plan)
-    return _print(report, plan, session.arm, as_json)
+        return execute(arm, plan, as_json)
+    report = PlanReport(
+        robot=arm.name, planned_s=plan.planning_time, duration_s=plan.duration, response=plan.response
+    )  # fmt: skip
+    return _print(report, plan, arm.description, as_json)
 
 
-def execute(session: Session, plan: PlanResponse, as_json: bool) -> ExitCode:
+def make_plan(arm: Arm, request: PlanRequest, quiet: bool = False) -> Plan:
+    """A verified trajectory; a refusal is raised with its reason and what would do, Ctrl-C as CANCELLED."""
+    block = LiveBlock(False if quiet else None)
+
+    def show(progress: PlanProgress) -> None:
+        stand = f"{progress.phase}, {progress.elapsed:.1f} of {progress.allowed:g} s"
+        block.draw(f"planning: {stand} (Ctrl-C cancels)")
+
+    try:
+        return arm.plan(request, on_progress=show)
+    except gemelo.Refused as error:
+        raise refusal_error(error, request.goal, arm.description) from error
+    except gemelo.Interrupted as error:
+        raise CommandError(str(error), ExitCode.CANCELLED) from error
+    finally:
+        block.say()
+
+
+def execute(arm: Arm, plan: Plan, as_json: bool) -> ExitCode:
     """Executes a plan and prints one line or one JSON object at the end; raises `CommandError` if it is refused."""
-    return _print(follow(session, plan, quiet=as_json), plan, session.arm, as_json)
+    return _print(follow(arm, plan, quiet=as_json), plan, arm.description, as_json)
 
 
-def _print(report: MoveReport, plan: PlanResponse, arm: Arm, as_json: bool) -> ExitCode:
-    if plan.stopped_by is not None:
-        report = replace(report, fraction=plan.fraction, stopped_by=plan.stopped_by.message)
+def _print(report: MoveReport, plan: Plan, arm: Description, as_json: bool) -> ExitCode:
+    if plan.response.stopped_by is not None:
+        report = replace(report, fraction=plan.response.fraction, stopped_by=plan.response.stopped_by.message)
     print(report.as_json() if as_json else summary(report, arm, isinstance(report, PlanReport)))
     return report.exit_code
 
 
-def follow(session: Session, plan: PlanResponse, quiet: bool = False) -> MoveReport:
-    """Executes `plan`; Ctrl-C cancels and waits for where the arm came to rest."""
-    client = session.node.action(FOLLOW_JOINT_TRAJECTORY)
-    with motion_progress(plan.duration, quiet) as shown, two_stage_interrupt() as interrupt:
+def follow(arm: Arm, plan: Plan, quiet: bool = False) -> MoveReport:
+    """Executes `plan`; Ctrl-C cancels and waits for where the arm came to rest.
 
-        def on_feedback(feedback: FollowJointTrajectoryFeedback) -> None:
-            shown(feedback.elapsed, feedback.duration)
+    The motion is detached: it goes on when this process is killed.
+    """
+    with motion_progress(plan.duration, quiet) as shown:
 
-        goal = FollowJointTrajectoryGoal(
-            trajectory=plan.trajectory, scene_version=plan.scene_version, scene_epoch=plan.scene_epoch
-        )
+        def on_progress(motion: Motion) -> None:
+            if motion.feedback is not None:
+                shown(motion.feedback.elapsed, motion.feedback.duration)
+
+        def on_cancel(motion: Motion) -> None:
+            if not quiet:
+                print(CANCELLING, flush=True)
+
         try:
-            handle = client.send(goal, on_feedback=on_feedback)
-        except GoalRefused as error:
-            raise CommandError(f"refused by {FOLLOW_JOINT_TRAJECTORY.server}: {error}") from error
-        outcome = handle.wait(plan.duration + LONGEST_HOLD, on_tick=lambda: cancel_once(handle, interrupt, quiet))
-    return report_of(session, plan, outcome.status, outcome.result, interrupt.is_set)
+            motion = arm.execute(plan, detached=True, on_progress=on_progress, on_cancel=on_cancel)
+        except gemelo.Refused as error:
+            raise CommandError(str(error)) from error
+        except (gemelo.Aborted, gemelo.Interrupted, gemelo.Lost) as error:
+            return _report_of_end(arm, error)
+    return report_of(arm.description, motion, is_interrupted=False)
 
 
-def cancel_once(handle: GoalHandle[Any, Any], interrupt: Interrupt, quiet: bool) -> None:
-    """Cancels when Ctrl-C has been pressed for the first time."""
-    if interrupt.is_set and not interrupt.is_answered:
-        interrupt.is_answered = True
-        handle.cancel()
-        if not quiet:
-            print("cancelling: the arm slows down on its path (Ctrl-C again leaves without waiting)", flush=True)
+def _report_of_end(arm: Arm, error: gemelo.Aborted | gemelo.Interrupted | gemelo.Lost) -> MoveReport:
+    """The report of a motion that ended before its goal; raises `CommandError` where nobody says how it ended."""
+    is_interrupted = isinstance(error, gemelo.Interrupted)
+    if error.motion is None and not is_interrupted:
+        raise error
+    if error.motion is None or not error.motion.has_result:
+        raise CommandError(str(error), ExitCode.CANCELLED if is_interrupted else ExitCode.FAILED) from error
+    return report_of(arm.description, error.motion, is_interrupted)

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from schemas.actions import GoalStatusCode
-from schemas.motion import FollowJointTrajectoryResult, JointTrajectory
+from schemas.motion import JointTrajectory
 from schemas.planning import PlanResponse
 from services.cli.errors import ExitCode
 from services.cli.units import show
 
 if TYPE_CHECKING:
-    from services.arm.model.description import Arm
-    from services.cli.session import Session
+    from gemelo import Motion
+    from services.arm.model.description import Arm as Description
 
 
 class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -56,27 +56,16 @@ class PlanReport(MoveReport, frozen=True, kw_only=True):
     response: PlanResponse
 
 
-def report_of(
-    session: Session,
-    plan: PlanResponse,
-    status: GoalStatusCode,
-    result: FollowJointTrajectoryResult | None,
-    interrupted: bool,
-) -> MoveReport:
-    """The report of a goal that has ended, from the steps that the device executed."""
-    arm = session.arm
-    result = result or FollowJointTrajectoryResult()
+def report_of(arm: Description, motion: Motion, is_interrupted: bool) -> MoveReport:
+    """The report of a motion that has ended, from the steps that the device executed."""
+    plan, result = motion.plan, motion.result
     errors = dict(zip(result.joint_names, result.final_error, strict=False))
-    stopped_at = {
-        name: arm.joint(name).steps.to_position(steps)
-        for name, steps in zip(result.joint_names, result.executed_steps, strict=False)
-    }
-    succeeded = status is GoalStatusCode.SUCCEEDED
+    succeeded = motion.status is GoalStatusCode.SUCCEEDED
     return MoveReport(
         robot=arm.name,
-        status=status.name,
+        status=motion.status.name,
         succeeded=succeeded,
-        interrupted=interrupted,
+        interrupted=is_interrupted,
         reason=result.error_string,
         planned_s=plan.planning_time,
         duration_s=plan.duration,
@@ -84,11 +73,11 @@ def report_of(
         final_error_m=tool_error(arm, plan.trajectory, errors) if succeeded else None,
         final_error_steps=errors,
         max_following_error_steps=dict(zip(result.joint_names, result.max_following_error, strict=False)),
-        stopped_at=stopped_at,
+        stopped_at=motion.stopped_at,
     )
 
 
-def summary(report: MoveReport, arm: Arm, plan_only: bool = False) -> str:
+def summary(report: MoveReport, arm: Description, plan_only: bool = False) -> str:
     """The report as one line for a person."""
     planned = f"planned in {1e3 * report.planned_s:.1f} ms"
     if report.stopped_by:
@@ -106,7 +95,7 @@ def summary(report: MoveReport, arm: Arm, plan_only: bool = False) -> str:
     return f"{planned}, took {report.took_s:.2f} s, final error {millimetres}, steps: {steps}"
 
 
-def tool_error(arm: Arm, trajectory: JointTrajectory, errors: Mapping[str, float]) -> float:
+def tool_error(arm: Description, trajectory: JointTrajectory, errors: Mapping[str, float]) -> float:
     """The tool's distance from the end of the trajectory [m], from the joints' final `errors` [steps].
 
     Forward kinematics of both: the goal, and the goal minus the error.

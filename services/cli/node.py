@@ -9,10 +9,10 @@ import msgspec
 from schemas.system import Empty, LogLevel, LogRecord, NodeInfo, Parameter, Parameters, ParameterValue, SetParameter
 from schemas.topics import LOG, Request
 from services.cli.errors import CommandError, ExitCode, nearest, unknown, usage
+from services.cli.messages import dump
 from services.cli.parser import Options, Parser
 from services.cli.session import Session, connect
 from services.cli.text_table import table
-from services.cli.yaml import dump
 
 TIMEOUT = 2.0  # [s]
 

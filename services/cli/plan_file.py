@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+import gemelo
 from schemas.planning import PlanResponse
 from services.cli.errors import CommandError, usage
 
 if TYPE_CHECKING:
+    from gemelo import Plan
     from services.arm.model.description import Arm
 
 STANDARD_INPUT = "-"
@@ -26,7 +28,7 @@ class PlanFile(msgspec.Struct, frozen=True, kw_only=True):
     response: PlanResponse
 
 
-def read_plan(source: str, arm: Arm) -> PlanResponse:
+def read_plan(source: str, arm: Arm) -> Plan:
     """The plan in a file, or on standard input for `-`.
 
     Raises `CommandError` naming the file if it holds no plan, or one that `arm` cannot follow. Whether the arm stands
@@ -40,7 +42,7 @@ def read_plan(source: str, arm: Arm) -> PlanResponse:
     if saved.robot != arm.name:
         raise usage(f"{name} is a plan for {saved.robot}, and this robot is {arm.name}")
     _require_trajectory(saved.response, name, arm)
-    return saved.response
+    return gemelo.Plan(saved.robot, {}, saved.response)
 
 
 def _read(source: str, name: str) -> bytes:

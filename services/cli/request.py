@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from schemas.message import Message
 from schemas.topics import REQUESTS, Request
 from services.cli.errors import ExitCode, unknown
-from services.cli.messages import message_of
+from services.cli.messages import dump, message_of
 from services.cli.parser import Choices, Options, Parser
-from services.cli.session import Robot, Session, connect
+from services.cli.session import Session, connect
 from services.cli.text_table import table
-from services.cli.yaml import dump
+
+if TYPE_CHECKING:
+    from gemelo import Robot
 
 CALL_TIMEOUT = 5.0  # [s]
 

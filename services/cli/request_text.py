@@ -21,9 +21,11 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
+from services.cli.errors import CommandError
 from services.cli.units import DEGREE, SHOWN
 
 if TYPE_CHECKING:
+    from gemelo import Refused
     from services.arm.model.description import Arm
 
 
@@ -126,6 +128,11 @@ def refusal_text(refusal: Refusal, goal: Goal, arm: Arm) -> str:
     if refusal.nearest:
         return f"{text}; nearest that can: {as_typed(goal, refusal.nearest, arm)}"
     return f"{text}; {refusal.remedy}" if refusal.remedy else text
+
+
+def refusal_error(error: Refused, goal: Goal, arm: Arm) -> CommandError:
+    """The end of a command whose `goal` was refused, in options where `gemelo` says arguments."""
+    return CommandError(refusal_text(error.refusal, goal, arm) if error.refusal is not None else str(error))
 
 
 def as_typed(goal: Goal, values: Sequence[float], arm: Arm) -> str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
+import gemelo
 from schemas.scene import (
     AllowedPair,
     PlanningScene,
@@ -15,23 +17,21 @@ from schemas.scene import (
     SceneClear,
     SceneDetach,
     SceneDisallow,
+    SceneEdit,
     SceneMove,
     SceneRemove,
     SceneReplace,
-    SceneRequest,
     SceneResize,
-    SceneResponse,
 )
-from schemas.topics import SCENE, SCENE_EDIT
-from services.cli.errors import CommandError, ExitCode
+from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.parser import Choices, Options, Parser, positive_number
 from services.cli.request_text import millimetres
-from services.cli.scene_object import object_of, pose_of, shape_of
-from services.cli.scene_text import listing, place_text, read_scene, sized_text, write_scene
-from services.cli.session import Robot, Session, connect
+from services.cli.scene_object import listing, object_of, place_text, pose_of, shape_of, sized_text
+from services.cli.session import connect_arm
 
-PATIENCE = 10.0  # [s] the planner takes that long for a mesh of many triangles
-LATCHED_WAIT = 1.0  # [s] for the latched scene
+if TYPE_CHECKING:
+    from gemelo import Robot
+
 KEPT = "scene.json"  # in the run folder; the planner writes it
 ADD_EXAMPLES = """examples:
   gemelo scene add table --box 600mm 400mm 20mm --at 300mm 0 -10mm
@@ -89,18 +89,20 @@ def add(options: Options) -> ExitCode:
     print(
         f"understood: {item.name}, {sized_text(item.shape)}, {place_text(item.pose, item.frame)}{padding}", flush=True
     )
-    return ask(SceneRequest(edit=SceneAdd(object=item)))
+    return ask(SceneAdd(object=item))
 
 
-def ask(request: SceneRequest) -> ExitCode:
-    """Connects and sends the change."""
-    with connect() as session:
-        return edit(session, request)
+def ask(change: SceneEdit) -> ExitCode:
+    """Connects, sends the change and prints the new version."""
+    with connect_arm() as arm:
+        response = arm.scene.edit(change)
+    print(f"scene version {response.version}{f': {response.reason}' if response.reason else ''}")
+    return ExitCode.OK
 
 
 def remove(options: Options) -> ExitCode:
     """Removes an object."""
-    return ask(SceneRequest(edit=SceneRemove(name=options.name)))
+    return ask(SceneRemove(name=options.name))
 
 
 def move_options(parser: Parser) -> None:
@@ -113,7 +115,7 @@ def move(options: Options) -> ExitCode:
     """Moves an object."""
     pose = pose_of(options.at, options.rpy)
     print(f"understood: {options.name} {place_text(pose, options.frame)}", flush=True)
-    return ask(SceneRequest(edit=SceneMove(name=options.name, pose=pose, frame=options.frame)))
+    return ask(SceneMove(name=options.name, pose=pose, frame=options.frame))
 
 
 def resize_options(parser: Parser) -> None:
@@ -126,7 +128,7 @@ def resize(options: Options) -> ExitCode:
     """Gives an object another shape."""
     shape = shape_of(options)
     print(f"understood: {options.name}, {sized_text(shape)}", flush=True)
-    return ask(SceneRequest(edit=SceneResize(name=options.name, shape=shape)))
+    return ask(SceneResize(name=options.name, shape=shape))
 
 
 def attach_options(parser: Parser) -> None:
@@ -139,12 +141,12 @@ def attach_options(parser: Parser) -> None:
 def attach(options: Options) -> ExitCode:
     """Attaches an object to a link, at its present pose."""
     touch_links = tuple(options.touch)
-    return ask(SceneRequest(edit=SceneAttach(name=options.name, link=options.link, touch_links=touch_links)))
+    return ask(SceneAttach(name=options.name, link=options.link, touch_links=touch_links))
 
 
 def detach(options: Options) -> ExitCode:
     """Detaches an object at its present pose."""
-    return ask(SceneRequest(edit=SceneDetach(name=options.name)))
+    return ask(SceneDetach(name=options.name))
 
 
 def pair_options(parser: Parser) -> None:
@@ -157,13 +159,13 @@ def allow(options: Options) -> ExitCode:
     """Allows or disallows a pair, as the last word says."""
     pair = AllowedPair(first=options.first, second=options.second)
     is_allowed = options.command.words[-1] == "allow"
-    return ask(SceneRequest(edit=SceneAllow(pair=pair) if is_allowed else SceneDisallow(pair=pair)))
+    return ask(SceneAllow(pair=pair) if is_allowed else SceneDisallow(pair=pair))
 
 
 def show(options: Options) -> ExitCode:
     """Prints the scene."""
-    with connect() as session:
-        scene = present(session)
+    with connect_arm() as arm:
+        scene = arm.scene.present
     print(msgspec.json.encode(scene).decode() if options.json else listing(scene))
     return ExitCode.OK
 
@@ -175,39 +177,23 @@ def file_option(parser: Parser) -> None:
 
 def load(options: Options) -> ExitCode:
     """Replaces the scene by that of a file."""
-    return ask(SceneRequest(edit=SceneReplace(scene=read_scene(options.file))))
+    return ask(SceneReplace(scene=_read(options.file)))
 
 
 def save(options: Options) -> ExitCode:
     """Writes the scene into a file."""
-    with connect() as session:
-        write_scene(present(session), options.file)
+    from gemelo.scene_files import write_scene
+
+    with connect_arm() as arm:
+        scene = arm.scene.present
+        write_scene(scene, options.file)
+    print(f"{options.file} has the scene, version {scene.version}")
     return ExitCode.OK
 
 
 def clear(options: Options) -> ExitCode:
     """Removes every object and every allowed pair."""
-    return ask(SceneRequest(edit=SceneClear()))
-
-
-def edit(session: Session, request: SceneRequest) -> ExitCode:
-    """Sends the change and prints the new version; raises `CommandError` with the planner's reason if refused."""
-    response: SceneResponse = session.node.call(SCENE_EDIT, request, timeout=PATIENCE)
-    if not response.accepted:
-        raise CommandError(f"refused: {response.reason}")
-    print(f"scene version {response.version}{f': {response.reason}' if response.reason else ''}")
-    return ExitCode.OK
-
-
-def present(session: Session) -> PlanningScene:
-    """The newest scene of the planner; raises `CommandError` if nobody publishes one."""
-    scene = session.node.latest(SCENE)
-    until = session.node.monotonic() + LATCHED_WAIT
-    while scene.message is None and session.node.monotonic() < until:
-        session.node.wait(0.02)
-    if scene.message is None:
-        raise CommandError("nobody publishes a scene: is the planner running?", ExitCode.NO_STACK)
-    return scene.message
+    return ask(SceneClear())
 
 
 def object_choices(robot: Robot | None) -> Choices:
@@ -234,11 +220,21 @@ def _object_names(robot: Robot | None) -> list[str]:
     if robot is None:
         return []
     try:
-        kept = read_scene(project_root() / Path(robot.deployment.paths.run) / KEPT)
+        kept = _read(project_root() / Path(robot.deployment.paths.run) / KEPT)
     except CommandError:
         return []
     return [item.name for item in kept.objects if " " not in item.name]
 
 
 def _link_names(robot: Robot | None) -> tuple[str, ...]:
-    return robot.arm.model.link_names if robot else ()
+    return robot.description.model.link_names if robot else ()
+
+
+def _read(path: Path) -> PlanningScene:
+    """The scene of a file; raises `CommandError` where it cannot be read, or holds none."""
+    from gemelo.scene_files import read_scene
+
+    try:
+        return read_scene(path)
+    except gemelo.Error as error:
+        raise usage(str(error)) from error

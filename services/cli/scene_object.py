@@ -1,19 +1,18 @@
-"""The options of `gemelo scene` turned into a scene object: shape, pose and frame, in SI units."""
+"""The objects of `gemelo scene`: from options to messages in SI units, and from messages to text in millimetres."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
+import gemelo
 from schemas.frames import Transform
-from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, SceneObject, Shape, SphereShape
+from schemas.scene import BoxShape, CylinderShape, MeshShape, PlaneShape, PlanningScene, SceneObject, Shape, SphereShape
 from services.arm.frames.transforms import from_rpy
 from services.cli.errors import usage
 from services.cli.parser import Options
+from services.cli.request_text import millimetres, rotation_text
+from services.cli.text_table import table
 from services.cli.units import LENGTH, parse_quantity, parse_rotation
-from services.runtime.deployment import project_root
-
-LARGEST_MESH = 10.0  # [m]; what is larger was drawn in mm
 
 
 def object_of(options: Options) -> SceneObject:
@@ -40,38 +39,17 @@ def shape_of(options: Options) -> Shape:
         radius, long = lengths(options.cylinder, "--cylinder")
         return CylinderShape(radius=radius, length=long)
     if options.mesh is not None:
-        return mesh_of(Path(options.mesh), options.scale)
+        return _mesh_of(options.mesh, options.scale)
     return PlaneShape()
 
 
-def mesh_of(path: Path, scale: float) -> MeshShape:
-    """The mesh of an STL file: by path inside the project, where every process finds it, else by content.
-
-    `scale` is [m] for each unit of the file. Raises `CommandError` if the file cannot be read or is far too large.
-    """
-    if not path.is_file():
-        raise usage(f'there is no file "{path}"')
-    _require_size(path, scale)
-    inside = path.resolve()
-    if inside.is_relative_to(project_root()):
-        return MeshShape(path=str(inside.relative_to(project_root())), scale=(scale,) * 3)
+def _mesh_of(path: str, scale: float) -> MeshShape:
+    """The mesh of an STL file, `scale` [m] to its unit; raises `CommandError` where it cannot be."""
     try:
-        return MeshShape(data=path.read_bytes(), scale=(scale,) * 3)
-    except OSError as error:
-        raise usage(f'"{path}" cannot be read: {error.strerror}') from error
-
-
-def _require_size(path: Path, scale: float) -> None:
-    """Raises `CommandError` for a mesh longer than `LARGEST_MESH`; the planner refuses files that are no mesh."""
-    from services.arm.stl import BadStl, read_stl
-
-    try:
-        vertices = read_stl(path.read_bytes()).vertices
-    except (BadStl, OSError):
-        return
-    longest = scale * float((vertices.max(axis=0) - vertices.min(axis=0)).max())
-    if longest > LARGEST_MESH:
-        raise usage(f'"{path}" would be {longest:.4g} m long: if it is drawn in mm, give --scale 0.001')
+        return gemelo.load_mesh(path, scale)
+    except gemelo.BadArgument as error:
+        remedy = ": if it is drawn in mm, give --scale 0.001" if error.remedy else ""
+        raise usage(f"{error.reason}{remedy}") from error
 
 
 def pose_of(at: Sequence[str], rpy: Sequence[str]) -> Transform:
@@ -88,3 +66,55 @@ def lengths(texts: Sequence[str], owner: str) -> tuple[float, ...]:
 def length(text: str, owner: str) -> float:
     """A length [m]; raises `CommandError` naming the option `owner`."""
     return parse_quantity(text, LENGTH, owner)
+
+
+def listing(scene: PlanningScene) -> str:
+    """A table of the objects, and the pairs that may touch."""
+    headings = ("object", "shape [mm]", "x y z [mm]", "turned", "in", "touches", "padding [mm]")
+    rows = [_row(item) for item in scene.objects]
+    lines = [table(headings, rows)] if rows else ["nothing is around the arm"]
+    lines += [f"{pair.first} and {pair.second} may touch" for pair in scene.allowed]
+    return "\n".join([*lines, f"version {scene.version}"])
+
+
+def _row(item: SceneObject) -> tuple[str, ...]:
+    at = " ".join(f"{1000.0 * value:z.1f}" for value in item.pose.translation)
+    held = f"{item.frame} (attached)" if item.attached else item.frame or "base"
+    touches = ", ".join(item.touch_links) or "-"
+    return (
+        item.name,
+        shape_text(item.shape),
+        at,
+        rotation_text(item.pose.rotation),
+        held,
+        touches,
+        f"{1000.0 * item.padding:g}",
+    )
+
+
+def place_text(pose: Transform, frame: str) -> str:
+    """A pose in `frame` (empty: the base) as text, lengths in [mm]."""
+    rotation = rotation_text(pose.rotation)
+    turned = f", turned {rotation}" if rotation != "-" else ""
+    return f"at {millimetres(pose.translation)}{turned}, in {frame or 'the base'}"
+
+
+def sized_text(shape: Shape) -> str:
+    """The shape as text with its unit."""
+    return f"{shape_text(shape)}{'' if isinstance(shape, PlaneShape | MeshShape) else ' mm'}"
+
+
+def shape_text(shape: Shape) -> str:
+    """The shape as text, lengths in [mm]."""
+    match shape:
+        case BoxShape():
+            return f"box {' x '.join(f'{1000.0 * edge:g}' for edge in shape.size)}"
+        case SphereShape():
+            return f"sphere of radius {1000.0 * shape.radius:g}"
+        case CylinderShape():
+            return f"cylinder of radius {1000.0 * shape.radius:g}, length {1000.0 * shape.length:g}"
+        case PlaneShape():
+            return "plane, solid below"
+        case MeshShape():
+            scale = "" if set(shape.scale) == {1.0} else f", scale {shape.scale[0]:g}"
+            return f"mesh {shape.path or f'of {len(shape.data)} bytes'}{scale}"

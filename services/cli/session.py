@@ -1,4 +1,4 @@
-"""The connection of one command: the deployment and the arm from their files, and a node on the robot's bus."""
+"""The connection of one command: the robot's files, then `gemelo` for what moves, or a node for what listens."""
 
 from __future__ import annotations
 
@@ -8,42 +8,83 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
 
-from services.cli.errors import CommandError, ExitCode, usage
+import gemelo
+from services.cli.errors import CommandError, ExitCode, in_commands, usage
 
 if TYPE_CHECKING:
+    from gemelo import Arm, Robot
     from schemas.deployment import Deployment
-    from services.arm.model.description import Arm
+    from services.arm.model.description import Arm as Description
     from services.runtime.node import Node
 
 CONNECT_TIMEOUT = 1.0  # [s]
-GATEWAY = "stepper_gateway"
-
-
-class Robot(NamedTuple):
-    """The robot that a command is about, from its files; read once for a command."""
-
-    deployment: Deployment
-    arm: Arm
 
 
 class Session(NamedTuple):
     """A robot, and this command's own node on its bus."""
 
     deployment: Deployment
-    arm: Arm
+    arm: Description
     node: Node
 
 
 def load_robot() -> Robot:
     """Reads the deployment and the arm's files; raises `CommandError` with one sentence if they are wrong."""
-    from services.arm.model.description import load_arm
-    from services.runtime.deployment import load_deployment, project_root
+    try:
+        return gemelo.load_robot()
+    except gemelo.Error as error:
+        raise usage(str(error)) from error
+
+
+@contextmanager
+def connect_arm(robot: Robot | None = None) -> Iterator[Arm]:
+    """Yields the arm of `robot`, by default the deployment's own.
+
+    Raises `CommandError` if there is no router, if nobody answers, or for what was refused or has failed.
+    """
+    robot = robot or load_robot()
+    require_router(robot.deployment)
+    with reported(robot), gemelo.connect(robot, name=_name(), needs_gateway=False) as arm:
+        yield arm
+
+
+@contextmanager
+def reported(robot: Robot) -> Iterator[None]:
+    """Raises every error of `gemelo` as a `CommandError`, with commands where `gemelo` names its methods."""
+    try:
+        yield
+    except gemelo.Lost as error:
+        raise CommandError(
+            other_robots(robot.deployment, robot.description) or str(error), ExitCode.NO_STACK
+        ) from error
+    except gemelo.BadArgument as error:
+        raise usage(in_commands(str(error))) from error
+    except gemelo.Error as error:
+        raise CommandError(in_commands(str(error))) from error
+    except gemelo.Interrupted as error:
+        raise CommandError(in_commands(str(error)), ExitCode.CANCELLED) from error
+
+
+@contextmanager
+def connect(robot: Robot | None = None) -> Iterator[Session]:
+    """Yields a session with a node for `robot`, by default the deployment's own.
+
+    Raises `CommandError` if there is no router, if nobody answers, or if a server refuses.
+    """
+    deployment, arm = robot or load_robot()
+    require_router(deployment)
+    from services.runtime.errors import BusError, NoAnswer, Refused, ServerLost
+    from services.runtime.node import Node
 
     try:
-        deployment = load_deployment()
-        return Robot(deployment, load_arm(project_root() / deployment.robot))
-    except (ValueError, OSError) as error:
-        raise usage(str(error)) from error
+        with Node(_name(), deployment, robot=arm.name) as node:
+            yield Session(deployment, arm, node)
+    except NoAnswer as error:
+        raise CommandError(other_robots(deployment, arm) or str(error), ExitCode.NO_STACK) from error
+    except BusError as error:
+        raise CommandError(str(error), ExitCode.NO_STACK) from error
+    except (Refused, ServerLost) as error:
+        raise CommandError(str(error)) from error
 
 
 def require_router(deployment: Deployment) -> None:
@@ -56,11 +97,9 @@ def require_router(deployment: Deployment) -> None:
         raise CommandError(f"no router at {where}: start the twin with `make up`", ExitCode.NO_STACK) from None
 
 
-def other_robots(deployment: Deployment, arm: Arm) -> str:
+def other_robots(deployment: Deployment, arm: Description) -> str:
     """A sentence that names the robots on the router if `arm`'s own gateway is not there; else empty."""
-    from services.runtime.robots import robots_on
-
-    robots = robots_on(deployment.router, GATEWAY)
+    robots = gemelo.robots(deployment)
     if not robots or arm.name in robots:
         return ""
     router = f"{deployment.router.host}:{deployment.router.port}"
@@ -70,23 +109,6 @@ def other_robots(deployment: Deployment, arm: Arm) -> str:
     )
 
 
-@contextmanager
-def connect(robot: Robot | None = None) -> Iterator[Session]:
-    """Yields a session with `robot`, by default the deployment's own.
-
-    Raises `CommandError` if there is no router, if nobody answers, or if a server refuses.
-    """
-    deployment, arm = robot or load_robot()
-    require_router(deployment)
-    from services.runtime.errors import BusError, NoAnswer, Refused, ServerLost
-    from services.runtime.node import Node
-
-    try:
-        with Node(f"cli-{os.getpid()}", deployment, robot=arm.name) as node:
-            yield Session(deployment, arm, node)
-    except NoAnswer as error:
-        raise CommandError(other_robots(deployment, arm) or str(error), ExitCode.NO_STACK) from error
-    except BusError as error:
-        raise CommandError(str(error), ExitCode.NO_STACK) from error
-    except (Refused, ServerLost) as error:
-        raise CommandError(str(error)) from error
+def _name() -> str:
+    """The name of this command's node; `gemelo node list` leaves it out."""
+    return f"cli-{os.getpid()}"

@@ -13,6 +13,7 @@ from services.cli.errors import CommandError, ExitCode, usage
 
 UP_AND_CLEAR = "\x1b[{}F\x1b[J"
 PLAIN_EVERY = 0.25  # of the whole motion
+CANCELLING = "cancelling: the arm slows down on its path (Ctrl-C again leaves without waiting)"
 ShowProgress = Callable[[float, float], None]  # elapsed [s], duration [s]
 
 

@@ -6,18 +6,20 @@ import math
 from collections import deque
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from schemas.message import Message
 from schemas.topics import TOPICS, Topic
 from services.cli.errors import CommandError, ExitCode, unknown
-from services.cli.messages import fields_of, message_of
+from services.cli.messages import dump, fields_of, message_of
 from services.cli.parser import Choices, Options, Parser, positive_integer, positive_number
-from services.cli.session import Robot, Session, connect
+from services.cli.session import Session, connect
 from services.cli.text_table import table
-from services.cli.yaml import dump
+
+if TYPE_CHECKING:
+    from gemelo import Robot
 
 HZ_EVERY = 1.0  # [s] between two reports
 

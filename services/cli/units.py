@@ -12,10 +12,13 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple, Protocol
 
+import gemelo
 from services.cli.errors import CommandError, unknown, usage
 
-DEGREE = math.radians(1.0)
-SHOWN = {"rad": ("deg", 1.0 / DEGREE), "m": ("mm", 1000.0)}  # what a person reads for an SI unit, and its factor
+DEGREE = gemelo.deg(1.0)
+MILLIMETRE = gemelo.mm(1.0)
+# What a person reads for an SI unit, and its factor.
+SHOWN = {"rad": ("deg", 1.0 / DEGREE), "m": ("mm", 1.0 / MILLIMETRE)}
 MOST_OF_A_TURN = 2.0 * math.pi  # [rad]
 
 _VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([A-Za-z°%][A-Za-z0-9/^²]*)?\s*")
@@ -37,9 +40,9 @@ class Quantity(NamedTuple):
 
 ANGLE = Quantity("an angle", {"deg": DEGREE, "rad": 1.0})
 ANGULAR_SPEED = Quantity("an angular speed", {"deg/s": DEGREE, "rad/s": 1.0})
-LENGTH = Quantity("a length", {"m": 1.0, "mm": 0.001}, "m")
-SPEED = Quantity("a speed", {"m/s": 1.0, "mm/s": 0.001}, "m/s")
-ACCELERATION = Quantity("an acceleration", {"m/s2": 1.0, "mm/s2": 0.001}, "m/s2")
+LENGTH = Quantity("a length", {"m": 1.0, "mm": MILLIMETRE}, "m")
+SPEED = Quantity("a speed", {"m/s": 1.0, "mm/s": MILLIMETRE}, "m/s")
+ACCELERATION = Quantity("an acceleration", {"m/s2": 1.0, "mm/s2": MILLIMETRE}, "m/s2")
 TIME = Quantity("a time", {"s": 1.0, "ms": 0.001}, "s")
 SHARE = Quantity("a share", {"%": 0.01})
 QUANTITIES = (ANGLE, ANGULAR_SPEED, LENGTH, SPEED, ACCELERATION, TIME, SHARE)

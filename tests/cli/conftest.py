@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import gemelo
+from gemelo.session import Session as ArmSession
 from schemas.actions import GoalStatusCode
 from schemas.deployment import Deployment, PathsSection
 from schemas.device import (
@@ -148,3 +150,11 @@ def planner(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterato
 def session(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[Session]:
     with Node("cli-1", deployment, robot="rm1", bus=MemoryBus(network)) as node:
         yield Session(deployment, arm, node)
+
+
+@pytest.fixture
+def connected(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Iterator[gemelo.Arm]:
+    """The arm as the commands have it."""
+    node = Node("cli-2", deployment, robot="rm1", bus=MemoryBus(network), log_level="warning")
+    with gemelo.Arm(ArmSession(deployment, arm, node)) as made:
+        yield made

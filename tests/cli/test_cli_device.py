@@ -40,18 +40,18 @@ def rm1_device(arm, network, deployment):
             yield made
 
 
-def test_homing_tells_the_way_of_every_joint_and_ends_with_zero(session, rm1_device, capsys):
-    assert home(session, []) is ExitCode.OK
+def test_homing_tells_the_way_of_every_joint_and_ends_with_zero(connected, rm1_device, capsys):
+    assert home(connected, []) is ExitCode.OK
     lines = capsys.readouterr().out.splitlines()
-    for name in session.arm.joint_names:
+    for name in connected.joint_names:
         assert f"{name}: home" in lines
     assert lines.index("brazo_joint: to its switch") < lines.index("brazo_joint: home")
     assert lines[-1].startswith("homed 3 of 3 joints in 0.")
 
 
-def test_homing_says_how_many_steps_were_lost(session, rm1_device, capsys):
+def test_homing_says_how_many_steps_were_lost(connected, rm1_device, capsys):
     rm1_device.steps_off = {"brazo_joint": -37, "antebrazo_joint": 0, "efector_joint": 1}
-    assert home(session, ["q1", "antebrazo_joint", "q3"]) is ExitCode.OK
+    assert home(connected, ["q1", "antebrazo_joint", "q3"]) is ExitCode.OK
     text = capsys.readouterr().out
     assert "brazo_joint: home; its counter was -37 steps off (steps were lost, or it was moved by hand)\n" in text
     assert "antebrazo_joint: home; its counter was right\n" in text
@@ -59,50 +59,50 @@ def test_homing_says_how_many_steps_were_lost(session, rm1_device, capsys):
     assert rm1_device.asked[-1].name == ("brazo_joint", "antebrazo_joint", "efector_joint")
 
 
-def test_homing_as_json_is_one_object(session, rm1_device, capsys):
+def test_homing_as_json_is_one_object(connected, rm1_device, capsys):
     rm1_device.steps_off = {"efector_joint": 5}
-    assert home(session, ["efector_joint"], as_json=True) is ExitCode.OK
+    assert home(connected, ["efector_joint"], as_json=True) is ExitCode.OK
     report = json.loads(capsys.readouterr().out)
     assert (report["homed"], report["steps_off"], report["reason"]) == (["efector_joint"], {"efector_joint": 5}, "")
 
 
-def test_a_fault_while_homing_names_the_joint_and_the_remedy(session, rm1_device, capsys):
+def test_a_fault_while_homing_names_the_joint_and_the_remedy(connected, rm1_device, capsys):
     rm1_device.homing_fault = DeviceFault.SWITCH_NOT_FOUND
     with pytest.raises(CommandError, match=r'SWITCH_NOT_FOUND at joint "antebrazo_joint": .*`gemelo reset`') as error:
-        home(session, [])
+        home(connected, [])
     assert error.value.code is ExitCode.FAILED
     assert "brazo_joint: home" in capsys.readouterr().out
 
 
-def test_ctrl_c_stops_the_homing(session, rm1_device, capsys):
+def test_ctrl_c_stops_the_homing(connected, rm1_device, capsys):
     threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
     with pytest.raises(CommandError, match="it was stopped") as error:
-        home(session, [])
+        home(connected, [])
     assert error.value.code is ExitCode.CANCELLED
     assert rm1_device.asked[-1] is StopKind.STOP
     assert "stopping: the joints slow down" in capsys.readouterr().out
 
 
-def test_a_disarmed_device_is_not_homed_but_the_remedy_is_said(session, rm1_device):
+def test_a_disarmed_device_is_not_homed_but_the_remedy_is_said(connected, rm1_device):
     rm1_device.set(armed=False)
     with pytest.raises(CommandError, match="`gemelo device arm`, then `gemelo home`"):
-        home(session, [])
+        home(connected, [])
     assert rm1_device.asked == []
 
 
-def test_a_device_in_fault_is_not_homed_but_the_remedy_is_said(session, rm1_device):
+def test_a_device_in_fault_is_not_homed_but_the_remedy_is_said(connected, rm1_device):
     rm1_device.set(mode=DeviceMode.ESTOP, fault=int(DeviceFault.EMERGENCY_STOP), armed=False)
     with pytest.raises(CommandError, match=r"EMERGENCY_STOP.*release it, `gemelo reset`, `gemelo device arm`"):
-        home(session, [])
+        home(connected, [])
 
 
-def test_a_homing_that_never_begins_is_not_waited_for_for_ever(session, rm1_device, monkeypatch):
-    from services.cli import home as module
+def test_a_homing_that_never_begins_is_not_waited_for_for_ever(connected, rm1_device, monkeypatch):
+    from gemelo import homing as module
 
     monkeypatch.setattr(module, "TO_BEGIN", 0.2)
     monkeypatch.setattr(rm1_device, "_home", lambda: rm1_device.set(mode=DeviceMode.UNREFERENCED))
     with pytest.raises(CommandError, match="did not begin"):
-        home(session, [])
+        home(connected, [])
 
 
 def test_the_status_is_one_screen(session, rm1_device, capsys):
@@ -139,13 +139,13 @@ def test_a_configuration_that_is_not_in_force_says_what_to_do(session, rm1_devic
     assert "NOT in force: the device has 00000001, robot.toml asks for 00000002; `gemelo device config --push`" in text
 
 
-def test_an_offline_device_says_why(session, rm1_device, capsys):
+def test_an_offline_device_says_why(session, connected, rm1_device, capsys):
     rm1_device.status = DeviceStatus(online=False, device="rm1", reason="the broker does not answer")
     rm1_device.tell()
     device_status.status(session, as_json=False)
     assert "device   rm1: OFFLINE: the broker does not answer" in capsys.readouterr().out
     with pytest.raises(CommandError, match="offline: the broker does not answer"):
-        home(session, [])
+        home(connected, [])
 
 
 def test_the_status_as_json_has_the_messages_and_the_words(session, rm1_device, capsys):
@@ -172,25 +172,25 @@ def test_silent_sensors_are_an_error(session, rm1_device, monkeypatch):
         device_status.sensors(session, as_json=False)
 
 
-def test_an_output_is_switched_by_its_name(session, rm1_device, capsys):
-    assert device.output(session, "avanzar", True) is ExitCode.OK
+def test_an_output_is_switched_by_its_name(connected, rm1_device, capsys):
+    assert device.output(connected, "avanzar", True) is ExitCode.OK
     assert rm1_device.asked[-1].on
     assert "output avanzar on done" in capsys.readouterr().out
     with pytest.raises(CommandError, match='no output "avansar": did you mean "avanzar"'):
-        device.output(session, "avansar", True)
+        device.output(connected, "avansar", True)
 
 
-def test_a_speed_is_a_share_of_the_planned_one(session, rm1_device):
-    assert device.speed(session, 0.5) is ExitCode.OK
+def test_a_speed_is_a_share_of_the_planned_one(connected, rm1_device):
+    assert device.speed(connected, 0.5) is ExitCode.OK
     assert rm1_device.asked[-1].scale == 0.5
     with pytest.raises(CommandError, match="not in 0% to 100%"):
-        device.speed(session, 1.01)
+        device.speed(connected, 1.01)
 
 
-def test_arming_and_disarming_say_what_follows(session, rm1_device, capsys):
-    assert device.command(session, "disarm") is ExitCode.OK
+def test_arming_and_disarming_say_what_follows(connected, rm1_device, capsys):
+    assert device.command(connected, "disarm") is ExitCode.OK
     assert "every joint is unreferenced" in capsys.readouterr().out
-    assert device.command(session, "arm") is ExitCode.OK
+    assert device.command(connected, "arm") is ExitCode.OK
     assert "`gemelo home`" in capsys.readouterr().out
 
 
@@ -212,42 +212,42 @@ def test_the_monitor_ends_after_so_many_lines_of_json(session, rm1_device, capsy
     assert all(line["stamp"] > 0 and line["text"] for line in lines)
 
 
-def test_the_configuration_is_shown_with_its_crc(session, rm1_device, capsys):
-    assert device_config.show(session, as_json=False) is ExitCode.OK
+def test_the_configuration_is_shown_with_its_crc(connected, rm1_device, capsys):
+    assert device_config.show(connected, as_json=False) is ExitCode.OK
     text = capsys.readouterr().out
     assert '"name": "rm1"' in text
     assert "crc32 00001234, in force" in text
 
 
-def test_a_configuration_in_force_is_not_pushed_again(session, rm1_device, capsys):
-    assert device_config.push(session, yes=False) is ExitCode.OK
+def test_a_configuration_in_force_is_not_pushed_again(connected, rm1_device, capsys):
+    assert device_config.push(connected, yes=False) is ExitCode.OK
     assert "nothing to do" in capsys.readouterr().out
     assert rm1_device.asked == []
 
 
-def test_pushing_disarms_configures_and_arms_again(session, rm1_device, capsys):
+def test_pushing_disarms_configures_and_arms_again(connected, rm1_device, capsys):
     rm1_device.configuration = msgspec.structs.replace(rm1_device.configuration, accepted=False)
     rm1_device.tell()
-    assert device_config.push(session, yes=True) is ExitCode.OK
+    assert device_config.push(connected, yes=True) is ExitCode.OK
     assert rm1_device.asked == [StopKind.DISARM, ArmCommand()]
     assert "no joint is referenced: `gemelo home` or `gemelo reference`" in capsys.readouterr().out
 
 
-def test_pushing_asks_first_and_a_pipe_cannot_answer(session, rm1_device, monkeypatch):
+def test_pushing_asks_first_and_a_pipe_cannot_answer(connected, rm1_device, monkeypatch):
     rm1_device.configuration = msgspec.structs.replace(rm1_device.configuration, accepted=False)
     rm1_device.tell()
     monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
     with pytest.raises(CommandError, match="--yes"):
-        device_config.push(session, yes=False)
+        device_config.push(connected, yes=False)
     assert rm1_device.asked == []
 
 
-def test_a_moving_arm_is_not_configured(session, rm1_device):
+def test_a_moving_arm_is_not_configured(connected, rm1_device):
     rm1_device.configuration = msgspec.structs.replace(rm1_device.configuration, accepted=False)
     rm1_device.tell()
     rm1_device.set(mode=DeviceMode.RUN)
     with pytest.raises(CommandError, match="in RUN: wait, or `gemelo stop`"):
-        device_config.push(session, yes=True)
+        device_config.push(connected, yes=True)
 
 
 @pytest.mark.parametrize(
@@ -297,18 +297,18 @@ def test_what_cannot_be_pressed_says_what_can(arm, words, reason):
     assert error.value.code is ExitCode.USAGE
 
 
-def test_a_press_is_done_or_refused_in_the_devices_words(session, rm1_device, capsys):
-    assert press(session, "slip", ["brazo_joint", "40"]) is ExitCode.OK
+def test_a_press_is_done_or_refused_in_the_devices_words(connected, rm1_device, capsys):
+    assert press(connected, "slip", ["brazo_joint", "40"]) is ExitCode.OK
     assert "slip brazo_joint 40: done" in capsys.readouterr().out
     with pytest.raises(CommandError, match="press refused: it does not slip"):
-        press(session, "slip", ["efector_joint", "40"])
+        press(connected, "slip", ["efector_joint", "40"])
 
 
-def test_a_real_device_is_not_pressed_over_the_bus(session, rm1_device):
+def test_a_real_device_is_not_pressed_over_the_bus(connected, rm1_device):
     rm1_device.status = msgspec.structs.replace(rm1_device.status, virtual=False)
     rm1_device.tell()
     with pytest.raises(CommandError, match="rm1 is a real device"):
-        press(session, "estop", [])
+        press(connected, "estop", [])
     assert rm1_device.pressed == []
 
 

@@ -18,6 +18,7 @@ from services.cli.errors import CommandError, ExitCode
 from services.cli.jog import command_of, jog_by_hand, jog_for
 from services.cli.jog_keys import FASTER, FIRST_SPEED, HELD, TOOL_SPEED, JogKeys, keyboard
 from services.cli.main import run
+from services.cli.session import load_robot, reported
 from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
 
@@ -117,8 +118,8 @@ def test_the_terminal_is_as_it_was_whatever_ends_the_command(terminal, number):
         with keyboard() as typed:
             assert not termios.tcgetattr(inner)[3] & termios.ICANON
             os.write(outer, b"w\x1b[A")
-            assert typed() == "w\x1b[A"
-            assert typed() == ""
+            assert typed(0.0) == "w\x1b[A"
+            assert typed(0.0) == ""
             if number is None:
                 raise ZeroDivisionError
             os.kill(os.getpid(), number)
@@ -162,8 +163,8 @@ def jogger(network, deployment) -> Iterator[PretendPlanner]:
         thread.join()
 
 
-def test_a_script_jogs_for_so_long_and_tells_where_it_stands_and_what_limited_it(session, gateway, jogger, capsys):
-    assert jog_for(session, TURN, 0.4) is ExitCode.OK
+def test_a_script_jogs_for_so_long_and_tells_where_it_stands_and_what_limited_it(connected, gateway, jogger, capsys):
+    assert jog_for(connected, TURN, 0.4) is ExitCode.OK
     assert len(jogger.commands) > 3
     assert all(command.velocity == (0.2,) and command.stamp > 0 for command in jogger.commands)
     said = capsys.readouterr().out
@@ -171,19 +172,19 @@ def test_a_script_jogs_for_so_long_and_tells_where_it_stands_and_what_limited_it
     assert said.rstrip().endswith("limited by joint limit of brazo_joint")
 
 
-def test_a_refusal_is_the_sentence_of_the_planner(session, gateway, jogger):
+def test_a_refusal_is_the_sentence_of_the_planner(connected, gateway, jogger):
     jogger.answer = JogStatus(active=False, limited_by="a goal is being carried out: cancel it first")
     with pytest.raises(CommandError, match="refused: a goal is being carried out: cancel it first"):
-        jog_for(session, TURN, 5.0)
+        jog_for(connected, TURN, 5.0)
 
 
-def test_without_a_planner_it_ends_with_the_remedy(session, gateway):
-    with pytest.raises(CommandError, match="the planner does not answer") as silent:
-        jog_for(session, TURN, 5.0)
+def test_without_a_planner_it_ends_with_the_remedy(connected, gateway):
+    with pytest.raises(CommandError, match="the planner does not answer") as silent, reported(load_robot()):
+        jog_for(connected, TURN, 5.0)
     assert silent.value.code is ExitCode.NO_STACK
 
 
-def test_keys_jog_until_they_are_let_go_and_x_leaves(session, gateway, jogger, terminal, capsys):
+def test_keys_jog_until_they_are_let_go_and_x_leaves(connected, gateway, jogger, terminal, capsys):
     outer, inner = terminal
     before = termios.tcgetattr(inner)
 
@@ -203,7 +204,7 @@ def test_keys_jog_until_they_are_let_go_and_x_leaves(session, gateway, jogger, t
     pause, heard = threading.Event(), list[int]()
     typist = threading.Thread(target=type_keys)
     typist.start()
-    assert jog_by_hand(session) is ExitCode.OK
+    assert jog_by_hand(connected) is ExitCode.OK
     typist.join()
     assert jogger.commands[0].linear == pytest.approx((FIRST_SPEED * TOOL_SPEED, 0.0, 0.0))
     assert len(jogger.commands) == heard[0]

@@ -16,14 +16,16 @@ from schemas.topics import FK, IK
 from services.cli import kinematics
 from services.cli.errors import ExitCode
 from services.cli.main import run
-from services.cli.session import load_robot
+from services.cli.session import load_robot, reported
 from services.planner.kinematics.kinematic_requests import KinematicRequests
 from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
 
 
 @pytest.fixture
-def asked(arm, network, deployment, session, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[IkRequest | FkRequest]]:
+def asked(
+    arm, network, deployment, connected, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[list[IkRequest | FkRequest]]:
     """What a planner on the same bus was asked; the commands reach it."""
     requests: list[IkRequest | FkRequest] = []
     answers = KinematicRequests(arm)
@@ -38,10 +40,11 @@ def asked(arm, network, deployment, session, monkeypatch: pytest.MonkeyPatch) ->
         return answers.fk(request, home)
 
     @contextmanager
-    def connect(robot=None):
-        yield session
+    def connect_arm(robot=None):
+        with reported(load_robot()):
+            yield connected
 
-    monkeypatch.setattr(kinematics, "connect", connect)
+    monkeypatch.setattr(kinematics, "connect_arm", connect_arm)
     with Node("planner", deployment, robot="rm1", bus=MemoryBus(network)) as node:
         node.serve(IK, ik)
         node.serve(FK, fk)

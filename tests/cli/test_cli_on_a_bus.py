@@ -8,6 +8,7 @@ import threading
 import pytest
 import yaml
 
+import gemelo
 from schemas.actions import GoalStatusCode
 from schemas.device import (
     DeviceCommandRequest,
@@ -24,7 +25,6 @@ from services.cli.errors import CommandError, ExitCode
 from services.cli.messages import message_of
 from services.cli.move import move
 from services.cli.terminal import Interrupt
-from services.runtime.errors import NoAnswer
 
 READY = PlanRequest(goal=NamedGoal(name="ready"))
 
@@ -34,8 +34,8 @@ def stack(gateway, planner):
     return gateway
 
 
-def test_a_move_says_how_exactly_the_arm_arrived(session, stack, capsys):
-    assert move(session, READY, plan_only=False, as_json=False) is ExitCode.OK
+def test_a_move_says_how_exactly_the_arm_arrived(connected, stack, capsys):
+    assert move(connected, READY, plan_only=False, as_json=False) is ExitCode.OK
     *progress, last = capsys.readouterr().out.splitlines()
     assert all(line.startswith("moving: ") for line in progress)
     assert last.startswith("planned in ")
@@ -43,45 +43,45 @@ def test_a_move_says_how_exactly_the_arm_arrived(session, stack, capsys):
     assert last.endswith(" mm, steps: brazo_joint +0.25, antebrazo_joint -0.50, efector_joint +0.00")
 
 
-def test_a_move_as_json_is_one_object(session, stack, capsys):
-    assert move(session, READY, plan_only=False, as_json=True) is ExitCode.OK
+def test_a_move_as_json_is_one_object(connected, stack, capsys):
+    assert move(connected, READY, plan_only=False, as_json=True) is ExitCode.OK
     report = json.loads(capsys.readouterr().out)
     assert report["succeeded"] is True
     assert report["final_error_m"] > 0.0
 
 
-def test_plan_only_moves_nothing(session, stack, capsys):
-    assert move(session, READY, plan_only=True, as_json=False) is ExitCode.OK
+def test_plan_only_moves_nothing(connected, stack, capsys):
+    assert move(connected, READY, plan_only=True, as_json=False) is ExitCode.OK
     assert "would take" in capsys.readouterr().out
 
 
-def test_a_goal_out_of_reach_is_refused_with_one_that_can_be_typed(session, stack):
+def test_a_goal_out_of_reach_is_refused_with_one_that_can_be_typed(connected, stack):
     with pytest.raises(CommandError, match=r"out of reach.*nearest that can: --to [-\d. ]+$") as refused:
-        move(session, PlanRequest(goal=PoseGoal(position=(2.0, 0.0, 0.1))), plan_only=False, as_json=False)
+        move(connected, PlanRequest(goal=PoseGoal(position=(2.0, 0.0, 0.1))), plan_only=False, as_json=False)
     assert refused.value.code is ExitCode.FAILED
 
 
-def test_a_joint_beyond_its_limit_is_refused_with_the_nearest_value(session, stack):
+def test_a_joint_beyond_its_limit_is_refused_with_the_nearest_value(connected, stack):
     goal = JointGoal(name=("brazo_joint",), position=(4.0,))
     with pytest.raises(CommandError, match=r"nearest that can: --joints brazo_joint=169\.\d+deg"):
-        move(session, PlanRequest(goal=goal), plan_only=False, as_json=False)
+        move(connected, PlanRequest(goal=goal), plan_only=False, as_json=False)
 
 
-def test_a_gateway_that_refuses_is_quoted(session, stack):
+def test_a_gateway_that_refuses_is_quoted(connected, stack):
     stack.refusal = 'device "rm1" has fault 1'
     with pytest.raises(CommandError, match='refused by stepper_gateway: device "rm1" has fault 1'):
-        move(session, READY, plan_only=False, as_json=False)
+        move(connected, READY, plan_only=False, as_json=False)
 
 
-def test_an_abort_says_why_and_where(session, stack, capsys):
+def test_an_abort_says_why_and_where(connected, stack, capsys):
     stack.ends_as, stack.reason = GoalStatusCode.ABORTED, "the boot id changed"
-    assert move(session, READY, plan_only=False, as_json=False) is ExitCode.FAILED
+    assert move(connected, READY, plan_only=False, as_json=False) is ExitCode.FAILED
     assert "aborted after 0.40 s: the boot id changed; now at brazo_joint 17." in capsys.readouterr().out
 
 
-def test_ctrl_c_cancels_and_says_where_the_arm_stopped(session, stack, capsys):
+def test_ctrl_c_cancels_and_says_where_the_arm_stopped(connected, stack, capsys):
     threading.Timer(0.15, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
-    assert move(session, READY, plan_only=False, as_json=False) is ExitCode.CANCELLED
+    assert move(connected, READY, plan_only=False, as_json=False) is ExitCode.CANCELLED
     text = capsys.readouterr().out
     assert "cancelling: the arm slows down" in text
     assert "stopped at brazo_joint 17.998 deg, antebrazo_joint -45.000 deg, efector_joint 39." in text
@@ -94,9 +94,9 @@ def test_a_second_ctrl_c_leaves():
         interrupt.press()
 
 
-def test_without_a_planner_the_stack_is_not_there(session):
-    with pytest.raises(NoAnswer, match="planner"):
-        move(session, READY, plan_only=False, as_json=False)
+def test_without_a_planner_the_stack_is_not_there(connected):
+    with pytest.raises(gemelo.Lost, match="planner"):
+        move(connected, READY, plan_only=False, as_json=False)
 
 
 def test_the_state_shows_joints_steps_device_and_link(session, stack, capsys):
@@ -172,22 +172,22 @@ def test_pub_stamps_what_has_no_stamp(session, network, deployment, capsys):
         ("reset", DeviceCommandRequest(command=ResetCommand())),
     ],
 )
-def test_a_device_command_is_done_or_refused_in_the_devices_words(session, stack, kind, request_, capsys):
-    assert device.command(session, kind) is ExitCode.OK
+def test_a_device_command_is_done_or_refused_in_the_devices_words(connected, stack, kind, request_, capsys):
+    assert device.command(connected, kind) is ExitCode.OK
     assert stack.commands[-1] == request_
     stack.mode = DeviceMode.RUN
     with pytest.raises(CommandError, match=r"refused: the arm moves \(device mode RUN\)"):
-        device.command(session, kind)
+        device.command(connected, kind)
 
 
-def test_a_refusal_that_names_the_mode_is_not_followed_by_it(session, stack):
+def test_a_refusal_that_names_the_mode_is_not_followed_by_it(connected, stack):
     stack.mode, stack.command_refusal = DeviceMode.RUN, "the device refuses RESUME in mode RUN"
     with pytest.raises(CommandError, match=r"in mode RUN$"):
-        device.command(session, "resume")
+        device.command(connected, "resume")
 
 
-def test_a_reference_says_where_the_joints_are_now(session, stack, capsys):
-    assert device.reference(session, ["q3=40mm"]) is ExitCode.OK
+def test_a_reference_says_where_the_joints_are_now(connected, stack, capsys):
+    assert device.reference(connected, ["q3=40mm"]) is ExitCode.OK
     assert "efector_joint is at 40.000 mm" in capsys.readouterr().out
 
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from schemas.device import DeviceMode, DeviceState
 from schemas.joints import JointState
+from services.cli.messages import dump
 from services.cli.text_table import table
 from services.cli.topic import RateWindow
-from services.cli.yaml import dump
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | texts

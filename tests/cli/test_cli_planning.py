@@ -10,19 +10,23 @@ from collections.abc import Iterator
 
 import pytest
 
-from schemas.planning import NamedGoal, PlanPhase, PlanProgress, PlanRequest
+import gemelo
+from gemelo import planning
+from schemas.joints import JointState
+from schemas.planning import NamedGoal, PlanPhase, PlanProgress, PlanRequest, PlanResponse
 from schemas.scene import SceneReplace, SceneRequest
-from schemas.topics import PLAN_PROGRESS, SCENE_EDIT
-from services.cli import planning
+from schemas.topics import PLAN, PLAN_PROGRESS, SCENE_EDIT
+from services.cli import move as move_module
 from services.cli.errors import CommandError, ExitCode
 from services.cli.move import move
 from services.cli.terminal import LiveBlock
+from services.planner.core import Planner
 from services.planner.main import run
 from services.runtime.bus.memory_bus import MemoryBus
-from services.runtime.errors import NoAnswer
 from services.runtime.node import Node
 from services.runtime.process.shutdown import ShutdownRequest
 from tests.planner.walled import WALLED, past_the_wall
+from tests.runtime.support import spinning
 
 PATIENCE = 60.0  # [s]
 
@@ -68,58 +72,67 @@ def press_when_it_searches(watcher: Node) -> None:
 
 
 @pytest.mark.parametrize("plan_only", [False, True])
-def test_ctrl_c_while_planning_cancels_the_plan_and_nothing_moves(session, gateway, walled, watcher, plan_only):
+def test_ctrl_c_while_planning_cancels_the_plan_and_nothing_moves(connected, gateway, walled, watcher, plan_only):
     press_when_it_searches(watcher)
     gateway.refusal = "nothing is to be sent here"
     with pytest.raises(
         CommandError, match=r"^the plan was cancelled after .* s, while searching: nothing moves$"
     ) as end:
-        move(session, past_the_wall(), plan_only, as_json=False)
+        move(connected, past_the_wall(), plan_only, as_json=False)
     assert end.value.code is ExitCode.CANCELLED
 
 
 def test_a_terminal_is_shown_how_planning_stands_and_nothing_of_it_stays(
-    session, gateway, walled, watcher, capsys, monkeypatch
+    connected, gateway, walled, watcher, capsys, monkeypatch
 ):
-    monkeypatch.setattr(planning, "LiveBlock", lambda _is_live: LiveBlock(is_live=True))
+    monkeypatch.setattr(move_module, "LiveBlock", lambda _is_live: LiveBlock(is_live=True))
     press_when_it_searches(watcher)
     with pytest.raises(CommandError):
-        move(session, past_the_wall(), plan_only=True, as_json=False)
+        move(connected, past_the_wall(), plan_only=True, as_json=False)
     written = capsys.readouterr().out
     assert re.search(r"planning: search, \d+\.\d of 100 s \(Ctrl-C cancels\)\n", written)
     assert written.endswith("\x1b[1F\x1b[J")
 
 
-def test_a_pipe_hears_nothing_of_it(session, gateway, walled, watcher, capsys):
+def test_a_pipe_hears_nothing_of_it(connected, gateway, walled, watcher, capsys):
     press_when_it_searches(watcher)
     with pytest.raises(CommandError):
-        move(session, past_the_wall(), plan_only=True, as_json=False)
+        move(connected, past_the_wall(), plan_only=True, as_json=False)
     assert capsys.readouterr().out == ""
 
 
-def test_a_plan_that_comes_too_late_is_not_left_behind(session, gateway, walled, watcher, monkeypatch):
+def test_a_plan_that_comes_too_late_is_not_left_behind(connected, gateway, walled, watcher, monkeypatch):
     monkeypatch.setattr(planning, "MARGIN", -99.0)
     heard: list[PlanProgress] = []
     watcher.subscribe(PLAN_PROGRESS, heard.append)
-    with pytest.raises(NoAnswer, match="planner did not answer plan within 1 s"):
-        move(session, past_the_wall(), plan_only=True, as_json=False)
+    with pytest.raises(gemelo.Lost, match="planner did not answer plan within 1 s"):
+        move(connected, past_the_wall(), plan_only=True, as_json=False)
     watcher.wait(0.5)
     count = len(heard)
     watcher.wait(0.5)
     assert len(heard) == count
 
 
-def test_ctrl_c_just_as_the_plan_is_made_moves_nothing_either(session, gateway, planner, monkeypatch):
-    """The planner of this one answers at once, and knows no cancel."""
-    asked = planning._asked
+@pytest.fixture
+def last_moment_planner(arm, network, deployment) -> Iterator[None]:
+    """A planner that knows no cancel, and answers when a person has just pressed Ctrl-C."""
+    core = Planner(arm)
+    home = JointState(name=arm.joint_names, position=(0.0,) * len(arm.joints))
 
-    def pressed_late(*arguments):
-        plan = asked(*arguments)
+    def plan(request: PlanRequest) -> PlanResponse:
+        made = core.plan(request, home)
         os.kill(os.getpid(), signal.SIGINT)
-        return plan
+        return made
 
-    monkeypatch.setattr(planning, "_asked", pressed_late)
+    with Node("planner", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        node.serve(PLAN, plan)
+        with spinning(node, rate=10.0):
+            yield
+
+
+def test_ctrl_c_just_as_the_plan_is_made_moves_nothing_either(connected, gateway, last_moment_planner):
     gateway.refusal = "nothing is to be sent here"
-    with pytest.raises(CommandError, match="nothing moves") as end:
-        move(session, PlanRequest(goal=NamedGoal(name="ready")), plan_only=False, as_json=False)
+    with pytest.raises(CommandError, match=r"^cancelled when the plan was just made: nothing moves$") as end:
+        move(connected, PlanRequest(goal=NamedGoal(name="ready")), plan_only=False, as_json=False)
     assert end.value.code is ExitCode.CANCELLED
+    assert gateway.goals == []

@@ -27,7 +27,7 @@ from services.cli import scene as scene_module
 from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.cli.scene import attach_choices, pair_choices
-from services.cli.session import load_robot
+from services.cli.session import load_robot, reported
 from services.planner.scene.scene_keeper import SceneKeeper
 from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
@@ -37,14 +37,15 @@ TRIANGLE = "solid a\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0
 
 
 @pytest.fixture
-def keeper(arm, network, deployment, session, monkeypatch, tmp_path) -> Iterator[None]:
+def keeper(arm, network, deployment, session, connected, monkeypatch, tmp_path) -> Iterator[None]:
     """A planner's scene on the same bus, with an arm at rest; the commands reach it."""
 
     @contextmanager
-    def connect(robot=None):
-        yield session
+    def connect_arm(robot=None):
+        with reported(load_robot()):
+            yield connected
 
-    monkeypatch.setattr(scene_module, "connect", connect)
+    monkeypatch.setattr(scene_module, "connect_arm", connect_arm)
     with Node("planner", deployment, robot="rm1", bus=MemoryBus(network)) as node:
         SceneKeeper(node, arm, node.latest(JOINT_STATES), tmp_path, lambda world: None)
         states = session.node.publisher(JOINT_STATES)

@@ -15,17 +15,19 @@ from schemas.planning import PlanResponse
 from services.cli import move
 from services.cli.errors import ExitCode
 from services.cli.main import run
+from services.cli.session import load_robot, reported
 
 
 @pytest.fixture
-def stack(session, gateway, planner, monkeypatch):
+def stack(connected, gateway, planner, monkeypatch):
     """The commands reach a planner and a gateway."""
 
     @contextmanager
-    def connect(robot=None):
-        yield session
+    def connect_arm(robot=None):
+        with reported(load_robot()):
+            yield connected
 
-    monkeypatch.setattr(move, "connect", connect)
+    monkeypatch.setattr(move, "connect_arm", connect_arm)
     return gateway
 
 
