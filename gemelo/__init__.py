@@ -19,17 +19,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from gemelo.arguments import Target, ToolGoal
     from gemelo.arm import Arm
     from gemelo.connection import connect, robots
     from gemelo.device import Device
     from gemelo.errors import Aborted, BadArgument, Canceled, Error, Interrupted, Lost, Refused
-    from gemelo.homing import HomingProgress, HomingReport
+    from gemelo.homing_report import HomingProgress, HomingReport
     from gemelo.motion import Motion
     from gemelo.planning import Configurations, Plan
     from gemelo.robot_files import Robot, load_robot
     from gemelo.scene import Scene
     from gemelo.scene_files import load_mesh
-    from gemelo.targets import Target, ToolGoal
     from gemelo.units import Pose, deg, mm
     from schemas import topics
     from schemas.actions import GoalStatusCode
@@ -71,17 +71,17 @@ __all__ = [
 
 # Each name is imported when it is first used: a program that needs one part, as the command line, loads no other.
 MODULES = {
+    "gemelo.arguments": ("Target", "ToolGoal"),
     "gemelo.arm": ("Arm",),
     "gemelo.connection": ("connect", "robots"),
     "gemelo.device": ("Device",),
     "gemelo.errors": ("Aborted", "BadArgument", "Canceled", "Error", "Interrupted", "Lost", "Refused"),
-    "gemelo.homing": ("HomingProgress", "HomingReport"),
+    "gemelo.homing_report": ("HomingProgress", "HomingReport"),
     "gemelo.motion": ("Motion",),
     "gemelo.planning": ("Configurations", "Plan"),
     "gemelo.robot_files": ("Robot", "load_robot"),
     "gemelo.scene": ("Scene",),
     "gemelo.scene_files": ("load_mesh",),
-    "gemelo.targets": ("Target", "ToolGoal"),
     "gemelo.units": ("Pose", "deg", "mm"),
     "schemas.actions": ("GoalStatusCode",),
     "schemas.device": ("DeviceMode", "StopKind"),

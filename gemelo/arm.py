@@ -6,16 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Self, Unpack
 
+from gemelo.arguments import Joints, Target, ToolGoal, Vector, Waypoint
 from gemelo.device import Device, reference_command
 from gemelo.errors import BadArgument
 from gemelo.frames import Frames
-from gemelo.homing import HomingReport, OnHoming, home
+from gemelo.homing import OnHoming, home
+from gemelo.homing_report import HomingReport
 from gemelo.jog import Jogging, Streaming, jog_command
 from gemelo.motion import Motion, Motions, OnMotion
 from gemelo.planning import Configurations, OnPlanProgress, Plan, find_configurations, find_poses, make_plan
 from gemelo.scene import Scene
 from gemelo.session import Session
-from gemelo.targets import Joints, Target, ToolGoal, Vector, Waypoint, as_target, ik_request, joint_state, request_of
+from gemelo.targets import as_target, ik_request, joint_state, request_of
 from gemelo.units import Pose
 from schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
 from schemas.joints import JointState

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
+from gemelo.arguments import Target
+from gemelo.homing_report import HomingReport
 from schemas.actions import GoalStatusCode
+from schemas.motion import FollowJointTrajectoryResult
 from schemas.planning import Refusal
-
-if TYPE_CHECKING:
-    from gemelo.homing import HomingReport
-    from gemelo.motion import Motion
-    from gemelo.targets import Target
 
 
 class Error(Exception):
@@ -98,14 +95,14 @@ class Aborted(Error):
         status: GoalStatusCode = GoalStatusCode.ABORTED,
         code: int = 0,
         stopped_at: Mapping[str, float] | None = None,
-        motion: Motion | None = None,
+        result: FollowJointTrajectoryResult | None = None,
         homing: HomingReport | None = None,
     ) -> None:
         super().__init__(message)
         self.status = status  # ABORTED, PREEMPTED or CANCELED
         self.code = code  # FollowErrorCode
         self.stopped_at = dict(stopped_at or {})  # [rad] or [m] by joint, from the steps that were read back
-        self.motion = motion  # that ended
+        self.result = result  # of the motion: executed steps and errors
         self.homing = homing  # how far it came, where it was a homing
 
 
@@ -125,9 +122,9 @@ class Lost(Error):
     gemelo.errors.Lost: no stepper_gateway of parol6 at the router ...; there is rm1: gemelo.connect("rm1")
     """
 
-    def __init__(self, message: str, robots: tuple[str, ...] = (), motion: Motion | None = None) -> None:
+    def __init__(self, message: str, robots: tuple[str, ...] = (), has_begun: bool = False) -> None:
         super().__init__(message)
-        self.motion = motion  # of which nothing more is heard
+        self.has_begun = has_begun  # True where a motion was under way, of which nothing more is heard
         self.robots = robots  # the arms that are on the router, where the one asked for is not
 
 
@@ -142,10 +139,12 @@ class Interrupted(KeyboardInterrupt):
         self,
         message: str,
         stopped_at: Mapping[str, float] | None = None,
-        motion: Motion | None = None,
+        status: GoalStatusCode = GoalStatusCode.UNKNOWN,
+        result: FollowJointTrajectoryResult | None = None,
         homing: HomingReport | None = None,
     ) -> None:
         super().__init__(message)
+        self.status = status  # how the motion ended: CANCELED, or SUCCEEDED where it had just arrived
+        self.result = result  # of the motion: executed steps and errors; None where nothing moved, or it is not known
         self.stopped_at = dict(stopped_at or {})  # [rad] or [m] by joint; empty where it is not known
-        self.motion = motion  # that was cancelled; None where nothing had moved
         self.homing = homing  # how far it came, where it was a homing

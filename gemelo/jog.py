@@ -8,9 +8,10 @@ from collections.abc import Callable
 
 from msgspec.structs import replace
 
+from gemelo.arguments import Joints, Vector
 from gemelo.errors import BadArgument, Interrupted, Lost, Refused
 from gemelo.session import Session
-from gemelo.targets import Joints, Vector, joint_state, named_joints, vector
+from gemelo.targets import joint_state, named_joints, vector
 from schemas.device import DeviceEvent
 from schemas.joints import JointTargets
 from schemas.planning import JogCommand, JogStatus
@@ -113,7 +114,10 @@ class Streaming:
 
 
 def jog_command(arm: Description, joints: Joints | None, twist: Vector | None, frame: str) -> JogCommand:
-    """The command; raises `BadArgument` for what cannot be meant."""
+    """The command; raises `BadArgument` for what cannot be meant.
+
+    `joints`: speeds [rad/s] or [m/s]; `twist`: (3,) [m/s] or (6,) [m/s] and [rad/s], along the axes of `frame`.
+    """
     if (joints is None) == (twist is None):
         raise BadArgument("jog by one of joints= (speeds by name) and twist= (speed of the tool)")
     if joints is not None:

@@ -92,15 +92,6 @@ class Motion:
         return self._handle is not None and self._handle.is_over
 
     @property
-    def has_result(self) -> bool:
-        """True if the gateway has said how it ended.
-
-        >>> arm.move(named="left").has_result
-        True
-        """
-        return self._outcome is not None
-
-    @property
     def result(self) -> FollowJointTrajectoryResult:
         """How exactly it arrived: commanded and executed steps, final and largest following error [steps].
 
@@ -190,7 +181,7 @@ class Motion:
         except (runtime.NoAnswer, runtime.BusError) as error:
             raise Lost(str(error)) from error
         except KeyboardInterrupt:
-            raise Interrupted("stopped by Ctrl-C as the motion began: it is cancelled", motion=self) from None
+            raise Interrupted("stopped by Ctrl-C as the motion began: it is cancelled") from None
         self._handle.on_end = self._session.notify
 
     def _await(self, timeout: float | None, on_progress: OnMotion | None) -> bool:
@@ -212,10 +203,10 @@ class Motion:
             self._session.node.log.warning("Ctrl-C: the arm slows down on its path (again: leave without waiting)")
         if not self._session.wait_for(lambda: self.is_over, BRAKING):
             silent = f"the arm was told to stop, but did not say within {BRAKING:g} s that it rests"
-            return Interrupted(silent, motion=self)
+            return Interrupted(silent)
         self._session.changed()
-        self._require_outcome()
-        return Interrupted(f"stopped by Ctrl-C: {self!r}", self.stopped_at, motion=self)
+        ended = self._require_outcome()
+        return Interrupted(f"stopped by Ctrl-C: {self!r}", self.stopped_at, ended.status, ended.result)
 
     def _ended(self) -> Motion:
         outcome = self._require_outcome()
@@ -224,13 +215,13 @@ class Motion:
             return self
         kind = Canceled if status is GoalStatusCode.CANCELED else Aborted
         reason = f"{status.name.lower()} after {result.duration:.2f} s: {result.error_string or 'no reason was given'}"
-        raise kind(reason, status, result.error_code, self.stopped_at, motion=self)
+        raise kind(reason, status, result.error_code, self.stopped_at, result)
 
     def _require_outcome(self) -> ActionOutcome[FollowJointTrajectoryResult]:
         """How it ended; raises `Lost` where the gateway was lost before."""
         assert self._handle is not None
         if self._handle.outcome is None:
-            raise Lost(str(self._handle.lost), motion=self)
+            raise Lost(str(self._handle.lost), has_begun=True)
         return self._handle.outcome
 
     def __repr__(self) -> str:

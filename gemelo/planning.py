@@ -14,10 +14,11 @@ from queue import SimpleQueue
 import msgspec
 from msgspec.structs import replace
 
+from gemelo.arguments import Joints, Target, ToolGoal
 from gemelo.errors import Error, Interrupted, Lost, Refused
 from gemelo.frames import pose_from
 from gemelo.session import Session, answer_of
-from gemelo.targets import Joints, Target, ToolGoal, as_target, named_joints
+from gemelo.targets import as_target, named_joints
 from gemelo.units import Pose
 from schemas.motion import JointTrajectory
 from schemas.planning import (

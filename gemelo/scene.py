@@ -6,10 +6,11 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from gemelo.arguments import Vector
 from gemelo.errors import BadArgument, Refused
 from gemelo.scene_files import load_mesh, read_scene, write_scene
 from gemelo.session import PATIENCE, Session
-from gemelo.targets import Vector, number, point, quaternion, vector
+from gemelo.targets import number, point, quaternion, vector
 from schemas.frames import Transform
 from schemas.scene import (
     AllowedPair,

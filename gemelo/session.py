@@ -130,7 +130,10 @@ class Session:
             return self.node.call(request, question, timeout)
 
     def ask(self, request: Request[Q, R], question: Q, timeout: float) -> PendingCall[Q, R]:
-        """Sends a question whose answer is awaited by `wait_for`, again after an interrupt too; raises `Lost`."""
+        """Sends a question whose answer is awaited by `wait_for`, again after an interrupt too; raises `Lost`.
+
+        `timeout` [s]: after it the call is over without an answer.
+        """
         with _as_own_errors():
             return self.node.ask(request, question, timeout, self.notify)
 

@@ -133,7 +133,7 @@ class Position:
 
 
 def jog_for(arm: Arm, command: JogCommand, seconds: float) -> ExitCode:
-    """Sends `command` for `seconds`, waits until the arm rests and prints where.
+    """Sends `command` for `seconds` [s], waits until the arm rests and prints where.
 
     Raises `CommandError` with the reason if the planner refuses.
     """

@@ -182,16 +182,19 @@ def follow(arm: Arm, plan: Plan, quiet: bool = False) -> MoveReport:
             motion = arm.execute(plan, detached=True, on_progress=on_progress, on_cancel=on_cancel)
         except gemelo.Refused as error:
             raise CommandError(str(error)) from error
-        except (gemelo.Aborted, gemelo.Interrupted, gemelo.Lost) as error:
-            return _report_of_end(arm, error)
-    return report_of(arm.description, motion, is_interrupted=False)
+        except gemelo.Lost as error:
+            if not error.has_begun:
+                raise
+            raise CommandError(str(error)) from error
+        except (gemelo.Aborted, gemelo.Interrupted) as error:
+            return _report_of_end(arm, plan, error)
+    return report_of(arm.description, plan, motion.status, motion.result, motion.stopped_at)
 
 
-def _report_of_end(arm: Arm, error: gemelo.Aborted | gemelo.Interrupted | gemelo.Lost) -> MoveReport:
+def _report_of_end(arm: Arm, plan: Plan, error: gemelo.Aborted | gemelo.Interrupted) -> MoveReport:
     """The report of a motion that ended before its goal; raises `CommandError` where nobody says how it ended."""
     is_interrupted = isinstance(error, gemelo.Interrupted)
-    if error.motion is None and not is_interrupted:
-        raise error
-    if error.motion is None or not error.motion.has_result:
+    if error.result is None:
         raise CommandError(str(error), ExitCode.CANCELLED if is_interrupted else ExitCode.FAILED) from error
-    return report_of(arm.description, error.motion, is_interrupted)
+    report = report_of(arm.description, plan, error.status, error.result, error.stopped_at)
+    return replace(report, interrupted=is_interrupted)

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from schemas.actions import GoalStatusCode
-from schemas.motion import JointTrajectory
+from schemas.motion import FollowJointTrajectoryResult, JointTrajectory
 from schemas.planning import PlanResponse
 from services.cli.errors import ExitCode
 from services.cli.units import show
 
 if TYPE_CHECKING:
-    from gemelo import Motion
+    from gemelo import Plan
     from services.arm.model.description import Arm as Description
 
 
@@ -56,16 +56,20 @@ class PlanReport(MoveReport, frozen=True, kw_only=True):
     response: PlanResponse
 
 
-def report_of(arm: Description, motion: Motion, is_interrupted: bool) -> MoveReport:
-    """The report of a motion that has ended, from the steps that the device executed."""
-    plan, result = motion.plan, motion.result
+def report_of(
+    arm: Description,
+    plan: Plan,
+    status: GoalStatusCode,
+    result: FollowJointTrajectoryResult,
+    stopped_at: dict[str, float],
+) -> MoveReport:
+    """The report of a motion that has ended, from the steps that the device executed; `stopped_at` is [rad] or [m]."""
     errors = dict(zip(result.joint_names, result.final_error, strict=False))
-    succeeded = motion.status is GoalStatusCode.SUCCEEDED
+    succeeded = status is GoalStatusCode.SUCCEEDED
     return MoveReport(
         robot=arm.name,
-        status=motion.status.name,
+        status=status.name,
         succeeded=succeeded,
-        interrupted=is_interrupted,
         reason=result.error_string,
         planned_s=plan.planning_time,
         duration_s=plan.duration,
@@ -73,7 +77,7 @@ def report_of(arm: Description, motion: Motion, is_interrupted: bool) -> MoveRep
         final_error_m=tool_error(arm, plan.trajectory, errors) if succeeded else None,
         final_error_steps=errors,
         max_following_error_steps=dict(zip(result.joint_names, result.max_following_error, strict=False)),
-        stopped_at=motion.stopped_at,
+        stopped_at=stopped_at,
     )
 
 

@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gemelo
+from gemelo.arguments import Target
 from gemelo.jog import jog_command
 from gemelo.planning import refused
-from gemelo.targets import Target, as_target, request_of
+from gemelo.targets import as_target, request_of
 from schemas.planning import (
     CircularMotion,
     JointGoal,
