@@ -14,7 +14,7 @@ import msgspec
 
 from schemas.deployment import Deployment
 from schemas.message import Message
-from schemas.system import Empty, NodeInfo, Parameter, ParameterValue, SetParameter
+from schemas.system import Empty, NodeInfo, Parameter, ParameterValue, SetParameter, TopicStatistics
 from schemas.topics import LOG, STATISTICS, Action, Request, Topic
 from services.runtime.actions.client import ActionClient
 from services.runtime.actions.server import ActionServer, OnCancel, OnGoal
@@ -176,6 +176,10 @@ class Node:
     def info(self) -> NodeInfo:
         """The node's identity and endpoints."""
         return self._endpoints.info(self._identity, self.robot)
+
+    def statistics(self) -> tuple[TopicStatistics, ...]:
+        """The messages received, dropped and bad since the start, by key: of topics and of requests served."""
+        return self._endpoints.statistics()
 
     def set_ready(self, ok: bool, reason: str = "") -> None:
         """Says whether this node's state is valid; `reason` is logged when it changes."""

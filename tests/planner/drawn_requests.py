@@ -23,6 +23,7 @@ from schemas.planning import (
 )
 from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject, Shape, SphereShape
 from services.planner.core import Planner
+from services.planner.kinematics.task_space import task_space
 from services.planner.path.search import KNOWN
 from tests.planner.independent import Judge
 from tests.planner.judging import asked, configuration_at, joints, quaternion_of
@@ -76,12 +77,12 @@ def held(planner: Planner, shape: Shape) -> SceneObject:
 @st.composite
 def pose_goals(draw: st.DrawFn, planner: Planner, start: Numbers) -> PoseGoal:
     """A pose that some configuration has, in every form that this arm can fulfil."""
-    judge, task_space = Judge(planner.arm), planner._goals.task_space
+    judge, is_full = Judge(planner.arm), task_space(planner.arm, planner.kinematics).is_full
     position, rotation = judge.tool(np.array(configuration_at(planner, draw(INNER))))
     frame = draw(st.sampled_from(("", planner.arm.base_frame, planner.arm.model.links[1].name)))
     origin, turned = judge.pose(frame or planner.arm.base_frame, np.array(start))
     place, turn = tuple((turned.T @ (position - origin)).tolist()), turned.T @ rotation
-    forms = ["position", "near"] + (["orientation", "free axis", "pointing", "about"] if task_space.is_full else [])
+    forms = ["position", "near"] + (["orientation", "free axis", "pointing", "about"] if is_full else [])
     axis = unit(draw(WAYS))
     match draw(st.sampled_from(forms)):
         case "near":

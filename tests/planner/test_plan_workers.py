@@ -218,7 +218,7 @@ def test_a_defect_costs_the_plan_and_not_the_process():
         def plan(self, *_args: object) -> PlanResponse:
             raise ZeroDivisionError("nothing divides")
 
-    response = worker._planned(Broken(load_arm(PROJECT / "urdf/rm1")), worker.AtHand(Job(request=EASY)))
+    response = worker.plan_at_hand(Broken(load_arm(PROJECT / "urdf/rm1")), worker.AtHand(Job(request=EASY)))
     assert response.code is PlanCode.FAILURE
     assert response.refusal is not None
     assert "ZeroDivisionError: nothing divides" in response.refusal.message

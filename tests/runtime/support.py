@@ -39,7 +39,12 @@ def until(is_true: Callable[[], object], timeout: float = 5.0) -> bool:
 
 def hear(node: Node, is_true: Callable[[], object], timeout: float = 5.0) -> bool:
     """Handles the node's inbox until something has come."""
-    return node._loop.wait_for(lambda: bool(is_true()), timeout, on_tick=lambda: None)
+    end = time.monotonic() + timeout
+    while not is_true():
+        if time.monotonic() > end:
+            return False
+        node.wait(0.005)
+    return True
 
 
 class RouterProcess:
@@ -83,22 +88,27 @@ class Buses:
     def __init__(self, make: Callable[[str], Bus], deployment: Deployment) -> None:
         self._make, self.deployment = make, deployment
         self.opened: list[Bus | Node] = []
+        self._buses: list[Bus] = []  # of the nodes too
 
     def open(self, robot: str = "rm1") -> Bus:
-        bus = self._make(robot)
+        bus = self._bus(robot)
         self.opened.append(bus)
         return bus
 
     def node(self, name: str, **options: object) -> Node:
-        node = Node(name, self.deployment, robot="rm1", bus=self._make("rm1"), **options)
+        node = Node(name, self.deployment, robot="rm1", bus=self._bus("rm1"), **options)
         self.opened.append(node)
         return node
 
+    def _bus(self, robot: str) -> Bus:
+        bus = self._make(robot)
+        self._buses.append(bus)
+        return bus
+
     def settle(self) -> None:
         """Waits until every bus knows what all others have declared so far."""
-        buses = [each._bus if isinstance(each, Node) else each for each in self.opened]
-        tokens = [bus.declare_alive(f"@barrier/{index}") for index, bus in enumerate(buses)]
-        assert until(lambda: all(len(bus.alive("@barrier/*")) == len(buses) for bus in buses))
+        tokens = [bus.declare_alive(f"@barrier/{index}") for index, bus in enumerate(self._buses)]
+        assert until(lambda: all(len(bus.alive("@barrier/*")) == len(self._buses) for bus in self._buses))
         for token in tokens:
             token.close()
 

@@ -6,9 +6,11 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import msgspec
 import pytest
 
 from schemas.actions import GoalStatusCode, ResultRequest
+from schemas.message import encode
 from schemas.motion import (
     FollowErrorCode,
     FollowJointTrajectoryFeedback,
@@ -187,11 +189,10 @@ def test_the_answer_to_a_result_request_can_be_held_back(buses: Buses) -> None:
 
 def test_the_same_goal_sent_twice_is_accepted_once(buses: Buses) -> None:
     from schemas.actions import GoalRequest
-    from services.runtime.actions.client import _raw
 
     with moving(buses) as arm:
         node = buses.node("client")
-        request = GoalRequest(goal_id="twice", client="c", goal=_raw(goal_of(10)))
+        request = GoalRequest(goal_id="twice", client="c", goal=msgspec.Raw(encode(goal_of(10))))
         first = node.call(keys.goal_request(FOLLOW), request)
         assert node.call(keys.goal_request(FOLLOW), request) == first
         assert until(lambda: arm.moved == 11, 1.0)

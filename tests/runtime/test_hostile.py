@@ -100,5 +100,5 @@ def full_size(payload: bytes) -> bytes:
 
 def counted(node: Node, key: str) -> tuple[int, int]:
     """Good and bad messages of a key."""
-    statistics = next(each for each in node._endpoints.statistics() if each.key == key)
+    statistics = next(each for each in node.statistics() if each.key == key)
     return statistics.received, statistics.bad

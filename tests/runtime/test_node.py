@@ -434,7 +434,7 @@ def test_a_flood_does_not_starve_the_step(buses: Buses) -> None:
     node = buses.node("loop")
     steps: list[float] = []
     for _ in range(2000):
-        node._loop.tasks.put(lambda: time.sleep(0.0005))
+        node.post(lambda: time.sleep(0.0005))
     with spinning(node, lambda now: steps.append(time.monotonic()), rate=50.0):
         time.sleep(0.6)
     assert len(steps) >= 25

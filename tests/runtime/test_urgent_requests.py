@@ -67,7 +67,7 @@ def test_equal_stops_that_wait_are_handled_once_and_all_answered(buses: Buses) -
 
 
 def _received(server) -> int:
-    return sum(each.received for each in server._endpoints.statistics() if each.key == DEVICE_STOP.key)
+    return sum(each.received for each in server.statistics() if each.key == DEVICE_STOP.key)
 
 
 def test_stops_are_carried_out_however_many_callers_wait(buses: Buses) -> None:

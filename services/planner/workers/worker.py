@@ -82,11 +82,11 @@ def main() -> None:
             case AtHand() as at_hand:
                 if at_hand.job.request.timing is Timing.TIME_OPTIMAL:
                     load_toppra()  # seconds, the first time, which are not the plan's
-                answers.put(Planned(_planned(planner, at_hand)))
+                answers.put(Planned(plan_at_hand(planner, at_hand)))
 
 
-def _planned(planner: Planner, at_hand: AtHand) -> PlanResponse:
-    """A defect costs the plan, and its traceback goes to the log; the process goes on."""
+def plan_at_hand(planner: Planner, at_hand: AtHand) -> PlanResponse:
+    """The plan; a defect is a refusal, and its traceback goes to the log; the process goes on."""
     job = at_hand.job
     try:
         return planner.plan(job.request, job.present, job.age, time.monotonic, at_hand.cancel, at_hand.watch)

@@ -10,22 +10,25 @@ import threading
 from collections import Counter, defaultdict, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from schemas.topics import Delivery
 from services.runtime.bus.interface import Arrival, BusReply, Query
 
-if TYPE_CHECKING:
-    from services.runtime.bus.memory_bus import MemoryBus
-
 KEPT = 1024  # messages that wait for the network to come back, as in Zenoh's publishers' cache
+
+
+class Member(Protocol):
+    """One node's bus, as the network knows it."""
+
+    network: MemoryNetwork
 
 
 @dataclass(eq=False)
 class MemorySubscription:
     """One reader of one key."""
 
-    bus: MemoryBus
+    bus: Member
     key: str
     on_arrival: Callable[[Arrival], None]
     own: bool
@@ -39,7 +42,7 @@ class MemorySubscription:
 class MemoryPublication:
     """One writer of one key, with what it keeps for late joiners."""
 
-    bus: MemoryBus
+    bus: Member
     key: str
     schema: str
     delivery: Delivery
@@ -72,7 +75,7 @@ class MemoryPublication:
 class MemoryQueryable:
     """A queryable: the server of the requests of one key."""
 
-    bus: MemoryBus
+    bus: Member
     key: str
     on_query: Callable[[Query], None]
 
@@ -87,7 +90,7 @@ class MemoryQueryable:
 class MemoryToken:
     """A liveliness token."""
 
-    bus: MemoryBus
+    bus: Member
     key: str
     is_open: bool = True
 
@@ -102,7 +105,7 @@ class MemoryToken:
 class MemoryWatch:
     """Who wants to know whether a token is there."""
 
-    bus: MemoryBus
+    bus: Member
     key: str
     on_change: Callable[[bool], None]
 
