@@ -27,7 +27,7 @@ class Label:
 
 @dataclass
 class Drawing:
-    """SVG elements, and where its labels are."""
+    """SVG elements, and where its labels are; lengths and places are in [px], y points down."""
 
     width: int
     height: int
@@ -35,7 +35,7 @@ class Drawing:
     labels: list[Label] = field(default_factory=list)
 
     def text(self, x: float, y: float, text: str, anchor: str = "start", color: str = INK, bold: bool = False) -> None:
-        """One line whose baseline is at `y`."""
+        """One line at `x` [px] whose baseline is at `y` [px]."""
         width = len(text) * SIZE * ADVANCE
         left = {"start": x, "middle": x - width / 2, "end": x - width}[anchor]
         self.labels.append(Label(text, left, y - SIZE + 2, width))
@@ -49,10 +49,11 @@ class Drawing:
         self.elements.append(f'<polyline points="{path}" fill="none" stroke="{color}" stroke-width="2"/>')
 
     def dot(self, x: float, y: float, color: str = SIGNAL) -> None:
+        """A filled circle around `x`, `y` [px]: wires that cross there are joined."""
         self.elements.append(f'<circle cx="{x:g}" cy="{y:g}" r="3.5" fill="{color}"/>')
 
     def box(self, left: float, top: float, width: float, height: float, title: str, fill: str = "#f4f6f8") -> None:
-        """A part, with its name above it."""
+        """A part of `width` and `height` [px] from its upper left corner, with its name above it."""
         self.elements.append(
             f'<rect x="{left:g}" y="{top:g}" width="{width:g}" height="{height:g}" rx="4" '
             f'fill="{fill}" stroke="{INK}"/>'
@@ -60,7 +61,7 @@ class Drawing:
         self.text(left + width / 2, top - 7, title, "middle", bold=True)
 
     def flag(self, x: float, y: float, net: str, color: str, to_left: bool = False) -> None:
-        """The name of a net at the end of a wire."""
+        """The name of a net at the end of a wire, at `x`, `y` [px]."""
         width, sign = len(net) * SIZE * ADVANCE + 12, -1 if to_left else 1
         corners = [(0, 0), (6, -10), (width, -10), (width, 10), (6, 10)]
         points = " ".join(f"{x + sign * dx:g},{y + dy:g}" for dx, dy in corners)
@@ -68,7 +69,7 @@ class Drawing:
         self.text(x + sign * (width / 2 + 2), y + 4.5, net, "middle", color)
 
     def resistor(self, x: float, y: float, value: str, upright: bool = False) -> None:
-        """Centred there, 40 long; its value above it, or to its right."""
+        """Centred at `x`, `y` [px], 40 px long; its value above it, or to its right."""
         width, height = (14, 40) if upright else (40, 14)
         self.elements.append(
             f'<rect x="{x - width / 2:g}" y="{y - height / 2:g}" width="{width}" height="{height}" '
@@ -80,7 +81,7 @@ class Drawing:
             self.text(x, y - 12, value, "middle")
 
     def closed_contact(self, x: float, y: float, color: str) -> None:
-        """A contact that opens when it is pressed, 50 long, from x to the right."""
+        """A contact that opens when it is pressed, 50 px long, from `x`, `y` [px] to the right."""
         self.wire((x, y), (x + 6, y), color=color)
         self.wire((x + 6, y), (x + 46, y - 8), color=color)
         self.wire((x + 40, y - 14), (x + 40, y), (x + 50, y), color=color)

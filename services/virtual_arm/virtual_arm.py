@@ -126,6 +126,7 @@ class VirtualArm(GatewayDriver):
         return tuple(j.steps.to_position(s) for j, s in zip(self.arm.joints, self.device.steps, strict=True))
 
     def run(self, seconds: float, until: Callable[[], bool] | None = None) -> bool:
+        """Runs for `seconds` [s] of virtual time, or until `until()`; False if that did not come."""
         end = self.now_us + round(seconds * 1e6)
         while self.now_us < end:
             if until is not None and until():

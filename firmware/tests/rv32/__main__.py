@@ -60,7 +60,7 @@ def gate(folder: Path) -> int:
 
 
 def bounds() -> dict[str, float]:
-    """The largest value allowed, by the figure's name."""
+    """The largest value allowed, by the figure's name, which ends in its unit: [bytes] or [instructions]."""
     return {name: value for name, value in table().items() if name != "library_calls"}
 
 

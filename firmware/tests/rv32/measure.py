@@ -20,7 +20,7 @@ def build(folder: Path) -> tuple[list[Path], list[Path]]:
 
 
 def cost(core: list[Path], play: list[Path], folder: Path) -> dict[str, float]:
-    """Every figure that gates.toml can bound, by the name it has there; and some more."""
+    """Every figure that gates.toml can bound, by the name it has there, and some more: [bytes] or [instructions]."""
     text, statics = toolchain.sizes(core)
     figures: dict[str, float] = {"core_text_bytes": text}
     for joints, name in ((JOINTS, "core_ram_bytes"), (DEFAULT_JOINTS, f"core_ram_bytes_{DEFAULT_JOINTS}")):

@@ -46,7 +46,7 @@ class Reporter:
         )
 
     def joint_command(self, point: PathPoint, state: State, stamp: int) -> JointState:
-        """What the path asks for at the same instant."""
+        """Positions [rad] or [m] and velocities [rad/s] or [m/s] that the path asks for at the same instant."""
         return JointState(
             stamp=stamp,
             name=self._names,
@@ -55,7 +55,7 @@ class Reporter:
         )
 
     def step_errors(self, point: PathPoint, state: State, stamp: int) -> StepErrors:
-        """Commanded minus executed."""
+        """Commanded minus executed [steps]."""
         error = tuple(wanted - done for wanted, done in zip(point.steps, state.steps, strict=True))
         self._max_error = [max(a, abs(b)) for a, b in zip(self._max_error, error, strict=True)]
         return StepErrors(

@@ -65,7 +65,7 @@ class ActiveGoal:
         self.stream, self.start_us, self.duration_us, self.deadline = stream, start_us, duration_us, deadline
 
     def follow(self, point: PathPoint, state: State) -> GoalEnding | None:
-        """Take a state; an ending if the arm has strayed from the path."""
+        """Take a state and the path [steps] at its instant; an ending if the arm has strayed from the path."""
         self.commanded = point.steps
         if state.play_us < self.start_us:
             return None
@@ -173,7 +173,7 @@ class ActiveGoal:
         )
 
     def result(self, ending: GoalEnding, state: State | None, now: float) -> FollowJointTrajectoryResult:
-        """What the client gets; without a state the steps stay empty."""
+        """What the client gets at `now` [s]; without a state the steps stay empty."""
         return FollowJointTrajectoryResult(
             error_code=ending.code,
             error_string=ending.reason,

@@ -119,7 +119,10 @@ class GoalExecutor:
             self._device.out.put(GoalExecuting(execution.goal_id))
 
     def on_state(self, state: State, point: PathPoint, moment: Moment) -> None:
-        """Check the goal's tolerances, report progress, and see whether it is done."""
+        """Check the goal's tolerances, report progress, and see whether it is done.
+
+        `point` is the path [steps] at the instant of `state`.
+        """
         execution, controller = self._current, self._controller
         if execution is not None and execution.stream is not None and state.stream == execution.stream.id:
             self._follow(execution, state, point, moment)

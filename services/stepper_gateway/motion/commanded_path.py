@@ -49,7 +49,7 @@ class CommandedPath:
         return self._knots[first : bisect_right(self._times, to_us)]
 
     def at(self, time_us: int) -> PathPoint:
-        """The commanded path at `time_us` of the stream, held at its ends."""
+        """The commanded path [steps] at `time_us` [us] of the stream, held at its ends."""
         index = bisect_right(self._times, time_us) - 1
         if index < 0:
             return _rest(self._steps[0])

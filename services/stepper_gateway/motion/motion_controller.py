@@ -103,7 +103,7 @@ class MotionController:
             self._send(self.transmission.pump(moment, self._device.session.clock, self.lead), moment)
 
     def on_ack(self, ack: Ack, arrival: float, moment: Moment) -> None:
-        """Account for a chunk's answer, and fill a gap that it tells of."""
+        """Account for a chunk's answer of `arrival` [s], and fill a gap that it tells of."""
         stream, round_trip = self.stream, 0.0
         if stream is not None and ack.stream == stream.id and ack.boot_id == stream.boot_id:
             round_trip, lost = stream.on_ack(ack, arrival)
@@ -113,7 +113,7 @@ class MotionController:
         device.out.publish(COMMAND_ACKS, device.reporter.ack(ack, round_trip, moment.unix_at(arrival), steps))
 
     def on_state(self, state: State, arrival: float) -> None:
-        """Account for what the device says of the stream."""
+        """Account for what the device says of the stream at `arrival` [s]."""
         stream = self.stream
         if stream is not None and state.stream == stream.id:
             stream.on_state(state)
@@ -125,7 +125,7 @@ class MotionController:
         self._slowness.on_state(state, self.is_held)
 
     def commanded(self, state: State) -> PathPoint:
-        """What the path asks for at the instant of `state`; where it is, if it follows no path of ours."""
+        """The path [steps] at the instant of `state`; where it is, if it follows no path of ours."""
         stream = self.stream
         if stream is None or state.stream != stream.id:
             return PathPoint(tuple(float(count) for count in state.steps), (0.0,) * len(state.steps))

@@ -150,7 +150,7 @@ class Stream:
         return min(self.end_us, self._play.play_us + int(since * self._play.time_scale))
 
     def commanded(self, play_us: int) -> PathPoint:
-        """What the path asks for at `play_us`."""
+        """The path [steps] at `play_us` [us]."""
         return self.log.at(play_us)
 
     def credits(self, played_us: int) -> int:

@@ -51,7 +51,7 @@ class TargetStream:
         return columns
 
     def note_message(self, now: float, silence: float) -> None:
-        """A message has come; after an interruption only silence makes the next one count again."""
+        """A message has come at `now` [s]; after an interruption only `silence` [s] makes the next one count again."""
         if now - self._latest > silence:
             self._is_interrupted = False
         self._latest = now

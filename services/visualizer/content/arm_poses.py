@@ -21,5 +21,5 @@ def arm_poses(model: VisualModel, root: str, times: Times, rows: Array) -> list[
 
 
 def arm_pose_at(model: VisualModel, root: str, now: int, configuration: Array) -> list[Update]:
-    """The arm under `root` in one `configuration` (joints,) from `now` on."""
+    """The arm under `root` in one `configuration` (joints,) [rad] or [m] from `now` [ns] on."""
     return arm_poses(model, root, np.array([now], dtype=np.int64), configuration[None, :])
