@@ -68,7 +68,7 @@ def test_no_scaling_but_a_share_will_do(name: str, field: str, value: float):
 
 @ARMS
 @pytest.mark.parametrize("field", ["velocity_scaling", "acceleration_scaling"])
-@pytest.mark.parametrize(("value", "words"), [(TINY, "no way ends"), (1e-300, "86400 s"), (1e-12, "86400 s")])
+@pytest.mark.parametrize(("value", "words"), [(TINY, "no path ends"), (1e-300, "86400 s"), (1e-12, "86400 s")])
 def test_a_scaling_with_which_nothing_ends_is_refused(name: str, field: str, value: float, words: str):
     assert words in planned(name, whole(name, **{field: value}))
 

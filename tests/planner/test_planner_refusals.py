@@ -160,7 +160,7 @@ def test_a_way_through_itself_names_the_pair(planner: Planner, rm1: Arm):
     refusal = refused(response, PlanCode.PLANNING_FAILED)
     assert refusal.check == "self-collision"
     assert "efector_link" in refusal.subject
-    assert "go by way of another configuration" in refusal.remedy
+    assert "go via another configuration" in refusal.remedy
 
 
 def test_a_start_in_collision_is_not_planned_from(planner: Planner, rm1: Arm):

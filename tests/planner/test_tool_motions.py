@@ -95,7 +95,7 @@ def test_a_line_is_a_line_or_says_why_it_ends(
     if response.code is not PlanCode.SUCCESS:
         assert response.refusal is not None
         assert response.refusal.check in ("singularity", "joint limit", "collision")
-        assert "the way cannot be begun" in response.refusal.message
+        assert "the path cannot be begun" in response.refusal.message
         return
     require_sound(planner, response, start)
     times, rows = tool_rows(planner, response)
@@ -105,7 +105,7 @@ def test_a_line_is_a_line_or_says_why_it_ends(
         assert rows[-1] == pytest.approx(end, abs=1e-7)
     else:
         assert response.stopped_by is not None
-        assert "along the way" in response.stopped_by.message
+        assert "along the path" in response.stopped_by.message
     if name == "parol6":
         last = planner.kinematics.tool(response.trajectory.points[-1].positions)
         assert last.rotation == pytest.approx(begin.rotation, abs=1e-6)

@@ -105,7 +105,7 @@ def test_what_is_in_the_way_ends_every_kind_of_way_before_it(kind: str):
     for reason in (refused.refusal, part.stopped_by):
         assert reason.check == "collision"
         assert "crate" in reason.subject
-        assert "along the way" in reason.message
+        assert "along the path" in reason.message
     assert 0.1 < part.fraction == pytest.approx(refused.fraction, abs=1e-3)
     assert Judge(planner.arm, scene).touch(seen("rm1", part)[0].positions) is None
 
@@ -175,7 +175,7 @@ def test_a_line_ends_at_a_singularity_with_its_place_and_how_near_it_is(
     assert reason is not None
     assert reason.check == "singularity"
     assert "manipulability" in reason.message
-    assert f"m of {np.linalg.norm(step):.4f} m along the way" in reason.message
+    assert f"m of {np.linalg.norm(step):.4f} m along the path" in reason.message
     if response.code is PlanCode.SUCCESS:
         rows = seen(name, response)[1]
         assert off_line(rows, np.array(step)) < OFF
@@ -218,7 +218,7 @@ def test_a_wrist_that_turns_through_its_singularity_or_beside_it_does_not_jump(s
     assert np.linalg.norm(rows - pose[0], axis=1).max() < OFF
     if response.stopped_by is not None:
         assert response.stopped_by.check in ("singularity", "joint limit")
-        assert "of the turn along the way" in response.stopped_by.message
+        assert "of the turn along the path" in response.stopped_by.message
 
 
 def turned(rotation: Array, about: Array) -> tuple[float, ...]:

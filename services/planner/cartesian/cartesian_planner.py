@@ -206,15 +206,15 @@ def _stopped(stop: StopReason, gone: float, metres: float, fraction: float) -> R
         subject=stop.subject,
         value=stop.value,
         limit=stop.limit,
-        message=f"{place} along the way, {stop.what}",
+        message=f"{place} along the path, {stop.what}",
         remedy=stop.remedy,
     )
 
 
 def _too_little(stop: Refusal, fraction: float, least: float) -> Refusal:
-    message = f"only {fraction:.1%} of the way can be gone, {least:.1%} is the least: {stop.message}"
+    message = f"only {fraction:.1%} of the path can be followed, {least:.1%} is the least: {stop.message}"
     if fraction == 0.0:
-        message = f"the way cannot be begun: {stop.message}"
+        message = f"the path cannot be begun: {stop.message}"
     remedy = f"{stop.remedy}; or allow less (least_fraction {math.floor(1000 * fraction) / 1000:g})"
     return replace(stop, message=message, remedy=remedy if fraction > 0.001 else stop.remedy)
 

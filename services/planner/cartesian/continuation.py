@@ -32,7 +32,7 @@ SAME = 1e-6  # [rad] or [m] by which configurations differ that are meant to be 
 ROUNDS = 8
 LOOKS = 8  # at the joints' limits between two configurations
 ORDER = 4  # configurations by which the next one is guessed
-TOO_FINE = f"max_step is so fine that the way would have more than {MOST_CONFIGURATIONS} configurations"
+TOO_FINE = f"max_step is so fine that the path would have more than {MOST_CONFIGURATIONS} configurations"
 
 
 @dataclass(frozen=True)
@@ -232,7 +232,7 @@ class Continuation:
     def _lost(self, last: Array) -> StopReason:
         value = self.solver.manipulability(last)
         what = f"the arm is stretched out or its axes line up (singularity, manipulability {value:.2g})"
-        remedy = "keep away from there, or go there freely instead of on a given way"
+        remedy = "keep away from there, or go there freely instead of on a given path"
         return StopReason("singularity", self._arm.tool_frame, value, 0.0, what, remedy)
 
     def _jump(self, check: str, last: Array, found: Array, jump: float) -> StopReason:
@@ -242,7 +242,7 @@ class Continuation:
             f'joint "{joint.name}" would jump by {value:.3g} {joint.unit}, more than {jump:g}'
             f" (singularity, manipulability {self.solver.manipulability(last):.2g})"
         )
-        remedy = "keep away from the singularity, or go there freely instead of on a given way"
+        remedy = "keep away from the singularity, or go there freely instead of on a given path"
         return StopReason(check, joint.name, value, jump, what, remedy)
 
 

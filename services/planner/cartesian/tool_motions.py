@@ -131,7 +131,9 @@ class ToolMotions:
         missing = target.misses(self._kinematics.tool(end))[1]
         if missing > max(ROTATION_TOLERANCE, target.rotation_tolerance):
             next(self._goals.candidates(last, start, NEVER), None)
-            message = f"on this way the tool ends {np.degrees(missing):.3g} deg from the orientation that was asked for"
+            message = (
+                f"on this path the tool ends {np.degrees(missing):.3g} deg from the orientation that was asked for"
+            )
             raise malformed(INVALID, "orientation", message, self._task_space.remedy, check="orientation")
 
     def _wanted(self, goal: Goal, start: Start) -> list[Start | None]:

@@ -43,7 +43,7 @@ class CollisionRefusals:
                 nearest = tuple(values[name] for name in asked.name)
             case NamedGoal() | WaypointGoal():
                 nearest = tuple(values.values())
-        remedy = f"the farthest it can go on the straight way there: {self._named(tuple(values.values()))}"
+        remedy = f"the farthest it can go on the straight path there: {self._named(tuple(values.values()))}"
         return self.refusal(PlanCode.GOAL_IN_COLLISION, "at the goal", np.array(goal), CLEARANCE, nearest, remedy)
 
     def start(self, start: Start, deadline: Deadline) -> PlanRefused:
@@ -65,20 +65,20 @@ class CollisionRefusals:
         found = first_collision(self._checker, np.array((start, goal)), margin)
         touching = np.array(goal) if found is None else found
         named = ", ".join(self._arm.state_names)
-        remedy = f"go by way of another configuration, for example a named one ({named})"
-        return self.refusal(PlanCode.PLANNING_FAILED, "on the straight way to the goal", touching, margin, (), remedy)
+        remedy = f"go via another configuration, for example a named one ({named})"
+        return self.refusal(PlanCode.PLANNING_FAILED, "on the straight path to the goal", touching, margin, (), remedy)
 
     def path(self, touching: Array, margin: float) -> PlanRefused:
         """The refusal of found paths that do not keep `margin` [m] once they are timed; `touching` (n,) [rad] or [m] is
         on one."""
         remedy = "ask with another seed or planner_id; if it stays, report this as a defect"
-        return self.refusal(PlanCode.PLANNING_FAILED, "on the way that was found", touching, margin, (), remedy)
+        return self.refusal(PlanCode.PLANNING_FAILED, "on the path that was found", touching, margin, (), remedy)
 
     def waypoints(self, touching: Array, margin: float) -> PlanRefused:
         """The refusal of the straight lines from waypoint to waypoint, on which `touching` (n,) [rad] or [m] does not
         keep `margin` [m]."""
         remedy = "give waypoints that lead around it, or ask for a free motion"
-        return self.refusal(PlanCode.PLANNING_FAILED, "on the way by the waypoints", touching, margin, (), remedy)
+        return self.refusal(PlanCode.PLANNING_FAILED, "on the path through the waypoints", touching, margin, (), remedy)
 
     def refusal(
         self, code: PlanCode, where: str, configuration: Array, margin: float, nearest: Vector, remedy: str

@@ -48,7 +48,7 @@ def timed_out() -> PlanRefused:
 
 def scaling_refused(which: str, value: float) -> PlanRefused:
     """The refusal of the scaling `which`, whose dimensionless `value` is not in (0, 1] or too small."""
-    must = f"below {LEAST_SCALING:g} no way ends" if 0.0 < value < 1.0 else "it must be above 0 and at most 1"
+    must = f"below {LEAST_SCALING:g} no path ends" if 0.0 < value < 1.0 else "it must be above 0 and at most 1"
     return PlanRefused(
         PlanCode.INVALID_GOAL_CONSTRAINTS,
         Refusal(
@@ -202,8 +202,8 @@ def no_path_around(why: SearchFailure, blocked: PlanRefused) -> PlanRefused:
                 check="allowed time",
                 subject=subject,
                 configuration=configuration,
-                message=f"{told} no way around it was found within the time allowed",
-                remedy="allow more time, go by way of another configuration, or make room",
+                message=f"{told} no path around it was found within the time allowed",
+                remedy="allow more time, go via another configuration, or make room",
             ),
         )
     where = "the start" if why is SearchFailure.START_TOUCHES else "every configuration of the goal"

@@ -127,7 +127,7 @@ def time_law(demand: Demand, deadline: Deadline) -> TimeLaw:
     tries = [(edges, share) for edges in reversed(finer) for share in SHARES[:2]]
     tries += [(whole, share) for share in SHARES]
     best: TimeLaw | None = None
-    why = NoProfile(f"no jerk-limited profile for a way of {float(demand.along[-1]):.3g}")
+    why = NoProfile(f"no jerk-limited profile for a path of {float(demand.along[-1]):.3g}")
     for edges, share in tries:
         deadline.check()
         try:
@@ -178,7 +178,7 @@ def _sections(demand: Demand, edges: Array, share: float) -> list[Section]:
     rows = zip(*(column.tolist() for column in (np.diff(edges), speed, rise, jerk)), strict=True)
     sections = [Section(length, v, a, j, bends=True) for length, v, a, j in rows]
     if min(min(section.speed, section.acceleration, section.jerk) for section in sections) <= 0.0:
-        raise NoProfile(f"no jerk-limited profile for a way of {end:.3g}")
+        raise NoProfile(f"no jerk-limited profile for a path of {end:.3g}")
     return sections
 
 

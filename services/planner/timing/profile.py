@@ -100,7 +100,7 @@ def _time_line(length: float, direction: Array, limits: JointLimits) -> tuple[Tr
     demand.max_velocity = [MARGIN * float(np.min(limits.velocity[moving] / share[moving]))]
     demand.max_acceleration = [MARGIN * float(np.min(limits.acceleration[moving] / share[moving]))]
     demand.max_jerk = [MARGIN * float(np.min(limits.jerk[moving] / share[moving]))]
-    profile = solved(demand, f"a way of {length:.3g} s at full speed")
+    profile = solved(demand, f"a path of {length:.3g} s at full speed")
     return profile, np.cumsum(profile.profiles[0][0].t).tolist()
 
 

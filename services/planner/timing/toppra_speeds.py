@@ -67,7 +67,7 @@ class _Task:
         )
         _, speeds, _ = algorithm.compute_parameterization(0.0, 0.0)
         if speeds is None or not np.isfinite(speeds).all() or (speeds[1:-1] <= 0.0).any():
-            raise NoProfile("toppra found no way through its limits: ask for the jerk-limited timing")
+            raise NoProfile("toppra found no speeds within the limits: ask for the jerk-limited timing")
         return np.asarray(speeds, dtype=np.float64) / unit
 
     def _unit(self) -> float:
