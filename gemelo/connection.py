@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import socket
 import time
 from pathlib import Path
 
 from gemelo.arm import Arm
 from gemelo.errors import Error, Lost
-from gemelo.robot_files import Robot, load_robot
+from gemelo.robot_files import Robot, load_robot, require_router
 from gemelo.session import Session, open_node
 from schemas.deployment import Deployment
 from services.runtime.deployment import load_deployment
 from services.runtime.robots import robots_on
 
 GATEWAY = "stepper_gateway"
-LOOK_TIMEOUT = 1.0  # [s] of one look for the router
 LOOK_EVERY = 0.1  # [s] while the twin is awaited
 
 
@@ -67,14 +65,12 @@ def robots(deployment: str | Path | Deployment | None = None) -> tuple[str, ...]
 
 
 def _await_router(deployment: Deployment, end: float) -> None:
-    address = (deployment.router.host, deployment.router.port)
     while True:
         try:
-            return socket.create_connection(address, timeout=LOOK_TIMEOUT).close()
-        except OSError:
+            return require_router(deployment)
+        except Lost:
             if time.monotonic() > end:
-                where = f"{address[0]}:{address[1]}"
-                raise Lost(f"no router at {where}: start the twin with `make up`") from None
+                raise
         time.sleep(LOOK_EVERY)
 
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 
 from gemelo.errors import Aborted, BadArgument, Interrupted, Refused
-from gemelo.homing_report import HomingProgress, HomingReport
+from gemelo.homing_report import HOME, OFF, TO, WAITS, HomingProgress, HomingReport
 from gemelo.session import Session
 from schemas.device import DeviceCommand, DeviceEvent, DeviceMode, DeviceState, HomeCommand, StopKind
 from schemas.device_faults import fault_text
@@ -17,7 +17,6 @@ from services.arm.errors import suggestion
 from services.arm.model.description import Arm as Description
 from services.arm.model.description import Joint
 
-WAITS, TO, OFF, HOME = "waits", "to its switch", "off its switch", "home"
 TO_BEGIN = 3.0  # [s] from the device's yes to its first word of homing
 LAST_WORDS = 0.5  # [s] for events that come after the state
 OFFLINE = 2.0  # [s] that the device may be away: a link that comes back, a clock that is synchronised anew

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+WAITS, TO, OFF, HOME = "waits", "to its switch", "off its switch", "home"
+
 
 class HomingProgress(dict[str, str]):
     """What each joint does, by name: "waits", "to its switch", "off its switch" or "home".

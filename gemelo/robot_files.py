@@ -1,18 +1,21 @@
-"""The files of an arm: where it runs, and what it is."""
+"""The files of an arm: where it runs, and what it is; and whether its router is there."""
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from gemelo.errors import BadArgument, Error
+from gemelo.errors import BadArgument, Error, Lost
 from schemas.deployment import Deployment
 from services.arm.errors import suggestion
 from services.arm.model import description as descriptions
 from services.arm.model.description import Arm as Description
 from services.runtime.deployment import load_deployment, project_root
+
+LOOK_TIMEOUT = 1.0  # [s] of one look for the router
 
 
 class Robot(NamedTuple):
@@ -41,6 +44,15 @@ def load_robot(robot: str = "", *, deployment: str | Path | None = None) -> Robo
         return Robot(found, descriptions.load_arm(project_root() / found.robot))
     except (ValueError, OSError) as error:
         raise error if isinstance(error, Error) else Error(str(error)) from error
+
+
+def require_router(deployment: Deployment) -> None:
+    """Raises `Lost` at once where no router listens, instead of waiting for a twin that does not run."""
+    address = (deployment.router.host, deployment.router.port)
+    try:
+        socket.create_connection(address, timeout=LOOK_TIMEOUT).close()
+    except OSError:
+        raise Lost(f"no router at {address[0]}:{address[1]}: start the twin with `make up`") from None
 
 
 def _folder(robot: str) -> Path:

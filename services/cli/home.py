@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 import gemelo
+from gemelo.homing_report import HOME, WAITS
 from services.cli.errors import CommandError, ExitCode, in_commands, joint_of
 from services.cli.parser import Choices, Options, Parser, json_option
 from services.cli.session import connect_arm, load_robot
@@ -15,8 +16,6 @@ from services.cli.terminal import LiveBlock
 
 if TYPE_CHECKING:
     from gemelo import Arm, HomingProgress, HomingReport, Robot
-
-WAITS, HOME = "waits", "home"  # the first and the last phase of a joint
 
 
 def add_options(parser: Parser) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,8 +15,6 @@ if TYPE_CHECKING:
     from schemas.deployment import Deployment
     from services.arm.model.description import Arm as Description
     from services.runtime.node import Node
-
-CONNECT_TIMEOUT = 1.0  # [s]
 
 
 class Session(NamedTuple):
@@ -88,13 +85,13 @@ def connect(robot: Robot | None = None) -> Iterator[Session]:
 
 
 def require_router(deployment: Deployment) -> None:
-    """Raises `CommandError` at once if no router listens, instead of waiting for a stack that does not run."""
-    address = (deployment.router.host, deployment.router.port)
+    """Raises `CommandError` where no router listens, before anything slow is loaded."""
+    from gemelo import robot_files
+
     try:
-        socket.create_connection(address, timeout=CONNECT_TIMEOUT).close()
-    except OSError:
-        where = f"{address[0]}:{address[1]}"
-        raise CommandError(f"no router at {where}: start the twin with `make up`", ExitCode.NO_STACK) from None
+        robot_files.require_router(deployment)
+    except gemelo.Lost as error:
+        raise CommandError(str(error), ExitCode.NO_STACK) from error
 
 
 def other_robots(deployment: Deployment, arm: Description) -> str:
