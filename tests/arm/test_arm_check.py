@@ -137,7 +137,7 @@ def test_a_fault_is_found_and_named(copy: Path, file: str, old: str, new: str, m
     edit(copy / file, old, new)
     findings = check(copy)
     assert any(message in str(f) and remedy in str(f) and f.severity is Severity.ERROR for f in findings), findings
-    assert all(str(f).count(f.thing) == 1 or not f.thing.startswith("joint ") for f in findings), "named twice"
+    assert all(str(f).count(f.subject) == 1 or not f.subject.startswith("joint ") for f in findings), "named twice"
 
 
 def test_one_fault_does_not_hide_another(copy: Path):

@@ -37,8 +37,8 @@ def check(folder: Path) -> list[Finding]:
     try:
         robot = msgspec.convert(_known(data), RobotFile)
     except msgspec.ValidationError as problem:
-        thing = where_of(problem, text).removeprefix(", ") or "types"
-        return [*findings, error(ROBOT_FILE, thing, str(problem), "see schemas/robot.py")]
+        subject = where_of(problem, text).removeprefix(", ") or "types"
+        return [*findings, error(ROBOT_FILE, subject, str(problem), "see schemas/robot.py")]
     if not_finite(data):
         return findings
     findings += _files(folder, robot)

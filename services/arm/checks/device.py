@@ -18,7 +18,7 @@ def check_device(robot: RobotFile) -> list[Finding]:
     """Everything that is wired to the board."""
     findings = _pins(robot)
     for kind, things in (("input", robot.input), ("output", robot.output), ("sensor", robot.sensor)):
-        findings += _twice(kind, [thing.name for thing in things])
+        findings += _twice(kind, [subject.name for subject in things])
     findings += _estops(robot)
     for switch in robot.input:
         findings += _switch(switch, robot)
@@ -72,25 +72,25 @@ def _estops(robot: RobotFile) -> list[Finding]:
 
 def _switch(switch: Input, robot: RobotFile) -> list[Finding]:
     """A limit or home switch belongs to one joint, an e-stop to all."""
-    thing, names = f'input "{switch.name}"', [joint.name for joint in robot.joint]
+    subject, names = f'input "{switch.name}"', [joint.name for joint in robot.joint]
     if switch.role is InputRole.ESTOP:
         message = f'an e-stop belongs to all joints, not to "{switch.joint}"'
-        return [error(ROBOT_FILE, thing, message, "remove `joint`")] if switch.joint else []
+        return [error(ROBOT_FILE, subject, message, "remove `joint`")] if switch.joint else []
     if not switch.joint:
-        return [error(ROBOT_FILE, thing, f"a {switch.role} switch belongs to a joint", "write `joint`")]
+        return [error(ROBOT_FILE, subject, f"a {switch.role} switch belongs to a joint", "write `joint`")]
     if switch.joint not in names:
-        return [error(ROBOT_FILE, thing, f'there is no joint "{switch.joint}"{suggestion(switch.joint, names)}')]
+        return [error(ROBOT_FILE, subject, f'there is no joint "{switch.joint}"{suggestion(switch.joint, names)}')]
     return []
 
 
 def _sensor(sensor: Sensor) -> list[Finding]:
-    thing, findings = f'sensor "{sensor.name}"', []
+    subject, findings = f'sensor "{sensor.name}"', []
     if sensor.name in RESERVED_NAMES:
-        findings.append(error(ROBOT_FILE, thing, "this name is taken by the readings' message", "choose another one"))
+        findings.append(error(ROBOT_FILE, subject, "this name is taken by the readings' message", "choose another one"))
     if sensor.kind is SensorKind.ULTRASONIC and sensor.trigger_pin is None:
-        findings.append(error(ROBOT_FILE, thing, "an ultrasonic sensor is asked by a pulse", "write trigger_pin"))
+        findings.append(error(ROBOT_FILE, subject, "an ultrasonic sensor is asked by a pulse", "write trigger_pin"))
     if sensor.kind is not SensorKind.ULTRASONIC and sensor.trigger_pin is not None:
-        findings.append(error(ROBOT_FILE, thing, f"a sensor of kind {sensor.kind} has no trigger_pin", "remove it"))
+        findings.append(error(ROBOT_FILE, subject, f"a sensor of kind {sensor.kind} has no trigger_pin", "remove it"))
     if sensor.scale == 0.0:
-        findings.append(error(ROBOT_FILE, thing, "its scale is 0: it would always read the same", "write its scale"))
+        findings.append(error(ROBOT_FILE, subject, "its scale is 0: it would always read the same", "write its scale"))
     return findings

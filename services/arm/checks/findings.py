@@ -15,22 +15,22 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong: a sentence with the thing and its value, and the remedy."""
+    """One mistake: its subject, a sentence with the value, and the remedy."""
 
     severity: Severity
     file: str
-    thing: str  # for example: joint "brazo_joint"
+    subject: str  # for example: joint "brazo_joint"
     message: str
     remedy: str = ""
 
     def __str__(self) -> str:
         remedy = f" -> {self.remedy}" if self.remedy else ""
-        return f"{self.severity}: {self.file}: {self.thing}: {self.message}{remedy}"
+        return f"{self.severity}: {self.file}: {self.subject}: {self.message}{remedy}"
 
 
-def error(file: str, thing: str, message: str, remedy: str = "") -> Finding:
-    return Finding(Severity.ERROR, file, thing, message, remedy)
+def error(file: str, subject: str, message: str, remedy: str = "") -> Finding:
+    return Finding(Severity.ERROR, file, subject, message, remedy)
 
 
-def warning(file: str, thing: str, message: str, remedy: str = "") -> Finding:
-    return Finding(Severity.WARNING, file, thing, message, remedy)
+def warning(file: str, subject: str, message: str, remedy: str = "") -> Finding:
+    return Finding(Severity.WARNING, file, subject, message, remedy)

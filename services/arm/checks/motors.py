@@ -23,18 +23,18 @@ def check_motors(robot: RobotFile, model: UrdfModel) -> list[Finding]:
     findings = _names(robot, model)
     drivers = {driver.name: driver for driver in robot.driver}
     for drive in robot.joint:
-        thing = f'joint "{drive.name}"'
+        subject = f'joint "{drive.name}"'
         if drive.name not in model.joint_names:
             hint = suggestion(drive.name, model.joint_names)
-            findings.append(error(ROBOT_FILE, thing, f"is not in the URDF{hint}"))
+            findings.append(error(ROBOT_FILE, subject, f"is not in the URDF{hint}"))
             continue
-        findings += _drive(drive, model.joint(drive.name), thing)
+        findings += _drive(drive, model.joint(drive.name), subject)
         driver = drivers.get(drive.motor.driver)
         if driver is None:
             hint = suggestion(drive.motor.driver, drivers)
-            findings.append(error(ROBOT_FILE, thing, f'there is no [[driver]] "{drive.motor.driver}"{hint}'))
+            findings.append(error(ROBOT_FILE, subject, f'there is no [[driver]] "{drive.motor.driver}"{hint}'))
         else:
-            findings += _pulses(drive, driver, robot.device.tick_hz, thing)
+            findings += _pulses(drive, driver, robot.device.tick_hz, subject)
     return findings
 
 
@@ -55,30 +55,30 @@ def _names(robot: RobotFile, model: UrdfModel) -> list[Finding]:
     return findings
 
 
-def _drive(drive: StepperJoint, joint: UrdfJoint, thing: str) -> list[Finding]:
+def _drive(drive: StepperJoint, joint: UrdfJoint, subject: str) -> list[Finding]:
     """Steps, speed and travel of one joint."""
     slides = joint.kind is JointKind.PRISMATIC
     if slides != (drive.transmission is Transmission.RACK_AND_PINION):
         needed = Transmission.RACK_AND_PINION if slides else Transmission.ROTARY
         message = f"is {joint.kind} in the URDF, but its transmission is {drive.transmission}"
-        return [error(ROBOT_FILE, thing, message, f'write transmission = "{needed}": metres are not radians')]
+        return [error(ROBOT_FILE, subject, message, f'write transmission = "{needed}": metres are not radians')]
     try:
         scale, speed = step_scale(drive), speed_limits(drive)
     except DescriptionError as problem:
-        return [error(ROBOT_FILE, thing, str(problem).removeprefix(f"{thing}: "))]
+        return [error(ROBOT_FILE, subject, str(problem).removeprefix(f"{subject}: "))]
     findings = []
     if joint.limit is not None:
-        findings += _against_limits(drive, joint, thing, scale.per_unit, speed.velocity)
+        findings += _against_limits(drive, joint, subject, scale.per_unit, speed.velocity)
     if scale.resolution > (COARSE_METRES if slides else COARSE):
         unit = "mm" if slides else "mrad"
         findings.append(
-            warning(ROBOT_FILE, thing, f"one step is {1000 * scale.resolution:.3g} {unit}", "use microsteps")
+            warning(ROBOT_FILE, subject, f"one step is {1000 * scale.resolution:.3g} {unit}", "use microsteps")
         )
     return findings
 
 
 def _against_limits(
-    drive: StepperJoint, joint: UrdfJoint, thing: str, per_unit: float, velocity: float
+    drive: StepperJoint, joint: UrdfJoint, subject: str, per_unit: float, velocity: float
 ) -> list[Finding]:
     """The URDF may not promise what the mechanics cannot do."""
     findings: list[Finding] = []
@@ -88,26 +88,26 @@ def _against_limits(
     unit = "m" if joint.kind is JointKind.PRISMATIC else "rad"
     if limit.velocity > 2.0 * velocity:
         message = f"the URDF allows {limit.velocity:g} {unit}/s, its motor does {velocity:.4g} {unit}/s"
-        findings.append(warning(ROBOT_FILE, thing, message, "the slower one is used; correct the URDF"))
+        findings.append(warning(ROBOT_FILE, subject, message, "the slower one is used; correct the URDF"))
     if joint.kind is JointKind.CONTINUOUS:
         return findings
-    findings += _against_mechanics(drive, limit, thing, unit)
+    findings += _against_mechanics(drive, limit, subject, unit)
     if joint.kind is JointKind.REVOLUTE and limit.upper - limit.lower > 2.0 * math.tau:
         message = f"travel of {limit.upper - limit.lower:.4g} rad is beyond two turns"
-        findings.append(warning(ROBOT_FILE, thing, message, "are these degrees?"))
+        findings.append(warning(ROBOT_FILE, subject, message, "are these degrees?"))
     if not limit.lower <= drive.reference_position <= limit.upper:
         message = (
             f"reference_position {drive.reference_position:g} {unit} is outside {limit.lower:g} to {limit.upper:g}"
         )
-        findings.append(error(ROBOT_FILE, thing, message, "the arm must be able to stand where it is referenced"))
+        findings.append(error(ROBOT_FILE, subject, message, "the arm must be able to stand where it is referenced"))
     farthest = max(abs(limit.lower), abs(limit.upper)) * per_unit
     if farthest > WIRE_RANGE:
         message = f"its travel of {farthest:.0f} steps does not fit the wire's {WIRE_RANGE:.0f}"
-        findings.append(error(ROBOT_FILE, thing, message, "fewer microsteps"))
+        findings.append(error(ROBOT_FILE, subject, message, "fewer microsteps"))
     return findings
 
 
-def _against_mechanics(drive: StepperJoint, limit: Limit, thing: str, unit: str) -> list[Finding]:
+def _against_mechanics(drive: StepperJoint, limit: Limit, subject: str, unit: str) -> list[Finding]:
     """The URDF's limits within what robot.toml says that the mechanics allow."""
     findings = []
     for side, urdf, mechanical, is_beyond in (
@@ -116,11 +116,11 @@ def _against_mechanics(drive: StepperJoint, limit: Limit, thing: str, unit: str)
     ):
         if mechanical is not None and is_beyond(urdf, mechanical):
             message = f"the URDF's {side} limit {urdf:g} {unit} is beyond the mechanics' {mechanical:g} {unit}"
-            findings.append(error(ROBOT_FILE, thing, message, f"write {side}={mechanical:g} in the URDF"))
+            findings.append(error(ROBOT_FILE, subject, message, f"write {side}={mechanical:g} in the URDF"))
     return findings
 
 
-def _pulses(drive: StepperJoint, driver: Driver, tick_hz: int, thing: str) -> list[Finding]:
+def _pulses(drive: StepperJoint, driver: Driver, tick_hz: int, subject: str) -> list[Finding]:
     """Checks that the device's tick and the driver's inputs support the joint's highest step rate."""
     try:
         rate = float(speed_limits(drive).step_rate)
@@ -136,9 +136,9 @@ def _pulses(drive: StepperJoint, driver: Driver, tick_hz: int, thing: str) -> li
             f"high and {driver.step_low_us:g} us low: {fastest:.0f} steps/s at a tick of {tick:g} us"
         )
         findings.append(
-            error(ROBOT_FILE, thing, message, "a lower max_speed_rpm, fewer microsteps or a higher tick_hz")
+            error(ROBOT_FILE, subject, message, "a lower max_speed_rpm, fewer microsteps or a higher tick_hz")
         )
     elif rate > 0.8 * fastest:
         message = f"{rate:.0f} steps/s is {100 * rate / fastest:.0f} % of the {fastest:.0f} that are possible"
-        findings.append(warning(ROBOT_FILE, thing, message, "leave some room for jitter"))
+        findings.append(warning(ROBOT_FILE, subject, message, "leave some room for jitter"))
     return findings

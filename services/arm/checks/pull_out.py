@@ -18,9 +18,9 @@ def check_pull_out(robot: RobotFile) -> list[Finding]:
     for drive in robot.joint:
         curve = drive.motor.pull_out
         if curve is not None:
-            thing = f'joint "{drive.name}"'
-            wrong = _shape(curve, thing)
-            findings += wrong or _demand(drive, curve, thing)
+            subject = f'joint "{drive.name}"'
+            wrong = _shape(curve, subject)
+            findings += wrong or _demand(drive, curve, subject)
     return findings
 
 
@@ -35,18 +35,18 @@ def torque_at(curve: PullOut, rate: float) -> float:
     return 0.0
 
 
-def _shape(curve: PullOut, thing: str) -> list[Finding]:
+def _shape(curve: PullOut, subject: str) -> list[Finding]:
     if not curve.speed or len(curve.speed) != len(curve.torque):
         message = f"pull_out has {len(curve.speed)} speeds and {len(curve.torque)} torques"
-        return [error(ROBOT_FILE, thing, message, "one torque for each speed")]
+        return [error(ROBOT_FILE, subject, message, "one torque for each speed")]
     for slower, faster in pairwise(curve.speed):
         if faster <= slower:
             message = f"pull_out.speed falls from {slower:g} to {faster:g} steps/s"
-            return [error(ROBOT_FILE, thing, message, "write the speeds in rising order")]
+            return [error(ROBOT_FILE, subject, message, "write the speeds in rising order")]
     return []
 
 
-def _demand(drive: StepperJoint, curve: PullOut, thing: str) -> list[Finding]:
+def _demand(drive: StepperJoint, curve: PullOut, subject: str) -> list[Finding]:
     """The torque at full speed while still accelerating, as the end of a ramp is."""
     try:
         speed = speed_limits(drive)
@@ -61,4 +61,4 @@ def _demand(drive: StepperJoint, curve: PullOut, thing: str) -> list[Finding]:
         f"at {drive.max_speed_rpm:g} RPM its motor gives {given:.3g} N m at {float(speed.step_rate):.0f} steps/s, "
         f"but needs {needed:.3g} N m: it will lose steps"
     )
-    return [warning(ROBOT_FILE, thing, message, "a lower max_speed_rpm or a longer ramp_time")]
+    return [warning(ROBOT_FILE, subject, message, "a lower max_speed_rpm or a longer ramp_time")]

@@ -32,35 +32,35 @@ def check_srdf(srdf: SrdfModel, robot: RobotFile, model: UrdfModel) -> list[Find
 
 
 def _group(group: Group, file: str, model: UrdfModel) -> list[Finding]:
-    thing = f'group "{group.name}"'
-    findings = _missing(file, thing, "joint", group.joints, model.joint_names)
-    findings += _missing(file, thing, "link", group.links, model.link_names)
+    subject = f'group "{group.name}"'
+    findings = _missing(file, subject, "joint", group.joints, model.joint_names)
+    findings += _missing(file, subject, "link", group.links, model.link_names)
     for chain in group.chains:
-        findings += _missing(file, thing, "link", chain, model.link_names)
+        findings += _missing(file, subject, "link", chain, model.link_names)
     return findings
 
 
 def _state(state: NamedState, file: str, robot: RobotFile, model: UrdfModel) -> list[Finding]:
-    thing = f'state "{state.name}"'
-    findings = _missing(file, thing, "joint", state.values, model.joint_names)
+    subject = f'state "{state.name}"'
+    findings = _missing(file, subject, "joint", state.values, model.joint_names)
     if state.group == robot.group:
         for drive in robot.joint:
             if drive.name not in state.values:
-                findings.append(error(file, thing, f"has no value for {drive.name}", "a state names every joint"))
+                findings.append(error(file, subject, f"has no value for {drive.name}", "a state names every joint"))
     for name, value in state.values.items():
         limit = model.joint(name).limit if name in model.joint_names else None
         if limit is not None and limit.lower < limit.upper and not limit.lower <= value <= limit.upper:
             message = f"{name} = {value:g} is outside {limit.lower:g} to {limit.upper:g}"
             findings.append(
-                error(file, thing, message, f"the nearest is {min(max(value, limit.lower), limit.upper):g}")
+                error(file, subject, message, f"the nearest is {min(max(value, limit.lower), limit.upper):g}")
             )
     return findings
 
 
-def _missing(file: str, thing: str, kind: str, names: Iterable[str], known: Iterable[str]) -> list[Finding]:
+def _missing(file: str, subject: str, kind: str, names: Iterable[str], known: Iterable[str]) -> list[Finding]:
     there = list(known)
     return [
-        error(file, thing, f'{kind} "{name}" does not exist{suggestion(name, there)}')
+        error(file, subject, f'{kind} "{name}" does not exist{suggestion(name, there)}')
         for name in names
         if name not in there
     ]

@@ -73,32 +73,32 @@ def _references(joint: UrdfJoint, model: UrdfModel, file: str) -> list[Finding]:
 
 
 def _link(link: UrdfLink, path: Path) -> list[Finding]:
-    thing = f'link "{link.name}"'
-    findings = [] if link.inertial is None else _inertial(link.inertial, thing, path.name)
+    subject = f'link "{link.name}"'
+    findings = [] if link.inertial is None else _inertial(link.inertial, subject, path.name)
     for role, shapes in (("visual", link.visuals), ("collision", link.collisions)):
         for geometry in shapes:
-            findings += _geometry(geometry, role, thing, path)
+            findings += _geometry(geometry, role, subject, path)
     if link.visuals and not link.collisions:
         message = "can be seen but not touched: it has no <collision>"
-        findings.append(warning(path.name, thing, message, COLLISION_REMEDY))
+        findings.append(warning(path.name, subject, message, COLLISION_REMEDY))
     return findings
 
 
-def _geometry(geometry: Geometry, role: str, thing: str, path: Path) -> list[Finding]:
+def _geometry(geometry: Geometry, role: str, subject: str, path: Path) -> list[Finding]:
     if geometry.shape not in SHAPES:
         remedy = "write <cylinder>" if geometry.shape == "capsule" else f"use {', '.join(SHAPES)}"
-        return [error(path.name, thing, f"<{geometry.shape}> in <{role}> is not URDF and would be ignored", remedy)]
+        return [error(path.name, subject, f"<{geometry.shape}> in <{role}> is not URDF and would be ignored", remedy)]
     if geometry.mesh is None:
         return []
     if geometry.mesh.startswith("package://"):
-        return [_package(geometry.mesh, thing, path)]
+        return [_package(geometry.mesh, subject, path)]
     if not (path.parent / geometry.mesh.removeprefix("file://")).is_file():
         near = suggestion(geometry.mesh, [str(p.relative_to(path.parent)) for p in path.parent.glob("**/*.*")])
-        return [error(path.name, thing, f'mesh "{geometry.mesh}" is not there{near}', "put the file there")]
+        return [error(path.name, subject, f'mesh "{geometry.mesh}" is not there{near}', "put the file there")]
     return []
 
 
-def _package(reference: str, thing: str, path: Path) -> Finding:
+def _package(reference: str, subject: str, path: Path) -> Finding:
     """A package:// path means nothing without ROS: say where the file is, if it is in this folder."""
     name = reference.rsplit("/", 1)[-1]
     found = sorted(path.parent.rglob(name))
@@ -107,43 +107,43 @@ def _package(reference: str, thing: str, path: Path) -> Finding:
         if found
         else f"put {name} into this folder and write its path relative to {path.name}"
     )
-    return error(path.name, thing, f'mesh "{reference}" is a ROS package path', remedy)
+    return error(path.name, subject, f'mesh "{reference}" is a ROS package path', remedy)
 
 
 def _limits(joint: UrdfJoint, file: str) -> list[Finding]:
-    thing, limit = f'joint "{joint.name}"', joint.limit
+    subject, limit = f'joint "{joint.name}"', joint.limit
     if limit is None:
-        return [error(file, thing, "has no <limit>", "give lower, upper, effort and velocity")]
+        return [error(file, subject, "has no <limit>", "give lower, upper, effort and velocity")]
     findings = []
     if joint.kind is not JointKind.CONTINUOUS and not limit.lower < limit.upper:
         findings.append(
-            error(file, thing, f"limits {limit.lower:g} to {limit.upper:g} leave no travel", "give lower < upper")
+            error(file, subject, f"limits {limit.lower:g} to {limit.upper:g} leave no travel", "give lower < upper")
         )
     for name, value in (("velocity", limit.velocity), ("effort", limit.effort)):
         if not value > 0.0:
-            findings.append(error(file, thing, f"its {name} limit is {value:g}", "give a value above 0"))
+            findings.append(error(file, subject, f"its {name} limit is {value:g}", "give a value above 0"))
     if limit.effort in PLACEHOLDER_EFFORTS:
         findings.append(
             warning(
-                file, thing, f"effort {limit.effort:g} looks like an exporter's placeholder", "give the motor's own"
+                file, subject, f"effort {limit.effort:g} looks like an exporter's placeholder", "give the motor's own"
             )
         )
     return findings
 
 
-def _inertial(inertial: Inertial, thing: str, file: str) -> list[Finding]:
+def _inertial(inertial: Inertial, subject: str, file: str) -> list[Finding]:
     """A real body: positive mass, positive principal moments, none above the sum of the other two."""
     if not inertial.mass > 0.0:
-        return [error(file, thing, f"its mass is {inertial.mass:g} kg", "give a mass above 0")]
+        return [error(file, subject, f"its mass is {inertial.mass:g} kg", "give a mass above 0")]
     ixx, ixy, ixz, iyy, iyz, izz = inertial.inertia
     low, middle, high = np.linalg.eigvalsh(np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])).tolist()
     if low <= 0.0:
-        return [error(file, thing, f"a principal moment of inertia is {low:.3g} kg m^2", "they are all above 0")]
+        return [error(file, subject, f"a principal moment of inertia is {low:.3g} kg m^2", "they are all above 0")]
     if low + middle < high * (1.0 - 1e-6):
         return [
             error(
                 file,
-                thing,
+                subject,
                 f"principal moments {low:.3g} + {middle:.3g} < {high:.3g} kg m^2: no body has such inertia",
                 "compute them from the shape; for a box m/12 (b^2 + c^2)",
             )

@@ -14,7 +14,6 @@ from typing import IO, TypeVar
 
 from schemas.planning import PlanPhase, PlanResponse, Timing
 from schemas.scene import PlanningScene
-from services.planner.workers.assignment import Assignment, Cancelled
 from services.planner.workers.jobs import (
     REPORTS,
     Ask,
@@ -29,6 +28,7 @@ from services.planner.workers.jobs import (
     receive,
     send,
 )
+from services.planner.workers.pending_plan import Cancelled, PendingPlan
 
 START = 60.0  # [s] in which a worker must have started, have a scene, or have imported toppra for the first time
 STOPS_WITHIN = 0.2  # [s] from a cancel to the answer of a process that lives on
@@ -77,7 +77,7 @@ class Process:
                 self._hear(Shown, START, on_tick)
                 self._told = scene
 
-    def plan(self, assignment: Assignment, job: Job, seconds: float) -> PlanResponse:
+    def plan(self, pending_plan: PendingPlan, job: Job, seconds: float) -> PlanResponse:
         """The worker's response; raises `TimeoutError` after `seconds` [s], `Cancelled` or `WorkerDied`. A process that
         did not end its job is replaced."""
         with self._replaced_where_it_fails():
@@ -85,7 +85,9 @@ class Process:
             needs_toppra = job.request.timing is Timing.TIME_OPTIMAL
             importing = START if needs_toppra and not self._has_toppra else 0.0
             try:
-                planned = self._hear(Planned, seconds + importing, lambda: self._look_after(assignment), assignment.at)
+                planned = self._hear(
+                    Planned, seconds + importing, lambda: self._look_after(pending_plan), pending_plan.at
+                )
             except Cancelled:
                 self._send(Cancel())
                 self._hear(Planned, STOPS_WITHIN)
@@ -105,8 +107,8 @@ class Process:
             with suppress(OSError):
                 _pipe(pipe).close()
 
-    def _look_after(self, assignment: Assignment) -> None:
-        assignment.require_wanted()
+    def _look_after(self, pending_plan: PendingPlan) -> None:
+        pending_plan.require_wanted()
         self._send(Ask())
 
     def _send(self, order: Order) -> None:

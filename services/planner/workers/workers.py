@@ -16,8 +16,8 @@ from schemas.joints import JointState
 from schemas.planning import PlanCancelResult, PlanCode, PlanProgress, PlanRequest, PlanResponse, Refusal
 from schemas.scene import PlanningScene
 from services.planner.core import LONGEST
-from services.planner.workers.assignment import Answer, Assignment, Cancelled
 from services.planner.workers.jobs import Job
+from services.planner.workers.pending_plan import Answer, Cancelled, PendingPlan
 from services.planner.workers.process import Process, WorkerDied
 
 MOST = 2  # processes: as many as small computers have cores for it
@@ -41,10 +41,10 @@ class Workers:
     def __init__(self, folder: Path, project: Path, present: Present, scene: Scene) -> None:
         self._folder, self._project = folder, project
         self._present, self._scene = present, scene
-        self._tasks: SimpleQueue[Assignment | None] = SimpleQueue()
+        self._tasks: SimpleQueue[PendingPlan | None] = SimpleQueue()
         self._processes: list[Process] = []
         self._threads: list[threading.Thread] = []
-        self._assignments: dict[str, Assignment] = {}
+        self._pending_plans: dict[str, PendingPlan] = {}
         self._numbers = itertools.count(1)
         self._lock = threading.Lock()
         self._start_one()
@@ -60,10 +60,12 @@ class Workers:
             request_id = request.request_id or f"planner-{next(self._numbers)}"
             objection = self._objection(request_id)
             if objection is None:
-                assignment = Assignment(request_id, request, lambda response: self._end(request_id, response, answer))
-                self._assignments[request_id] = assignment
-                self._tasks.put(assignment)
-                if len(self._assignments) > len(self._processes) < MOST:
+                pending_plan = PendingPlan(
+                    request_id, request, lambda response: self._end(request_id, response, answer)
+                )
+                self._pending_plans[request_id] = pending_plan
+                self._tasks.put(pending_plan)
+                if len(self._pending_plans) > len(self._processes) < MOST:
                     self._start_one()
         if objection is not None:
             answer(PlanResponse(code=PlanCode.INVALID_GOAL_CONSTRAINTS, refusal=objection))
@@ -73,16 +75,16 @@ class Workers:
         if not request_id:
             return PlanCancelResult(message="request_id is empty: give the one that the plan was asked for with")
         with self._lock:
-            assignment = self._assignments.get(request_id)
-        if assignment is None or not assignment.cancel():
+            pending_plan = self._pending_plans.get(request_id)
+        if pending_plan is None or not pending_plan.cancel():
             return PlanCancelResult(message=f'there is no plan "{request_id}": it has ended, or never began')
-        return PlanCancelResult(found=True, message=f'the plan "{request_id}" is cancelled {assignment.words}')
+        return PlanCancelResult(found=True, message=f'the plan "{request_id}" is cancelled {pending_plan.words}')
 
     def progress(self, now: int) -> list[PlanProgress]:
         """Of every plan that is no short one; `now` [ns] UNIX."""
         with self._lock:
-            assignments = list(self._assignments.values())
-        return [assignment.progress(now) for assignment in assignments if assignment.elapsed > SHORT]
+            pending_plans = list(self._pending_plans.values())
+        return [pending_plan.progress(now) for pending_plan in pending_plans if pending_plan.elapsed > SHORT]
 
     def close(self) -> None:
         """Ends every process, in the midst of a plan too."""
@@ -93,20 +95,20 @@ class Workers:
             thread.join(PATIENCE)
 
     def _objection(self, request_id: str) -> Refusal | None:
-        if len(self._assignments) >= MOST_PLANS:
+        if len(self._pending_plans) >= MOST_PLANS:
             return _refused(
                 "plan", f"{MOST_PLANS} plans are waiting already", "plan again when some of them have ended"
             )
         remedy = "choose another request_id, or leave it empty"
         if len(request_id) > LONGEST_ID:
             return _refused("request_id", f"request_id has {len(request_id)} characters: at most {LONGEST_ID}", remedy)
-        if request_id in self._assignments:
+        if request_id in self._pending_plans:
             return _refused("request_id", f'a plan "{request_id}" is being made already', remedy)
         return None
 
     def _end(self, request_id: str, response: PlanResponse, answer: Answer) -> None:
         with self._lock:
-            del self._assignments[request_id]
+            del self._pending_plans[request_id]
         answer(response)
 
     def _start_one(self) -> None:
@@ -124,13 +126,13 @@ class Workers:
                 self._prepare(process, scene)
                 prepared = scene
             try:
-                assignment = self._tasks.get(timeout=LOOK)
+                pending_plan = self._tasks.get(timeout=LOOK)
             except Empty:
                 continue
-            if assignment is None:
+            if pending_plan is None:
                 break
-            if assignment.begin():
-                assignment.end(self._planned(process, assignment))
+            if pending_plan.begin():
+                pending_plan.end(self._planned(process, pending_plan))
                 prepared = None
         process.close()
 
@@ -140,23 +142,23 @@ class Workers:
             process.be_ready()
             process.show(scene)
 
-    def _planned(self, process: Process, assignment: Assignment) -> PlanResponse | None:
+    def _planned(self, process: Process, pending_plan: PendingPlan) -> PlanResponse | None:
         """A plan in the scene as it is at the plan's end; None for one that was cancelled."""
-        request, deaths = assignment.request, 0
+        request, deaths = pending_plan.request, 0
         for _ in range(AGAIN):
             began: float | None = None  # [s] monotonic
             try:
-                process.be_ready(assignment.require_wanted)
+                process.be_ready(pending_plan.require_wanted)
                 scene = self._scene()
-                process.show(scene, assignment.require_wanted)
+                process.show(scene, pending_plan.require_wanted)
                 present, age = self._present()
                 job = Job(request=request, present=present, age=age)
                 began = time.monotonic()
-                response = process.plan(assignment, job, min(max(0.0, request.allowed_time), LONGEST) + GRACE)
+                response = process.plan(pending_plan, job, min(max(0.0, request.allowed_time), LONGEST) + GRACE)
             except Cancelled:
                 return None
             except TimeoutError:
-                return self._late(assignment)
+                return self._late(pending_plan)
             except WorkerDied as error:
                 deaths += 1
                 request = _with_what_is_left(request, began)
@@ -167,15 +169,15 @@ class Workers:
                 return response
         return _failed("the scene changes faster than a plan can be made in it", "plan again when it stays as it is")
 
-    def _late(self, assignment: Assignment) -> PlanResponse:
+    def _late(self, pending_plan: PendingPlan) -> PlanResponse:
         """It was stopped, for it did not stop by itself."""
-        allowed = assignment.request.allowed_time
+        allowed = pending_plan.request.allowed_time
         refusal = Refusal(
             check="allowed time",
             subject="allowed_time",
-            value=assignment.elapsed,
+            value=pending_plan.elapsed,
             limit=allowed,
-            message=f"the plan was stopped {assignment.words}: {allowed:g} s were allowed",
+            message=f"the plan was stopped {pending_plan.words}: {allowed:g} s were allowed",
             remedy="allow more time, a larger scaling, or a goal nearer to where the arm is",
         )
         scene = self._scene()

@@ -24,7 +24,7 @@ class Cancelled(Exception):
     """The plan is wanted no more."""
 
 
-class Assignment:
+class PendingPlan:
     """Answers exactly once; everything here may be called from any thread."""
 
     def __init__(self, request_id: str, request: PlanRequest, answer: Answer) -> None:
