@@ -21,6 +21,7 @@ from services.arm.model.description import Arm as Description
 PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
 ANSWER = 3.0  # [s] of jogging without a word of the planner, after which it counts as lost
 PAUSE = 0.5  # [s] without a command, after which the next one begins a new jog
+SILENT = "the planner does not answer to jogging: is it running? `gemelo node list`"
 REST = 5.0  # [s] that the arm may take to come to rest
 FASTEST = 1.0  # [m/s] of the tool of a desktop arm
 FASTEST_TURN = math.pi  # [rad/s] of its tool
@@ -44,7 +45,7 @@ class Jogging:
         node.publisher(JOG).put(replace(command, stamp=node.now()))
         heard = newest.message if newest.age() < now - self._began else None
         if heard is None and now - self._began > ANSWER:
-            raise Lost("the planner does not answer to jogging: is it running? `gemelo node list`")
+            raise Lost(SILENT)
         if heard is not None and not heard.active and heard.limited_by and now - self._began > PERIOD:
             raise Refused(f"refused: {heard.limited_by}", check="jog", reason=heard.limited_by)
         return heard
@@ -79,7 +80,8 @@ class Jogging:
             return status is not None and not status.active
 
         if not self._session.wait_for(is_at_rest, REST) or newest.message is None:
-            raise Lost(f"the planner does not say within {REST:g} s that the jog has ended")
+            is_silent = newest.age() > time.monotonic() - began
+            raise Lost(SILENT if is_silent else f"the planner does not say within {REST:g} s that the jog has ended")
         self._session.changed()
         if newest.message.limited_by and not newest.message.limits:
             raise Refused(f"refused: {newest.message.limited_by}", check="jog", reason=newest.message.limited_by)

@@ -178,9 +178,10 @@ def test_a_refusal_is_the_sentence_of_the_planner(connected, gateway, jogger):
         jog_for(connected, TURN, 5.0)
 
 
-def test_without_a_planner_it_ends_with_the_remedy(connected, gateway):
+@pytest.mark.parametrize("seconds", [5.0, 0.1])
+def test_without_a_planner_it_ends_with_the_remedy(connected, gateway, seconds):
     with pytest.raises(CommandError, match="the planner does not answer") as silent, reported(load_robot()):
-        jog_for(connected, TURN, 5.0)
+        jog_for(connected, TURN, seconds)
     assert silent.value.code is ExitCode.NO_STACK
 
 
