@@ -8,7 +8,10 @@ from typing import cast
 
 from msgspec.structs import asdict, replace
 
-from gemelo.arguments import Joints, Target, ToolGoal, Waypoint
+from gemelo.arguments import Joints as Joints
+from gemelo.arguments import Target as Target
+from gemelo.arguments import ToolGoal
+from gemelo.arguments import Waypoint as Waypoint
 from gemelo.errors import BadArgument
 from gemelo.units import Pose
 from schemas.joints import JointState
