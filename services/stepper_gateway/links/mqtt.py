@@ -12,9 +12,10 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterable
+from functools import partial
 
 from paho.mqtt import client as paho
-from paho.mqtt.enums import CallbackAPIVersion
+from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
 
 from services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
 from services.stepper_gateway.links.link import FROM_DEVICE, Kind, Received
@@ -26,6 +27,34 @@ CONNECT_TIMEOUT = 2.0  # [s]
 KEEP_ALIVE = 5  # [s]
 
 
+class DirectClient(paho.Client):
+    """A client whose caller writes to the socket itself, before paho's thread would.
+
+    paho's thread has to be woken and to wait for its turn among the threads of the process: in a flood tens of
+    milliseconds. It still writes what the socket did not take at once, and handles every error.
+    """
+
+    def __init__(self, client_id: str) -> None:
+        super().__init__(
+            CallbackAPIVersion.VERSION2,
+            client_id=client_id,
+            clean_session=True,
+            protocol=paho.MQTTv311,
+            reconnect_on_failure=False,
+        )
+        self._writing = threading.RLock()  # two that write parts of frames would mix them
+
+    def write_now(self) -> None:
+        """Writes what is queued, as far as the socket takes it without blocking; from any thread."""
+        with self._writing:
+            self._packet_write()
+
+    def loop_write(self) -> MQTTErrorCode:
+        """As paho's; its thread calls it."""
+        with self._writing:
+            return super().loop_write()
+
+
 class MqttLink:
     """A link to one device through one broker; connects and reconnects in a thread of its own."""
 
@@ -34,7 +63,7 @@ class MqttLink:
         self._prefix = f"{PREFIX}/{device}/"
         self._wake = wake
         self._inbox = ReceiveQueue(wake)
-        self._client: paho.Client | None = None
+        self._client: DirectClient | None = None
         self._reason = f"no connection yet to the MQTT broker at {host}:{port}"
         self._lost = threading.Event()
         self._stop = threading.Event()
@@ -58,7 +87,9 @@ class MqttLink:
             return False
         # The newest configuration replaces what any gateway before us has left at the broker.
         retain = kind is Kind.CONFIG
-        return client.publish(self._prefix + kind, payload, _qos(kind), retain).rc == paho.MQTT_ERR_SUCCESS
+        queued = client.publish(self._prefix + kind, payload, _qos(kind), retain)
+        client.write_now()
+        return queued.rc == paho.MQTT_ERR_SUCCESS
 
     def take(self, most: int) -> list[Received]:
         return self._inbox.take(most)
@@ -88,19 +119,13 @@ class MqttLink:
         self._client = None  # a late answer of the broker may have set it once more
         return was_connected
 
-    def _new_client(self) -> paho.Client:
-        client = paho.Client(
-            CallbackAPIVersion.VERSION2,
-            client_id=f"gemelo-gateway-{secrets.token_hex(6)}",
-            clean_session=True,
-            protocol=paho.MQTTv311,
-            reconnect_on_failure=False,
-        )
+    def _new_client(self) -> DirectClient:
+        client = DirectClient(f"gemelo-gateway-{secrets.token_hex(6)}")
         client.connect_timeout = CONNECT_TIMEOUT
         client.max_inflight_messages_set(0)  # no limit: a stop must not wait until a broker has acknowledged others
         client.on_socket_open = _send_at_once
         client.on_connect = self._on_connect
-        client.on_subscribe = self._on_subscribe
+        client.on_subscribe = partial(self._on_subscribe, client)
         client.on_disconnect = self._on_disconnect
         client.on_message = self._on_message
         return client
@@ -112,13 +137,13 @@ class MqttLink:
         client.subscribe([(self._prefix + kind, _qos(kind)) for kind in FROM_DEVICE])
 
     def _on_subscribe(
-        self, client: paho.Client, _data: object, _id: int, reasons: Iterable[object], _props: object
+        self, subscribed: DirectClient, _client: object, _data: object, _id: int, reasons: Iterable[object], _p: object
     ) -> None:
         """Only now nothing that the device answers can be missed."""
         if any(getattr(reason, "is_failure", False) for reason in reasons):
             self._lose(f"the MQTT broker at {self._address[0]}:{self._address[1]} lets us hear nothing: see its ACL")
             return
-        self._client = client
+        self._client = subscribed
         self._wake()
 
     def _on_disconnect(
