@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,6 +18,9 @@ from services.runtime.process.readiness import Readiness
 from services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
 
 BEAT = 1.0  # [s]
+# Zenoh's own threads of the router, 2 without this. One that brings an answer to a client that does not read waits for
+# up to LONGEST_BLOCK_US, and with it every link that the same thread serves: chosen as one for each process and script.
+RECEIVING_THREADS = 16
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -27,6 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     log = line_logger("router", options.log_level)
     stop = ShutdownRequest()
+    os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {RECEIVING_THREADS}))")
     try:
         deployment = load_deployment(options.config)
         section = deployment.router
