@@ -31,6 +31,7 @@ from services.runtime.process.logs import BusHandler, line_logger
 from services.runtime.process.readiness import Readiness
 from services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
 from services.runtime.requests import client as requests
+from services.runtime.requests.limits import RequestRates
 from services.runtime.requests.server import Pending, RequestServer, UrgentServer
 from services.runtime.topics import Latest, Publisher, Subscription
 
@@ -72,6 +73,7 @@ class Node:
         self._worker = Worker()
         self._readiness: Readiness | None = None
         self._endpoints = NodeEndpoints()
+        self._rates = RequestRates()
         from_file = self.deployment.parameters.get(name, {})
         self._parameters = ParameterRegistry(name, from_file, overrides or {}, self.log)
         self._is_closed = False
@@ -269,11 +271,12 @@ class Node:
         self, request: Request[Q, R], handler: Callable[[Q, Pending[R]], None], worker: bool = False
     ) -> RequestServer[Q, R]:
         server: RequestServer[Q, R]
+        warn, rates = self.log.warning, self._rates
         if request.urgent:
-            server = UrgentServer(self._bus, self._loop.tasks.put_first, request, handler, self.log.warning)
+            server = UrgentServer(self._bus, self._loop.tasks.put_first, request, handler, warn, rates)
         else:
             put = self._worker.put if worker else self._loop.tasks.put
-            server = RequestServer(self._bus, put, request, handler, self.log.warning)
+            server = RequestServer(self._bus, put, request, handler, warn, rates)
         self._endpoints.servers.append(server)
         return server
 

@@ -139,6 +139,29 @@ def test_a_request_without_an_answer_ends_in_time(buses: Buses) -> None:
     assert ask(client, "nobody", b"") is None
 
 
+def test_a_dropped_request_ends_at_once_without_an_answer(buses: Buses) -> None:
+    buses.open().serve("plan", lambda query: query.drop())
+    client = buses.open()
+    assert client.wait_served("plan", 1.0)
+    begin = time.monotonic()
+    assert ask(client, "plan", b"x", timeout=10.0) is None
+    assert time.monotonic() - begin < 5.0
+
+
+def test_who_asks_is_known_before_what(buses: Buses) -> None:
+    """Limits look at the client of a query only: no schema and no payload has been read by then."""
+    kept: list[Query] = []
+    buses.open().serve("plan", kept.append)
+    one, other = buses.open(), buses.open()
+    for client in (one, one, other):
+        assert client.wait_served("plan", 1.0)
+        count = len(kept)
+        client.ask("plan", "Question", b"x", 5.0, lambda answer: None)
+        assert until(lambda count=count: len(kept) == count + 1)
+    first, second, third = (query.client for query in kept)
+    assert first == second != third
+
+
 def test_wait_served_wakes_when_a_server_comes_and_knows_when_it_is_gone(buses: Buses) -> None:
     client, server = buses.open(), buses.open()
     threading.Timer(0.2, server.serve, ("plan", lambda query: query.reply("BusReply", b""))).start()

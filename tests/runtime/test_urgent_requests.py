@@ -15,8 +15,11 @@ from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
 from services.runtime.actions import keys as keys
 from services.runtime.actions.server import accept
 from services.runtime.bus.interface import Bus, BusReply
-from services.runtime.requests.server import MAX_UNANSWERED, MAX_WAITING, MAX_WAITING_OF_A_CLIENT, Pending
+from services.runtime.requests.limits import MAX_WAITING_OF_A_CLIENT
+from services.runtime.requests.server import MAX_UNANSWERED, Pending
 from tests.runtime.support import Buses, hear, spinning, until
+
+FLOOD = 800  # requests at once: within a client's burst, above what may wait
 
 Answers = list[BusReply | None]
 
@@ -102,9 +105,9 @@ def test_the_flood_of_one_client_leaves_room_for_another(buses: Buses) -> None:
     assert flooder.wait_served(PLAN.key, 1.0)
     assert client.wait_served(PLAN.key, 1.0)
     flood: Answers = []
-    for _ in range(MAX_WAITING):
+    for _ in range(FLOOD):
         ask(flooder, PLAN.key, PlanRequest(), flood)
-    assert until(lambda: len(flood) == MAX_WAITING - MAX_WAITING_OF_A_CLIENT)
+    assert until(lambda: len(flood) == FLOOD - MAX_WAITING_OF_A_CLIENT)
     assert "requests are waiting already, all of this client" in words(flood[0])
     answers: Answers = []
     ask(client, PLAN.key, PlanRequest(), answers)

@@ -35,10 +35,12 @@ class BusReply:
 
 
 class Query(Protocol):
-    """A request that waits for exactly one of `reply` and `fail`, from any thread."""
+    """A request that waits for exactly one of `reply`, `fail` and `drop`, from any thread."""
 
     @property
-    def arrival(self) -> Arrival: ...
+    def arrival(self) -> Arrival:
+        """Read from the wire when it is first asked for."""
+        ...
 
     @property
     def client(self) -> str:
@@ -48,6 +50,10 @@ class Query(Protocol):
     def reply(self, schema: str, payload: bytes) -> None: ...
 
     def fail(self, schema: str, payload: bytes) -> None: ...
+
+    def drop(self) -> None:
+        """Ends it at once without an answer, which is the cheapest end."""
+        ...
 
 
 class Declaration(Protocol):
@@ -92,8 +98,8 @@ class Bus(Protocol):
         """
         ...
 
-    def serve(self, key: str, on_query: Callable[[Query], None]) -> Declaration:
-        """Requests under `key` come to `on_query`."""
+    def serve(self, key: str, on_query: Callable[[Query], None], urgent: bool = False) -> Declaration:
+        """Requests under `key` come to `on_query`; of those that wait for it the oldest may be lost if not `urgent`."""
         ...
 
     def wait_served(self, key: str, timeout: float) -> bool:

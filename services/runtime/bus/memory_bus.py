@@ -57,7 +57,7 @@ class MemoryBus:
         self._declared.append(subscription)
         return subscription
 
-    def serve(self, key: str, on_query: Callable[[Query], None]) -> MemoryQueryable:
+    def serve(self, key: str, on_query: Callable[[Query], None], urgent: bool = False) -> MemoryQueryable:
         service = MemoryQueryable(self, key, on_query)
         with self.network.served:
             self.network.services[key] = service

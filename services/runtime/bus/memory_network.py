@@ -135,6 +135,9 @@ class MemoryQuery:
     def fail(self, schema: str, payload: bytes) -> None:
         self._finish(BusReply(False, schema, payload))
 
+    def drop(self) -> None:
+        self._finish(None)
+
     def _finish(self, answer: BusReply | None) -> None:
         with self._lock:
             was_open, self._is_open = self._is_open, False

@@ -22,7 +22,7 @@ from services.runtime.bus.zenoh_declarations import (
     ServerMonitor,
     ZenohDeclaration,
     ZenohPublication,
-    ZenohQuery,
+    ZenohQueryable,
     close_at_exit,
     encoding_of,
     forget,
@@ -55,6 +55,7 @@ class ZenohBus:
         self._name = str(self._session.zid()).encode()
         self._disconnected_since: float | None = None  # [s] monotonic
         self._tokens: list[ZenohDeclaration] = []
+        self._queryables: list[ZenohQueryable] = []
         self._monitors: dict[str, ServerMonitor] = {}
         self._lock = threading.Lock()
         close_at_exit(self)
@@ -123,10 +124,10 @@ class ZenohBus:
         misses = subscriber.sample_miss_listener(lambda miss: on_miss(0 if latched else miss.nb))
         return ZenohDeclaration(misses, subscriber)
 
-    def serve(self, key: str, on_query: Callable[[Query], None]) -> ZenohDeclaration:
-        return ZenohDeclaration(
-            self._session.declare_queryable(key, lambda query: on_query(ZenohQuery(query, key)), complete=True)
-        )
+    def serve(self, key: str, on_query: Callable[[Query], None], urgent: bool = False) -> ZenohQueryable:
+        queryable = ZenohQueryable(self._session, key, on_query, urgent)
+        self._queryables.append(queryable)
+        return queryable
 
     def wait_served(self, key: str, timeout: float) -> bool:
         """True if a node serves `key`; waits up to `timeout` [s] for it."""
@@ -160,7 +161,8 @@ class ZenohBus:
 
         self._session.get(
             key,
-            Callback(on_reply, on_end),
+            # Direct: else Zenoh starts a thread for each request, which costs ten times as much as the request itself.
+            Callback(on_reply, on_end, indirect=False),
             payload=payload,
             encoding=encoding_of(schema),
             timeout=timeout,
@@ -191,6 +193,9 @@ class ZenohBus:
         closing = threading.Thread(target=self._session.close, daemon=True, name="close")
         closing.start()
         closing.join(CLOSE_TIMEOUT)
+        end = time.monotonic() + CLOSE_TIMEOUT
+        for queryable in self._queryables:
+            queryable.join(max(0.0, end - time.monotonic()))
 
 
 def router_answers(host: str, port: int, timeout: float = 0.5) -> bool:

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import threading
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cached_property
 from typing import Any, Protocol
 
 import zenoh
+from zenoh.handlers import FifoChannel, Handler, RingChannel
 
 from services.runtime.bus.interface import ENCODING, Arrival
 
 MAX_CLIENT_NAME = 32  # [bytes] of what a client says of itself
+QUERIES = 1024  # of one key that wait for Python; chosen: a client's burst (requests/limits.py) fits
 
 
 class ZenohPublication:
@@ -41,17 +47,61 @@ class ZenohQuery:
     """A query that is finalised by its one reply."""
 
     def __init__(self, query: zenoh.Query, key: str) -> None:
-        self._query = query
-        self.arrival = Arrival(key, schema_in(query.encoding), bytes(query.payload or b""))
+        self._query, self._key = query, key
         self.client = bytes(query.attachment or b"")[:MAX_CLIENT_NAME].hex()
+
+    @cached_property
+    def arrival(self) -> Arrival:
+        return Arrival(self._key, schema_in(self._query.encoding), bytes(self._query.payload or b""))
 
     def reply(self, schema: str, payload: bytes) -> None:
         with self._query as query:
-            query.reply(self.arrival.key, payload, encoding=encoding_of(schema))
+            query.reply(self._key, payload, encoding=encoding_of(schema))
 
     def fail(self, schema: str, payload: bytes) -> None:
         with self._query as query:
             query.reply_err(payload, encoding=encoding_of(schema))
+
+    def drop(self) -> None:
+        with self._query:
+            pass
+
+
+class ZenohQueryable:
+    """Hands the queries of one key to `on_query` in a thread of its own.
+
+    Zenoh's thread, which brings the queries of all keys, only puts them into a channel: it never waits for Python, so
+    that a flood of one key does not delay the others. Of a full channel the oldest query is lost, unless it is urgent.
+    """
+
+    def __init__(self, session: zenoh.Session, key: str, on_query: Callable[[ZenohQuery], None], urgent: bool) -> None:
+        self._key, self._on_query = key, on_query
+        channel: Any = FifoChannel(QUERIES) if urgent else RingChannel(QUERIES)
+        self._queryable: Any = session.declare_queryable(key, channel, complete=True)
+        self._thread = threading.Thread(target=self._run, args=(self._queryable.handler,), daemon=True, name=key)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._queryable.undeclare()
+
+    def join(self, timeout: float) -> None:
+        """Waits up to `timeout` [s] for the end of the thread: one that outlives the interpreter would abort it."""
+        if self._thread is not threading.current_thread():
+            self._thread.join(timeout)
+
+    def _run(self, queries: Handler[zenoh.Query]) -> None:
+        with suppress(zenoh.ZError):  # the channel is closed
+            while True:
+                query: zenoh.Query | None = queries.recv()
+                while query is not None:
+                    self._hand_over(query)
+                    query = queries.try_recv()
+
+    def _hand_over(self, query: zenoh.Query) -> None:
+        try:
+            self._on_query(ZenohQuery(query, self._key))
+        except Exception:
+            traceback.print_exc()
 
 
 class ServerMonitor:

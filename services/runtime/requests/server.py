@@ -6,26 +6,23 @@ import math
 import threading
 import time
 import traceback
-from collections import Counter
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
 from schemas.message import BadMessage, Message
 from schemas.system import Failure, TopicStatistics
 from schemas.topics import Request
-from services.runtime.bus.interface import Bus, Query
+from services.runtime.bus.interface import Arrival, Bus, Query
 from services.runtime.bus.wire import from_arrival, schema_of, to_payload
 from services.runtime.errors import Refused
 from services.runtime.loop.task_queue import Task
+from services.runtime.requests.limits import OF_A_CLIENT, RequestRates, WaitingRequests
 from services.runtime.topics import Warn
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
 R_contra = TypeVar("R_contra", bound=Message, contravariant=True)
 
-# Chosen: a script waits for its answers, so few clients ever have more than one request here.
-MAX_WAITING_OF_A_CLIENT = 64  # requests of one client that wait in one server; more are refused
-MAX_WAITING = 1024  # requests of all clients that wait in one server; more are refused
 MAX_UNANSWERED = 1024  # callers of one urgent server that are answered together; the rest hears so at once
 
 
@@ -82,31 +79,6 @@ class PendingGroup(Generic[R]):
         return queries
 
 
-class WaitingRequests:
-    """Counts the waiting requests per client and limits them, so that one client cannot block the others."""
-
-    def __init__(self, key: str) -> None:
-        self._key = key
-        self._of: Counter[str] = Counter()
-        self._lock = threading.Lock()
-
-    def refusal(self, client: str) -> str:
-        """Counts one more request of `client`; returns the reason if its limit is reached, else an empty text."""
-        with self._lock:
-            if self._of[client] >= MAX_WAITING_OF_A_CLIENT:
-                return f"{self._key}: {MAX_WAITING_OF_A_CLIENT} requests are waiting already, all of this client"
-            if self._of.total() >= MAX_WAITING:
-                return f"{self._key}: {MAX_WAITING} requests are waiting already"
-            self._of[client] += 1
-            return ""
-
-    def leave(self, client: str) -> None:
-        with self._lock:
-            self._of[client] -= 1
-            if self._of[client] <= 0:
-                del self._of[client]
-
-
 class RequestServer(Generic[Q, R]):
     """Answers the requests of one key in order; `handler` may keep the `Pending` and answer later."""
 
@@ -117,18 +89,21 @@ class RequestServer(Generic[Q, R]):
         request: Request[Q, R],
         handler: Callable[[Q, Pending[R]], None],
         warn: Warn,
+        rates: RequestRates,
     ) -> None:
+        """`rates` are those of the node, which all its servers share."""
         self.request = request
         self._put = put
-        self._handler, self._warn = handler, warn
-        self._received, self._refused, self._bad = 0, 0, 0
+        self._handler, self._warn, self._rates = handler, warn, rates
+        self._received, self._refused, self._dropped, self._bad = 0, 0, 0, 0
         self._waiting = WaitingRequests(request.key)
         self._void_before, self._void_reason = -math.inf, ""  # [s] monotonic
-        self._declaration = bus.serve(request.key, self._on_query)
+        self._declaration = bus.serve(request.key, self._on_query, request.urgent)
 
     @property
     def statistics(self) -> TopicStatistics:
-        return TopicStatistics(key=self.request.key, received=self._received, dropped=self._refused, bad=self._bad)
+        dropped = self._refused + self._dropped
+        return TopicStatistics(key=self.request.key, received=self._received, dropped=dropped, bad=self._bad)
 
     def close(self) -> None:
         self._declaration.close()
@@ -138,24 +113,39 @@ class RequestServer(Generic[Q, R]):
         self._void_before, self._void_reason = time.monotonic(), reason
 
     def _on_query(self, query: Query) -> None:
-        if refusal := self._waiting.refusal(query.client):
-            self._refused += 1
-            PendingQuery[R](query).refuse("busy", refusal)
-            return
-        arrived = time.monotonic()
-        self._put(lambda: self._take(query, arrived))
+        """Nothing of a request is read before its client may ask at all."""
+        if not self._rates.permit_request(query.client):
+            self._drop(query)
+        elif refusal := self._waiting.refusal(query.client):
+            self._refuse(query, refusal)
+        else:
+            arrived = time.monotonic()
+            self._put(lambda: self._take(query, arrived))
+
+    def _drop(self, query: Query) -> None:
+        query.drop()
+        self._dropped += 1
+        if self._dropped == 1:
+            most = f"more than {OF_A_CLIENT.per_second:g} requests a second to this node"
+            self._warn(f"{self.request.key}: {most} of one client: no answer (further ones are only counted)")
+
+    def _refuse(self, query: Query, reason: str) -> None:
+        self._refused += 1
+        if self._rates.permit_refusal():
+            PendingQuery[R](query).refuse("busy", reason)
+        else:
+            query.drop()
 
     def _take(self, query: Query, arrived: float) -> None:
         self._waiting.leave(query.client)
-        pending = PendingQuery[R](query)
         if arrived <= self._void_before:
-            return pending.refuse("void", f"{self.request.key}: {self._void_reason}")
-        question = self._question(query, pending)
+            return PendingQuery[R](query).refuse("void", f"{self.request.key}: {self._void_reason}")
+        question = self._question(query)
         if question is not None:
             self._received += 1
-            self._handle(question, pending)
+            self._handle(question, PendingQuery[R](query))
 
-    def _question(self, query: Query, pending: PendingQuery[R]) -> Q | None:
+    def _question(self, query: Query) -> Q | None:
         """The decoded question; None where it cannot be decoded, after a refusal was sent."""
         try:
             return from_arrival(self.request.request, query.arrival)
@@ -163,7 +153,7 @@ class RequestServer(Generic[Q, R]):
             self._bad += 1
             if self._bad == 1:
                 self._warn(f"{self.request.key}: refused a bad request: {error} (further ones are only counted)")
-            pending.refuse("bad request", str(error))
+            PendingQuery[R](query).refuse("bad request", str(error))
             return None
 
     def _handle(self, question: Q, pending: Pending[R]) -> None:
@@ -180,7 +170,7 @@ class UrgentServer(RequestServer[Q, R]):
     """Answers the requests of one key before everything else that waits in the node.
 
     Requests are read where they arrive, and equal ones that wait are handled once, for all their callers: repeating
-    one costs nothing.
+    one costs nothing. All are carried out; the callers above a client's rate get no answer.
     """
 
     def __init__(
@@ -190,22 +180,27 @@ class UrgentServer(RequestServer[Q, R]):
         request: Request[Q, R],
         handler: Callable[[Q, Pending[R]], None],
         warn: Warn,
+        rates: RequestRates,
     ) -> None:
         self._groups: dict[Q, PendingGroup[R]] = {}
         self._unanswered = 0
+        self._last: tuple[Arrival, Q] | None = None  # a request that repeats it need not be decoded again
         self._lock = threading.Lock()
-        super().__init__(bus, put, request, handler, warn)
+        super().__init__(bus, put, request, handler, warn, rates)
 
     def _on_query(self, query: Query) -> None:
-        question = self._question(query, PendingQuery[R](query))
+        arrival = query.arrival
+        question = self._last[1] if self._last and self._last[0] == arrival else self._question(query)
         if question is None:
             return
-        refusal = self._join(question, query)
-        if refusal:
-            self._refused += 1
-            PendingQuery[R](query).refuse("busy", refusal)
+        self._last = (arrival, question)
+        is_answered = self._rates.permit_request(query.client)
+        if refusal := self._join(question, query, is_answered):
+            self._refuse(query, refusal)
+        elif not is_answered:
+            self._drop(query)
 
-    def _join(self, question: Q, query: Query) -> str:
+    def _join(self, question: Q, query: Query, is_answered: bool) -> str:
         """Queues `question`; returns the reason where its caller cannot be answered with the others."""
         with self._lock:
             group = self._groups.get(question)
@@ -215,6 +210,8 @@ class UrgentServer(RequestServer[Q, R]):
                 group = self._groups[question] = PendingGroup(self._answered)
                 self._put(lambda: self._take_group(question, query.client))
             self._received += 1
+            if not is_answered:
+                return ""
             if self._unanswered >= MAX_UNANSWERED:
                 return f"{self.request.key}: taken; {MAX_UNANSWERED} callers wait for its answer already"
             self._unanswered += 1

@@ -1,0 +1,189 @@
+"""What a node answers of a flood, who is not touched by it, and that a stop is carried out all the same."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
+from schemas.message import Message, encode
+from schemas.planning import PlanRequest, PlanResponse
+from schemas.topics import DEVICE_STOP, PLAN
+from services.runtime.bus.interface import Bus, BusReply, Query
+from services.runtime.bus.zenoh_bus import ZenohBus
+from services.runtime.bus.zenoh_declarations import QUERIES
+from services.runtime.errors import NoAnswer
+from services.runtime.node import Node
+from services.runtime.requests.limits import (
+    MAX_CLIENTS,
+    MAX_WAITING_OF_A_CLIENT,
+    OF_A_CLIENT,
+    OF_REFUSALS,
+    Rate,
+    RequestRates,
+    TokenBucket,
+)
+from tests.runtime.support import Buses, RouterProcess, hear, spinning, until
+
+Answers = list[BusReply | None]
+
+
+@given(st.floats(0.1, OF_A_CLIENT.per_second), st.integers(1, 3000))
+def test_a_client_below_the_rate_is_never_dropped(rate: float, count: int) -> None:
+    bucket = TokenBucket(OF_A_CLIENT, 0.0)
+    assert all(bucket.take(number / rate) for number in range(count))
+
+
+@given(st.floats(1.5, 20.0), st.floats(1.0, 5.0))
+def test_of_a_flood_only_the_rate_is_taken(factor: float, seconds: float) -> None:
+    bucket, rate = TokenBucket(OF_A_CLIENT, 0.0), OF_A_CLIENT.per_second * factor
+    taken = sum(bucket.take(number / rate) for number in range(round(seconds * rate)))
+    assert taken <= OF_A_CLIENT.burst + OF_A_CLIENT.per_second * seconds + 1
+
+
+def test_clients_that_change_their_names_share_one_rate() -> None:
+    rates = RequestRates(Rate(0.0, 10))
+    for number in range(MAX_CLIENTS):
+        assert rates.permit_request(f"client {number}")
+    assert sum(rates.permit_request(f"another {number}") for number in range(100)) == 10
+    assert rates.permit_request("client 0")
+
+
+def ask(client: Bus, key: str, question: Message, answers: Answers) -> None:
+    client.ask(key, type(question).__name__, encode(question), 20.0, answers.append, key == DEVICE_STOP.key)
+
+
+def dropped(server: Node, key: str) -> int:
+    return sum(each.dropped for each in server._endpoints.statistics() if each.key == key)
+
+
+def test_a_polite_client_gets_all_its_answers(buses: Buses) -> None:
+    server, client = buses.node("planner"), buses.open()
+    server.serve(PLAN, lambda request: PlanResponse())
+    assert client.wait_served(PLAN.key, 1.0)
+    answers: Answers = []
+    with spinning(server):
+        for sent in range(50, 1001, 50):  # 500 a second are bursts of 50, ten a second
+            for _ in range(50):
+                ask(client, PLAN.key, PlanRequest(), answers)
+            assert until(lambda sent=sent: len(answers) == sent, 10.0)
+    assert all(answer is not None and answer.ok for answer in answers)
+    assert dropped(server, PLAN.key) == 0
+
+
+def limited(buses: Buses, name: str, of_a_client: Rate = OF_A_CLIENT, of_refusals: Rate = OF_REFUSALS) -> Node:
+    """A node with these limits in place of its own."""
+    node = buses.node(name)
+    node._rates = RequestRates(of_a_client, of_refusals)
+    return node
+
+
+def test_what_a_client_asks_above_its_rate_is_dropped_counted_and_said_once(
+    buses: Buses, capsys: pytest.CaptureFixture[str]
+) -> None:
+    server, flooder, client = limited(buses, "planner", Rate(0.0, 10)), buses.open(), buses.open()
+    server.serve(PLAN, lambda request: PlanResponse())
+    assert flooder.wait_served(PLAN.key, 1.0)
+    assert client.wait_served(PLAN.key, 1.0)
+    flood, answers = Answers(), Answers()
+    for _ in range(30):
+        ask(flooder, PLAN.key, PlanRequest(), flood)
+    assert until(lambda: len(flood) == 20)
+    ask(client, PLAN.key, PlanRequest(), answers)
+    with spinning(server):
+        assert until(lambda: len(flood) == 30 and len(answers) == 1)
+    assert flood[:20] == [None] * 20
+    assert all(answer is not None and answer.ok for answer in flood[20:] + answers)
+    assert dropped(server, PLAN.key) == 20
+    assert capsys.readouterr().err.count("of one client: no answer (further ones are only counted)") == 1
+
+
+def test_a_caller_above_the_rate_hears_that_there_is_no_answer(buses: Buses) -> None:
+    server, client = limited(buses, "planner", Rate(0.0, 0)), buses.node("script")
+    server.serve(PLAN, lambda request: PlanResponse())
+    with pytest.raises(NoAnswer, match="planner did not answer plan within 5 s: is it busy, or gone"):
+        client.call(PLAN, PlanRequest(), timeout=5.0)
+
+
+def test_no_more_is_said_of_what_is_refused_than_the_rate(buses: Buses) -> None:
+    server, client = limited(buses, "planner", of_refusals=Rate(0.0, 5)), buses.open()
+    server.serve(PLAN, lambda request: PlanResponse())
+    assert client.wait_served(PLAN.key, 1.0)
+    answers = Answers()
+    for _ in range(MAX_WAITING_OF_A_CLIENT + 30):
+        ask(client, PLAN.key, PlanRequest(), answers)
+    assert until(lambda: len(answers) == 30)
+    assert answers.count(None) == 25
+    assert dropped(server, PLAN.key) == 30
+
+
+def test_a_stop_above_the_rate_is_carried_out(buses: Buses) -> None:
+    server, client = limited(buses, "gateway", Rate(0.0, 3)), buses.open()
+    handled: list[StopKind] = []
+    server.serve(DEVICE_STOP, lambda request: handled.append(request.kind) or DeviceCommandResponse(accepted=True))
+    assert client.wait_served(DEVICE_STOP.key, 1.0)
+    answers = Answers()
+    for _ in range(20):
+        ask(client, DEVICE_STOP.key, DeviceStopRequest(kind=StopKind.HOLD), answers)
+    ask(client, DEVICE_STOP.key, DeviceStopRequest(), answers)
+    assert until(lambda: len(answers) == 18)
+    assert hear(server, lambda: len(answers) == 21 and len(handled) == 2)
+    assert handled == [StopKind.HOLD, StopKind.STOP]
+    assert answers.count(None) == 18
+
+
+def test_a_key_whose_requests_nobody_takes_delays_no_other(
+    router: RouterProcess, request: pytest.FixtureRequest
+) -> None:
+    server, client = (ZenohBus("127.0.0.1", router.port, "rm1") for _ in range(2))
+    request.addfinalizer(client.close)
+    request.addfinalizer(server.close)
+    is_over = threading.Event()
+    request.addfinalizer(is_over.set)
+    server.serve("slow", lambda query: is_over.wait(30.0))
+    server.serve("fast", lambda query: query.reply("BusReply", b""))
+    assert client.wait_served("slow", 1.0)
+    assert client.wait_served("fast", 1.0)
+    for _ in range(3000):
+        client.ask("slow", "Question", b"", 30.0, lambda answer: None)
+    answers = Answers()
+    client.ask("fast", "Question", b"", 5.0, answers.append)
+    assert until(lambda: len(answers) == 1, 6.0)
+    assert answers == [BusReply(True, "BusReply", b"")]
+
+
+def test_every_urgent_request_arrives_however_slowly_they_are_taken(
+    router: RouterProcess, request: pytest.FixtureRequest
+) -> None:
+    server, client = (ZenohBus("127.0.0.1", router.port, "rm1") for _ in range(2))
+    request.addfinalizer(client.close)
+    request.addfinalizer(server.close)
+    may_go_on = threading.Event()
+    request.addfinalizer(may_go_on.set)
+    taken: list[str] = []
+    server.serve("stop", lambda query: (may_go_on.wait(30.0), taken.append(query.client), query.drop()), urgent=True)
+    assert client.wait_served("stop", 1.0)
+    for _ in range(2 * QUERIES):
+        client.ask("stop", "Question", b"", 30.0, lambda answer: None)
+    may_go_on.set()
+    assert until(lambda: len(taken) == 2 * QUERIES, 20.0)
+
+
+def test_a_request_that_waits_for_its_answer_costs_no_thread(
+    router: RouterProcess, request: pytest.FixtureRequest
+) -> None:
+    server, client = (ZenohBus("127.0.0.1", router.port, "rm1") for _ in range(2))
+    request.addfinalizer(client.close)
+    request.addfinalizer(server.close)
+    kept: list[Query] = []
+    server.serve("plan", kept.append)
+    assert client.wait_served("plan", 1.0)
+    before = len(list(Path("/proc/self/task").iterdir()))
+    for _ in range(100):
+        client.ask("plan", "Question", b"", 30.0, lambda answer: None)
+    assert until(lambda: len(kept) == 100)
+    assert len(list(Path("/proc/self/task").iterdir())) <= before + 10
