@@ -6,9 +6,11 @@ import pytest
 
 from schemas.actions import GoalStatusCode
 from schemas.device import DeviceCommandKind, DeviceMode, InjectKind, InjectRequest, SpeedCommand, StopKind
-from services.stepper_gateway.device.pending_commands import MOST_UNDER_WAY
+from services.stepper_gateway.device.clock import ClockSync
+from services.stepper_gateway.device.pending_commands import MOST_TICKETS, MOST_UNDER_WAY, PendingCommands
 from services.stepper_gateway.links.frames import Command, decode
 from services.stepper_gateway.links.link import Kind
+from services.stepper_gateway.moment import Moment
 from services.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import assert_within_limits, move
 
@@ -115,6 +117,14 @@ def test_repeated_stops_cost_one_frame_and_are_all_answered() -> None:
     assert rig.run(0.1, lambda: len(rig.answers) == 200)
     assert all(answer.accepted for answer in rig.answers.values())
     assert rig.finish()[0] == GoalStatusCode.ABORTED
+
+
+def test_more_callers_of_a_stop_than_one_frame_serves_cost_few_frames() -> None:
+    commands, moment = PendingCommands(1), Moment(0, 0.0)
+    for ticket in range(1, 4 * MOST_TICKETS + 1):
+        commands.ask(DeviceCommandKind.STOP, moment, 2.0, ticket)
+    assert len(commands.due(moment, ClockSync(), 1, is_reachable=False)) == 4
+    assert sum(len(command.tickets) for command in commands.expired(Moment(0, 3.0))) == 4 * MOST_TICKETS
 
 
 def test_a_stop_of_a_later_motion_is_not_taken_for_the_earlier_one() -> None:

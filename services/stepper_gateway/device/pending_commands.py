@@ -80,7 +80,7 @@ class PendingCommands:
         """
         tickets = [] if ticket == INTERNAL else [ticket]
         under_way = self._stop_under_way(kind, stream)
-        if under_way is not None and len(under_way.tickets) < MOST_TICKETS:
+        if under_way is not None:
             under_way.tickets += tickets
             under_way.is_own |= not tickets
             if moment.monotonic - under_way.sent >= REPEAT:
@@ -146,8 +146,9 @@ class PendingCommands:
         return dropped
 
     def _stop_under_way(self, kind: DeviceCommandKind, stream: int) -> PendingCommand | None:
+        """One that is the same and has room for another caller."""
         alike = (c for c in self._pending if c.is_stop and c.kind == kind and c.stream == stream)
-        return next(alike, None)
+        return next((c for c in alike if len(c.tickets) < MOST_TICKETS), None)
 
     def _place_of(self, command: PendingCommand) -> int:
         """Stops go before everything that is under way."""
