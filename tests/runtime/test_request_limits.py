@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,7 @@ from services.runtime.requests.limits import (
     RequestRates,
     TokenBucket,
 )
+from services.runtime.requests.server import REPEAT
 from tests.runtime.support import Buses, RouterProcess, hear, spinning, until
 
 Answers = list[BusReply | None]
@@ -134,6 +136,38 @@ def test_a_stop_above_the_rate_is_carried_out(buses: Buses) -> None:
     assert hear(server, lambda: len(answers) == 21 and len(handled) == 2)
     assert handled == [StopKind.HOLD, StopKind.STOP]
     assert answers.count(None) == 18
+
+
+def test_a_flood_of_equal_stops_leaves_the_loop_free_between_two_of_them(buses: Buses) -> None:
+    server, flooder, client = limited(buses, "gateway", Rate(0.0, 1)), buses.open(), buses.open()
+    handled: list[StopKind] = []
+    server.serve(DEVICE_STOP, lambda request: handled.append(request.kind) or DeviceCommandResponse(accepted=True))
+    assert flooder.wait_served(DEVICE_STOP.key, 1.0)
+    assert client.wait_served(DEVICE_STOP.key, 1.0)
+    answers, flood = Answers(), Answers()
+    with spinning(server):
+        began = time.monotonic()
+        while len(flood) < 2000:
+            ask(flooder, DEVICE_STOP.key, DeviceStopRequest(kind=StopKind.HOLD), flood)
+        ask(client, DEVICE_STOP.key, DeviceStopRequest(kind=StopKind.HOLD), answers)
+        assert until(lambda: len(answers) == 1)
+        most = (time.monotonic() - began) / REPEAT + 3
+    assert answers[0] is not None
+    assert answers[0].ok
+    assert len(handled) <= most
+
+
+def test_the_last_stop_of_a_flood_is_carried_out(buses: Buses) -> None:
+    server, flooder = limited(buses, "gateway", Rate(0.0, 1)), buses.open()
+    handled: list[float] = []
+    server.serve(DEVICE_STOP, lambda _: handled.append(time.monotonic()) or DeviceCommandResponse(accepted=True))
+    assert flooder.wait_served(DEVICE_STOP.key, 1.0)
+    flood = Answers()
+    with spinning(server):
+        for _ in range(500):
+            ask(flooder, DEVICE_STOP.key, DeviceStopRequest(), flood)
+            last = time.monotonic()
+        assert until(lambda: handled and handled[-1] >= last)
 
 
 def test_a_key_whose_requests_nobody_takes_delays_no_other(

@@ -24,6 +24,8 @@ R = TypeVar("R", bound=Message)
 R_contra = TypeVar("R_contra", bound=Message, contravariant=True)
 
 MAX_UNANSWERED = 1024  # callers of one urgent server that are answered together; the rest hears so at once
+REPEAT = 0.005  # [s] chosen: in a flood of stops the gateway is free for other work between two of them
+MAX_TAKEN = 64  # questions whose last time is kept
 
 
 class Pending(Protocol[R_contra]):
@@ -58,7 +60,10 @@ class PendingQuery(Generic[R]):
 class PendingGroup(Generic[R]):
     """Equal requests of any number of callers, answered together."""
 
-    def __init__(self, on_answered: Callable[[int], None]) -> None:
+    def __init__(self, client: str, on_answered: Callable[[int], None]) -> None:
+        self.client = client  # the first
+        self.is_queued = False  # for the event loop
+        self.is_new = True  # no timer will queue it
         self._queries: list[PendingQuery[R]] = []
         self._on_answered = on_answered
 
@@ -170,7 +175,8 @@ class UrgentServer(RequestServer[Q, R]):
     """Answers the requests of one key before everything else that waits in the node.
 
     Requests are read where they arrive, and equal ones that wait are handled once, for all their callers: repeating
-    one costs nothing. All are carried out; the callers above a client's rate get no answer.
+    one costs nothing. All are carried out. What a client asks above its rate gets no answer, and is carried out up to
+    REPEAT later where it repeats what has just been carried out.
     """
 
     def __init__(
@@ -184,6 +190,7 @@ class UrgentServer(RequestServer[Q, R]):
     ) -> None:
         self._groups: dict[Q, PendingGroup[R]] = {}
         self._unanswered = 0
+        self._taken: dict[Q, float] = {}  # [s] monotonic, when it was handled last
         self._last: tuple[Arrival, Q] | None = None  # a request that repeats it need not be decoded again
         self._lock = threading.Lock()
         super().__init__(bus, put, request, handler, warn, rates)
@@ -207,8 +214,8 @@ class UrgentServer(RequestServer[Q, R]):
             if group is None:
                 if refusal := self._waiting.refusal(query.client):
                     return refusal
-                group = self._groups[question] = PendingGroup(self._answered)
-                self._put(lambda: self._take_group(question, query.client))
+                group = self._groups[question] = PendingGroup(query.client, self._answered)
+            self._queue(question, group, is_answered)
             self._received += 1
             if not is_answered:
                 return ""
@@ -218,10 +225,29 @@ class UrgentServer(RequestServer[Q, R]):
             group.join(query)
             return ""
 
-    def _take_group(self, question: Q, client: str) -> None:
-        self._waiting.leave(client)
+    def _queue(self, question: Q, group: PendingGroup[R], is_at_once: bool) -> None:
+        """Has the group handled, once; call with the lock."""
+        if group.is_queued:
+            return
+        is_repeated = time.monotonic() - self._taken.get(question, -math.inf) < REPEAT
+        if is_at_once or not is_repeated:
+            group.is_queued = True
+            self._put(lambda: self._take_group(question))
+        elif group.is_new:
+            group.is_new = False
+            threading.Timer(REPEAT, self._queue_late, (question, group)).start()
+
+    def _queue_late(self, question: Q, group: PendingGroup[R]) -> None:
+        with self._lock:
+            self._queue(question, group, True)
+
+    def _take_group(self, question: Q) -> None:
         with self._lock:
             group = self._groups.pop(question)
+            self._waiting.leave(group.client)
+            if len(self._taken) >= MAX_TAKEN:
+                self._taken.clear()
+            self._taken[question] = time.monotonic()
         self._handle(question, group)
 
     def _answered(self, count: int) -> None:
