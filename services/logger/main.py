@@ -14,6 +14,7 @@ from services.logger.origin import origin
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
+from services.runtime.process.priority import step_behind
 
 WRITE_RATE = 2.0  # [Hz] a batch and an MCAP chunk each: what a kill -9 can cost
 
@@ -60,6 +61,7 @@ def _folder(deployment: Deployment, parameters: LoggerParameters) -> Path:
 
 def main() -> None:
     """Entry point."""
+    step_behind()
     service("logger", run)
 
 

@@ -25,6 +25,7 @@ from schemas.topics import (
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
+from services.runtime.process.priority import step_behind
 from services.visualizer.core import Visualizer
 from services.visualizer.model.mesh_files import missing_meshes, scene_mesh
 from services.visualizer.model.triangle_meshes import TriangleMesh
@@ -88,6 +89,7 @@ def _visualizer(node: Node, message: RobotDescription, folders: tuple[Path, ...]
 
 def main() -> None:
     """Entry point."""
+    step_behind()
     service("visualizer", run)
 
 

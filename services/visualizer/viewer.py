@@ -20,6 +20,7 @@ from urllib.parse import quote
 from schemas.deployment import Deployment, ViewerMode, ViewerSection
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.process.ports import PortTaken, require_free
+from services.runtime.process.priority import step_behind
 from services.runtime.process.readiness import Readiness
 from services.visualizer.program.rerun_program import rerun_binary, start, stop
 from services.visualizer.program.viewer_connection import ViewerConnection
@@ -143,6 +144,7 @@ def main() -> None:
     parser.add_argument("--memory-limit", default="1GB", help="of the viewer's store, for example 1GB or 25%%")
     parser.add_argument("--log-level", default="INFO", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
+    step_behind()
     stopping = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stopping.set())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import signal
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import pytest
 
 from schemas.topics import JOINT_STATES
 from services.runtime.node import Node
+from services.runtime.process.priority import BEHIND
 from tests.runtime.support import ROOT, RouterProcess, programs, until
 
 PROMPT = 3.0  # [s] within which every process ends after SIGTERM
@@ -263,3 +265,12 @@ def test_importing_the_node_is_fast_and_light() -> None:
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=10.0)
     assert done.stdout == "False False\n", done.stderr
     assert time.monotonic() - begin < 2.0
+
+
+@pytest.mark.parametrize(("before", "after"), [(0, BEHIND), (BEHIND + 4, BEHIND + 4)])
+def test_what_may_wait_steps_behind_and_never_ahead(before: int, after: int) -> None:
+    asked = max(0, before - os.nice(0))
+    code = "import os; from services.runtime.process.priority import step_behind; step_behind(); print(os.nice(0))"
+    command = [sys.executable, "-c", f"import os; os.nice({asked}); {code}"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert int(done.stdout) == max(after, os.nice(0))

@@ -34,6 +34,7 @@ from services.planner.workers.jobs import (
     receive,
     send,
 )
+from services.runtime.process.priority import step_behind
 
 
 class AtHand:
@@ -63,6 +64,7 @@ class Answers:
 
 def main() -> None:
     """`python -m services.planner.workers.worker ROBOT_FOLDER PROJECT_FOLDER`."""
+    step_behind()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the planner, which closes this one's input
     answers = Answers(os.fdopen(os.dup(1), "wb"))
     os.dup2(2, 1)  # what a library prints is no answer
