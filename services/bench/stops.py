@@ -18,24 +18,27 @@ from paho.mqtt.client import Client, MQTTMessage
 from schemas.device import (
     ConfigureRequest,
     DeviceCommandKind,
+    DeviceCommandResponse,
     DeviceStopRequest,
     InjectKind,
     InjectRequest,
     StopKind,
 )
 from schemas.joints import JointState
-from schemas.message import encode
+from schemas.message import decode, encode
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.topics import DEVICE_CONFIGURE, DEVICE_INJECT, DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, JOINT_STATES
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile, rounded
 from services.bench.latency import sharp_start
-from services.bench.stack import Running, Stacks
+from services.bench.stack import Running, Stacks, families
 from services.bench.traffic import connected, flood
+from services.runtime.bus.interface import BusReply
 from services.runtime.bus.zenoh_bus import ZenohBus
 
 GOAL = Goal(p99=20.0)  # [ms]
 CALLS = 200  # for each condition in which the device answers
 CALLS_TO_A_FROZEN_DEVICE = 20  # each waits 2 s for its answer
+CALLS_TO_A_FROZEN_BROKER = 3  # as well
 MOVES = 5  # stopped in each condition in which the arm can move
 RAMP = 0.8  # [s] of acceleration: the arm is stopped during it
 SPEED = 0.01  # [rad/s] below which the arm stands
@@ -91,6 +94,18 @@ class Caller:
         answers.get(timeout=2 * PATIENCE)  # a stop that is not answered yet would absorb the next one
         return (seen - called) * 1e3
 
+    def stop_that_cannot_leave(self) -> float:
+        """Time [ms] from one call to the answer that it was not carried out; raises NotMeasured for another answer."""
+        answers: SimpleQueue[BusReply | None] = SimpleQueue()
+        payload = encode(DeviceStopRequest(kind=StopKind.STOP))
+        called = time.monotonic()
+        self.bus.ask(DEVICE_STOP.key, DeviceStopRequest.__name__, payload, 2 * PATIENCE, answers.put, True)
+        answer = answers.get(timeout=3 * PATIENCE)
+        took = (time.monotonic() - called) * 1e3
+        if answer is None or not answer.ok or decode(DeviceCommandResponse, answer.payload).accepted:
+            raise NotMeasured(f"a stop with the broker frozen was answered with {answer}")
+        return took
+
     def stops(self, count: int) -> list[float]:
         """Times [ms] of `count` calls, one after the other."""
         return [self.stop() for _ in range(count)]
@@ -119,6 +134,11 @@ class Caller:
             if self.states.message is not None and holds(self.states.message):
                 return self.states.message
         raise NotMeasured("the arm neither moved nor stood in time")
+
+    def wait_for_states(self) -> None:
+        """Returns once the device says its state now; raises NotMeasured if it does not."""
+        asked = time.time_ns()
+        self._until(lambda state: state.stamp > asked)
 
     def leave_unanswered(self) -> None:
         """Sends a configuration and twenty presses, which a frozen device does not answer."""
@@ -152,10 +172,13 @@ def stop_ms(stacks: Stacks) -> Figure:
                 if name not in ("planner frozen", "flood of holds"):
                     rest[name] = caller.stops_of_moves()
         wire["device frozen, configure and 20 presses unanswered"] = _to_a_frozen_device(running, caller)
+        to_answer, after_thaw = _to_a_frozen_broker(running, caller)
     finally:
         caller.close()
     worst = max(wire, key=lambda name: quantile(wire[name], 0.99))
     reference = {f"{name} p99": quantile(samples, 0.99) for name, samples in wire.items()}
+    reference["broker frozen, to the answer that it was not carried out, median"] = quantile(to_answer, 0.5)
+    reference["broker frozen, from its thaw to the stop on the wire, median"] = quantile(after_thaw, 0.5)
     reference |= {f"to rest, {name}, median": quantile(samples, 0.5) for name, samples in rest.items()}
     note = (
         f"the worst condition is given: {worst}; {CALLS} calls each, broker mosquitto, floods of 5,000 a second from a "
@@ -174,11 +197,27 @@ def _to_a_frozen_device(running: Running, caller: Caller) -> list[float]:
         return took
 
 
+def _to_a_frozen_broker(running: Running, caller: Caller) -> tuple[list[float], list[float]]:
+    """Times [ms] of stops from the call to the answer while the broker is frozen, and from its thaw to the wire."""
+    to_answer, after_thaw = [], []
+    for _ in range(CALLS_TO_A_FROZEN_BROKER):
+        caller.wait_for_states()
+        with _frozen(running, "broker"):
+            called = time.monotonic()
+            to_answer.append(caller.stop_that_cannot_leave())
+        thawed = time.monotonic()
+        after_thaw.append((caller.wire.next(called) - thawed) * 1e3)
+    return to_answer, after_thaw
+
+
 @contextmanager
 def _frozen(running: Running, name: str) -> Iterator[None]:
-    pid = running.stack.pid(name)
-    os.kill(pid, signal.SIGSTOP)
+    """Stops a process of the stack and its children, for the block."""
+    pids = [process.pid for process in families(running.stack)[name]]
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
     try:
         yield
     finally:
-        os.kill(pid, signal.SIGCONT)
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)

@@ -66,6 +66,10 @@ class Processes:
             time.sleep(0.05)
         raise AssertionError("the broker does not listen")
 
+    def signal(self, module: str, number: int) -> None:
+        """To the process and what it has started itself."""
+        os.killpg(self._running[module].pid, number)
+
     def kill(self, module: str) -> None:
         process = self._running.pop(module)
         os.killpg(process.pid, signal.SIGKILL)  # its own group, with the broker's child

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import time
 from contextlib import closing
 
 from msgspec.structs import replace
 from paho.mqtt import publish
+from paho.mqtt.client import Client
+from paho.mqtt.enums import CallbackAPIVersion
 
 from schemas.actions import GoalStatusCode
-from schemas.device import ArmCommand, DeviceStatus, ReferenceCommand, StopKind
+from schemas.device import ArmCommand, DeviceCommandKind, DeviceStatus, ReferenceCommand, StopKind
 from schemas.device_config import config_crc, config_text
 from schemas.motion import FollowErrorCode
 from services.arm.device.device_config import device_config
+from services.stepper_gateway.links.frames import Chunk, Command, decode
 from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.links.mqtt import MqttLink
 from services.virtual_arm.virtual_arm import rm1
@@ -67,6 +71,53 @@ def test_a_killed_broker_aborts_the_goal_and_nothing_stale_is_sent_after_it_retu
         assert gateway.move_to(NEAR, "next").accepted
         assert gateway.finish("next")[0] == GoalStatusCode.SUCCEEDED
         assert gateway.published["device/state"][-1].refused == refused
+
+
+def test_a_stop_to_a_frozen_broker_is_answered_in_time_and_is_carried_out_when_it_thaws(processes: Processes) -> None:
+    with closing(WiredGateway(processes.port)) as gateway, closing(Wire(processes.port)) as wire:
+        gateway.ready()
+        assert gateway.move_to((1.0, -1.0, 0.1)).accepted
+        gateway.run(1.0)
+        processes.signal(BROKER, signal.SIGSTOP)
+        sent_before = len(wire.frames)
+        began = time.monotonic()
+        answer = gateway.answer(StopKind.STOP)
+        took = time.monotonic() - began
+        processes.signal(BROKER, signal.SIGCONT)
+        assert took < gateway.core.device.parameters.command_timeout + 0.5
+        assert not answer.accepted
+        assert answer.sent
+        assert "has not answered STOP in time" in answer.reason
+        assert gateway.finish()[0] == GoalStatusCode.ABORTED
+        gateway.ready()
+        late = [decode(frame) for frame in wire.frames[sent_before:]]
+        commands = [frame for frame in late if isinstance(frame, Command)]
+        assert commands[0].cmd == DeviceCommandKind.STOP
+        assert not [frame for frame in late[late.index(commands[0]) :] if isinstance(frame, Chunk)]
+        states = gateway.published["joint_states"]
+        thawed = time.time_ns()
+        assert gateway.run(10.0, lambda: states[-1].stamp > thawed)  # not one that has waited in the broker
+        stood = states[-1].position
+        gateway.run(1.0)
+        assert states[-1].position == stood
+        assert gateway.move_to(NEAR, "next").accepted
+        assert gateway.finish("next")[0] == GoalStatusCode.SUCCEEDED
+
+
+class Wire:
+    """The trajectory and command frames on the wire, in their order."""
+
+    def __init__(self, port: int) -> None:
+        self.frames: list[bytes] = []
+        self._client = Client(CallbackAPIVersion.VERSION2)
+        self._client.on_message = lambda client, data, message: self.frames.append(message.payload)
+        self._client.connect("127.0.0.1", port)
+        self._client.subscribe([(f"gemelo/v1/rm1/{kind}", 0) for kind in (Kind.TRAJ, Kind.CMD)])
+        self._client.loop_start()
+
+    def close(self) -> None:
+        self._client.disconnect()
+        self._client.loop_stop()
 
 
 def test_a_restarted_device_is_met_again(processes: Processes) -> None:
