@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceMode
+from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.topics import JOINT_STATES
+from services.stepper_gateway.links.frames import Command, decode
+from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.virtual_arm import VirtualArm
 from tests.stepper_gateway.harness import assert_within_limits, move
 
@@ -62,3 +64,15 @@ def test_a_goal_that_was_aborted_before_the_frozen_device_read_it_moves_nothing(
     rig.run(3.0)
     assert rig.device.mode == DeviceMode.IDLE
     assert rig.device.steps == (0, 0, 0)
+
+
+def test_a_device_that_is_lost_in_a_move_finds_a_stop_on_the_wire() -> None:
+    rig = VirtualArm().ready()
+    assert rig.goal(move(HOME, READY)).accepted
+    rig.run(1.2)
+    rig.device_is_frozen = True
+    assert rig.run(3.0, lambda: "g" in rig.finished)
+    since = len(rig.sent)
+    rig.run(0.5)
+    late = [decode(payload) for _, kind, payload in rig.sent[since - 1 :] if kind == Kind.CMD]
+    assert [frame.cmd for frame in late if isinstance(frame, Command)].count(DeviceCommandKind.STOP) == 1
