@@ -19,6 +19,7 @@ from gemelo.scene import Scene
 from gemelo.session import Session
 from gemelo.targets import as_target, ik_request, joint_state, request_of
 from gemelo.units import Pose
+from schemas.deployment import Deployment
 from schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
 from schemas.joints import JointState
 from schemas.planning import IkRequest, JogCommand, JogStatus, PlanRequest
@@ -82,6 +83,15 @@ class Arm:
         'rad'
         """
         return self._session.description
+
+    @property
+    def deployment(self) -> Deployment:
+        """The deployment file as types, with what the environment says instead: router, paths, parameters.
+
+        >>> arm.deployment.router.host
+        '127.0.0.1'
+        """
+        return self._session.deployment
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -170,6 +180,21 @@ class Arm:
         True
         """
         return self._frames.look_up(target, source, stamp)
+
+    def wait_for(self, is_so: Callable[[], bool], timeout: float | None = None) -> bool:
+        """Sleeps until `is_so()`, which is called after every message; False after `timeout` [s].
+
+        >>> arm.wait_for(lambda: False, timeout=0.1)
+        False
+        """
+        return self._session.wait_for(is_so, timeout)
+
+    def wake(self) -> None:
+        """Lets every `wait_for` look again, for what no message tells of; from any thread.
+
+        >>> arm.wake()
+        """
+        self._session.notify()
 
     @property
     def step_errors(self) -> dict[str, float]:

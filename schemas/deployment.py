@@ -69,6 +69,7 @@ class ViewerSection(DeploymentRecord, frozen=True, kw_only=True):
 class PathsSection(DeploymentRecord, frozen=True, kw_only=True):
     run: str = ".gemelo/run"  # readiness files, the virtual device's memory
     out: str = "out"  # recordings and logs
+    programs: str = "programs"  # taught points and programs
 
 
 class Deployment(DeploymentRecord, frozen=True, kw_only=True):

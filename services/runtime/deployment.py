@@ -117,6 +117,9 @@ def _override(raw: dict[str, Any], environ: Mapping[str, str]) -> list[str]:
 
 def _with_absolute_paths(deployment: Deployment, root: Path) -> Deployment:
     paths = msgspec.structs.replace(
-        deployment.paths, run=str(root / deployment.paths.run), out=str(root / deployment.paths.out)
+        deployment.paths,
+        run=str(root / deployment.paths.run),
+        out=str(root / deployment.paths.out),
+        programs=str(root / deployment.paths.programs),
     )
     return msgspec.structs.replace(deployment, robot=str(root / deployment.robot), paths=paths)
