@@ -1,0 +1,200 @@
+"""The legs of a program carried out one after another, each planned while the one before moves."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from threading import Event
+
+from gemelo.arm import Arm
+from gemelo.errors import Error, Refused
+from gemelo.motion import Motion
+from gemelo.planning import Plan
+from gemelo.programs.planning import plan_leg
+from gemelo.programs.points import Point
+from gemelo.programs.sequence import Leg
+from gemelo.programs.steps import Attach, Detach, Output, Wait, WaitFor
+
+LOOK_AHEAD = 50  # legs that are looked through for the next motion
+SENSOR_PERIOD = 0.05  # [s] between two looks at a sensor, of which there are 10 a second
+
+OnLeg = Callable[[Leg | None, int, int, str], object]  # the leg, legs done, legs planned, why it pauses
+
+
+class Failed(Error):
+    """A step that could not be carried out."""
+
+
+@dataclass
+class Controls:
+    """What a person wants, written by his thread and read by that of the run."""
+
+    pauses: bool = False  # at the end of the present leg
+    pauses_after_one: bool = False
+    holds: bool = False  # on the path
+    stop: Event = field(default_factory=Event)  # the arm decelerates, and the run is over
+
+
+@dataclass
+class Prepared:
+    """A motion that comes later: its plan, or why there is none, and the motion itself where it is handed over."""
+
+    leg: Leg
+    plan: Plan | None = None
+    refusal: Error | None = None
+    motion: Motion | None = None
+
+
+class Execution:
+    """One run, in the thread of the one who calls `run`."""
+
+    def __init__(
+        self, arm: Arm, legs: Iterator[Leg], points: Mapping[str, Point], controls: Controls, on_leg: OnLeg
+    ) -> None:
+        self._arm, self._legs, self._points, self._controls, self._on_leg = arm, legs, points, controls, on_leg
+        self._queue: deque[Leg] = deque()
+        self._next: Prepared | None = None
+        self._motion: Motion | None = None
+        self.leg: Leg | None = None  # that is carried out, or was the last
+        self._done = self._planned = 0
+
+    @property
+    def is_moving(self) -> bool:
+        motion = self._motion
+        return motion is not None and not motion.is_over
+
+    def cancel(self) -> None:
+        """The arm decelerates; from any thread."""
+        for motion in (self._next.motion if self._next is not None else None, self._motion):
+            if motion is not None and not motion.is_over:
+                motion.cancel()
+
+    def run(self) -> None:
+        """Returns at the end of the program or when a person has stopped it; raises `Failed`."""
+        while (leg := self._take()) is not None:
+            self._pause_if_asked(leg)
+            if self._controls.stop.is_set():
+                return
+            self.leg = leg
+            self._tell(leg)
+            try:
+                self._carry_out(leg)
+            except Error as error:
+                if self._controls.stop.is_set():
+                    return
+                raise Failed(str(error)) from error
+            if self._controls.stop.is_set():
+                return
+            self._done += len(leg.steps)
+            self._controls.pauses |= self._controls.pauses_after_one
+        self._tell(None)
+
+    def _pause_if_asked(self, leg: Leg) -> None:
+        handed_over = self._next is not None and self._next.leg is leg and self._next.motion is not None
+        if not self._controls.pauses or handed_over:
+            return
+        self._on_leg(leg, self._done, self._planned, "paused before this step")
+        self._arm.wait_for(lambda: self._controls.stop.is_set() or not self._controls.pauses, None)
+
+    def _carry_out(self, leg: Leg) -> None:
+        step = leg.steps[0]
+        match step:
+            case Output():
+                self._arm.output(step.name, step.on)
+            case Wait():
+                self._arm.wait_for(self._controls.stop.is_set, step.time)
+            case WaitFor():
+                self._wait_for(step)
+            case Attach():
+                self._arm.scene.attach(step.object, step.link or self._arm.tool_frame, step.touch)
+            case Detach():
+                self._arm.scene.detach(step.object)
+            case _:
+                self._move(leg)
+
+    def _wait_for(self, step: WaitFor) -> None:
+        clock = self._arm.node
+        end = clock.monotonic() + step.timeout
+        while not self._controls.stop.is_set():
+            value = self._arm.sensors.get(step.sensor)
+            if value is not None and _is_met(step, value):
+                return
+            if clock.monotonic() >= end:
+                raise Failed(_not_met(step, value))
+            self._arm.wait_for(self._controls.stop.is_set, SENSOR_PERIOD)
+
+    def _move(self, leg: Leg) -> None:
+        prepared, self._next = self._next, None
+        if prepared is None or prepared.leg is not leg:
+            prepared = None
+        motion = prepared.motion if prepared is not None else None
+        if motion is None:
+            motion = self._start(leg, prepared.plan if prepared is not None else None)
+        self._motion = motion
+        if self._controls.stop.is_set():
+            motion.cancel()  # asked for while it was being started
+        self._prepare_next(motion)
+        motion.wait()
+
+    def _start(self, leg: Leg, plan: Plan | None) -> Motion:
+        """Along the plan if that still leads from here, else along a new one."""
+        if plan is not None:
+            try:
+                return self._arm.start(plan)
+            except Refused:
+                pass  # moved by hand meanwhile, or the scene is another
+        return self._arm.start(self._plan(leg, None))
+
+    def _prepare_next(self, motion: Motion) -> None:
+        """Plans the next motion from the end of this one, if nothing before it changes the scene."""
+        leg = self._upcoming()
+        if leg is None or self._controls.stop.is_set():
+            return
+        prepared = Prepared(leg)
+        try:
+            prepared.plan = self._plan(leg, motion.plan.end)
+        except Error as error:
+            prepared.refusal = error  # it is planned once more when its turn comes
+        self._next = prepared
+
+    def _plan(self, leg: Leg, start: Mapping[str, float] | None) -> Plan:
+        plan = plan_leg(self._arm, leg, self._points, start)
+        self._planned += 1
+        return plan
+
+    def _upcoming(self) -> Leg | None:
+        for index in range(LOOK_AHEAD):
+            leg = self._peek(index)
+            if leg is None or isinstance(leg.steps[0], Attach | Detach):
+                return None
+            if leg.is_motion:
+                return leg
+        return None
+
+    def _peek(self, index: int) -> Leg | None:
+        while len(self._queue) <= index:
+            leg = next(self._legs, None)
+            if leg is None:
+                return None
+            self._queue.append(leg)
+        return self._queue[index]
+
+    def _take(self) -> Leg | None:
+        leg = self._peek(0)
+        if leg is not None:
+            self._queue.popleft()
+        return leg
+
+    def _tell(self, leg: Leg | None) -> None:
+        self._on_leg(leg, self._done, self._planned, "")
+
+
+def _is_met(step: WaitFor, value: float) -> bool:
+    return (step.above is not None and value > step.above) or (step.below is not None and value < step.below)
+
+
+def _not_met(step: WaitFor, value: float | None) -> str:
+    wanted = f"above {step.above:g}" if step.above is not None else f"below {step.below:g}"
+    reads = "has no reading" if value is None else f"reads {value:g}"
+    return f'sensor "{step.sensor}" {reads}, not {wanted}, after {step.timeout:g} s'

@@ -1,0 +1,82 @@
+"""The folder of programs: which one it is, and the programs in it by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from gemelo.arm import Arm
+from gemelo.errors import BadArgument
+from gemelo.programs.names import POINTS_END, checked_folder, program_name
+from gemelo.programs.program import Program
+from gemelo.programs.reading import read_program
+from services.arm.errors import suggestion
+
+
+def programs_folder(arm: Arm) -> Path:
+    """`paths.programs` of the deployment file ($GEMELO_PATHS_PROGRAMS): `programs` in the project if not said."""
+    return checked_folder(arm.deployment.paths.programs)
+
+
+class Programs(Mapping[str, Program]):
+    """The programs of a folder, by name; each is read when it is asked for, so a change on the disk counts at once.
+
+    >>> from gemelo.programs import Go, Program, Programs
+    >>> Program("tour", (Go(state="left"), Go(state="ready"))).save(folder).name
+    'tour.toml'
+    >>> programs = Programs(folder)
+    >>> list(programs), programs["tour"].steps[0].state
+    (['tour'], 'left')
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = checked_folder(folder)
+
+    def __getitem__(self, name: str) -> Program:
+        """Raises KeyError where there is no such file, `ProgramError` with its mistakes where it is wrong."""
+        if not isinstance(name, str) or name not in self:
+            raise KeyError(name)
+        return read_program(self._file(name))
+
+    def __contains__(self, name: object) -> bool:
+        try:
+            return isinstance(name, str) and self._file(name).is_file()
+        except BadArgument:
+            return False
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(sorted(_name(path) for path in self.folder.glob("*.toml") if _is_program(path)))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def require(self, name: str) -> Program:
+        """The program; raises `BadArgument` with the nearest name, `ProgramError` with the mistakes of its file."""
+        if name not in self:
+            raise BadArgument(f'no program "{program_name(name)}" in {self.folder}{suggestion(name, self)}')
+        return self[name]
+
+    def remove(self, name: str) -> None:
+        """Deletes its file; raises `BadArgument`."""
+        if name not in self:
+            raise BadArgument(f'no program "{program_name(name)}" in {self.folder}{suggestion(name, self)}')
+        self._file(name).unlink(missing_ok=True)
+
+    def rename(self, old: str, new: str) -> None:
+        """Gives its file another name; calls of it elsewhere are not changed. Raises `BadArgument`."""
+        if new in self and new != old:
+            raise BadArgument(f'there is a program "{new}": remove it first, or take another name')
+        if old not in self:
+            raise BadArgument(f'no program "{program_name(old)}" in {self.folder}{suggestion(old, self)}')
+        self._file(old).rename(self._file(new))
+
+    def _file(self, name: str) -> Path:
+        return self.folder / f"{program_name(name)}.toml"
+
+
+def _name(path: Path) -> str:
+    return path.name.removesuffix(".toml")
+
+
+def _is_program(path: Path) -> bool:
+    return not path.name.startswith(".") and not _name(path).endswith(POINTS_END)

@@ -1,0 +1,206 @@
+"""A program that runs: started, paused, stepped, held and stopped by a person, and never by itself."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from gemelo.arm import Arm
+from gemelo.errors import Error
+from gemelo.programs.execution import Controls, Execution, Failed
+from gemelo.programs.meaning import require_right
+from gemelo.programs.points import Point
+from gemelo.programs.program import Program
+from gemelo.programs.sequence import Leg, called_programs, legs_of
+from gemelo.programs.steps import StepPath, path_text, words_of
+
+
+class RunStatus(StrEnum):
+    """How a run stands; STOPPED, FAILED and DONE are its end."""
+
+    READY = "ready"  # not started yet
+    RUNNING = "running"
+    PAUSED = "paused"  # until somebody says `resume` or `step`
+    STOPPED = "stopped"  # by `stop`
+    FAILED = "failed"  # `message` says why
+    DONE = "done"
+
+    @property
+    def is_over(self) -> bool:
+        return self in (RunStatus.STOPPED, RunStatus.FAILED, RunStatus.DONE)
+
+
+@dataclass(frozen=True)
+class RunState:
+    """How a run stands."""
+
+    program: str
+    status: RunStatus = RunStatus.READY
+    steps: tuple[StepPath, ...] = ()  # that are carried out now, several where they are blended; or were the last
+    rounds: tuple[int, ...] = ()  # from 0, of every repeat around the first of them
+    done: int = 0  # steps that have been carried out, each as often as it was
+    planned: int = 0  # legs that have been planned so far
+    started_at: float = 0.0  # [s] UNIX; 0 before the start
+    message: str = ""  # why it has paused, stopped or failed
+
+    @property
+    def step(self) -> StepPath:
+        """The first of the steps that are carried out."""
+        return self.steps[0] if self.steps else ()
+
+
+class ProgramRun:
+    """One program on one arm. Every method may be called from any thread but those that handle messages.
+
+    While the arm is on one leg the next is planned and handed over, so that the arm does not wait between them.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        program: Program,
+        points: Mapping[str, Point],
+        programs: Mapping[str, Program],
+        *,
+        on_change: Callable[[RunState], object] | None = None,
+    ) -> None:
+        """`on_change` is called with every new state, from the thread that caused it; it should return soon."""
+        self._arm, self.program = arm, program
+        self._points, self._programs = points, programs
+        self._on_change = on_change
+        self._lock = threading.RLock()
+        self._state = RunState(program.name)
+        self._controls = Controls()
+        self._execution: Execution | None = None
+        self._thread: threading.Thread | None = None
+
+    @property
+    def state(self) -> RunState:
+        """The newest state."""
+        return self._state
+
+    def start(self, first: StepPath = (), *, one_step: bool = False) -> None:
+        """Runs from the step `first` on, or only that step if `one_step`; returns at once.
+
+        Raises `ProgramError` with the program's mistakes, `BadArgument` where there is no such step, and `Error` while
+        it runs already.
+        """
+        with self._lock:
+            if self._thread is not None and self._thread.is_alive():
+                raise Error(f'program "{self.program.name}" is {self._state.status}: stop it before it starts again')
+            require_right(self.program, self._arm.description, self._points, self._programs)
+            programs = called_programs(self.program, self._programs)
+            legs = legs_of(self.program, programs, first)
+            self._controls = Controls(pauses_after_one=one_step)
+            self._execution = Execution(self._arm, legs, dict(self._points), self._controls, self._on_leg)
+            self._put(RunState(self.program.name, RunStatus.RUNNING, started_at=time.time()))
+            self._thread = threading.Thread(target=self._run, args=(self._execution,), name="program", daemon=True)
+            self._thread.start()
+
+    def pause(self) -> None:
+        """Pauses at the end of the present step; a motion that was handed over already is that step."""
+        with self._lock:
+            self._require(RunStatus.RUNNING)
+            self._controls.pauses = True
+            self._arm.wake()
+
+    def hold(self) -> None:
+        """Pauses at once: the arm decelerates on its path and stands there until `resume` or `stop`."""
+        with self._lock:
+            self._require(RunStatus.RUNNING)
+            execution = self._execution
+            if execution is None or not execution.is_moving:
+                return self.pause()
+            self._arm.hold()
+            self._controls.holds = True
+            self._put(replace(self._state, status=RunStatus.PAUSED, message="held on its path"))
+
+    def resume(self) -> None:
+        """Goes on after `pause`, `hold` or `step`."""
+        self._go_on(one_step=False)
+
+    def step(self) -> None:
+        """Carries out one step, and pauses; starts the program where it does not run."""
+        if self._state.status is RunStatus.PAUSED:
+            self._go_on(one_step=True)
+        else:
+            self.start(one_step=True)
+
+    def stop(self) -> None:
+        """The arm decelerates on its path, and the run is over; returns at once, `wait` when it rests."""
+        with self._lock:
+            if self._thread is None or self._state.status.is_over:
+                return
+            self._controls.stop.set()
+            if self._execution is not None:
+                self._execution.cancel()
+            self._arm.wake()
+
+    def wait(self, timeout: float | None = None) -> RunState:
+        """Returns when the run is over or has paused, with its state; TimeoutError after `timeout` [s]."""
+        end = None if timeout is None else time.monotonic() + timeout
+        while self._state.status is RunStatus.RUNNING:
+            left = 1.0 if end is None else end - time.monotonic()
+            if left <= 0.0:
+                raise TimeoutError(f'program "{self.program.name}" still runs after {timeout:g} s')
+            self._arm.wait_for(lambda: self._state.status is not RunStatus.RUNNING, min(left, 1.0))
+        return self._state
+
+    def _go_on(self, one_step: bool) -> None:
+        with self._lock:
+            self._require(RunStatus.PAUSED)
+            if self._controls.holds:
+                self._arm.resume()
+            self._controls.holds = self._controls.pauses = False
+            self._controls.pauses_after_one = one_step
+            self._put(replace(self._state, status=RunStatus.RUNNING, message=""))
+            self._arm.wake()
+
+    def _require(self, status: RunStatus) -> None:
+        if self._state.status is not status:
+            raise Error(f'program "{self.program.name}" is {self._state.status}, not {status}')
+
+    def _run(self, execution: Execution) -> None:
+        """The run's own thread."""
+        status, message = RunStatus.DONE, ""
+        try:
+            execution.run()
+        except Failed as failed:
+            status, message = RunStatus.FAILED, f"step {self._where()}: {failed}"
+        except BaseException as error:
+            status, message = RunStatus.FAILED, f"step {self._where()}: {type(error).__name__}: {error}"
+            raise
+        else:
+            if self._controls.stop.is_set():
+                status, message = RunStatus.STOPPED, f"stopped in step {self._where()}"
+        finally:
+            with self._lock:
+                self._put(replace(self._state, status=status, message=message))
+            self._arm.wake()
+
+    def _on_leg(self, leg: Leg | None, done: int, planned: int, pause: str) -> None:
+        """The execution tells what it is at."""
+        with self._lock:
+            state = replace(self._state, done=done, planned=planned)
+            if leg is not None:
+                state = replace(state, steps=leg.paths, rounds=leg.rounds)
+            if pause:
+                state = replace(state, status=RunStatus.PAUSED, message=pause)
+            self._put(state)
+
+    def _where(self) -> str:
+        """The present step for a person, with its rounds."""
+        step, rounds = path_text(self._state.step), self._state.rounds
+        about = f", round {'.'.join(str(number + 1) for number in rounds)}" if rounds else ""
+        leg = self._execution.leg if self._execution is not None else None
+        return f"{step}{about} ({words_of(leg.steps[0])})" if leg is not None else step or "none"
+
+    def _put(self, state: RunState) -> None:
+        if state != self._state:
+            self._state = state
+            if self._on_change is not None:
+                self._on_change(state)
+        self._arm.wake()
