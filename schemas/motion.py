@@ -46,6 +46,7 @@ class FollowJointTrajectoryGoal(Message, frozen=True, kw_only=True):
     goal_time_tolerance: float = 0.0  # [s] 0 is the default of the gateway, which is finite
     scene_version: int | None = None  # of the planning scene it is free of; absent: not planned in one
     scene_epoch: int | None = None  # of the same scene; absent: not known, the version alone is compared
+    after: str = ""  # goal under way at whose end this one begins, without a pause; empty: it begins at once
 
 
 class FollowJointTrajectoryFeedback(Message, frozen=True, kw_only=True):
@@ -86,5 +87,5 @@ class FollowJointTrajectoryResult(Message, frozen=True, kw_only=True):
     commanded_steps: tuple[int, ...] = ()  # [steps] absolute, at the end
     executed_steps: tuple[int, ...] = ()  # [steps] absolute, as the device reported it
     max_following_error: Vector = ()  # [steps] largest |commanded - executed| on the way
-    final_error: Vector = ()  # [steps] goal - executed at the end, with the goal's fraction
+    final_error: Vector = ()  # [steps] goal - executed at the end; commanded - executed where another goal followed
     duration: float = 0.0  # [s] from acceptance to result

@@ -29,6 +29,7 @@ class Play:
     def __init__(self, wire: Wire, seed: int) -> None:
         self.rig = VirtualArm(wire, seed=seed).ready()
         self.accepted: dict[str, float] = {}  # [s] when
+        self.ends: dict[str, Vector] = {}  # of the goals that were accepted
         self.tickets = 0
         self.boot = 77
         self.quiet_since = 0  # [ms] since the last reboot
@@ -52,10 +53,14 @@ class Play:
         states = self.rig.messages(JOINT_STATES)
         return states[-1].position if states else self.rig.position
 
-    def goal(self, trajectory: JointTrajectory, time_tolerance: float = 0.0) -> None:
+    def goal(self, trajectory: JointTrajectory, time_tolerance: float = 0.0, after: str = "") -> None:
         goal_id = f"g{len(self.accepted)}"
-        goal = FollowJointTrajectoryGoal(trajectory=trajectory, goal_time_tolerance=time_tolerance)
+        goal = FollowJointTrajectoryGoal(trajectory=trajectory, goal_time_tolerance=time_tolerance, after=after)
         if self.rig.goal(goal, goal_id).accepted:
+            self.ends[goal_id] = trajectory.points[-1].positions
+            if after:
+                self.accepted[goal_id] = self.accepted[after] + LONGEST_GOAL
+                return
             self.accepted[goal_id] = self.rig.now + max(0.0, trajectory.stamp * 1e-9 - self.rig.moment.unix * 1e-9)
 
     def command(self, kind: DeviceCommandKind, value: float = 0.0) -> None:
@@ -152,6 +157,18 @@ def planned(share: Vector, reach: float, delay: float, tolerance: float) -> Acti
     return act
 
 
+def following(share: Vector, reach: float) -> Action:
+    """A goal from the end of the last one, while that is under way or just after it."""
+
+    def act(play: Play) -> None:
+        if play.ends:
+            last, start = list(play.ends.items())[-1]
+            end = tuple(a + reach * (b - a) for a, b in zip(start, place(share), strict=True))
+            play.goal(move(start, end), after=last)
+
+    return act
+
+
 def corners(share: Vector, reach: float, count: int, time: float) -> Action:
     def act(play: Play) -> None:
         start, end = play.here(), near(play, share, reach)
@@ -212,6 +229,7 @@ waits = st.one_of(st.floats(0.0, 0.06), st.floats(0.0, 3.0))
 reaches = st.sampled_from([0.0, 1e-4, 0.003, 0.02, 0.1, 0.4, 1.0])
 EXPLORED = st.one_of(
     st.builds(planned, shares, reaches, st.sampled_from([0.0, 0.0, 0.0, 0.5, 3.0]), st.sampled_from([0.0, -1.0, 0.3])),
+    st.builds(following, shares, reaches),
     st.builds(corners, shares, reaches, st.integers(1, 6), st.sampled_from([0.02, 0.5, 1.5])),
     st.builds(
         lambda share, reach, time, rests: lambda play: play.goal(point(near(play, share, reach), time, rests)),

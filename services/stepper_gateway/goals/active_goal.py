@@ -50,6 +50,7 @@ class ActiveGoal:
     max_error: list[float] = field(default_factory=list)  # [steps]
     feedback_due: float = 0.0  # [s] monotonic
     commanded: tuple[float, ...] = ()  # [steps] latest
+    is_passed: bool = False  # the arm has gone on from its end to that of the goal after it, without a stop
     departed: tuple[int, ...] = ()  # [steps] where the joints stood or passed when it began
 
     def __post_init__(self) -> None:
@@ -63,6 +64,11 @@ class ActiveGoal:
     def begin(self, stream: Stream, start_us: int, duration_us: int, deadline: float | None) -> None:
         """Its first knot comes `start_us` [us] along `stream`; it is late after `deadline` [s] monotonic."""
         self.stream, self.start_us, self.duration_us, self.deadline = stream, start_us, duration_us, deadline
+
+    @property
+    def end_us(self) -> int:
+        """Stream time at which it ends."""
+        return self.start_us + self.duration_us
 
     def follow(self, point: PathPoint, state: State) -> GoalEnding | None:
         """Take a state and the path [steps] at its instant; an ending if the arm has strayed from the path."""
@@ -110,13 +116,32 @@ class ActiveGoal:
             f"{j.name} from {j.steps.to_position(old):+.4f} to {j.steps.to_position(new):+.4f} {j.unit}"
             for j, old, new in rows
         )
-        errors = [abs(error) for error in self.goal_errors(state)]
+        errors = [abs(error) for error in self._final_errors(state)]
         off = max(errors)
         return f"{said}; {moves}; {off:.2f} steps from the goal at most ({self.joints[errors.index(off)].name})"
 
     def goal_errors(self, state: State) -> list[float]:
         """[steps] goal minus executed."""
         return [wanted - done for wanted, done in zip(self.target_steps, state.steps, strict=True)]
+
+    def passing_error(self, point: PathPoint, state: State) -> GoalEnding | None:
+        """The arm goes on past its end: an ending if it was not on its path there, to the goal tolerance."""
+        bounds = self.goal.goal_tolerance.position
+        for joint, wanted, done, bound in zip(self.joints, point.steps, state.steps, bounds, strict=True):
+            if bound is not None and abs(wanted - done) > bound:
+                return GoalEnding(
+                    GoalStatusCode.ABORTED,
+                    FollowErrorCode.GOAL_TOLERANCE_VIOLATED,
+                    f'joint "{joint.name}" was {wanted - done:+.2f} steps off its path as it passed the goal, more '
+                    f"than {bound:g} steps",
+                )
+        return None
+
+    def _final_errors(self, state: State) -> list[float]:
+        """[steps] goal minus executed, or commanded minus executed where the arm has gone on."""
+        if not self.is_passed:
+            return self.goal_errors(state)
+        return [wanted - done for wanted, done in zip(self.commanded, state.steps, strict=True)]
 
     def is_reached(self, state: State) -> bool:
         """True if the executed steps and the velocities are within the goal tolerance."""
@@ -181,6 +206,6 @@ class ActiveGoal:
             commanded_steps=tuple(round(steps) for steps in self.commanded),
             executed_steps=state.steps if state is not None else (),
             max_following_error=tuple(self.max_error),
-            final_error=tuple(self.goal_errors(state)) if state is not None else (),
+            final_error=tuple(self._final_errors(state)) if state is not None else (),
             duration=now - self.accepted.monotonic,
         )

@@ -9,7 +9,8 @@ from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from schemas.system import LogLevel
 from services.stepper_gateway.device.gateway_device import GatewayDevice
 from services.stepper_gateway.goals.active_goal import ActiveGoal, GoalEnding
-from services.stepper_gateway.goals.goal_validator import GoalValidator
+from services.stepper_gateway.goals.goal_validator import GoalValidator, ValidatedGoal
+from services.stepper_gateway.goals.next_goal import CANCELED, NextGoal
 from services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from services.stepper_gateway.goals.scene_versions import PlannedIn, SceneVersions
 from services.stepper_gateway.links.frames import State
@@ -38,7 +39,7 @@ class GoalVerdict(NamedTuple):
 
 
 class GoalExecutor:
-    """At most one goal moves the arm; a newer one takes over from it."""
+    """At most one goal moves the arm; a newer one takes over from it, or follows it where it asks for that."""
 
     def __init__(self, device: GatewayDevice, controller: MotionController) -> None:
         self._device, self._controller = device, controller
@@ -46,10 +47,11 @@ class GoalExecutor:
         self._validator = GoalValidator(device.joints, device.arm.device.tick_hz)
         self._current: ActiveGoal | None = None
         self._waiting: ActiveGoal | None = None  # until its stamp, or until the stream before it has ended
+        self._next = NextGoal(controller)
 
     @property
     def is_active(self) -> bool:
-        return self._current is not None or self._waiting is not None
+        return self._current is not None or self._waiting is not None or self._next.goal is not None
 
     def use_tick(self, tick_hz: int) -> None:
         """The device's own figure for the tick that bounds step rates."""
@@ -65,6 +67,8 @@ class GoalExecutor:
                 raise invalid("the arm is still decelerating after the last goal; send this one again when it rests")
             self.scenes.require_newest(PlannedIn.of(goal))
             checked = self._validator.check(goal, moment.unix, self._device.parameters)
+            if goal.after and (present := self._next.require_place(checked, self._current, goal.after)) is not None:
+                return self._accept_next(goal_id, checked, present, moment)
             motion_start = controller.motion_start(moment)
             path = self._validator.path(checked, motion_start, moment.unix, self._device.parameters)
         except GoalRejected as rejected:
@@ -78,22 +82,26 @@ class GoalExecutor:
 
     def cancel(self, goal_id: str, moment: Moment) -> str:
         """Decelerate; empty, or why there is nothing to cancel."""
+        if self._next.goal is not None and self._next.goal.goal_id == goal_id:
+            if (taken := self._next.cancel()) is not None:
+                self._finish(taken, CANCELED, moment)
+            return ""
         execution = next((e for e in (self._current, self._waiting) if e is not None and e.goal_id == goal_id), None)
         if execution is None:
             return f"goal {goal_id} is not being carried out"
-        ending = GoalEnding(GoalStatusCode.CANCELED, FollowErrorCode.CANCELED, "the arm decelerated on its path")
         if execution is self._waiting:
             self._waiting = None
             if self._current is not None or self._controller.is_resting():
-                self._finish(execution, ending, moment)
+                self._finish(execution, CANCELED, moment)
                 return ""
             self._current = execution  # what it waited behind has to stop
-        self._end(ending, moment)
+        self._end(CANCELED, moment)
         return ""
 
     def step(self, moment: Moment, period: float) -> None:
         """Start what has waited, and end what is late or refused; `period` [s] since the last step."""
         self._start_waiting(moment)
+        self._require_scene_of_next(moment)
         execution, controller = self._current, self._controller
         if execution is None:
             return self._stop_what_failed(moment)
@@ -157,9 +165,28 @@ class GoalExecutor:
         """The device played another stream than the present goal's, and is being stopped."""
         self._end(GoalEnding(*FAILED, "the device moved along another stream"), moment)
 
+    def _accept_next(self, goal_id: str, checked: ValidatedGoal, present: ActiveGoal, moment: Moment) -> GoalVerdict:
+        """The goal begins at the end of the present one; raises `GoalRejected`."""
+        path = self._validator.path(checked, NextGoal.start_of(present), moment.unix, self._device.parameters)
+        self._drop_waiting(moment)
+        self._next.put(ActiveGoal(goal_id, checked, self._device.joints, moment), path, present)
+        return GoalVerdict(True)
+
+    def _require_scene_of_next(self, moment: Moment) -> None:
+        """What follows was planned in a scene that may be another by now; knots on their way are not called back."""
+        if (goal := self._next.withdrawable) is None:
+            return
+        try:
+            self.scenes.require_newest(goal.goal.planned_in)
+        except GoalRejected as rejected:
+            self._next.take_away()
+            self._finish(goal, GoalEnding(GoalStatusCode.ABORTED, rejected.code, rejected.reason), moment)
+
     def _follow(self, execution: ActiveGoal, state: State, point: PathPoint, moment: Moment) -> None:
         strayed = execution.follow(point, state)
         stream = execution.stream
+        if execution.ending is None and strayed is None and self._next.is_due(execution, state):
+            return self._go_on_to_next(execution, state, point, moment)
         is_finished = stream is not None and stream.is_finished and execution.ending is None
         if is_finished and strayed is None and execution.is_reached(state):
             done = GoalEnding(GoalStatusCode.SUCCEEDED, FollowErrorCode.SUCCESSFUL, "")
@@ -169,6 +196,18 @@ class GoalExecutor:
         if strayed is not None and execution.ending is None:
             return self._end(strayed, moment)
         self._report(execution, state, point, moment)
+
+    def _go_on_to_next(self, execution: ActiveGoal, state: State, point: PathPoint, moment: Moment) -> None:
+        """The arm has passed the end of the present goal on its way to that of the next."""
+        execution.is_passed = True
+        if (missed := execution.passing_error(point, state)) is not None:
+            return self._end(missed, moment)
+        following = self._next.begin(state, moment)
+        self._finish_current(GoalEnding(GoalStatusCode.SUCCEEDED, FollowErrorCode.SUCCESSFUL, ""), moment)
+        self._current, ending, following.ending = following, following.ending, None
+        self._device.out.put(GoalExecuting(following.goal_id))
+        if ending is not None:  # it was cancelled when its knots were on their way
+            self._end(ending, moment)
 
     def _report(self, execution: ActiveGoal, state: State, point: PathPoint, moment: Moment) -> None:
         if moment.monotonic < execution.feedback_due or not execution.is_executing:
@@ -246,14 +285,27 @@ class GoalExecutor:
         if self._current is not None and self._current.ending is None:
             self._current.ending = ending
             self._controller.stop(moment)
+            self._drop_next(self._current, ending, moment)
 
     def _finish_current(self, ending: GoalEnding, moment: Moment) -> None:
         execution, self._current = self._current, None
-        if execution is not None:
-            self._finish(execution, ending, moment)
+        if execution is None:
+            return
+        self._finish(execution, ending, moment)
+        if ending.status is not GoalStatusCode.SUCCEEDED:
+            self._drop_next(execution, ending, moment)
+        elif (waiting := self._next.take_away()) is not None:
+            self._waiting = waiting  # its knots could not follow in the stream any more: it begins at rest
+
+    def _drop_next(self, present: ActiveGoal, ending: GoalEnding, moment: Moment) -> None:
+        """What was to follow does not."""
+        if (dropped := self._next.take_away()) is not None:
+            reason = f"goal {present.goal_id}, which it was to follow, {ending.status.name.lower()}: {ending.reason}"
+            self._finish(dropped, GoalEnding(GoalStatusCode.ABORTED, ending.code, reason), moment)
 
     def _finish(self, execution: ActiveGoal, ending: GoalEnding, moment: Moment) -> None:
         result = execution.result(ending, self._device.state, moment.monotonic)
         self._device.out.put(GoalFinished(execution.goal_id, ending.status, result))
+        self._next.ended(execution.goal_id, ending.status)
         level = LogLevel.INFO if ending.status == GoalStatusCode.SUCCEEDED else LogLevel.WARNING
         self._device.out.log(level, execution.account(ending, self._device.state, moment.monotonic))

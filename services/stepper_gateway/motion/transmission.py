@@ -23,6 +23,7 @@ class Transmission:
         self._next_id = first_stream
         self.stream: Stream | None = None  # the present or the last one
         self._motion: KnotSource | None = None
+        self._following: KnotSource | None = None
         self._start: Knot | None = None
 
     @property
@@ -40,16 +41,25 @@ class Transmission:
         """A new stream from rest at `start`."""
         self.stream = Stream(self._next_id, boot_id, self._joints, self._encoder, capacity)
         self._next_id = self._next_id % 0xFFFFFFFF + 1
-        self._motion, self._start = motion, start
+        self._motion, self._following, self._start = motion, None, start
         return self.stream
 
     def splice(self, motion: KnotSource) -> None:
         """Go on with another motion, which continues from the last knot sent."""
-        self._motion = motion
+        self._motion, self._following = motion, None
+
+    def follow(self, motion: KnotSource | None) -> None:
+        """After the last knot of the present motion go on with another one, from rest; None: with none."""
+        self._following = motion
+
+    @property
+    def has_following(self) -> bool:
+        """True while the present motion has knots left, and another one follows it."""
+        return self._following is not None
 
     def abandon(self) -> None:
         """Send nothing more of this stream, not even again."""
-        self._motion = self._start = None
+        self._motion = self._following = self._start = None
         if self.stream is not None:
             self.stream.is_abandoned = True
             self.stream.unacked.clear()
@@ -89,8 +99,8 @@ class Transmission:
             knots.insert(0, self._start)
             self._start = None
         if motion.is_finished:
-            self._motion = None
-        return stream.add(knots, motion.dt_us, motion.is_finished)
+            self._motion, self._following = self._following, None
+        return stream.add(knots, motion.dt_us, last=self._motion is None)
 
     def _braking(self, stream: Stream, played_us: int) -> float:
         """[s] half the longest stopping time on the way: with less, the device would slow down by itself."""
