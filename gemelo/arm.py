@@ -420,18 +420,34 @@ class Arm:
         """
         return self._motions.run(plan, detached, on_progress, on_cancel)
 
-    def start(self, plan: Plan | None = None, *, detached: bool = False, **target: Unpack[Target]) -> Motion:
+    def start(
+        self,
+        plan: Plan | None = None,
+        *,
+        detached: bool = False,
+        after: Motion | None = None,
+        **target: Unpack[Target],
+    ) -> Motion:
         """As `execute` and `move`, but returns as soon as the arm goes; a motion that still runs is taken over.
+
+        `after`: the plan begins where that motion ends, and in the same instant, without a pause. One motion can wait
+        behind another; it is over too when that one ends before its goal.
 
         >>> motion = arm.start(named="left")
         >>> motion.is_over
         False
         >>> motion.wait().status.name
         'SUCCEEDED'
+        >>> first = arm.start(named="ready")
+        >>> second = arm.start(arm.plan(named="left", from_joints=first.plan.end), after=first)
+        >>> first.wait().status.name, second.wait().status.name
+        ('SUCCEEDED', 'SUCCEEDED')
         """
         if (plan is None) == (not target):
             raise BadArgument("start a plan, or say where to: not both, not none")
-        return self._motions.start(plan if plan is not None else self.plan(**target), detached)
+        if target and after is not None and "from_joints" not in target:
+            target["from_joints"] = after.plan.end
+        return self._motions.start(plan if plan is not None else self.plan(**target), detached, after=after)
 
     def home(
         self, *joints: str, on_progress: OnHoming | None = None, on_cancel: Callable[[], object] | None = None

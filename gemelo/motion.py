@@ -119,6 +119,15 @@ class Motion:
         return {name: arm.joint(name).steps.to_position(count) for name, count in steps}
 
     @property
+    def goal_id(self) -> str:
+        """Under which the gateway knows it.
+
+        >>> len(arm.move(named="left").goal_id) > 8
+        True
+        """
+        return self._handle.goal_id if self._handle is not None else ""
+
+    @property
     def _outcome(self) -> ActionOutcome[FollowJointTrajectoryResult] | None:
         return self._handle.outcome if self._handle is not None else None
 
@@ -250,11 +259,11 @@ class Motions:
             self._start(motion)
             return motion.wait(on_progress=on_progress, on_cancel=on_cancel)
 
-    def start(self, plan: Plan, detached: bool) -> Motion:
-        """Sends the plan's trajectory; raises `Refused` or `Lost`."""
-        return self._start(Motion(self._session, plan, detached))
+    def start(self, plan: Plan, detached: bool, after: Motion | None = None) -> Motion:
+        """Sends the plan's trajectory, to begin at the end of the motion `after`; raises `Refused` or `Lost`."""
+        return self._start(Motion(self._session, plan, detached), after)
 
-    def _start(self, motion: Motion) -> Motion:
+    def _start(self, motion: Motion, after: Motion | None = None) -> Motion:
         client = self._client = self._client or self._session.node.action(FOLLOW_JOINT_TRAJECTORY)
         plan = motion.plan
         self._started = [each for each in self._started if not each.is_over] + [motion]
@@ -262,6 +271,7 @@ class Motions:
             trajectory=plan.trajectory,
             scene_version=plan.response.scene_version,
             scene_epoch=plan.response.scene_epoch,
+            after=after.goal_id if after is not None else "",
         )
         try:
             motion._send(client, goal)

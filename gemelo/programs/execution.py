@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from threading import Event
 
 from gemelo.arm import Arm
-from gemelo.errors import Error, Refused
+from gemelo.errors import Aborted, Error, Refused
 from gemelo.motion import Motion
 from gemelo.planning import Plan
 from gemelo.programs.planning import plan_leg
 from gemelo.programs.points import Point
 from gemelo.programs.sequence import Leg
 from gemelo.programs.steps import Attach, Detach, Output, Wait, WaitFor
+from schemas.motion import FollowErrorCode
 
 LOOK_AHEAD = 50  # legs that are looked through for the next motion
+HAND_OVER = 1.0  # [s] before the end of a motion that the next is handed over; the gateway sends 0.5 s ahead at most
 SENSOR_PERIOD = 0.05  # [s] between two looks at a sensor, of which there are 10 a second
 
 OnLeg = Callable[[Leg | None, int, int, str], object]  # the leg, legs done, legs planned, why it pauses
@@ -38,11 +41,10 @@ class Controls:
 
 @dataclass
 class Prepared:
-    """A motion that comes later: its plan, or why there is none, and the motion itself where it is handed over."""
+    """A motion that comes later: its plan, and the motion itself where the gateway has it already."""
 
     leg: Leg
     plan: Plan | None = None
-    refusal: Error | None = None
     motion: Motion | None = None
 
 
@@ -127,15 +129,47 @@ class Execution:
     def _move(self, leg: Leg) -> None:
         prepared, self._next = self._next, None
         if prepared is None or prepared.leg is not leg:
-            prepared = None
-        motion = prepared.motion if prepared is not None else None
-        if motion is None:
-            motion = self._start(leg, prepared.plan if prepared is not None else None)
+            prepared = Prepared(leg)
+        motion = prepared.motion or self._start(leg, prepared.plan)
+        try:
+            self._follow(motion)
+        except Aborted as aborted:
+            was_handed_over = motion is prepared.motion
+            if not was_handed_over or aborted.code != FollowErrorCode.SCENE_CHANGED or self._controls.stop.is_set():
+                raise
+            self._follow(self._start(leg, None))  # the scene has changed since it was handed over
+
+    def _follow(self, motion: Motion) -> None:
+        """To its end; the next motion is planned meanwhile, and handed over when this one is near its end."""
         self._motion = motion
         if self._controls.stop.is_set():
             motion.cancel()  # asked for while it was being started
-        self._prepare_next(motion)
+        self._prepare_handover(motion)
         motion.wait()
+
+    def _prepare_handover(self, motion: Motion) -> None:
+        following = self._prepare_next(motion)
+        while following is not None and not motion.is_over and not self._controls.stop.is_set():
+            if self._wants_to_hand_over(motion):
+                return self._hand_over(motion, following)
+            self._arm.wait_for(partial(self._is_time_to_look, motion), None)
+
+    def _is_time_to_look(self, motion: Motion) -> bool:
+        return motion.is_over or self._controls.stop.is_set() or self._wants_to_hand_over(motion)
+
+    def _wants_to_hand_over(self, motion: Motion) -> bool:
+        controls = self._controls
+        will_pause = controls.pauses or controls.pauses_after_one or controls.holds
+        return not will_pause and motion.plan.duration - motion.elapsed <= HAND_OVER
+
+    def _hand_over(self, motion: Motion, following: Prepared) -> None:
+        """The gateway appends it to the present motion; what it refuses is planned anew in its turn."""
+        try:
+            following.motion = self._arm.start(following.plan, after=motion)
+        except Refused:
+            following.plan = None
+        if self._controls.stop.is_set():
+            self.cancel()
 
     def _start(self, leg: Leg, plan: Plan | None) -> Motion:
         """Along the plan if that still leads from here, else along a new one."""
@@ -146,17 +180,16 @@ class Execution:
                 pass  # moved by hand meanwhile, or the scene is another
         return self._arm.start(self._plan(leg, None))
 
-    def _prepare_next(self, motion: Motion) -> None:
-        """Plans the next motion from the end of this one, if nothing before it changes the scene."""
+    def _prepare_next(self, motion: Motion) -> Prepared | None:
+        """Plans the next motion from the end of this one; returns it where it follows at once."""
         leg = self._upcoming()
         if leg is None or self._controls.stop.is_set():
-            return
-        prepared = Prepared(leg)
+            return None
         try:
-            prepared.plan = self._plan(leg, motion.plan.end)
-        except Error as error:
-            prepared.refusal = error  # it is planned once more when its turn comes
-        self._next = prepared
+            self._next = Prepared(leg, self._plan(leg, motion.plan.end))
+        except Error:
+            return None  # it is planned once more when its turn comes, and refused then if it must be
+        return self._next if self._peek(0) is leg else None
 
     def _plan(self, leg: Leg, start: Mapping[str, float] | None) -> Plan:
         plan = plan_leg(self._arm, leg, self._points, start)
