@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from gemelo.programs.check import CheckedLeg, ProgramCheck, check_program
+from gemelo.programs.export import export_script
 from gemelo.programs.folder import Programs, programs_folder
 from gemelo.programs.meaning import find_mistakes, find_mistakes_in_file
 from gemelo.programs.mistakes import Mistake, ProgramError
@@ -60,6 +61,7 @@ __all__ = [
     "Wait",
     "WaitFor",
     "check_program",
+    "export_script",
     "find_mistakes",
     "find_mistakes_in_file",
     "kind_of",

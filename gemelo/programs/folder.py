@@ -10,12 +10,14 @@ from gemelo.errors import BadArgument
 from gemelo.programs.names import POINTS_END, checked_folder, program_name
 from gemelo.programs.program import Program
 from gemelo.programs.reading import read_program
+from schemas.deployment import Deployment
 from services.arm.errors import suggestion
 
 
-def programs_folder(arm: Arm) -> Path:
+def programs_folder(of: Arm | Deployment) -> Path:
     """`paths.programs` of the deployment file ($GEMELO_PATHS_PROGRAMS): `programs` in the project if not said."""
-    return checked_folder(arm.deployment.paths.programs)
+    deployment = of.deployment if isinstance(of, Arm) else of
+    return checked_folder(deployment.paths.programs)
 
 
 class Programs(Mapping[str, Program]):
@@ -36,11 +38,11 @@ class Programs(Mapping[str, Program]):
         """Raises KeyError where there is no such file, `ProgramError` with its mistakes where it is wrong."""
         if not isinstance(name, str) or name not in self:
             raise KeyError(name)
-        return read_program(self._file(name))
+        return read_program(self.file(name))
 
     def __contains__(self, name: object) -> bool:
         try:
-            return isinstance(name, str) and self._file(name).is_file()
+            return isinstance(name, str) and self.file(name).is_file()
         except BadArgument:
             return False
 
@@ -60,7 +62,7 @@ class Programs(Mapping[str, Program]):
         """Deletes its file; raises `BadArgument`."""
         if name not in self:
             raise BadArgument(f'no program "{program_name(name)}" in {self.folder}{suggestion(name, self)}')
-        self._file(name).unlink(missing_ok=True)
+        self.file(name).unlink(missing_ok=True)
 
     def rename(self, old: str, new: str) -> None:
         """Gives its file another name; calls of it elsewhere are not changed. Raises `BadArgument`."""
@@ -68,9 +70,10 @@ class Programs(Mapping[str, Program]):
             raise BadArgument(f'there is a program "{new}": remove it first, or take another name')
         if old not in self:
             raise BadArgument(f'no program "{program_name(old)}" in {self.folder}{suggestion(old, self)}')
-        self._file(old).rename(self._file(new))
+        self.file(old).rename(self.file(new))
 
-    def _file(self, name: str) -> Path:
+    def file(self, name: str) -> Path:
+        """Where the program of that name is, or would be; raises `BadArgument` for what is no name."""
         return self.folder / f"{program_name(name)}.toml"
 
 

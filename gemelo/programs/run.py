@@ -41,6 +41,7 @@ class RunState:
     status: RunStatus = RunStatus.READY
     steps: tuple[StepPath, ...] = ()  # that are carried out now, several where they are blended; or were the last
     rounds: tuple[int, ...] = ()  # from 0, of every repeat around the first of them
+    text: str = ""  # what they do, for a person
     done: int = 0  # steps that have been carried out, each as often as it was
     planned: int = 0  # legs that have been planned so far
     started_at: float = 0.0  # [s] UNIX; 0 before the start
@@ -186,7 +187,7 @@ class ProgramRun:
         with self._lock:
             state = replace(self._state, done=done, planned=planned)
             if leg is not None:
-                state = replace(state, steps=leg.paths, rounds=leg.rounds)
+                state = replace(state, steps=leg.paths, rounds=leg.rounds, text="; ".join(map(words_of, leg.steps)))
             if pause:
                 state = replace(state, status=RunStatus.PAUSED, message=pause)
             self._put(state)
@@ -195,8 +196,7 @@ class ProgramRun:
         """The present step for a person, with its rounds."""
         step, rounds = path_text(self._state.step), self._state.rounds
         about = f", round {'.'.join(str(number + 1) for number in rounds)}" if rounds else ""
-        leg = self._execution.leg if self._execution is not None else None
-        return f"{step}{about} ({words_of(leg.steps[0])})" if leg is not None else step or "none"
+        return f"{step}{about} ({self._state.text})" if step else "none"
 
     def _put(self, state: RunState) -> None:
         if state != self._state:
