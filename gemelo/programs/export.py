@@ -48,17 +48,20 @@ def export_script(program: Program, points: Mapping[str, Point], programs: Mappi
     """The text of the script: a function for the program and each that it calls, the joint values of points written in.
 
     `programs`: those that it calls. Where a repeat ends with a blended motion the script stops, and the program does
-    not. Raises `BadArgument` for a point that is not known, KeyError for a program.
+    not. Raises `BadArgument` for a point that is not known and for calls in a circle, KeyError for a program.
     """
     called = called_programs(program, programs or {})
-    return _Script(points, [program, *called.values()]).text()
+    return _Script(points, {program.name: program, **called}).text()
 
 
 class _Script:
-    def __init__(self, points: Mapping[str, Point], programs: Sequence[Program]) -> None:
+    """`programs`: the one that is exported first, then those that it calls."""
+
+    def __init__(self, points: Mapping[str, Point], programs: Mapping[str, Program]) -> None:
         self._points, self._programs = points, programs
-        self._functions = _function_names([each.name for each in programs])
-        self._steps = [step for each in programs for _, step in each.all_steps()]
+        self._functions = _function_names(list(programs))
+        self._steps = [step for each in programs.values() for _, step in each.all_steps()]
+        self._name = next(iter(programs))
 
     def text(self) -> str:
         """The whole script."""
@@ -66,11 +69,11 @@ class _Script:
         blocks = [self._head() + ("\n" + "\n".join(self._table(list(used))) + "\n" if used else "")]
         if any(isinstance(step, WaitFor) for step in self._steps):
             blocks.append(WAIT_FOR)
-        blocks += ["\n".join(self._function(each)) + "\n" for each in reversed(self._programs)]
+        blocks += ["\n".join(self._function(*each)) + "\n" for each in reversed(list(self._programs.items()))]
         return "\n\n".join([*blocks, self._main()])
 
     def _head(self) -> str:
-        said = f"Program {self._programs[0].name}, written by `gemelo program export`; m, rad, s."
+        said = f"Program {self._name}, written by `gemelo program export`; m, rad, s."
         needs_time = any(isinstance(step, Wait | WaitFor) for step in self._steps)
         return f'"""{_in_docstring(said)}"""\n\n' + ("import time\n\n" if needs_time else "") + "import gemelo\n"
 
@@ -80,9 +83,9 @@ class _Script:
             yield f"{INDENT}{_py(name)}: {_py(require_point(self._points, name).joints)},"
         yield "}"
 
-    def _function(self, program: Program) -> Iterator[str]:
-        yield f"def {self._functions[program.name]}(arm: gemelo.Arm, speed: float) -> None:"
-        yield f'{INDENT}"""Program {_in_docstring(program.name)}; `speed`: share of the joints\' velocity limits."""'
+    def _function(self, name: str, program: Program) -> Iterator[str]:
+        yield f"def {self._functions[name]}(arm: gemelo.Arm, speed: float) -> None:"
+        yield f'{INDENT}"""Program {_in_docstring(name)}; `speed`: share of the joints\' velocity limits."""'
         if program.robot:
             yield f"{INDENT}if arm.name != {_py(program.robot)}:"
             said = _py(f"this is for {program.robot}, and the arm is ")
@@ -90,7 +93,7 @@ class _Script:
         yield from self._lines(program.steps, INDENT)
 
     def _main(self) -> str:
-        function = self._functions[self._programs[0].name]
+        function = self._functions[self._name]
         return f'if __name__ == "__main__":\n{INDENT}with gemelo.connect() as arm:\n{INDENT * 2}{function}(arm, 1.0)\n'
 
     def _lines(self, steps: Sequence[AnyStep], indent: str) -> Iterator[str]:

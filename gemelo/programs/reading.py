@@ -6,6 +6,7 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +70,7 @@ def load_toml(text: str, file: str) -> dict[str, Any]:
         raise ProgramError([Mistake(file, 0, (), "this is nested far too deep")]) from None
     except tomllib.TOMLDecodeError as error:
         at = re.search(r" \(at line (\d+), column (\d+)\)$", str(error))
-        line = int(at[1]) if at else text.count("\n") + 1
+        line = int(at[1]) if at else text.rstrip().count("\n") + 1
         said = str(error)[: at.start()] if at else str(error).removesuffix(" (at end of document)")
         what = f"this is not TOML: {said}{f' (column {at[2]})' if at else ' (at the end)'}"
         raise ProgramError([Mistake(file, line, (), what)]) from None
@@ -184,12 +185,12 @@ def _number(value: object, unit: str) -> object:
         raise _BadUnit(f'write it in per cent: "{value if value > 1 else value * 100:g}%"')
     if not isinstance(value, str):
         return value
-    found = re.fullmatch(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S+)\s*", value)
+    found = re.fullmatch(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(\S+)\s*", value)
     base, factor = UNITS.get(found[2], ("", 1.0)) if found else ("", 1.0)
     if found is None or base not in unit.split(" or "):
         known = ", ".join(name for name, (base, _) in UNITS.items() if base in unit.split(" or "))
         raise _BadUnit(f"{value!r} has none of the units {known}")
-    return float(found[1]) / 100.0 if base == "%" else float(found[1]) * factor
+    return float(Decimal(found[1]) / 100) if base == "%" else float(found[1]) * factor
 
 
 def _expected(kind: type[Step], name: str, expected: Any) -> str:

@@ -57,13 +57,21 @@ def require_step(program: Program, programs: Mapping[str, Program], path: StepPa
         steps = _inner(steps[index], programs)
 
 
-def called_programs(program: Program, programs: Mapping[str, Program]) -> dict[str, Program]:
-    """All programs that it calls, and those that they call, as they are now; there is no circle among them."""
+def called_programs(
+    program: Program, programs: Mapping[str, Program], callers: tuple[str, ...] = ()
+) -> dict[str, Program]:
+    """All programs that it calls, and those that they call, as they are now, by the name in the call.
+
+    Raises `BadArgument` for calls in a circle, KeyError for a program that is not there.
+    """
     found: dict[str, Program] = {}
+    callers = (*callers, program.name)
     for _, step in program.all_steps():
         if isinstance(step, Call) and step.program not in found:
+            if step.program in callers:
+                raise BadArgument(f"programs call one another without end: {', '.join(callers)}, {step.program}")
             called = programs[step.program]
-            found |= {step.program: called, **called_programs(called, programs)}
+            found |= {step.program: called, **called_programs(called, programs, callers)}
     return found
 
 

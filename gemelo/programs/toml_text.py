@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from decimal import Decimal
 
 import msgspec
 
@@ -52,9 +53,8 @@ def _lines(steps: Iterable[AnyStep], indent: str) -> Iterable[str]:
 
 
 def percent_text(share: float) -> str:
-    """A share as per cent, which reads back as the same number."""
-    text = f"{share * 100.0:.15g}"
-    return f"{text}%" if float(text) / 100.0 == share else f"{share * 100.0!r}%"
+    """A share as per cent, exact: it reads back as the same number."""
+    return f"{(Decimal(repr(share)) * 100).normalize():f}%"
 
 
 def _string(text: str) -> str:
