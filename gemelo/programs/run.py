@@ -10,7 +10,7 @@ from enum import StrEnum
 
 from gemelo.arm import Arm
 from gemelo.errors import Error
-from gemelo.programs.execution import Controls, Execution, Failed
+from gemelo.programs.execution import Controls, Execution
 from gemelo.programs.meaning import require_right
 from gemelo.programs.points import Point
 from gemelo.programs.program import Program
@@ -148,6 +148,8 @@ class ProgramRun:
             if left <= 0.0:
                 raise TimeoutError(f'program "{self.program.name}" still runs after {timeout:g} s')
             self._arm.wait_for(lambda: self._state.status is not RunStatus.RUNNING, min(left, 1.0))
+        if self._state.status.is_over and self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join()  # it has said its last word
         return self._state
 
     def _go_on(self, one_step: bool) -> None:
@@ -169,8 +171,8 @@ class ProgramRun:
         status, message = RunStatus.DONE, ""
         try:
             execution.run()
-        except Failed as failed:
-            status, message = RunStatus.FAILED, f"step {self._where()}: {failed}"
+        except Error as error:
+            status, message = RunStatus.FAILED, f"step {self._where()}: {error}"
         except BaseException as error:
             status, message = RunStatus.FAILED, f"step {self._where()}: {type(error).__name__}: {error}"
             raise
@@ -180,7 +182,6 @@ class ProgramRun:
         finally:
             with self._lock:
                 self._put(replace(self._state, status=status, message=message))
-            self._arm.wake()
 
     def _on_leg(self, leg: Leg | None, done: int, planned: int, pause: str) -> None:
         """The execution tells what it is at."""

@@ -27,6 +27,7 @@ SHOWS = {  # what the last line of each says
     "08_stream": r"largest step error: 0\.\d+",
     "09_pick_and_place": r"home: straight, .* 0 steps lost",
     "13_custom_planner": r"SUCCEEDED  \(.*\)",
+    "15_program": r"done: 6 steps, \d+\.\d s planned",
 }
 NODES = {  # what one line of each says, for as long as it runs
     "10_joint_monitor": r"(\w+ [+-]\d\.\d{4}(  )?)+",

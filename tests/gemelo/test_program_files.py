@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from gemelo.programs import (
     Line,
     Output,
     Point,
+    Points,
     Program,
     ProgramError,
     Programs,
@@ -35,6 +37,7 @@ from gemelo.programs import (
     read_program,
 )
 from gemelo.programs.reading import parse_program
+from gemelo.programs.steps import KINDS
 from gemelo.programs.toml_lines import toml_lines
 from services.arm.model.description import load_arm
 
@@ -303,3 +306,21 @@ def test_a_steps_number_reads_back(path: tuple[int, ...]) -> None:
 def test_what_is_no_step_is_refused(text: str) -> None:
     with pytest.raises(BadArgument, match="is no step"):
         parse_path(text)
+
+
+def test_the_files_of_the_page_about_programs_are_right(root: Path, tmp_path: Path) -> None:
+    program, points = re.findall(r"```toml\n(.*?)```", (root / "docs/programs.md").read_text(), flags=re.DOTALL)
+    (tmp_path / "shown.toml").write_text(program)
+    (tmp_path / "rm1.points.toml").write_text(points)
+    (tmp_path / "tour.toml").write_text((root / "programs/tour.toml").read_text())
+    programs = Programs(tmp_path)
+    assert find_mistakes_in_file(tmp_path / "shown.toml", ROBOT, Points.load(tmp_path, ROBOT), programs) == ()
+    assert {type(step) for _, step in programs["shown"].all_steps()} == set(KINDS)
+
+
+@pytest.mark.parametrize("robot", ["rm1", "parol6"])
+def test_the_programs_of_the_project_have_no_mistakes_on_any_arm(root: Path, robot: str) -> None:
+    programs = Programs(root / "programs")
+    assert "tour" in programs
+    for name in programs:
+        assert find_mistakes_in_file(programs.file(name), load_arm(root / "urdf" / robot), {}, programs) == ()
