@@ -38,6 +38,11 @@ class Controls:
     holds: bool = False  # on the path
     stop: Event = field(default_factory=Event)  # the arm decelerates, and the run is over
 
+    @property
+    def wants_pause(self) -> bool:
+        """True if no other leg is to begin; a hold may come when the motion has just ended."""
+        return self.pauses or self.holds
+
 
 @dataclass
 class Prepared:
@@ -94,10 +99,10 @@ class Execution:
 
     def _pause_if_asked(self, leg: Leg) -> None:
         handed_over = self._next is not None and self._next.leg is leg and self._next.motion is not None
-        if not self._controls.pauses or handed_over:
+        if handed_over or not self._controls.wants_pause:
             return
         self._on_leg(leg, self._done, self._planned, "paused before this step")
-        self._arm.wait_for(lambda: self._controls.stop.is_set() or not self._controls.pauses, None)
+        self._arm.wait_for(lambda: self._controls.stop.is_set() or not self._controls.wants_pause, None)
 
     def _carry_out(self, leg: Leg) -> None:
         step = leg.steps[0]
@@ -158,8 +163,7 @@ class Execution:
         return motion.is_over or self._controls.stop.is_set() or self._wants_to_hand_over(motion)
 
     def _wants_to_hand_over(self, motion: Motion) -> bool:
-        controls = self._controls
-        will_pause = controls.pauses or controls.pauses_after_one or controls.holds
+        will_pause = self._controls.wants_pause or self._controls.pauses_after_one
         return not will_pause and motion.plan.duration - motion.elapsed <= HAND_OVER
 
     def _hand_over(self, motion: Motion, following: Prepared) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from gemelo.arm import Arm
-from gemelo.errors import Error
+from gemelo.errors import Error, Refused
 from gemelo.programs.execution import Controls, Execution
 from gemelo.programs.meaning import require_right
 from gemelo.programs.points import Point
@@ -115,8 +116,12 @@ class ProgramRun:
             execution = self._execution
             if execution is None or not execution.is_moving:
                 return self.pause()
-            self._arm.hold()
             self._controls.holds = True
+            try:
+                self._arm.hold()
+            except BaseException:
+                self._controls.holds = False
+                raise
             self._put(replace(self._state, status=RunStatus.PAUSED, message="held on its path"))
 
     def resume(self) -> None:
@@ -132,31 +137,36 @@ class ProgramRun:
 
     def stop(self) -> None:
         """The arm decelerates on its path, and the run is over; returns at once, `wait` when it rests."""
-        with self._lock:
-            if self._thread is None or self._state.status.is_over:
-                return
-            self._controls.stop.set()
-            if self._execution is not None:
-                self._execution.cancel()
-            self._arm.wake()
+        if self._execution is None or self._state.status.is_over:
+            return
+        self._controls.stop.set()  # without the lock: a stop waits for nobody's answer
+        self._execution.cancel()
+        self._arm.wake()
 
     def wait(self, timeout: float | None = None) -> RunState:
         """Returns when the run is over or has paused, with its state; TimeoutError after `timeout` [s]."""
         end = None if timeout is None else time.monotonic() + timeout
-        while self._state.status is RunStatus.RUNNING:
+        while self._goes_on:
             left = 1.0 if end is None else end - time.monotonic()
             if left <= 0.0:
                 raise TimeoutError(f'program "{self.program.name}" still runs after {timeout:g} s')
-            self._arm.wait_for(lambda: self._state.status is not RunStatus.RUNNING, min(left, 1.0))
+            self._arm.wait_for(lambda: not self._goes_on, min(left, 1.0))
         if self._state.status.is_over and self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join()  # it has said its last word
         return self._state
+
+    @property
+    def _goes_on(self) -> bool:
+        """True until it is over, or has paused for a person."""
+        status = self._state.status
+        return status is RunStatus.RUNNING or (status is RunStatus.PAUSED and self._controls.stop.is_set())
 
     def _go_on(self, one_step: bool) -> None:
         with self._lock:
             self._require(RunStatus.PAUSED)
             if self._controls.holds:
-                self._arm.resume()
+                with suppress(Refused):  # the motion had ended when the hold came
+                    self._arm.resume()
             self._controls.holds = self._controls.pauses = False
             self._controls.pauses_after_one = one_step
             self._put(replace(self._state, status=RunStatus.RUNNING, message=""))
