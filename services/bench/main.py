@@ -62,6 +62,7 @@ FIGURES = {
     "stack_rss_mb": Row("stack:stack_rss_mb", "MB per process", True),
     "state_to_frame_ms": Row("frames:state_to_frame_ms", "ms", True),
     "move_accept_to_first_step_ms": Row("latency:move_accept_to_first_step_ms", "ms", True),
+    "program_legs": Row("program_legs:program_legs", "ms", True),
     "stop_ms": Row("stops:stop_ms", "ms", True),
     "chunk_ack_ms": Row("latency:chunk_ack_ms", "ms", True, "mosquitto"),
     "chunk_ack_ms_amqtt": Row("latency:chunk_ack_ms", "ms", True, "amqtt"),
