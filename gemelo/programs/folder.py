@@ -7,7 +7,7 @@ from pathlib import Path
 
 from gemelo.arm import Arm
 from gemelo.errors import BadArgument
-from gemelo.programs.names import POINTS_END, checked_folder, program_name
+from gemelo.programs.names import checked_folder, program_name
 from gemelo.programs.program import Program
 from gemelo.programs.reading import read_program
 from schemas.deployment import Deployment
@@ -47,7 +47,8 @@ class Programs(Mapping[str, Program]):
             return False
 
     def __iter__(self) -> Iterator[str]:
-        return iter(sorted(_name(path) for path in self.folder.glob("*.toml") if _is_program(path)))
+        names = (path.name.removesuffix(".toml") for path in self.folder.glob("*.toml"))
+        return iter(sorted(name for name in names if name in self))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
@@ -75,11 +76,3 @@ class Programs(Mapping[str, Program]):
     def file(self, name: str) -> Path:
         """Where the program of that name is, or would be; raises `BadArgument` for what is no name."""
         return self.folder / f"{program_name(name)}.toml"
-
-
-def _name(path: Path) -> str:
-    return path.name.removesuffix(".toml")
-
-
-def _is_program(path: Path) -> bool:
-    return not path.name.startswith(".") and not _name(path).endswith(POINTS_END)

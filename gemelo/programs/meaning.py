@@ -42,6 +42,8 @@ def find_mistakes_in_file(
         program, mistakes = parse_program(path.name.removesuffix(".toml"), read_text(path), path)
     except ProgramError as error:
         return error.mistakes
+    except Error as error:
+        return (Mistake(str(path), 0, (), str(error).removeprefix(f"{path} ")),)
     found = {*mistakes, *find_mistakes(program, robot, points, programs)}
     return tuple(sorted(found, key=lambda each: (each.file != str(path), each.file, each.line, each.step)))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -32,6 +33,7 @@ from services.cli.parser import Choices, Options, Parser, json_option
 from services.cli.session import Robot, load_robot
 from services.cli.text_table import table
 
+PLAIN = re.compile(r"[\w.-]+")
 BRAKING = 10.0  # [s] that the arm may take to come to rest after Ctrl-C
 
 
@@ -57,8 +59,8 @@ def export_options(parser: Parser) -> None:
 
 
 def choices(robot: Robot | None) -> Choices:
-    """The names of the programs."""
-    return {} if robot is None else {"": [name for name in _programs(robot) if " " not in name]}
+    """The names of the programs; only those that a shell takes as one plain word."""
+    return {} if robot is None else {"": [name for name in _programs(robot) if PLAIN.fullmatch(name)]}
 
 
 def run_list(options: Options) -> ExitCode:
@@ -173,7 +175,7 @@ def _row(programs: Programs, name: str, robot: Robot, points: Points) -> dict[st
     mistakes = find_mistakes_in_file(programs.file(name), robot.arm, points, programs)
     try:
         program = programs[name]
-    except ProgramError:
+    except gemelo.Error:
         return {"name": name, "steps": None, "robot": "", "mistakes": [str(each) for each in mistakes]}
     steps = sum(1 for _ in program.all_steps())
     return {"name": name, "steps": steps, "robot": program.robot, "mistakes": [str(each) for each in mistakes]}

@@ -266,6 +266,18 @@ def test_the_folder_is_read_as_it_is_now(tmp_path: Path) -> None:
         programs["d"]
 
 
+def test_files_whose_names_or_contents_are_no_programs_leave_the_others_as_they_are(tmp_path: Path) -> None:
+    Program("a", (Go(state="ready"),)).save(tmp_path)
+    (tmp_path / "b?.toml").touch()
+    (tmp_path / ".c.toml").touch()
+    (tmp_path / "d.toml").mkdir()
+    (tmp_path / "e.toml").write_bytes(b"\xff")
+    programs = Programs(tmp_path)
+    assert list(programs) == ["a", "e"]
+    [mistake] = find_mistakes_in_file(programs.file("e"), ROBOT, POINTS, programs)
+    assert str(mistake).startswith(f"{tmp_path / 'e.toml'}: is no UTF-8 text")
+
+
 def test_a_folder_that_can_be_none_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadArgument, match="no path has a NUL in it"):
         Programs("a\0b")
