@@ -75,6 +75,18 @@ def test_a_script_ends_by_itself_and_shows_what_it_says(twin: Stack, arm: gemelo
     assert max(abs(error) for error in arm.step_errors.values()) <= 0.5 + 1e-9
 
 
+def test_the_programs_of_the_project_are_checked_and_run(twin: Stack, arm: gemelo.Arm) -> None:
+    arm.move(named="ready")
+    for words, end in (("check", "it can run, "), ("run", "done, 10 steps")):
+        command = [sys.executable, "-m", "services.cli.main", "program", words, "tour"]
+        done = subprocess.run(
+            command, cwd=twin.root, env={**os.environ, **twin.deployment}, capture_output=True, text=True,
+            timeout=LONGEST, check=True,
+        )  # fmt: skip
+        assert done.stderr == ""
+        assert done.stdout.splitlines()[-1].startswith(f"tour: {end}")
+
+
 @pytest.mark.parametrize("name", NODES)
 def test_a_node_says_what_it_hears_until_it_is_stopped(twin: Stack, arm: gemelo.Arm, name: str) -> None:
     with start(twin, name) as process:
