@@ -5,9 +5,9 @@ from __future__ import annotations
 from bisect import bisect_left
 from itertools import pairwise
 
+import gemelo
 from gemelo.arm import Arm
 from gemelo.programs import Go, Point, Program, ProgramRun, Repeat, RunStatus
-from gemelo.session import Session
 from schemas.device import DeviceState
 from schemas.topics import DEVICE_STATE
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile
@@ -22,7 +22,7 @@ LONGEST = 120.0  # [s]
 def program_legs(stacks: Stacks) -> Figure:
     """Standing time [ms] between two legs of a program; the reference sends each leg when the last has ended."""
     running = stacks.any_broker()
-    arm = Arm(Session(running.deployment, running.arm))
+    arm = gemelo.connect(gemelo.Robot(running.deployment, running.arm))
     try:
         if not all(arm.device.state.referenced):
             arm.reference()

@@ -30,7 +30,7 @@ from gemelo.programs import (
 )
 from services.cli.errors import CommandError, ExitCode, unknown, usage
 from services.cli.parser import Choices, Options, Parser, json_option
-from services.cli.session import Robot, load_robot
+from services.cli.session import load_robot
 from services.cli.text_table import table
 
 PLAIN = re.compile(r"[\w.-]+")
@@ -58,7 +58,7 @@ def export_options(parser: Parser) -> None:
     parser.add_argument("file", metavar="FILE", nargs="?", default="-", help="to write; standard output if left out")
 
 
-def choices(robot: Robot | None) -> Choices:
+def choices(robot: gemelo.Robot | None) -> Choices:
     """The names of the programs; only those that a shell takes as one plain word."""
     return {} if robot is None else {"": [name for name in _programs(robot) if PLAIN.fullmatch(name)]}
 
@@ -68,7 +68,7 @@ def run_list(options: Options) -> ExitCode:
     robot = load_robot()
     programs = _programs(robot)
     with _as_command_errors():
-        points = Points.load(programs.folder, robot.arm)
+        points = Points.load(programs.folder, robot.description)
         rows = [_row(programs, name, robot, points) for name in programs]
     if options.json:
         print(json.dumps({"folder": str(programs.folder), "programs": rows}))
@@ -85,7 +85,7 @@ def run_check(options: Options) -> ExitCode:
     program, points, programs = _load(options.name, robot)
     first = _first(options.first)
     shown = None if options.json else _show_leg
-    with _as_command_errors(), gemelo.connect() as arm:
+    with _as_command_errors(), gemelo.connect(robot) as arm:
         check = check_program(arm, program, points, programs, first=first, on_leg=shown)
     print(json.dumps(_check_fields(check)) if options.json else _verdict(check))
     return ExitCode.OK if check.ok else ExitCode.FAILED
@@ -96,7 +96,7 @@ def run_program(options: Options) -> ExitCode:
     robot = load_robot()
     program, points, programs = _load(options.name, robot)
     first = _first(options.first)
-    with _as_command_errors(), gemelo.connect() as arm:
+    with _as_command_errors(), gemelo.connect(robot) as arm:
         run = ProgramRun(arm, program, points, programs, on_change=None if options.json else _show_steps())
         run.start(first)
         state = _await(run, options.json)
@@ -148,20 +148,20 @@ def _as_command_errors() -> Iterator[None]:
         raise CommandError(str(error)) from error
 
 
-def _programs(robot: Robot) -> Programs:
+def _programs(robot: gemelo.Robot) -> Programs:
     with _as_command_errors():
         return Programs(programs_folder(robot.deployment))
 
 
-def _load(name: str, robot: Robot) -> tuple[Program, Points, Programs]:
+def _load(name: str, robot: gemelo.Robot) -> tuple[Program, Points, Programs]:
     """The program with all that it needs; raises `CommandError` with every mistake of the files."""
     programs = _programs(robot)
     with _as_command_errors():
-        points = Points.load(programs.folder, robot.arm)
+        points = Points.load(programs.folder, robot.description)
         if name not in programs:
             programs.file(name)
             raise unknown(f"program in {programs.folder}", name, programs)
-        if mistakes := find_mistakes_in_file(programs.file(name), robot.arm, points, programs):
+        if mistakes := find_mistakes_in_file(programs.file(name), robot.description, points, programs):
             raise ProgramError(mistakes)
         return programs[name], points, programs
 
@@ -171,8 +171,8 @@ def _first(text: str) -> StepPath:
         return parse_path(text) if text else ()
 
 
-def _row(programs: Programs, name: str, robot: Robot, points: Points) -> dict[str, object]:
-    mistakes = find_mistakes_in_file(programs.file(name), robot.arm, points, programs)
+def _row(programs: Programs, name: str, robot: gemelo.Robot, points: Points) -> dict[str, object]:
+    mistakes = find_mistakes_in_file(programs.file(name), robot.description, points, programs)
     try:
         program = programs[name]
     except gemelo.Error:
@@ -251,9 +251,9 @@ def _await(run: ProgramRun, quiet: bool) -> RunState:
         return run.wait(BRAKING)
 
 
-def _end_text(state: RunState, joints: dict[str, float], robot: Robot) -> str:
+def _end_text(state: RunState, joints: dict[str, float], robot: gemelo.Robot) -> str:
     if state.status is RunStatus.DONE:
         return f"{state.program}: done, {state.done} steps"
-    where = ", ".join(f"{name} {value:.4f} {robot.arm.joint(name).unit}" for name, value in joints.items())
+    where = ", ".join(f"{name} {value:.4f} {robot.description.joint(name).unit}" for name, value in joints.items())
     again = f"gemelo program run {shlex.quote(state.program)} --from {path_text(state.step)}"
     return f"{state.program}: {state.status}: {state.message}; the arm is at {where}\ngo on with: {again}"
