@@ -14,7 +14,7 @@ from gemelo.homing import OnHoming, home
 from gemelo.homing_report import HomingReport
 from gemelo.jog import Jogging, Streaming, jog_command
 from gemelo.motion import Motion, Motions, OnMotion
-from gemelo.planning import Configurations, OnPlanProgress, Plan, find_configurations, find_poses, make_plan
+from gemelo.planning import Configurations, OnPlanProgress, Plan, find_configurations, find_poses, make_plan, require_valid
 from gemelo.scene import Scene
 from gemelo.session import Session
 from gemelo.targets import as_target, ik_request, joint_state, request_of
@@ -608,6 +608,20 @@ class Arm:
         (..., ..., ...)
         """
         return find_poses(self._session, joints, ())[self.tool_frame]
+
+    def check(self, joints: Joints) -> None:
+        """Raises `Refused` where the arm may not stand, with the nearest joint values at which it may; nothing moves.
+
+        `joints`: [rad] or [m] by name, the others as they stand now. Limits, the arm itself and the scene are checked.
+
+        >>> arm.check({"brazo_joint": 0.3})
+        >>> try:
+        ...     arm.check({"brazo_joint": 9.0})
+        ... except gemelo.Refused as refused:
+        ...     print(refused.check, refused.nearest)
+        joint limit {'joints': {'brazo_joint': ...}}
+        """
+        require_valid(self._session, joints)
 
     def link_poses(self, joints: Joints | None = None, links: Sequence[str] = ()) -> dict[str, Pose]:
         """As `fk`, for `links`, or for all.

@@ -33,8 +33,9 @@ from schemas.planning import (
     PoseGoal,
     Refusal,
     StepMargin,
+    ValidityRequest,
 )
-from schemas.topics import FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS
+from schemas.topics import FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS, STATE_VALIDITY
 from services.arm.model.description import Arm as Description
 from services.runtime.requests.client import PendingCall
 
@@ -205,6 +206,16 @@ def find_poses(session: Session, joints: Joints | None, links: tuple[str, ...]) 
     if response.refusal is not None:
         raise refused(session.description, response.refusal, PlanRequest(), Target(), response.code)
     return {link: pose_from(pose) for link, pose in zip(response.links, response.poses, strict=True)}
+
+
+def require_valid(session: Session, joints: Joints) -> None:
+    """Raises `Refused` where the arm may not stand, with the nearest joint values at which it may."""
+    values = named_joints(session.description, joints, "joints")
+    request = ValidityRequest(name=tuple(values), position=tuple(values.values()))
+    response = session.call(STATE_VALIDITY, request, KINEMATICS)
+    if response.refusal is not None:
+        goal = PlanRequest(goal=JointGoal(name=request.name, position=request.position))
+        raise refused(session.description, response.refusal, goal, Target(joints=joints), response.code)
 
 
 def refused(arm: Description, refusal: Refusal, request: PlanRequest, target: Target, code: int) -> Refused:

@@ -8,6 +8,7 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.message import Message, Vector
 from schemas.motion import JointTrajectory
+from schemas.scene import Contact
 
 
 class PoseGoal(Message, frozen=True, kw_only=True, tag="pose"):
@@ -249,6 +250,21 @@ class IkResponse(Message, frozen=True, kw_only=True):
     name: tuple[str, ...] = ()
     solutions: tuple[IkSolution, ...] = ()
     refusal: Refusal | None = None
+
+
+class ValidityRequest(Message, frozen=True, kw_only=True):
+    """A configuration to check; joints that are not named stand as they do now."""
+
+    name: tuple[str, ...] = ()
+    position: Vector = ()  # [rad] or [m]
+
+
+class ValidityResponse(Message, frozen=True, kw_only=True):
+    """Whether an arm at rest there is within its limits and keeps the clearance; the refusal says what does not."""
+
+    code: PlanCode = PlanCode.FAILURE
+    refusal: Refusal | None = None
+    contacts: tuple[Contact, ...] = ()  # the pairs nearer than the clearance
 
 
 class FkRequest(Message, frozen=True, kw_only=True):

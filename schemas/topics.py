@@ -48,6 +48,8 @@ from schemas.planning import (
     PlanProgress,
     PlanRequest,
     PlanResponse,
+    ValidityRequest,
+    ValidityResponse,
 )
 from schemas.scene import Contacts, PlanningScene, SceneRequest, SceneResponse
 from schemas.system import LogRecord, NodeStatistics
@@ -163,6 +165,9 @@ PLAN = Request("plan", PlanRequest, PlanResponse, "planner", "a goal in, a verif
 PLAN_CANCEL = Request("plan/cancel", PlanCancel, PlanCancelResult, "planner", "end a plan before its end")
 IK = Request("ik", IkRequest, IkResponse, "planner", "joint values for a tool pose")
 FK = Request("fk", FkRequest, FkResponse, "planner", "link poses for joint values")
+STATE_VALIDITY = Request(
+    "state_validity", ValidityRequest, ValidityResponse, "planner", "may the arm stand there, and what would touch"
+)
 SCENE_EDIT = Request("scene/edit", SceneRequest, SceneResponse, "planner", "add, remove, move, attach, allow ...")
 DEVICE_COMMAND = Request(
     "device/command", DeviceCommandRequest, DeviceCommandResponse, GATEWAY,
@@ -188,6 +193,7 @@ REQUESTS: tuple[Request[Message, Message], ...] = (
     PLAN_CANCEL,
     IK,
     FK,
+    STATE_VALIDITY,
     SCENE_EDIT,
     DEVICE_COMMAND,
     DEVICE_STOP,

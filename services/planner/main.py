@@ -1,11 +1,11 @@
-"""The process: plans from the newest joint state, in the scene as it is; answers `ik` and `fk`; jogs."""
+"""The process: plans from the newest joint state in the present scene; answers `ik`, `fk`, `state_validity`; jogs."""
 
 from __future__ import annotations
 
 from contextlib import closing
 
 from schemas.deployment import Deployment
-from schemas.topics import FK, IK, JOINT_STATES
+from schemas.topics import FK, IK, JOINT_STATES, STATE_VALIDITY
 from services.arm.model.description import load_arm
 from services.planner.core import Planner
 from services.planner.jog_service import JogService
@@ -37,6 +37,11 @@ def run(node: Node, deployment: Deployment) -> None:
         worker=True,
     )
     node.serve(FK, lambda request: kinematic.fk(request, states.message, states.age()), worker=True)
+    node.serve(
+        STATE_VALIDITY,
+        lambda request: kinematic.validity(request, states.message, states.age(), planner.checker.newest),
+        worker=True,
+    )
     workers = Workers(arm.folder, project_root(), lambda: (states.message, states.age()), lambda: keeper.world.scene)
     plans = PlanService(node, workers, planner, keeper)
 

@@ -10,11 +10,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from schemas.frames import Transform
 from schemas.joints import JointState
-from schemas.planning import FkRequest, IkRequest, IkResponse, PlanCode, PoseGoal
+from schemas.planning import (
+    FkRequest,
+    IkRequest,
+    IkResponse,
+    PlanCode,
+    PoseGoal,
+    ValidityRequest,
+    ValidityResponse,
+)
+from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import load_arm
 from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.world import World
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.kinematic_requests import KinematicRequests
 from services.planner.kinematics.targets import Target
@@ -177,3 +188,42 @@ def test_fk_without_a_joint_state_says_so():
     assert SERVED["rm1"].fk(FkRequest(), None).code is PlanCode.ROBOT_STATE_STALE
     beyond = FkRequest(name=RM1.joint_names, position=(math.tau, 0.0, 0.0))
     assert SERVED["rm1"].fk(beyond, None).code is PlanCode.SUCCESS
+
+
+POST = SceneObject(
+    name="post",
+    shape=BoxShape(size=(0.04, 0.04, 0.16)),
+    pose=Transform(translation=(0.29, 0.27, 0.08), rotation=(0.0, 0.0, 0.0, 1.0)),
+)
+
+
+def validity(request_: ValidityRequest, *objects: SceneObject) -> ValidityResponse:
+    world = World(RM1, Kinematics(RM1), PlanningScene(objects=objects))
+    return SERVED["rm1"].validity(request_, PRESENT["rm1"], 0.0, world)
+
+
+def test_where_the_arm_may_stand_is_valid_and_a_limit_is_named_with_the_nearest_value():
+    assert validity(ValidityRequest(name=("brazo_joint",), position=(0.3,))).code is PlanCode.SUCCESS
+    response = validity(ValidityRequest(name=("brazo_joint",), position=(9.0,)))
+    assert response.refusal is not None
+    assert (response.refusal.check, response.refusal.subject) == ("joint limit", "brazo_joint")
+    assert response.refusal.nearest == (RM1.joint("brazo_joint").upper,)
+
+
+def test_what_touches_is_named_with_its_place_and_the_nearest_configuration_that_is_free():
+    [pose] = SERVED["rm1"].ik(IkRequest(goal=PoseGoal(position=(0.29, 0.27, 0.1))), PRESENT["rm1"]).solutions
+    asked = ValidityRequest(name=RM1.joint_names, position=pose.position)
+    assert validity(asked).code is PlanCode.SUCCESS
+    response = validity(asked, POST)
+    assert response.code is PlanCode.GOAL_IN_COLLISION
+    assert response.refusal is not None
+    assert response.refusal.check == "collision"
+    assert all("post" in (contact.first, contact.second) for contact in response.contacts)
+    assert validity(ValidityRequest(name=RM1.joint_names, position=response.refusal.nearest), POST).refusal is None
+
+
+def test_a_configuration_with_an_unknown_joint_or_no_number_is_refused():
+    for name, value, said in (("elbow", 0.1, 'no joint "elbow"'), ("brazo_joint", 1e9, "no position")):
+        response = validity(ValidityRequest(name=(name,), position=(value,)))
+        assert response.refusal is not None
+        assert said in response.refusal.message

@@ -1,21 +1,33 @@
-"""The answers to `ik` and `fk`: configurations for a pose, poses for a configuration, each with the reason where there
-is none."""
+"""The answers to `ik`, `fk` and `state_validity`, each with the reason where there is none."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import islice
 
 import msgspec
+import numpy as np
 
 from schemas.joints import JointState
-from schemas.planning import FkRequest, FkResponse, IkRequest, IkResponse, IkSolution, PlanCode
+from schemas.planning import (
+    FkRequest,
+    FkResponse,
+    IkRequest,
+    IkResponse,
+    IkSolution,
+    PlanCode,
+    ValidityRequest,
+    ValidityResponse,
+)
+from schemas.scene import Contact
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
-from services.planner.collision.clearance import CLEARANCE, DistanceChecker
+from services.planner.collision.clearance import CLEARANCE, DistanceChecker, last_free
+from services.planner.collision.world import World
 from services.planner.kinematics.goals import INVALID, Goals, Start
 from services.planner.kinematics.pose_goals import FARTHEST
 from services.planner.request.deadline import NEVER, Deadline
-from services.planner.request.refusals import PlanRefused, in_collision, malformed, unknown_name
+from services.planner.request.refusals import PlanRefused, beyond_limit, in_collision, malformed, unknown_name
 from services.planner.request.start_state import require_parallel, resolve_start
 
 # Tuning constants: chosen, where a line does not say measured or standard.
@@ -69,6 +81,45 @@ class KinematicRequests:
         except PlanRefused as refused:
             return FkResponse(code=refused.code, refusal=refused.refusal)
         return FkResponse(code=PlanCode.SUCCESS, links=links, poses=tuple(poses[link] for link in links))
+
+    def validity(
+        self, request: ValidityRequest, present: JointState | None, age: float, world: World
+    ) -> ValidityResponse:
+        """Whether the arm may stand in the configuration, within its limits and clear of itself and of `world`; `age`
+        [s] is of `present`. A refusal names the nearest one on the straight joint path from `present`."""
+        try:
+            asked = self._completed(FkRequest(name=request.name, position=request.position), present, age)
+            self._require_limits(request, asked)
+        except PlanRefused as refused:
+            return ValidityResponse(code=refused.code, refusal=refused.refusal)
+        contacts = tuple(world.contacts(asked, CLEARANCE))
+        if not contacts:
+            return ValidityResponse(code=PlanCode.SUCCESS)
+        touching = self._touching(asked, self._nearest_free(asked, present, age, world), contacts, world)
+        return ValidityResponse(code=touching.code, refusal=touching.refusal, contacts=contacts)
+
+    def _require_limits(self, request: ValidityRequest, asked: Start) -> None:
+        values = dict(zip(self._arm.joint_names, asked, strict=True))
+        for joint in self._arm.joints:
+            if joint.name in request.name and not joint.is_within(values[joint.name]):
+                within = tuple(self._arm.joint(name).clamp(values[name]) for name in request.name)
+                raise beyond_limit(self._arm, joint, values[joint.name], within)
+
+    def _nearest_free(self, asked: Start, present: JointState | None, age: float, world: World) -> Start:
+        """The last free configuration on the straight joint path from `present`; empty where there is none."""
+        try:
+            standing = self._standing(None, present, age)
+        except PlanRefused:
+            return ()
+        last = last_free(world, np.array(standing), np.array(asked))
+        return tuple(last.tolist()) if world.distance(last) > CLEARANCE else ()
+
+    def _touching(self, asked: Start, nearest: Start, contacts: Sequence[Contact], world: World) -> PlanRefused:
+        pairs = [(contact.first, contact.second) for contact in contacts]
+        remedy = "take the nearest configuration that is free" if nearest else "choose another configuration"
+        return in_collision(
+            PlanCode.GOAL_IN_COLLISION, "there", pairs, CLEARANCE, nearest, remedy, asked, world.objects
+        )
 
     def _standing(self, given: JointState | None, present: JointState | None, age: float) -> Start:
         """Where distances are measured from; that the arm moves does not matter."""
