@@ -94,10 +94,7 @@ class Device:
         >>> arm.device.fault
         ''
         """
-        state = self.state
-        if state.fault == DeviceFault.NONE:
-            return ""
-        return fault_text(state.fault, joint_name(self._session.description, state.fault_joint))
+        return fault_of(self._session.description, self.state)
 
     @property
     def configuration(self) -> DeviceConfiguration:
@@ -232,6 +229,13 @@ class Device:
             raise BadArgument(f'"{kind}" is done to the whole device, not to "{target}"')
         if known is not None and target not in known:
             raise BadArgument(f'"{kind}" needs a target; there is no "{target}"{suggestion(target, known)}')
+
+
+def fault_of(arm: Description, state: DeviceState) -> str:
+    """The fault in `state`, what it means, and what to do; empty if there is none."""
+    if state.fault == DeviceFault.NONE:
+        return ""
+    return fault_text(state.fault, joint_name(arm, state.fault_joint))
 
 
 def reference_command(arm: Description, values: Mapping[str, float]) -> ReferenceCommand:

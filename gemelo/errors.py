@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from gemelo.arguments import Target
 from gemelo.homing_report import HomingReport
 from schemas.actions import GoalStatusCode
 from schemas.motion import FollowJointTrajectoryResult
 from schemas.planning import Refusal
+from schemas.scene import Contact
 
 
 class Error(Exception):
@@ -64,6 +65,7 @@ class Refused(Error):
         code: int = 0,
         reason: str = "",
         refusal: Refusal | None = None,
+        contacts: Sequence[Contact] = (),
     ) -> None:
         super().__init__(message)
         self.reason = reason or message  # without the remedy, in the words of the planner, the gateway or the device
@@ -77,6 +79,7 @@ class Refused(Error):
         self.configuration = dict(configuration or {})  # [rad] or [m] by joint, where the arm would touch something
         self.nearest_free = dict(nearest_free or {})  # [rad] or [m] by joint, the nearest to a start that touches
         self.code = code  # PlanCode of the planner, FollowErrorCode of the gateway
+        self.contacts = tuple(contacts)  # of `Arm.check`: the pairs that are too near, each with its point
 
 
 class Aborted(Error):

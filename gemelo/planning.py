@@ -35,6 +35,7 @@ from schemas.planning import (
     StepMargin,
     ValidityRequest,
 )
+from schemas.scene import Contact
 from schemas.topics import FK, IK, PLAN, PLAN_CANCEL, PLAN_PROGRESS, STATE_VALIDITY
 from services.arm.model.description import Arm as Description
 from services.runtime.requests.client import PendingCall
@@ -215,10 +216,19 @@ def require_valid(session: Session, joints: Joints) -> None:
     response = session.call(STATE_VALIDITY, request, KINEMATICS)
     if response.refusal is not None:
         goal = PlanRequest(goal=JointGoal(name=request.name, position=request.position))
-        raise refused(session.description, response.refusal, goal, Target(joints=joints), response.code)
+        raise refused(
+            session.description, response.refusal, goal, Target(joints=joints), response.code, response.contacts
+        )
 
 
-def refused(arm: Description, refusal: Refusal, request: PlanRequest, target: Target, code: int) -> Refused:
+def refused(
+    arm: Description,
+    refusal: Refusal,
+    request: PlanRequest,
+    target: Target,
+    code: int,
+    contacts: tuple[Contact, ...] = (),
+) -> Refused:
     """The refusal as an exception, with the nearest goal as arguments."""
     nearest = _nearest(arm, refusal, request, target)
     about = f"refused ({refusal.check})" if refusal.check else "refused"
@@ -236,6 +246,7 @@ def refused(arm: Description, refusal: Refusal, request: PlanRequest, target: Ta
         code=code,
         reason=refusal.message,
         refusal=refusal,
+        contacts=contacts,
     )
 
 

@@ -66,6 +66,11 @@ class ViewerSection(DeploymentRecord, frozen=True, kw_only=True):
     web_port: int = 9090  # the page
 
 
+class PanelSection(DeploymentRecord, frozen=True, kw_only=True):
+    host: str = "127.0.0.1"
+    port: int = 8088  # the operator's page
+
+
 class PathsSection(DeploymentRecord, frozen=True, kw_only=True):
     run: str = ".gemelo/run"  # readiness files, the virtual device's memory
     out: str = "out"  # recordings and logs
@@ -82,5 +87,6 @@ class Deployment(DeploymentRecord, frozen=True, kw_only=True):
     mqtt: MqttSection = MqttSection()
     serial: SerialSection = SerialSection()
     viewer: ViewerSection = ViewerSection()
+    panel: PanelSection = PanelSection()
     paths: PathsSection = PathsSection()
     parameters: dict[str, dict[str, ParameterValue]] = {}  # by node, then by name

@@ -27,6 +27,7 @@ PROCESSES = (
     "logger",
     "visualizer",
     "viewer",
+    "panel",
 )
 POLL = 0.05  # [s]
 STOP = 20.0  # [s] for all to end by themselves
@@ -39,7 +40,7 @@ class StackError(Exception):
 class Stack:
     """Starts on entering, stops on leaving; every process can be looked at and killed by name.
 
-    `viewer="none"` leaves the viewer's process out. `environment` is added to what the stack gets.
+    `viewer="none"` leaves the viewer's process out, `panel` adds the operator's page. `environment` is added to what the stack gets.
     `command` starts it in another way, for example ("make", "up").
     """
 
@@ -48,6 +49,7 @@ class Stack:
         *,
         broker: str = "amqtt",
         viewer: str = "none",
+        panel: bool = False,
         out: Path | None = None,
         processes: Sequence[str] | None = None,
         environment: Mapping[str, str] | None = None,
@@ -58,7 +60,7 @@ class Stack:
         self.folder = Path(tempfile.mkdtemp(prefix="gemelo-"))
         self.run = self.folder / "run"
         self.out = (out or self.folder / "out").resolve()
-        left_out = ("viewer",) if viewer == "none" else ()
+        left_out = {name for name, wanted in (("viewer", viewer != "none"), ("panel", panel)) if not wanted}
         self.processes = tuple(processes or (name for name in PROCESSES if name not in left_out))
         self.ready_seconds = 0.0
         self._command = command
@@ -66,7 +68,7 @@ class Stack:
         self.socket = self.folder / "process-compose.sock"
         self.compose = Compose(self.socket)
         self.server: subprocess.Popen[bytes] | None = None
-        router, mqtt, grpc, web = free_ports(4)
+        router, mqtt, grpc, web, page = free_ports(5)
         self.deployment: dict[str, str] = {
             "GEMELO_ROUTER_PORT": str(router),
             "GEMELO_MQTT_PORT": str(mqtt),
@@ -74,6 +76,7 @@ class Stack:
             "GEMELO_VIEWER_MODE": viewer,
             "GEMELO_VIEWER_PORT": str(grpc),
             "GEMELO_VIEWER_WEB_PORT": str(web),
+            "GEMELO_PANEL_PORT": str(page),
             "GEMELO_PATHS_RUN": str(self.run),
             "GEMELO_PATHS_OUT": str(self.out),
             **(environment or {}),

@@ -18,8 +18,9 @@ def start_problems(deployment: Deployment) -> list[str]:
         load_arm(project_root() / deployment.robot)
     except ConfigurationError as error:
         found.append(str(error))
-    router, mqtt, viewer = deployment.router, deployment.mqtt, deployment.viewer
+    router, mqtt, viewer, panel = deployment.router, deployment.mqtt, deployment.viewer, deployment.panel
     ports = [(router.host, router.port, "router", "port"), (mqtt.host, mqtt.port, "mqtt", "port")]
+    ports.append((panel.host, panel.port, "panel", "port"))
     if viewer.mode is not ViewerMode.NONE:
         ports += [(viewer.host, viewer.port, "viewer", "port"), (viewer.host, viewer.web_port, "viewer", "web_port")]
     for host, port, section, key in ports:

@@ -1,0 +1,139 @@
+"""`gemelo-panel`: serves the operator's page, and says where it is and whether what it shows is live."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import logging
+import sys
+import threading
+import time
+from pathlib import Path
+
+import viser
+
+import gemelo
+from schemas.deployment import Deployment
+from services.panel.model.operator import Operator
+from services.panel.view.page import Page
+from services.panel.view.world import World
+from services.runtime.deployment import load_deployment
+from services.runtime.process.logs import LEVELS, line_logger
+from services.runtime.process.ports import PortTaken, require_free
+from services.runtime.process.shutdown import ShutdownRequest, end_soon, stop_on_signals
+
+NAME = "panel"
+PICTURES = 25.0  # [Hz] at most
+TEXTS = 5.0  # [Hz]
+LOOK_FOR_TWIN = 2.0  # [s] of one look
+
+
+class Panel:
+    """The server, and one page for each browser that is open."""
+
+    def __init__(self, arm: gemelo.Arm, deployment: Deployment, log: logging.Logger) -> None:
+        self._arm, self._log = arm, log
+        self._pages: dict[int, Page] = {}
+        self._lock = threading.Lock()
+        self.operator = Operator(arm)
+        with contextlib.redirect_stdout(None):  # its own greeting
+            self._server = viser.ViserServer(deployment.panel.host, deployment.panel.port, verbose=False)
+        self._world = World(self._server, self.operator)
+        self._server.on_client_connect(self._open)
+        self._server.on_client_disconnect(self._close)
+        log.info(f"page: http://{deployment.panel.host}:{deployment.panel.port}")
+
+    def run(self, stop: ShutdownRequest) -> None:
+        """Draws until it is asked to stop; ready while the arm's state is live."""
+        texts_at = 0.0
+        while not stop.is_set:
+            began = time.monotonic()
+            readings = self.operator.bus.read()
+            self._arm.node.set_ready(readings.is_live, "" if readings.is_live else "no fresh joint_states")
+            with self._server.atomic():
+                self._world.update(readings)
+            if began - texts_at > 1.0 / TEXTS:
+                texts_at = began
+                for page in self._present():
+                    page.refresh(readings)
+            self.operator.wait(max(0.0, 1.0 / PICTURES - (time.monotonic() - began)))
+
+    def close(self) -> None:
+        """Ends the server; the arm brakes where the page has led it."""
+        self.operator.close()
+        self._server.stop()
+
+    def _present(self) -> list[Page]:
+        with self._lock:
+            return list(self._pages.values())
+
+    def _open(self, client: viser.ClientHandle) -> None:
+        page = Page(client, self.operator, self._world)
+        with self._lock:
+            self._pages[client.client_id] = page
+        self._log.info(f"browser {client.client_id} is here; {len(self._present())} in all")
+
+    def _close(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            self._pages.pop(client.client_id, None)
+        self._log.info(f"browser {client.client_id} has gone; {len(self._present())} in all")
+
+
+def run(deployment: Deployment, config: Path | None, log: logging.Logger, stop: ShutdownRequest) -> int:
+    """Waits for the twin, then serves the page; returns the exit code."""
+    try:
+        require_free(deployment.panel.host, deployment.panel.port, NAME)
+    except PortTaken as error:
+        log.error("%s", error)
+        return 1
+    arm = _connected(config, log, stop)
+    if arm is None:
+        return 0
+    with arm:
+        panel = Panel(arm, deployment, log)
+        try:
+            panel.run(stop)
+        finally:
+            panel.close()
+    return 0
+
+
+def _connected(config: Path | None, log: logging.Logger, stop: ShutdownRequest) -> gemelo.Arm | None:
+    """The arm, as soon as its gateway is there; None if the process is to end before."""
+    told = ""
+    while not stop.is_set:
+        try:
+            arm = gemelo.connect(deployment=config, name=NAME, timeout=LOOK_FOR_TWIN)
+            try:
+                assert arm.joints
+                arm.fk()
+                return arm
+            except BaseException:
+                arm.close()
+                raise
+        except gemelo.Lost as lost:
+            if str(lost) != told:
+                told = str(lost)
+                log.warning(f"waiting: {told}")
+    return None
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(prog="gemelo-panel", description=__doc__)
+    parser.add_argument("--config", type=Path, default=None, metavar="FILE", help="deployment file [deploy/local.toml]")
+    parser.add_argument("--log-level", default="info", choices=LEVELS)
+    arguments = parser.parse_args()
+    log, stop = line_logger(NAME, arguments.log_level), ShutdownRequest()
+    try:
+        with stop_on_signals(stop):
+            code = run(load_deployment(arguments.config), arguments.config, log, stop)
+    except (gemelo.Error, ValueError) as error:
+        log.error("%s", error)
+        code = 1
+    end_soon(code)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+"""What can be done now, and for what cannot the reason, as a key of the words and the value that goes with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import gemelo
+from schemas.device import DeviceMode, DeviceState
+from services.panel.model.readings import Readings
+
+Reason = tuple[str, str] | None  # key of the words, value; None: it can be done
+
+MOVING = (DeviceMode.RUN, DeviceMode.HOLD, DeviceMode.HOMING)
+FAULTY = (DeviceMode.FAULT, DeviceMode.ESTOP)
+
+
+def reasons(arm: gemelo.Arm, readings: Readings) -> dict[str, Reason]:
+    """By action: move, jog, arm, disarm, home, reference, reset, hold, resume, output, inject."""
+    state = readings.state
+    if state is None:
+        gone: Reason = ("device_silent", "")
+        return dict.fromkeys((*CHECKS, "home", "inject"), gone)
+    found = {name: check(state) for name, check in CHECKS.items()}
+    found["home"] = _home(arm, state)
+    found["inject"] = None if readings.status is not None and readings.status.virtual else ("not_virtual", "")
+    return found
+
+
+def _move(state: DeviceState) -> Reason:
+    if state.mode in FAULTY:
+        return "in_fault", state.mode.name
+    if not state.armed:
+        return "drivers_off", ""
+    if not all(state.referenced):
+        missing = [name for name, known in zip(state.name, state.referenced, strict=False) if not known]
+        return "unreferenced", ", ".join(missing)
+    return ("is_homing", "") if state.mode is DeviceMode.HOMING else None
+
+
+def _still(state: DeviceState) -> Reason:
+    return ("is_moving", state.mode.name) if state.mode in MOVING else None
+
+
+def _arm(state: DeviceState) -> Reason:
+    if state.mode in FAULTY:
+        return "in_fault", state.mode.name
+    return ("already_armed", "") if state.armed else None
+
+
+def _disarm(state: DeviceState) -> Reason:
+    return None if state.armed else ("already_disarmed", "")
+
+
+def _reference(state: DeviceState) -> Reason:
+    if state.mode in FAULTY:
+        return "in_fault", state.mode.name
+    return _still(state)
+
+
+def _reset(state: DeviceState) -> Reason:
+    return None if state.mode in FAULTY or state.fault else ("no_fault", "")
+
+
+def _hold(state: DeviceState) -> Reason:
+    return None if state.mode is DeviceMode.RUN else ("not_moving", state.mode.name)
+
+
+def _resume(state: DeviceState) -> Reason:
+    return None if state.mode is DeviceMode.HOLD else ("not_held", state.mode.name)
+
+
+def _output(state: DeviceState) -> Reason:
+    return None
+
+
+def _home(arm: gemelo.Arm, state: DeviceState) -> Reason:
+    if all(joint.drive.homing is None for joint in arm.description.joints):
+        return "no_switches", ""
+    if state.mode in FAULTY:
+        return "in_fault", state.mode.name
+    return _still(state) or (None if state.armed else ("drivers_off", ""))
+
+
+CHECKS: dict[str, Callable[[DeviceState], Reason]] = {
+    "move": _move, "jog": _move, "arm": _arm, "disarm": _disarm, "reference": _reference, "reset": _reset,
+    "hold": _hold, "resume": _resume, "output": _output,
+}  # fmt: skip

@@ -1,0 +1,156 @@
+"""The goal arm: joint values that sliders, a gizmo or names lead, checked all the time, the newest wish first."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from math import pi
+
+import gemelo
+from services.panel.model.problems import Problem, problem_of
+
+IDLE = 1.0  # [s] after which a solver without work looks whether it is to end
+FULL = 6  # joints with which a tool can be turned as one likes
+JUMP = {"rad": pi / 4, "m": 0.05}  # chosen: more of a joint between two points of a drag is another configuration
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Where the arm is to go, and what is wrong with that; `problem` is of `joints`, or of `wanted`."""
+
+    joints: Mapping[str, float]  # [rad] or [m]
+    pose: gemelo.Pose  # of the tool at `joints`
+    problem: Problem | None = None
+    wanted: gemelo.Pose | None = None  # where the gizmo was dragged, if the arm cannot be there
+    jumped: tuple[str, ...] = ()  # joints that the last step of a drag has thrown to another configuration
+    version: int = 0
+    source: int = -1  # the browser that set it
+
+
+@dataclass(frozen=True)
+class JointsWish:
+    joints: Mapping[str, float]
+    source: int
+
+
+@dataclass(frozen=True)
+class PoseWish:
+    pose: gemelo.Pose
+    source: int
+
+
+class GoalSolver:
+    """Turns wishes into goals in a thread of its own; of wishes that come faster than answers only the newest counts.
+
+    `on_change` is called from that thread after every change.
+    """
+
+    def __init__(self, arm: gemelo.Arm, on_change: Callable[[], object]) -> None:
+        self._arm, self._on_change = arm, on_change
+        self._news = threading.Condition()
+        self._wish: JointsWish | PoseWish | None = None
+        self._is_open = True
+        self.solved = 0  # wishes that were answered
+        joints = arm.joints
+        self.goal = Goal(joints, arm.fk(joints))
+        self._thread = threading.Thread(target=self._run, name="goal", daemon=True)
+        self._thread.start()
+
+    @property
+    def can_turn(self) -> bool:
+        """True if the gizmo may turn the tool freely."""
+        return len(self._arm.description.joints) >= FULL
+
+    def set_joints(self, joints: Mapping[str, float], source: int = -1) -> None:
+        """All joints, or some; the goal shows them at once, and is checked right after."""
+        with self._news:
+            joints = {**self.goal.joints, **joints}
+            self.goal = replace(self.goal, joints=joints, version=self.goal.version + 1, source=source)
+            self._want(JointsWish(joints, source))
+
+    def set_pose(self, pose: gemelo.Pose, source: int = -1) -> None:
+        """Where the tool is to be; the nearest configuration is taken."""
+        with self._news:
+            self._want(PoseWish(pose, source))
+
+    def settle(self) -> None:
+        """The drag has ended: the gizmo goes back to where the goal arm's tool is."""
+        with self._news:
+            if self._wish is None and self.goal.wanted is not None:
+                self.goal = replace(self.goal, wanted=None, version=self.goal.version + 1)
+        self._on_change()
+
+    def check_again(self) -> None:
+        """What stands around has changed."""
+        with self._news:
+            if self._wish is None:
+                self._want(JointsWish(self.goal.joints, self.goal.source))
+
+    def close(self) -> None:
+        """Ends the thread."""
+        with self._news:
+            self._is_open = False
+            self._news.notify_all()
+        self._thread.join(2.0)
+
+    def _want(self, wish: JointsWish | PoseWish) -> None:
+        self._wish = wish
+        self._news.notify_all()
+
+    def _run(self) -> None:
+        while True:
+            with self._news:
+                while self._wish is None and self._is_open:
+                    self._news.wait(IDLE)
+                if not self._is_open:
+                    return
+                wish, self._wish, before = self._wish, None, self.goal
+            assert wish is not None
+            goal = self._checked(before, wish) if isinstance(wish, JointsWish) else self._followed(before, wish)
+            with self._news:
+                self.solved += 1
+                if not isinstance(self._wish, JointsWish):  # sliders have gone on meanwhile: theirs stay
+                    self.goal = replace(goal, version=self.goal.version + 1, source=wish.source)
+            self._on_change()
+
+    def _checked(self, before: Goal, wish: JointsWish) -> Goal:
+        """The configuration of the sliders, which is shown also where it cannot be."""
+        try:
+            pose = self._arm.fk(wish.joints)
+        except Exception as error:
+            return replace(before, problem=problem_of(error))
+        return Goal(wish.joints, pose, self._problem_at(wish.joints))
+
+    def _followed(self, before: Goal, wish: PoseWish) -> Goal:
+        """The nearest configuration for the gizmo's pose; where there is none, the goal stays and says why."""
+        target = self._target(wish.pose)
+        try:
+            [joints] = self._arm.ik(near=before.joints, **target)
+            return self._arrived(before, joints, wish.pose, None)
+        except gemelo.Refused as refused:
+            problem = problem_of(refused)
+        except Exception as error:
+            return replace(before, problem=problem_of(error), wanted=wish.pose)
+        if problem.check not in ("collision", "self-collision"):
+            return replace(before, problem=problem, wanted=wish.pose, jumped=())
+        try:
+            [joints] = self._arm.ik(near=before.joints, touching=True, **target)
+        except Exception:
+            return replace(before, problem=problem, wanted=wish.pose, jumped=())
+        return self._arrived(before, joints, wish.pose, self._problem_at(joints) or problem)
+
+    def _arrived(self, before: Goal, joints: Mapping[str, float], pose: gemelo.Pose, problem: Problem | None) -> Goal:
+        units = {joint.name: joint.unit for joint in self._arm.description.joints}
+        jumped = tuple(name for name, at in joints.items() if abs(at - before.joints[name]) > JUMP[units[name]])
+        return Goal(joints, pose if self.can_turn else self._arm.fk(joints), problem, None, jumped)
+
+    def _target(self, pose: gemelo.Pose) -> gemelo.ToolGoal:
+        return gemelo.ToolGoal(pose=pose) if self.can_turn else gemelo.ToolGoal(position=pose.position)
+
+    def _problem_at(self, joints: Mapping[str, float]) -> Problem | None:
+        try:
+            self._arm.check(joints)
+        except Exception as error:
+            return problem_of(error)
+        return None

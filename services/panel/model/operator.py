@@ -1,0 +1,163 @@
+"""Everything that the page can do, and what all browsers share: goal, plan, motion, jog, problems."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import gemelo
+from services.panel.model.goal import GoalSolver
+from services.panel.model.jogging import Jogging
+from services.panel.model.live import LiveSliders
+from services.panel.model.motions import MotionChoice, Motions
+from services.panel.model.problems import Problem, problem_of
+from services.panel.model.readings import Bus
+
+KEPT = 30.0  # [s] that a problem stays on the page
+
+
+@dataclass(frozen=True)
+class ToldProblem:
+    """A problem, and when it was told: [s] monotonic, and its number."""
+
+    problem: Problem
+    at: float
+    number: int
+
+
+class Operator:
+    """One for all browsers. Any thread may call it; errors are told in `newest_problem`, never raised."""
+
+    def __init__(self, arm: gemelo.Arm) -> None:
+        self.arm, self.bus = arm, Bus(arm)
+        self.choice = MotionChoice()
+        self.homing: dict[str, str] = {}  # by joint what it does, while the arm homes
+        self._told: ToldProblem | None = None
+        self._changed = threading.Event()
+        self.goal = GoalSolver(arm, self.wake)
+        self.motions = Motions(arm, self.tell)
+        self.jogging = Jogging(arm, self.tell)
+        self.live = LiveSliders(arm, self.jogging, self.bus)
+
+    def close(self) -> None:
+        """Ends its threads; the arm brakes where the page has led it by hand."""
+        self.live.close()
+        self.jogging.close()
+        self.goal.close()
+
+    def wake(self) -> None:
+        """Something that is shown has changed."""
+        self._changed.set()
+
+    def wait(self, timeout: float) -> None:
+        """Returns after a change, or after `timeout` [s]."""
+        self._changed.wait(timeout)
+        self._changed.clear()
+
+    def tell(self, problem: Problem) -> None:
+        """Shows it at every browser."""
+        number = self._told.number + 1 if self._told is not None else 1
+        self._told = ToldProblem(problem, time.monotonic(), number)
+        self.wake()
+
+    @property
+    def newest_problem(self) -> ToldProblem | None:
+        """The last one, while it is young."""
+        told = self._told
+        return told if told is not None and time.monotonic() - told.at < KEPT else None
+
+    def forget_problem(self) -> None:
+        """It has been read, or mended."""
+        self._told = None
+        self.wake()
+
+    # Goals
+
+    def set_goal(self, joints: Mapping[str, float], source: int = -1) -> None:
+        """Joint values [rad] or [m] from sliders; with live sliders the arm follows."""
+        self.goal.set_joints(joints, source)
+        self.live.follow(self.goal.goal.joints)
+        self.wake()
+
+    def set_named(self, name: str, source: int = -1) -> None:
+        """A named state as the goal."""
+        self.set_goal(self.arm.states[name], source)
+
+    def take_nearest(self, problem: Problem) -> None:
+        """The nearest goal that can be, of the goal's problem or of a refusal."""
+        nearest = problem.nearest
+        joints = nearest.get("joints")
+        if isinstance(joints, Mapping):
+            self.set_goal(joints)
+        elif "position" in nearest:
+            x, y, z = nearest["position"]
+            turned = nearest.get("orientation")
+            orientation = tuple(turned) if turned else self.goal.goal.pose.orientation
+            a, b, c, d = orientation
+            self.goal.set_pose(gemelo.Pose((x, y, z), (a, b, c, d)))
+        self.forget_problem()
+
+    def follow_measured(self) -> None:
+        """The goal is where the arm is."""
+        self.guarded(lambda: self.set_goal(self.arm.joints))
+
+    # Motions
+
+    def plan(self) -> None:
+        """A path to the goal, shown and not gone."""
+        self.forget_problem()
+        self.motions.make(self.choice.target(dict(self.goal.goal.joints)))
+        self.wake()
+
+    def execute(self) -> None:
+        """Goes along the plan that is shown."""
+        self.forget_problem()
+        self.motions.execute()
+        self.wake()
+
+    def plan_and_execute(self) -> None:
+        """Both."""
+        self.forget_problem()
+        self.motions.make_and_execute(self.choice.target(dict(self.goal.goal.joints)))
+        self.wake()
+
+    def step(self, target: gemelo.Target) -> None:
+        """A small motion by a button, at once."""
+        self.forget_problem()
+        target["speed"] = self.choice.speed
+        self.motions.make_and_execute(target)
+        self.wake()
+
+    def stop(self) -> None:
+        """Before everything else; also what is planned just now does not begin."""
+        self.motions.on_stop()
+        self.jogging.release()
+        self.live.switch(False)
+        self.guarded(self.arm.stop)
+
+    def set_speed(self, share: float) -> None:
+        """Of everything that is played from now on."""
+        self.guarded(lambda: self.arm.speed(share))
+
+    def home(self, *joints: str) -> None:
+        """All joints with a switch, or those named; `homing` says how far."""
+
+        def follow(phases: dict[str, str]) -> None:
+            self.homing = dict(phases)
+            self.wake()
+
+        self.guarded(lambda: self.arm.home(*joints, on_progress=follow))
+        self.homing = {}
+        self.wake()
+
+    def guarded(self, action: Callable[[], object]) -> bool:
+        """Does it; False, and the problem told, where it was refused."""
+        try:
+            action()
+        except Exception as error:
+            self.tell(problem_of(error))
+            return False
+        self.wake()
+        return True

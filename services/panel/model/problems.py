@@ -1,0 +1,53 @@
+"""What a person is told of an error: a sentence, the check, what touches, and the nearest goal that can."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import wraps
+from typing import ParamSpec
+
+import gemelo
+from schemas.scene import Contact
+
+P = ParamSpec("P")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Why something cannot be, or has ended; the words are those of `gemelo`, the check can be translated."""
+
+    text: str
+    check: str = ""  # as in `gemelo.Refused.check`
+    remedy: str = ""
+    nearest: gemelo.Target = field(default_factory=lambda: gemelo.Target())
+    contacts: tuple[Contact, ...] = ()
+    is_refusal: bool = True  # False: something moved, and ended before its goal
+
+    @property
+    def has_nearest(self) -> bool:
+        return bool(self.nearest)
+
+
+def problem_of(error: Exception) -> Problem:
+    """The error as a problem; one that is not of `gemelo` keeps its kind in the text."""
+    if isinstance(error, gemelo.Refused):
+        return Problem(str(error), error.check, error.remedy, error.nearest, error.contacts)
+    if isinstance(error, gemelo.Aborted):
+        return Problem(str(error), error.status.name.lower(), is_refusal=False)
+    if isinstance(error, gemelo.Error):
+        return Problem(str(error), "lost" if isinstance(error, gemelo.Lost) else "argument")
+    return Problem(f"{type(error).__name__}: {error}", "defect")
+
+
+def reporting(tell: Callable[[Problem], object], action: Callable[P, object]) -> Callable[P, None]:
+    """`action`, whose errors are told instead of raised: a press on a button has no caller that could catch them."""
+
+    @wraps(action)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        try:
+            action(*args, **kwargs)
+        except Exception as error:
+            tell(problem_of(error))
+
+    return run

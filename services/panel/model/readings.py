@@ -1,0 +1,97 @@
+"""The newest of everything that the twin says, read without waiting: what is late is shown as late."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import gemelo
+from gemelo.device import fault_of
+from schemas.device import DeviceState, DeviceStatus
+from schemas.planning import JogStatus, PlannedPath
+from schemas.scene import Contacts, PlanningScene
+from schemas.system import LogRecord
+
+LOG_LINES = 12  # chosen: what a person reads at one look
+LATE = 0.5  # [s] a joint state older than that is not where the arm is
+
+
+@dataclass(frozen=True)
+class Readings:
+    """One moment, as the page shows it."""
+
+    joints: Mapping[str, float]  # [rad] or [m] measured
+    age: float  # [s] of the joint state
+    step_errors: Mapping[str, float]  # [steps]
+    commanded: Mapping[str, float]  # [rad] or [m] what the path asks for
+    state: DeviceState | None
+    status: DeviceStatus | None
+    sensors: Mapping[str, float]
+    fault: str
+
+    @property
+    def is_live(self) -> bool:
+        return self.age < LATE
+
+    @property
+    def is_moving(self) -> bool:
+        return self.state is not None and any(abs(speed) >= 1.0 for speed in self.state.velocity)
+
+
+class Bus:
+    """Subscriptions of one connection. Any thread may read."""
+
+    def __init__(self, arm: gemelo.Arm) -> None:
+        node, topics = arm.node, gemelo.topics
+        self._arm = arm
+        self._joints, self._commands = node.latest(topics.JOINT_STATES), node.latest(topics.JOINT_COMMANDS)
+        self._errors, self._sensors = node.latest(topics.STEP_ERRORS), node.latest(topics.SENSORS)
+        self._state, self._status = node.latest(topics.DEVICE_STATE), node.latest(topics.DEVICE_STATUS)
+        self._scene, self._contacts = node.latest(topics.SCENE), node.latest(topics.CONTACTS)
+        self._path, self._jog = node.latest(topics.PLANNED_PATH), node.latest(topics.JOG_STATUS)
+        self._log: deque[LogRecord] = deque(maxlen=LOG_LINES)
+        node.subscribe(topics.LOG, self._log.append)
+
+    def read(self) -> Readings:
+        """Everything that has a value for every joint, now."""
+        joints, errors = self._joints.message, self._errors.message
+        commands, sensors = self._commands.message, self._sensors.message
+        state = self._state.message
+        return Readings(
+            joints=dict(zip(joints.name, joints.position, strict=False)) if joints is not None else {},
+            age=self._joints.age(),
+            step_errors=dict(zip(errors.name, errors.error, strict=False)) if errors is not None else {},
+            commanded=dict(zip(commands.name, commands.position, strict=False)) if commands is not None else {},
+            state=state if not self._state.is_stale else None,
+            status=self._status.message,
+            sensors=dict(zip(sensors.name, sensors.value, strict=False))
+            if sensors is not None and not self._sensors.is_stale
+            else {},
+            fault=fault_of(self._arm.description, state) if state is not None else "",
+        )
+
+    @property
+    def scene(self) -> PlanningScene:
+        """The newest planning scene."""
+        return self._scene.message or PlanningScene()
+
+    @property
+    def contacts(self) -> Contacts:
+        """What touches where a plan was refused last."""
+        return self._contacts.message or Contacts()
+
+    @property
+    def planned_path(self) -> PlannedPath:
+        """The newest plan of anybody."""
+        return self._path.message or PlannedPath()
+
+    @property
+    def jog_status(self) -> JogStatus | None:
+        """What slows the jogging, of the last second."""
+        return self._jog.message if self._jog.age() < 1.0 else None
+
+    @property
+    def log(self) -> tuple[LogRecord, ...]:
+        """The last lines of every node's log, oldest first."""
+        return tuple(self._log.copy())

@@ -1,0 +1,100 @@
+"""The few lines of JavaScript that viser's page lacks, and what they tell of the browser.
+
+Space is Stop wherever the focus is but in a text field: a focused button would else be pressed by it, and a number
+field would swallow it. The arrow keys hold the jog buttons that name them. Once a second the browser's language, its
+wish for dark colours, its frame rate and the newest header that it has drawn come back through a hidden text field.
+"""
+
+from __future__ import annotations
+
+import html
+from dataclasses import dataclass
+
+import msgspec
+
+CHANNEL = "gemelo-browser"  # how the hidden field's text begins
+STOP_SIGN = "■"  # how the Stop button's text begins, in every language
+
+SCRIPT = """
+(() => {
+  if (window.gemelo) return;
+  window.gemelo = true;
+  const buttons = () => [...document.querySelectorAll('button')];
+  const keys = {ArrowLeft: '◀', ArrowRight: '▶', ArrowUp: '▲', ArrowDown: '▼', PageUp: '⏶', PageDown: '⏷'};
+  const isText = (t) => t.tagName === 'TEXTAREA' || t.isContentEditable || (t.tagName === 'INPUT'
+    && !['range', 'checkbox', 'radio', 'button'].includes(t.type) && !['decimal', 'numeric'].includes(t.inputMode));
+  const isNumber = (t) => t.tagName === 'INPUT' || (t.getAttribute && t.getAttribute('role') === 'slider');
+  const held = {};
+  const point = (button, kind) => button.dispatchEvent(
+    new PointerEvent(kind, {bubbles: true, button: 0, pointerId: 1, isPrimary: true}));
+  const take = (e) => { e.preventDefault(); e.stopImmediatePropagation(); };
+  window.addEventListener('keydown', (e) => {
+    if (isText(e.target)) return;
+    if (e.code === 'Space') {
+      take(e);
+      const stop = buttons().find((b) => b.textContent.trim().startsWith('STOP_SIGN'));
+      if (!e.repeat && stop) stop.click();
+    } else if (keys[e.code] && !isNumber(e.target)) {
+      const button = buttons().find((b) => b.offsetParent && b.textContent.includes(keys[e.code]));
+      if (!button) return;
+      take(e);
+      if (!e.repeat && !held[e.code]) { held[e.code] = button; point(button, 'pointerdown'); }
+    }
+  }, true);
+  const release = (code) => { if (held[code]) { point(held[code], 'pointerup'); delete held[code]; } };
+  window.addEventListener('keyup', (e) => {
+    if (e.code === 'Space' && !isText(e.target)) take(e);
+    release(e.code);
+  }, true);
+  window.addEventListener('blur', () => Object.keys(held).forEach(release));
+  const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;
+  let frames = 0, began = performance.now(), rate = 0, told = '';
+  const tell = () => {
+    frames += 1;
+    const now = performance.now();
+    if (now - began > 1000) { rate = frames * 1000 / (now - began); frames = 0; began = now; }
+    const field = [...document.querySelectorAll('input')].find((i) => i.value.startsWith('CHANNEL'));
+    const sent = (document.querySelector('[data-gemelo-sent]') || {dataset: {}}).dataset.gemeloSent || '';
+    if (field) {
+      const row = field.closest('.mantine-Box-root, [class*=wrapper]') || field.parentElement;
+      field.parentElement.parentElement.parentElement.parentElement.style.display = 'none';
+      if (sent !== told) {
+        told = sent;
+        set.call(field, 'CHANNEL ' + JSON.stringify({sent: Number(sent), language: navigator.language, rate: rate,
+          dark: matchMedia('(prefers-color-scheme: dark)').matches, width: innerWidth, height: innerHeight}));
+        field.dispatchEvent(new Event('input', {bubbles: true}));
+      }
+    }
+    requestAnimationFrame(tell);
+  };
+  tell();
+})()
+"""
+
+
+@dataclass(frozen=True)
+class Browser:
+    """What a browser has told of itself."""
+
+    sent: float = 0.0  # [ms] the mark of the newest header that it had drawn
+    language: str = ""  # as "es-MX"
+    rate: float = 0.0  # [Hz] frames a second
+    dark: bool = False
+    width: int = 0  # [pixels]
+    height: int = 0
+
+
+def script_html() -> str:
+    """An invisible element whose loading fails, and so runs the script: viser puts no other code on the page."""
+    script = SCRIPT.replace("STOP_SIGN", STOP_SIGN).replace("CHANNEL", CHANNEL)
+    return f'<img src="data:," alt="" style="display:none" onerror="{html.escape(script, quote=True)}">'
+
+
+def read_browser(text: str) -> Browser | None:
+    """What the hidden field says; None for anything else."""
+    if not text.startswith(f"{CHANNEL} "):
+        return None
+    try:
+        return msgspec.json.decode(text[len(CHANNEL) + 1 :], type=Browser)
+    except msgspec.MsgspecError:
+        return None

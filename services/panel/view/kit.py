@@ -1,0 +1,115 @@
+"""Buttons, numbers and lines of text for one browser, in its language, each action with its errors told."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+import viser
+
+from services.panel.model.availability import Reason
+from services.panel.model.operator import Operator
+from services.panel.model.problems import reporting
+from services.panel.words.words import Words
+
+Color = Literal["red", "blue", "green", "gray", "orange", "yellow", "teal"]
+
+
+class Kit:
+    """What every tab builds itself of. Buttons that `needs` name are greyed while it cannot be done."""
+
+    def __init__(self, client: viser.ClientHandle, operator: Operator, words: Words) -> None:
+        self.client, self.gui, self.operator, self.words = client, client.gui, operator, words
+        self._gated: list[tuple[viser.GuiButtonHandle, str]] = []
+        self._reasons: list[tuple[viser.GuiHtmlHandle, dict[str, str]]] = []
+
+    def button(
+        self, label: str, action: Callable[[], object], *, color: Color | None = None, needs: str = ""
+    ) -> viser.GuiButtonHandle:
+        """`action` runs in a thread of its own."""
+        handle = self.gui.add_button(label, color=color)
+        act = reporting(self.operator.tell, action)
+        handle.on_click(without_event(act))
+        if needs:
+            self._gated.append((handle, needs))
+        return handle
+
+    def held(self, label: str, action: Callable[[], object], *, rate: float, needs: str = "") -> viser.GuiButtonHandle:
+        """`action` is called `rate` times a second while the button is held."""
+        handle = self.gui.add_button(label, color="gray")
+        handle.on_hold(without_event(action), callback_hz=rate)
+        if needs:
+            self._gated.append((handle, needs))
+        return handle
+
+    def reasons(self, **titles: str) -> None:
+        """A place for the reasons why actions cannot be done now: by action, what it is called."""
+        self._reasons.append((self.gui.add_html(""), titles))
+
+    def line(self, content: str = "") -> viser.GuiHtmlHandle:
+        """A piece of HTML."""
+        return self.gui.add_html(content)
+
+    def refresh(self, reasons: dict[str, Reason]) -> None:
+        """Greys what cannot be done now, and says why."""
+        for button, name in self._gated:
+            set_if_new(button, "disabled", reasons.get(name) is not None)
+        for place, titles in self._reasons:
+            told: dict[str, list[str]] = {}
+            for name, title in titles.items():
+                why = self.words.reason(reasons.get(name))
+                if why:
+                    told.setdefault(why, []).append(title)
+            lines = (f"{esc(', '.join(of))}: {esc(why)}<br>" for why, of in told.items())
+            set_if_new(place, "content", note("".join(lines)))
+
+
+def without_event(action: Callable[[], object]) -> Callable[[object], None]:
+    """A callback of viser's that needs to know nothing of the event."""
+
+    def run(event: object) -> None:
+        action()
+
+    return run
+
+
+def set_if_new(handle: object, name: str, value: object) -> None:
+    """Sends nothing where it is so already."""
+    if getattr(handle, name) != value:
+        setattr(handle, name, value)
+
+
+def esc(text: object) -> str:
+    """Text that a person or a file has written, safe in HTML."""
+    return html.escape(str(text), quote=True)
+
+
+def note(content: str) -> str:
+    """Small print; nothing at all where there is nothing to say."""
+    return f'<div style="margin:0 0.9em 0.5em;font-size:0.8em;opacity:0.75">{content}</div>' if content else ""
+
+
+def box(content: str, color: str) -> str:
+    """A coloured box that stands out, on light and on dark."""
+    return (
+        f'<div style="margin:0 0.8em 0.5em;padding:0.45em 0.7em;border-left:4px solid {color};border-radius:4px;'
+        f'background:{color}22;font-size:0.85em;line-height:1.35">{content}</div>'
+    )
+
+
+def table(rows: Sequence[tuple[str, ...]], header: tuple[str, ...] = ()) -> str:
+    """Cells are HTML; the first column is left, the others right."""
+    cells = [_row(header, "th")] if header else []
+    cells += [_row(row, "td") for row in rows]
+    return (
+        '<table style="margin:0 0.8em 0.6em;font-size:0.82em;width:calc(100% - 1.6em);border-collapse:collapse;'
+        f'font-variant-numeric:tabular-nums">{"".join(cells)}</table>'
+    )
+
+
+def _row(cells: tuple[str, ...], tag: str) -> str:
+    style = "padding:1px 2px;font-weight:normal;text-align:"
+    first, *others = cells
+    rest = "".join(f'<{tag} style="{style}right">{cell}</{tag}>' for cell in others)
+    return f'<tr style="border-bottom:1px solid #8884"><{tag} style="{style}left">{first}</{tag}>{rest}</tr>'

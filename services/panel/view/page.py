@@ -1,0 +1,191 @@
+"""The controls of one browser: what is always there, the tabs, and what the browser tells of itself."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from math import isfinite
+from typing import Literal
+
+import viser
+
+from services.panel.model.availability import reasons
+from services.panel.model.operator import Operator
+from services.panel.model.readings import Readings
+from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, read_browser, script_html
+from services.panel.view.kit import Kit, box, esc, set_if_new, without_event
+from services.panel.view.tabs.device import DeviceTab
+from services.panel.view.tabs.jog import JogTab
+from services.panel.view.tabs.move import MoveTab
+from services.panel.view.tabs.scene import SceneTab
+from services.panel.view.tabs.state import StateTab
+from services.panel.view.world import World
+from services.panel.words.words import NAMES, Words, language_of
+
+MARK = 1.0  # [s] between two marks by which a browser's lag is measured
+BRAND = (28, 126, 214)
+WIDTH = 400.0  # [pixels] of the controls
+GOOD, BAD, NEUTRAL = "#2f9e44", "#e03131", "#868e96"
+
+
+class Page:
+    """Built anew when the language or the colours change."""
+
+    def __init__(self, client: viser.ClientHandle, operator: Operator, world: World) -> None:
+        self.client, self._operator, self._world = client, operator, world
+        self.browser: Browser | None = None
+        self.lag = float("nan")  # [s] from a header that was sent to the word that it is drawn
+        self._began = time.monotonic()
+        self._marked = 0.0
+        self._language, self._is_dark, self._was_chosen = "en", False, False
+        self._told = 0
+        self._build()
+
+    def refresh(self, readings: Readings) -> None:
+        """Shows what has changed."""
+        now = time.monotonic()
+        if now - self._marked > MARK:
+            self._marked = now
+        self._kit.refresh(reasons(self._operator.arm, readings))
+        set_if_new(self._header, "content", self._header_text(readings))
+        self._show_problem()
+        self._move.refresh(readings)
+        self._jog.refresh(readings)
+        self._device.refresh(readings)
+        self._scene.refresh(readings)
+        pose = self._world.tool_pose
+        self._state.refresh(readings, self.browser, self.lag, (*pose.position, *pose.orientation))
+        if readings.state is not None:
+            set_if_new(self._speed, "value", round(100.0 * readings.state.speed))
+
+    def close(self) -> None:
+        """Takes away what it has put into the scene."""
+        self._scene.close()
+
+    def _build(self) -> None:
+        self._words = words = Words(self._language)
+        self._kit = kit = Kit(self.client, self._operator, words)
+        gui = self.client.gui
+        gui.configure_theme(dark_mode=self._is_dark, show_logo=False, show_share_button=False, brand_color=BRAND)
+        gui.set_panel_label(f"gemelo · {self._operator.arm.name}")
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(WIDTH)
+        kit.line(script_html())
+        self._header = kit.line()
+        kit.button(f"{STOP_SIGN} {words('stop')}", self._operator.stop, color="red")
+        self._hold = kit.button(words("hold"), self._operator.arm.hold, color="gray", needs="hold")
+        self._resume = kit.button(words("resume"), self._operator.arm.resume, color="gray", needs="resume")
+        self._speed = gui.add_slider(words("speed"), 0, 100, 1, 100)
+        self._speed.on_update(
+            lambda event: self._operator.set_speed(event.target.value / 100.0) if event.client_id is not None else None
+        )
+        self._problem = kit.line()
+        self._nearest = kit.button(words("take_nearest"), self._take_nearest, color="orange")
+        self._read = kit.button(words("understood"), self._operator.forget_problem, color="gray")
+        tabs = gui.add_tab_group()
+        with tabs.add_tab(words("tab_move")):
+            self._move = MoveTab(kit, self._world)
+        with tabs.add_tab(words("tab_jog")):
+            self._jog = JogTab(kit)
+        with tabs.add_tab(words("tab_device")):
+            self._device = DeviceTab(kit)
+        with tabs.add_tab(words("tab_scene")):
+            self._scene = SceneTab(kit, self._world)
+        with tabs.add_tab(words("tab_state")):
+            self._state = StateTab(kit)
+            self._settings()
+        self._add_commands()
+        self._channel = gui.add_text(CHANNEL, CHANNEL)
+        self._channel.on_update(lambda event: self._hear(event.target.value))
+
+    def _settings(self) -> None:
+        words, gui = self._words, self.client.gui
+        language = gui.add_dropdown("Language / Idioma", tuple(NAMES.values()), initial_value=NAMES[words.language])
+        dark = gui.add_checkbox(words("dark"), self._is_dark)
+
+        @language.on_update
+        def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
+            if event.client_id is not None:
+                [chosen] = [key for key, name in NAMES.items() if name == event.target.value]
+                self._was_chosen = True
+                self._rebuild(chosen, self._is_dark)
+
+        @dark.on_update
+        def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
+            if event.client_id is not None:
+                self._was_chosen = True
+                self._rebuild(self._language, event.target.value)
+
+    def _add_commands(self) -> None:
+        """The same by keys, and in the palette that Ctrl-K opens."""
+        words, gui, operator = self._words, self.client.gui, self._operator
+        keys: tuple[tuple[str, Literal["space", "H", "R", "P"], Callable[[], object]], ...] = (
+            ("stop", "space", operator.stop),
+            ("hold", "H", lambda: operator.guarded(operator.arm.hold)),
+            ("resume", "R", lambda: operator.guarded(operator.arm.resume)),
+            ("plan", "P", operator.plan),
+        )
+        for name, key, action in keys:
+            gui.add_command(words(name), hotkey=key).on_trigger(without_event(action))
+
+        @self.client.scene.on_click(modifier="shift")
+        def _(event: viser.SceneClickEvent) -> None:
+            self._world.place_goal(event)
+
+    def _rebuild(self, language: str, is_dark: bool) -> None:
+        if (language, is_dark) == (self._language, self._is_dark):
+            return
+        self._language, self._is_dark = language, is_dark
+        self._scene.close()
+        with self.client.atomic():
+            self.client.gui.reset()
+            self._told = 0
+            self._build()
+
+    def _hear(self, text: str) -> None:
+        browser = read_browser(text)
+        if browser is None:
+            return
+        self.browser = browser
+        self.lag = max(0.0, time.monotonic() - self._began - browser.sent / 1000.0)
+        if not self._was_chosen:
+            self._was_chosen = True
+            self._rebuild(language_of(browser.language), browser.dark)
+
+    def _header_text(self, readings: Readings) -> str:
+        words, state = self._words, readings.state
+        mark = f'<span data-gemelo-sent="{1000 * (self._marked - self._began):.0f}"></span>'
+        if state is None or not readings.is_live:
+            age = f"{readings.age:.1f} s" if isfinite(readings.age) else "-"
+            reason = readings.status.reason if readings.status is not None and not readings.status.online else ""
+            return mark + box(f"<b>{esc(words('not_live', age=age))}</b> {esc(reason)}", BAD)
+        worst = max((abs(error) for error in readings.step_errors.values()), default=0.0)
+        lag = f", {1000 * self.lag:.0f} ms" if isfinite(self.lag) else ""
+        text = (
+            f"<b>{esc(words(f'mode_{state.mode.name.lower()}'))}</b> · {esc(words('step_error', steps=f'{worst:.2f}'))}"
+            f" · {esc(words('live_data'))}{lag}"
+        )
+        if readings.fault:
+            return mark + box(f"{text}<br>{esc(readings.fault)}", BAD)
+        return mark + box(text, GOOD if state.armed and all(state.referenced) else NEUTRAL)
+
+    def _show_problem(self) -> None:
+        told = self._operator.newest_problem
+        number = told.number if told is not None else 0
+        if (number == self._told and self._told != 0) or (number == 0 and self._problem.content == ""):
+            set_if_new(self._read, "visible", number != 0)
+            set_if_new(self._nearest, "visible", told is not None and told.problem.has_nearest)
+            return
+        self._told = number
+        content = ""
+        if told is not None:
+            heading, text = self._words.problem(told.problem)
+            content = box(f"<b>{esc(heading)}</b><br>{esc(text)}", BAD)
+        set_if_new(self._problem, "content", content)
+        set_if_new(self._read, "visible", number != 0)
+        set_if_new(self._nearest, "visible", told is not None and told.problem.has_nearest)
+
+    def _take_nearest(self) -> None:
+        told = self._operator.newest_problem
+        if told is not None:
+            self._operator.take_nearest(told.problem)

@@ -1,0 +1,83 @@
+"""The tab that runs the device: drivers, homing, reference, faults, outputs, and a virtual device's mishaps."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import viser
+
+from services.panel.model.readings import Readings
+from services.panel.view.kit import Kit, box, esc, set_if_new, table
+from services.panel.view.units import text_of
+
+
+class DeviceTab:
+    """Each button is greyed with its reason while it cannot be pressed."""
+
+    def __init__(self, kit: Kit) -> None:
+        self._kit, self._operator = kit, kit.operator
+        words, arm = kit.words, kit.operator.arm
+        self._facts = kit.line()
+        kit.button(words("arm"), arm.device.arm, color="green", needs="arm")
+        kit.button(words("disarm"), arm.device.disarm, color="orange", needs="disarm")
+        kit.button(words("home"), self._operator.home, color="blue", needs="home")
+        kit.button(words("reference"), self._ask_reference, color="blue", needs="reference")
+        kit.button(words("reset"), arm.device.reset, color="orange", needs="reset")
+        self._homing = kit.line()
+        kit.reasons(
+            arm=words("arm"), disarm=words("disarm"), home=words("home"), reference=words("reference"),
+            reset=words("reset"),
+        )  # fmt: skip
+        self._outputs = {output.name: self._output(output.name) for output in arm.description.outputs}
+        with kit.gui.add_folder(words("virtual"), expand_by_default=False):
+            for key, value in (("estop_press", 1.0), ("estop_release", 0.0)):
+                kit.button(words(key), partial(arm.device.inject, "estop", value=value), needs="inject")
+            for joint in arm.joint_names:
+                self._slip_button(joint)
+            kit.reasons(inject=words("virtual"))
+
+    def refresh(self, readings: Readings) -> None:
+        """Mode, switches, outputs, homing."""
+        words, state, status = self._kit.words, readings.state, readings.status
+        rows: list[tuple[str, ...]] = []
+        if status is not None:
+            kind = words("virtual_device") if status.virtual else words("real_device")
+            rows.append((esc(words("device")), f"{esc(status.device)} ({esc(kind)}), {esc(status.firmware)}"))
+        if state is not None:
+            rows.append((esc(words("mode")), esc(state.mode.name)))
+            rows.append((esc(words("inputs")), esc(", ".join(state.inputs) or "-")))
+            rows.append((esc(words("link")), f"{1000 * state.round_trip:.1f} ms"))
+            for name, handle in self._outputs.items():
+                set_if_new(handle, "value", name in state.outputs)
+        set_if_new(self._facts, "content", table(rows) if rows else "")
+        phases = ", ".join(f"{joint}: {phase}" for joint, phase in self._operator.homing.items())
+        set_if_new(self._homing, "content", box(esc(words("homing", phases=phases)), "#1c7ed6") if phases else "")
+
+    def _output(self, name: str) -> viser.GuiCheckboxHandle:
+        handle = self._kit.gui.add_checkbox(f"{self._kit.words('output')} {name}", False)
+
+        @handle.on_update
+        def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
+            if event.client_id is not None:
+                self._operator.guarded(lambda: self._operator.arm.output(name, event.target.value))
+
+        return handle
+
+    def _slip_button(self, joint: str) -> None:
+        slip = partial(self._operator.arm.device.inject, "slip", joint, 10.0)
+        self._kit.button(self._kit.words("slip", joint=joint), slip, needs="inject")
+
+    def _ask_reference(self) -> None:
+        """A declaration that is wrong drives the arm into something: it is said back before it counts."""
+        words, arm = self._kit.words, self._operator.arm
+        joints = zip(arm.description.joints, arm.description.reference_position, strict=True)
+        where = table([(esc(joint.name), esc(text_of(joint, at))) for joint, at in joints])
+        with self._kit.gui.add_modal(words("reference")) as modal:
+            self._kit.line(f"{esc(words('reference_question'))}{where}")
+
+            def declare() -> None:
+                modal.close()
+                self._operator.guarded(arm.reference)
+
+            self._kit.button(words("reference_yes"), declare, color="orange")
+            self._kit.button(words("cancel"), modal.close, color="gray")

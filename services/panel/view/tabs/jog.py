@@ -1,0 +1,124 @@
+"""The tab that moves the arm by hand: joint by joint, or the tool along the axes of the base or its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import radians
+
+import gemelo
+from services.arm.frames.transforms import from_rpy, multiply
+from services.arm.model.description import Joint
+from services.panel.model.jogging import JogWish
+from services.panel.model.readings import Readings
+from services.panel.view.kit import Kit, box, esc, note, set_if_new, without_event
+from services.panel.view.units import jog_speed
+
+HOLD_RATE = 20.0  # [Hz] of a held button
+LINEAR, ANGULAR = 0.1, 1.0  # [m/s], [rad/s] of the tool at 100 %
+STEPS = (0.1, 1.0, 10.0, 30.0)  # [mm] and [deg] of one press
+KEYS = {("x", 1): "▲", ("x", -1): "▼", ("y", 1): "◀", ("y", -1): "▶", ("z", 1): "⏶", ("z", -1): "⏷"}  # of the keyboard
+
+
+class JogTab:
+    """Continuous while a button or key is held, or in steps."""
+
+    def __init__(self, kit: Kit) -> None:
+        self._kit, self._operator = kit, kit.operator
+        words, gui = kit.words, kit.gui
+        self._modes = (words("continuous"), *(f"{step:g} mm / {step:g}°" for step in STEPS))
+        self._mode = gui.add_dropdown(words("jog_mode"), self._modes)
+        self._speed = gui.add_slider(words("jog_speed"), 1, 100, 1, 25)
+        self._frame = gui.add_dropdown(words("along_axes"), (words("base_axes"), words("tool_axes")))
+        self._status = kit.line()
+        with gui.add_folder(words("tool")):
+            kit.line(note(esc(words("keys_note"))))
+            for axis in ("x", "y", "z"):
+                for sign in (1, -1):
+                    self._tool_button(axis, sign, "")
+            if self._operator.goal.can_turn:
+                for axis in ("x", "y", "z"):
+                    for sign in (1, -1):
+                        self._tool_button(axis, sign, "r")
+        with gui.add_folder(words("joints")):
+            for joint in self._operator.arm.description.joints:
+                for sign in (-1, 1):
+                    self._joint_button(joint, sign)
+        kit.reasons(jog=words("jog"))
+
+    def refresh(self, readings: Readings) -> None:
+        """What slows the jog."""
+        status = self._operator.bus.jog_status
+        content = ""
+        if status is not None and status.active:
+            told = ", ".join(f"{limit.check} {limit.subject}" for limit in status.limits)
+            content = box(esc(self._kit.words("jogging", share=round(100 * status.scale), limits=told)), "#1c7ed6")
+        set_if_new(self._status, "content", content)
+
+    @property
+    def _step(self) -> float:
+        """[mm] or [deg] of one press; 0 while continuous."""
+        place = self._modes.index(self._mode.value)
+        return STEPS[place - 1] if place else 0.0
+
+    def _joint_button(self, joint: Joint, sign: int) -> None:
+        def hold() -> None:
+            speed = sign * jog_speed(joint, self._speed.value / 100.0)
+            self._operator.jogging.hold(JogWish(joints={joint.name: speed}))
+
+        def step() -> None:
+            size = radians(self._step) if joint.unit == "rad" else self._step / 1000.0
+            at = self._operator.arm.joints[joint.name] + sign * size
+            self._operator.step(gemelo.Target(joints={joint.name: joint.clamp(at)}))
+
+        self._add(f"{joint.name} {'+' if sign > 0 else '-'}", hold, step)
+
+    def _tool_button(self, axis: str, sign: int, turn: str) -> None:
+        place = "xyz".index(axis)
+
+        def vector(size: float) -> tuple[float, ...]:
+            return tuple(sign * size if index == place else 0.0 for index in range(3))
+
+        def hold() -> None:
+            share = self._speed.value / 100.0
+            still = (0.0, 0.0, 0.0)
+            twist = (*still, *vector(share * ANGULAR)) if turn else (*vector(share * LINEAR), *still)
+            self._operator.jogging.hold(JogWish(twist=twist, frame=self._frame_name))
+
+        def step() -> None:
+            if turn:
+                self._turn(vector(radians(self._step)))
+            else:
+                offset = vector(self._step / 1000.0)
+                self._operator.step(gemelo.Target(offset=offset, line=True, frame=self._frame_name))
+
+        key = f"  {KEYS[axis, sign]}" if not turn else ""
+        self._add(f"{turn}{axis} {'+' if sign > 0 else '-'}{key}", hold, step)
+
+    def _turn(self, angles: tuple[float, ...]) -> None:
+        """The tool turned by roll, pitch or yaw [rad] about the chosen axes, where it is."""
+        pose, (roll, pitch, yaw) = self._operator.arm.pose(), angles
+        turned = from_rpy(roll, pitch, yaw)
+        in_tool = bool(self._frame_name)
+        orientation = multiply(pose.orientation, turned) if in_tool else multiply(turned, pose.orientation)
+        self._operator.step(gemelo.Target(pose=gemelo.Pose(pose.position, orientation)))
+
+    @property
+    def _frame_name(self) -> str:
+        is_tool = self._frame.value == self._kit.words("tool_axes")
+        return self._operator.arm.tool_frame if is_tool else ""
+
+    def _add(self, label: str, hold: Callable[[], object], step: Callable[[], object]) -> None:
+        """A press is a step, or a hold, as the mode says."""
+
+        def keep() -> None:
+            if not self._step:
+                hold()
+
+        def press() -> None:
+            if self._step:
+                self._operator.guarded(step)
+            else:
+                self._operator.jogging.release()
+
+        button = self._kit.held(label, keep, rate=HOLD_RATE, needs="jog")
+        button.on_click(without_event(press))

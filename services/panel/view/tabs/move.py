@@ -1,0 +1,178 @@
+"""The tab that sets a goal, plans a path to it, shows the plan and executes it."""
+
+from __future__ import annotations
+
+import time
+
+import viser
+
+import gemelo
+from services.arm.model.description import Joint
+from services.panel.model.motions import PLANNERS, MotionChoice
+from services.panel.model.readings import Readings
+from services.panel.view.kit import Kit, box, esc, note, set_if_new, table
+from services.panel.view.units import SHOWN, STEP, meant, shown, slider_range, text_of
+from services.panel.view.world import World
+
+OWN_DRAG = 0.6  # [s] after its own change a browser's slider is not written: the finger may still be on it
+SCRUB = 100.0  # parts of the plan's duration
+
+
+class MoveTab:
+    """A slider for each joint, named states, Plan, Execute, and what is known of the plan."""
+
+    def __init__(self, kit: Kit, world: World) -> None:
+        self._kit, self._world, self._operator = kit, world, kit.operator
+        self._client = kit.client.client_id
+        self._touched = 0.0  # [s] monotonic, of this browser's last slider
+        self._goal_version = self._plan_version = -1
+        words = kit.words
+        self._problem = kit.line()
+        self._nearest = kit.button(words("take_nearest"), self._take_nearest, color="orange")
+        self._sliders = {joint.name: self._slider(joint) for joint in self._operator.arm.description.joints}
+        self._state_names = tuple(self._operator.arm.states)
+        if self._state_names:
+            named = kit.gui.add_dropdown(words("named_state"), (words("choose"), *self._state_names))
+            named.on_update(lambda event: self._name(event))
+        kit.button(words("goal_is_measured"), self._operator.follow_measured, color="gray")
+        self._live = kit.gui.add_checkbox(words("live"), False, hint=words("live_hint"))
+        self._live.on_update(lambda event: self._switch_live(event))
+        with kit.gui.add_folder(words("how"), expand_by_default=False):
+            self._choices()
+        kit.button(words("plan"), self._operator.plan, color="blue")
+        kit.button(words("execute"), self._operator.execute, color="green", needs="move")
+        kit.button(words("plan_and_execute"), self._operator.plan_and_execute, color="green", needs="move")
+        kit.reasons(move=words("execute"))
+        self._plan = kit.line()
+        self._play = kit.gui.add_checkbox(words("play"), True)
+        self._scrub = kit.gui.add_slider(words("scrub"), 0.0, SCRUB, 0.5, 0.0)
+        self._scrub.on_update(lambda event: self._show_moment(False) if event.client_id is not None else None)
+        self._play.on_update(lambda event: self._show_moment(self._play.value))
+
+    def refresh(self, readings: Readings) -> None:
+        """What has changed since the last time."""
+        goal, motions = self._operator.goal.goal, self._operator.motions
+        if goal.version != self._goal_version:
+            self._goal_version = goal.version
+            self._show_problem()
+            if goal.source != self._client or time.monotonic() - self._touched > OWN_DRAG:
+                self._write_sliders()
+        elif goal.source == self._client and time.monotonic() - self._touched > OWN_DRAG:
+            self._write_sliders()
+        set_if_new(self._live, "value", self._operator.live.is_on)
+        if motions.version != self._plan_version or motions.is_moving or motions.is_planning:
+            self._plan_version = motions.version
+            set_if_new(self._plan, "content", self._plan_text())
+            for handle in (self._scrub, self._play):
+                set_if_new(handle, "visible", motions.plan is not None)
+
+    def _slider(self, joint: Joint) -> viser.GuiSliderHandle[float]:
+        lower, upper = slider_range(joint)
+        at = min(max(shown(joint, self._operator.goal.goal.joints[joint.name]), lower), upper)
+        label = f"{joint.name} [{SHOWN[joint.unit]}]"
+        slider = self._kit.gui.add_slider(label, lower, upper, STEP[joint.unit], at)
+
+        @slider.on_update
+        def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
+            if event.client_id is not None:
+                self._touched = time.monotonic()
+                self._operator.set_goal({joint.name: meant(joint, event.target.value)}, self._client)
+
+        return slider
+
+    def _write_sliders(self) -> None:
+        for joint in self._operator.arm.description.joints:
+            slider = self._sliders[joint.name]
+            at = min(max(shown(joint, self._operator.goal.goal.joints[joint.name]), slider.min), slider.max)
+            if abs(slider.value - at) > STEP[joint.unit] / 2.0:
+                set_if_new(slider, "value", at)
+
+    def _choices(self) -> None:
+        words, gui = self._kit.words, self._kit.gui
+        kinds = (words("free_motion"), words("line_motion"))
+        kind = gui.add_dropdown(words("path_kind"), kinds)
+        speed = gui.add_slider(words("speed_share"), 1, 100, 1, round(100 * self._operator.choice.speed))
+        planner = gui.add_dropdown(words("planner"), (words("default"), *PLANNERS[1:]))
+
+        def choose(event: viser.GuiEvent[viser.GuiInputHandle[object]]) -> None:
+            if event.client_id is not None:
+                chosen = planner.value if planner.value in PLANNERS else ""
+                self._operator.choice = MotionChoice(kind.value == kinds[1], speed.value / 100.0, chosen)
+
+        for handle in (kind, speed, planner):
+            handle.on_update(choose)  # type: ignore[arg-type]
+
+    def _name(self, event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
+        if event.client_id is not None and event.target.value in self._state_names:
+            self._operator.set_named(event.target.value)
+            set_if_new(event.target, "value", self._kit.words("choose"))
+
+    def _switch_live(self, event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
+        if event.client_id is not None:
+            if event.target.value:
+                self._operator.follow_measured()
+            self._operator.live.switch(event.target.value)
+
+    def _take_nearest(self) -> None:
+        problem = self._operator.goal.goal.problem
+        if problem is not None:
+            self._operator.take_nearest(problem)
+
+    def _show_moment(self, is_playing: bool) -> None:
+        plan = self._operator.motions.plan
+        if plan is not None:
+            set_if_new(self._play, "value", is_playing)
+            self._world.is_playing, self._world.scrubbed = is_playing, self._scrub.value / SCRUB * plan.duration
+
+    def _show_problem(self) -> None:
+        goal, words = self._operator.goal.goal, self._kit.words
+        content = ""
+        if goal.problem is not None:
+            heading, text = words.problem(goal.problem)
+            content = box(f"<b>{esc(heading)}</b><br>{esc(text)}", "#d9480f")
+        elif goal.jumped:
+            content = box(esc(words("jumped", joints=", ".join(goal.jumped))), "#f59f00")
+        set_if_new(self._problem, "content", content)
+        set_if_new(self._nearest, "visible", goal.problem is not None and goal.problem.has_nearest)
+
+    def _plan_text(self) -> str:
+        words, motions = self._kit.words, self._operator.motions
+        if motions.is_planning:
+            return box(esc(words("planning")), "#1c7ed6")
+        moving = ""
+        motion = motions.motion
+        if motion is not None and not motion.is_over:
+            moving = box(esc(words("moving", share=round(100 * motion.progress))), "#2f9e44")
+        elif motion is not None:
+            moving = self._arrival(motion)
+        if motions.plan is None:
+            return moving
+        return moving + self._facts(motions.plan)
+
+    def _facts(self, plan: gemelo.Plan) -> str:
+        words = self._kit.words
+        facts = [
+            (esc(words("duration")), f"{plan.duration:.2f} s"),
+            (esc(words("planner")), f"{esc(plan.planner)}, {1000 * plan.planning_time:.0f} ms"),
+        ]
+        for joint in self._operator.arm.description.joints:
+            margin = plan.margins.get(joint.name)
+            if margin is not None:
+                facts.append((esc(joint.name), f"{100 * (1 - margin.share):.0f} % {esc(words('left'))}"))
+        return table(facts) + note(esc(words("margins_note")))
+
+    def _arrival(self, motion: gemelo.Motion) -> str:
+        words = self._kit.words
+        key = f"ended_{motion.status.name.lower()}"
+        where = [
+            (esc(joint.name), esc(text_of(joint, motion.stopped_at[joint.name])))
+            for joint in self._operator.arm.description.joints
+            if joint.name in motion.stopped_at
+        ]
+        try:
+            worst = max((abs(error) for error in motion.result.final_error), default=0.0)
+        except gemelo.Error:
+            return note(esc(words(key)))
+        return note(f"{esc(words(key))}: {esc(words('final_error', steps=f'{worst:.2f}'))}") + (
+            "" if motion.status.name == "SUCCEEDED" else table(where)
+        )

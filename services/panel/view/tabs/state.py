@@ -1,0 +1,71 @@
+"""The tab that shows numbers: joints and steps, the tool's pose, sensors, the link, this browser, the log."""
+
+from __future__ import annotations
+
+from math import degrees
+
+import numpy as np
+from viser.transforms import SO3
+
+from services.panel.model.readings import Readings
+from services.panel.view.browser import Browser
+from services.panel.view.kit import Kit, esc, note, set_if_new, table
+from services.panel.view.units import text_of
+
+LOG_LINES = 8
+
+
+class StateTab:
+    """Nothing here can be pressed."""
+
+    def __init__(self, kit: Kit) -> None:
+        self._kit, self._operator = kit, kit.operator
+        self._joints, self._tool, self._log = kit.line(), kit.line(), kit.line()
+
+    def refresh(self, readings: Readings, browser: Browser | None, lag: float, tool: tuple[float, ...]) -> None:
+        """`lag` [s] of this browser; `tool`: x, y, z [m] and quaternion of the measured tool."""
+        words = self._kit.words
+        header = ("", *(esc(words(key)) for key in ("measured", "steps_off")))
+        rows = [
+            (
+                esc(joint.name),
+                esc(text_of(joint, readings.joints[joint.name])),
+                f"{readings.step_errors.get(joint.name, 0.0):+.2f}",
+            )
+            for joint in self._operator.arm.description.joints
+            if joint.name in readings.joints
+        ]
+        set_if_new(self._joints, "content", table(rows, header) + self._steps(readings))
+        set_if_new(self._tool, "content", table(self._numbers(readings, browser, lag, tool)))
+        lines = [f"{esc(line.node)}: {esc(line.text)}" for line in self._operator.bus.log[-LOG_LINES:]]
+        set_if_new(self._log, "content", note("<br>".join(lines)))
+
+    def _steps(self, readings: Readings) -> str:
+        """Executed steps beside those of the path, to the half step."""
+        state = readings.state
+        if state is None:
+            return ""
+        words, arm = self._kit.words, self._operator.arm.description
+        executed = dict(zip(state.name, state.steps, strict=False))
+        rows = []
+        for joint in arm.joints:
+            if joint.name in readings.commanded and joint.name in executed:
+                wanted = joint.steps.to_steps(readings.commanded[joint.name])
+                rows.append((esc(joint.name), f"{wanted:.1f}", str(executed[joint.name])))
+        return table(rows, (esc(words("steps")), esc(words("commanded")), esc(words("executed"))))
+
+    def _numbers(
+        self, readings: Readings, browser: Browser | None, lag: float, tool: tuple[float, ...]
+    ) -> list[tuple[str, ...]]:
+        words = self._kit.words
+        x, y, z = (1000.0 * value for value in tool[:3])
+        a, b, c, w = tool[3:]
+        roll, pitch, yaw = (degrees(angle) for angle in SO3(np.array((w, a, b, c))).as_rpy_radians())
+        rows: list[tuple[str, ...]] = [
+            (esc(words("tool")), f"{x:.1f}, {y:.1f}, {z:.1f} mm"),
+            (esc(words("turned")), f"{roll:.1f}°, {pitch:.1f}°, {yaw:.1f}°"),
+        ]
+        rows += [(esc(name), f"{value:.4g}") for name, value in readings.sensors.items()]
+        if browser is not None:
+            rows.append((esc(words("browser")), f"{browser.rate:.0f} fps, {1000 * lag:.0f} ms"))
+        return rows

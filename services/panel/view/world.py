@@ -1,0 +1,164 @@
+"""The three-dimensional picture, one for all browsers: arms, gizmo, paths, obstacles and contacts."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Mapping
+from math import ceil
+
+import numpy as np
+import viser
+
+import gemelo
+from services.panel.model.goal import Goal
+from services.panel.model.operator import Operator
+from services.panel.model.readings import Readings
+from services.panel.view.arms import Array, DrawnArm
+from services.panel.view.obstacles import Obstacles
+from services.runtime.deployment import project_root
+
+GOAL, BAD_GOAL, GHOST = (1.0, 0.62, 0.1, 0.45), (0.9, 0.2, 0.15, 0.5), (0.25, 0.55, 1.0, 0.35)
+PLANNED, EXECUTED = (40, 110, 230), (30, 150, 70)
+APART = 2e-3  # [rad] or [m]: a goal nearer than that is where the arm is, and is not drawn over it
+TRAIL = 400  # points of the executed path
+STEP = 0.002  # [m] between two of them
+REDRAWN = 0.25  # [s] between two drawings of the executed path
+ABOVE = 0.03  # [m] chosen: a goal by a click is so high above the surface that a gripper's finger is clear of it
+GHOST_RATE = 20.0  # [Hz] of the plan that is played
+
+
+class World:
+    """Everything drawn under the server's scene; `update` is called again and again, and draws what has changed."""
+
+    def __init__(self, server: viser.ViserServer, operator: Operator) -> None:
+        arm = operator.arm.description
+        self._operator, self._scene = operator, server.scene
+        self._base, self._tool = arm.base_frame, arm.tool_frame
+        self.measured = DrawnArm(server, arm.urdf_path, "/measured")
+        self._goal = DrawnArm(server, arm.urdf_path, "/goal", GOAL)
+        self._bad_goal = DrawnArm(server, arm.urdf_path, "/bad_goal", BAD_GOAL)
+        self._ghost = DrawnArm(server, arm.urdf_path, "/ghost", GHOST)
+        self.obstacles = Obstacles(server, (project_root(), arm.folder))
+        reach = max(0.3, float(np.linalg.norm(operator.goal.goal.pose.position)))
+        self._set_stage(server, reach)
+        self.gizmo = self._scene.add_transform_controls(
+            "/gizmo", scale=0.35 * reach, disable_rotations=not operator.goal.can_turn, depth_test=False
+        )
+        self._frame = self._scene.add_frame("/tool", axes_length=0.12 * reach, axes_radius=0.004 * reach)
+        self._is_dragged = False
+        self._tool_pose = operator.goal.goal.pose
+        self._follow_gizmo()
+        self._goal_version = -1
+        self._trail: deque[Array] = deque(maxlen=TRAIL)
+        self._trail_drawn = 0.0
+        self._path_stamp = 0
+        self._played_at = 0.0
+        self.is_playing, self.scrubbed = True, 0.0  # [s] of the plan that the ghost shows while it does not play
+
+    def update(self, readings: Readings) -> None:
+        """One picture."""
+        goal = self._operator.goal.goal
+        if self.measured.show(readings.joints):
+            self._tool_moved()
+        self._show_goal(goal, readings)
+        self._show_plan()
+        contacts = goal.problem.contacts if goal.problem is not None else ()
+        self.obstacles.show(self._operator.bus.scene, contacts, self.measured.pose)
+
+    @property
+    def tool_pose(self) -> gemelo.Pose:
+        """Of the measured arm, in the base frame, as it is drawn."""
+        return self._tool_pose
+
+    def place_goal(self, event: viser.SceneClickEvent) -> None:
+        """The goal a little above the surface that was clicked."""
+        hit = self.obstacles.under_the_cursor(np.array(event.ray_origin), np.array(event.ray_direction))
+        if hit is not None:
+            x, y, z = (hit + np.array((0.0, 0.0, ABOVE))).tolist()
+            pose = gemelo.Pose((x, y, z), self._operator.goal.goal.pose.orientation)
+            self._operator.goal.set_pose(pose, event.client_id)
+
+    def _set_stage(self, server: viser.ViserServer, reach: float) -> None:
+        size = 2.0 * ceil(4.0 * reach) / 2.0
+        self._scene.add_grid("/ground", size, size, cell_size=0.1, section_size=0.5, infinite_grid=False)
+        self._scene.configure_environment_map(None)
+        self._scene.configure_default_lights(True)
+        self._scene.add_light_ambient("/lights/ambient", intensity=0.9)
+        server.initial_camera.position = (1.35 * reach, -1.15 * reach, 0.95 * reach)
+        server.initial_camera.look_at = (0.35 * reach, 0.1 * reach, 0.1 * reach)
+
+    def _follow_gizmo(self) -> None:
+        @self.gizmo.on_drag_start
+        def _(event: viser.TransformControlsEvent) -> None:
+            self._is_dragged = True
+
+        @self.gizmo.on_update
+        def _(event: viser.TransformControlsEvent) -> None:
+            w, a, b, c = (float(value) for value in event.target.wxyz)
+            x, y, z = (float(value) for value in event.target.position)
+            pose = gemelo.Pose((x, y, z), (a, b, c, w))
+            self._operator.goal.set_pose(pose, event.client_id if event.client_id is not None else -1)
+
+        @self.gizmo.on_drag_end
+        def _(event: viser.TransformControlsEvent) -> None:
+            self._is_dragged = False
+            self._operator.goal.settle()
+
+    def _show_goal(self, goal: Goal, readings: Readings) -> None:
+        measured = readings.joints
+        apart = any(abs(at - measured.get(name, at)) > APART for name, at in goal.joints.items())
+        is_bad = goal.problem is not None and goal.wanted is None
+        self._goal.is_visible = apart and not is_bad
+        self._bad_goal.is_visible = is_bad
+        if goal.version == self._goal_version:
+            return
+        self._goal_version = goal.version
+        (self._bad_goal if is_bad else self._goal).show(goal.joints)
+        if not self._is_dragged:
+            self.gizmo.position = goal.pose.position
+            a, b, c, w = goal.pose.orientation
+            self.gizmo.wxyz = (w, a, b, c)
+
+    def _show_plan(self) -> None:
+        motions, path = self._operator.motions, self._operator.bus.planned_path
+        if path.stamp != self._path_stamp and len(path.points) > 1:
+            self._path_stamp = path.stamp
+            self._draw_line("/planned", np.array(path.points), PLANNED)
+        plan = motions.plan
+        self._ghost.is_visible = plan is not None and not motions.is_moving
+        if plan is None or motions.is_moving:
+            return
+        now = time.monotonic()
+        if now - self._played_at < 1.0 / GHOST_RATE:
+            return
+        self._played_at = now
+        at = now % (plan.duration + 0.7) if self.is_playing else self.scrubbed
+        self._ghost.show(configuration_at(plan, at))
+
+    def _tool_moved(self) -> None:
+        pose = self.measured.pose(self._tool)
+        self._frame.position = pose[:3, 3]
+        self._frame.wxyz = viser.transforms.SO3.from_matrix(pose[:3, :3]).wxyz
+        x, y, z = (float(value) for value in pose[:3, 3])
+        w, a, b, c = (float(value) for value in self._frame.wxyz)
+        self._tool_pose = gemelo.Pose((x, y, z), (a, b, c, w))
+        if self._trail and float(np.linalg.norm(self._trail[-1] - pose[:3, 3])) < STEP:
+            return
+        self._trail.append(pose[:3, 3].copy())
+        if len(self._trail) > 1 and time.monotonic() - self._trail_drawn > REDRAWN:
+            self._trail_drawn = time.monotonic()
+            self._draw_line("/executed", np.array(self._trail), EXECUTED)
+
+    def _draw_line(self, name: str, points: Array, color: tuple[int, int, int]) -> None:
+        segments = np.stack([points[:-1], points[1:]], axis=1)
+        self._scene.add_line_segments(name, segments, color, thickness=2.5, thickness_units="screen")
+
+
+def configuration_at(plan: gemelo.Plan, time_from_start: float) -> Mapping[str, float]:
+    """Joint values [rad] or [m] of the plan at `time_from_start` [s], straight between its points."""
+    points = plan.trajectory.points
+    times = [point.time_from_start for point in points]
+    rows = np.array([point.positions for point in points])
+    values = [float(np.interp(time_from_start, times, column)) for column in rows.T]
+    return dict(zip(plan.trajectory.joint_names, values, strict=True))

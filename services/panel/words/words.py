@@ -1,0 +1,40 @@
+"""The words of the page in one language; a missing one is an error where it is asked for."""
+
+from __future__ import annotations
+
+from services.panel.model.availability import Reason
+from services.panel.model.problems import Problem
+from services.panel.words.en import ENGLISH
+from services.panel.words.es import SPANISH
+
+TABLES = {"en": ENGLISH, "es": SPANISH}
+NAMES = {"en": "English", "es": "Español"}
+
+
+class Words:
+    """`words("key", name=value)` is the text of the key with its values put in."""
+
+    def __init__(self, language: str) -> None:
+        self.language = language if language in TABLES else "en"
+        self._table = TABLES[self.language]
+
+    def __call__(self, key: str, **values: object) -> str:
+        text = self._table[key]
+        return text.format(**values) if values else text
+
+    def reason(self, reason: Reason) -> str:
+        """Why something cannot be done now; empty where it can."""
+        return "" if reason is None else self(f"reason_{reason[0]}", value=reason[1])
+
+    def problem(self, problem: Problem) -> tuple[str, str]:
+        """A heading for the check, in this language, and the sentence of the part of the twin that refused."""
+        key = f"check_{problem.check.replace(' ', '_').replace('-', '_')}"
+        heading = self._table.get(key, self._table["check_other"] if problem.is_refusal else self._table["check_ended"])
+        known = self._table.get(f"text_{problem.text.replace(' ', '_')}")
+        return heading, known or problem.text
+
+
+def language_of(browser: str) -> str:
+    """The nearest of our languages to a browser's, as "es-MX"."""
+    short = browser.partition("-")[0].lower()
+    return short if short in TABLES else "en"
