@@ -40,7 +40,8 @@ class StackError(Exception):
 class Stack:
     """Starts on entering, stops on leaving; every process can be looked at and killed by name.
 
-    `viewer="none"` leaves the viewer's process out, `panel` adds the operator's page. `environment` is added to what the stack gets.
+    `viewer="none"` leaves the viewer's process out, `panel` adds the operator's page.
+    `environment` is added to what the stack gets.
     `command` starts it in another way, for example ("make", "up").
     """
 
