@@ -14,6 +14,7 @@ from services.panel.model.live import LiveSliders
 from services.panel.model.motions import MotionChoice, Motions
 from services.panel.model.problems import Problem, problem_of
 from services.panel.model.readings import Bus
+from services.panel.model.teaching import Teaching
 
 KEPT = 30.0  # [s] that a problem stays on the page
 
@@ -39,10 +40,12 @@ class Operator:
         self.goal = GoalSolver(arm, self.wake)
         self.motions = Motions(arm, self.tell)
         self.jogging = Jogging(arm, self.tell)
+        self.teaching = Teaching(arm, self.wake)
         self.live = LiveSliders(arm, self.jogging, self.bus)
 
     def close(self) -> None:
         """Ends its threads; the arm brakes where the page has led it by hand."""
+        self.teaching.stop()
         self.live.close()
         self.jogging.close()
         self.goal.close()
@@ -136,6 +139,7 @@ class Operator:
         self.jogging.release()
         self.live.switch(False)
         self.guarded(self.arm.stop)
+        self.guarded(self.teaching.stop)
 
     def set_speed(self, share: float) -> None:
         """Of everything that is played from now on."""

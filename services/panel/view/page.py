@@ -17,8 +17,10 @@ from services.panel.view.kit import Kit, box, esc, set_if_new, without_event
 from services.panel.view.tabs.device import DeviceTab
 from services.panel.view.tabs.jog import JogTab
 from services.panel.view.tabs.move import MoveTab
+from services.panel.view.tabs.programs import ProgramsTab
 from services.panel.view.tabs.scene import SceneTab
 from services.panel.view.tabs.state import StateTab
+from services.panel.view.tabs.teach import TeachTab
 from services.panel.view.world import World
 from services.panel.words.words import NAMES, Words, language_of
 
@@ -53,6 +55,8 @@ class Page:
         self._jog.refresh(readings)
         self._device.refresh(readings)
         self._scene.refresh(readings)
+        self._teach.refresh(readings)
+        self._programs.refresh(readings)
         pose = self._world.tool_pose
         self._state.refresh(readings, self.browser, self.lag, (*pose.position, *pose.orientation))
         if readings.state is not None:
@@ -89,6 +93,10 @@ class Page:
             self._jog = JogTab(kit)
         with tabs.add_tab(words("tab_device")):
             self._device = DeviceTab(kit)
+        with tabs.add_tab(words("tab_teach")):
+            self._teach = TeachTab(kit)
+        with tabs.add_tab(words("tab_programs")):
+            self._programs = ProgramsTab(kit)
         with tabs.add_tab(words("tab_scene")):
             self._scene = SceneTab(kit, self._world)
         with tabs.add_tab(words("tab_state")):

@@ -1,0 +1,167 @@
+"""The tab that edits, checks and runs programs."""
+
+from __future__ import annotations
+
+import gemelo
+from gemelo.programs import CheckedLeg, RunState, RunStatus, StepPath, path_text, words_of
+from services.panel.model.readings import Readings
+from services.panel.view.kit import Kit, box, esc, note, set_if_new
+from services.panel.view.tabs.new_step import NewStep
+
+COLORS = {
+    RunStatus.RUNNING: "#2f9e44", RunStatus.PAUSED: "#f59f00", RunStatus.FAILED: "#e03131",
+    RunStatus.STOPPED: "#868e96", RunStatus.DONE: "#1c7ed6", RunStatus.READY: "#868e96",
+}  # fmt: skip
+
+
+class ProgramsTab:
+    """The program that is open, its steps, one of them chosen, and its run."""
+
+    def __init__(self, kit: Kit) -> None:
+        self._kit, self._operator, self._teaching = kit, kit.operator, kit.operator.teaching
+        words, gui = kit.words, kit.gui
+        self._version = -1
+        self._paths: dict[str, StepPath] = {}
+        self._file = gui.add_dropdown(words("program"), (words("none"),))
+        self._file.on_update(lambda event: self._open() if event.client_id is not None else None)
+        self._name = gui.add_text(words("name"), self._teaching.program.name)
+        kit.button(words("save"), lambda: self._teaching.save(self._name.value), color="blue")
+        kit.button(words("new_program"), lambda: self._teaching.new(self._name.value), color="gray")
+        self._state = kit.line()
+        self._list = kit.line()
+        self._step = gui.add_dropdown(words("step"), (words("whole_program"),))
+        kit.button(words("check"), self._check, color="blue")
+        kit.button(words("run_from"), self._run, color="green", needs="move")
+        kit.button(words("one_step"), lambda: self._teaching.step(self._first()), color="teal", needs="move")
+        self._pause = kit.button(words("pause"), self._teaching.pause, color="orange")
+        self._resume = kit.button(words("resume"), self._teaching.resume, color="green")
+        kit.reasons(move=words("run_from"))
+        with gui.add_folder(words("edit")):
+            self._form = NewStep(kit)
+            kit.button(words("add_step"), self._add, color="green")
+            kit.button(
+                words("change_step"), lambda: self._teaching.change(self._chosen(), self._form.make()), color="gray"
+            )
+            kit.button(words("step_up"), lambda: self._shift(-1), color="gray")
+            kit.button(words("step_down"), lambda: self._shift(1), color="gray")
+            kit.button(words("delete_step"), lambda: self._teaching.delete(self._chosen()), color="orange")
+        with gui.add_folder(words("file"), expand_by_default=False):
+            kit.button(words("export"), self._export, color="gray")
+            kit.button(words("remove_program"), lambda: self._teaching.remove(self._teaching.program.name), color="red")
+
+    def refresh(self, readings: Readings) -> None:
+        """The steps with what their check and the run say of them."""
+        teaching, words = self._teaching, self._kit.words
+        self._form.refresh()
+        state = teaching.state
+        set_if_new(self._pause, "visible", state is not None and state.status is RunStatus.RUNNING)
+        set_if_new(self._resume, "visible", state is not None and state.status is RunStatus.PAUSED)
+        if teaching.version == self._version:
+            return
+        self._version = teaching.version
+        names = (words("none"), *teaching.programs)
+        if tuple(self._file.options) != names:
+            self._file.options = names
+        opened = teaching.program.name if teaching.program.name in names else words("none")
+        set_if_new(self._file, "value", opened)
+        self._show_steps()
+        set_if_new(self._state, "content", self._state_text(state))
+        set_if_new(self._list, "content", self._list_text(state))
+
+    def _show_steps(self) -> None:
+        """The list to choose from; the chosen place stays where it can."""
+        chosen = self._paths.get(str(self._step.value), ())
+        steps = self._teaching.program.all_steps()
+        self._paths = {self._kit.words("whole_program"): ()}
+        self._paths |= {f"{path_text(path)}  {words_of(step)}"[:60]: path for path, step in steps}
+        options = tuple(self._paths)
+        if tuple(self._step.options) != options:
+            self._step.options = options
+        kept = next((text for text, path in self._paths.items() if path == chosen), options[0])
+        set_if_new(self._step, "value", kept)
+
+    def _state_text(self, state: RunState | None) -> str:
+        teaching, words = self._teaching, self._kit.words
+        saved = "" if teaching.is_saved else note(esc(words("not_saved")))
+        if teaching.is_checking:
+            return saved + box(esc(words("checking")), "#1c7ed6")
+        if state is not None and (not state.status.is_over or teaching.check is None):
+            text = f"<b>{esc(words(f'run_{state.status.value}'))}</b> {esc(state.message)}"
+            return saved + box(text, COLORS[state.status])
+        check = teaching.check
+        if check is None:
+            return saved
+        if check.ok:
+            return saved + box(esc(words("check_ok", duration=f"{check.duration:.1f}")), "#2f9e44")
+        told = [str(mistake) for mistake in check.mistakes] + list(check.refusals)
+        return saved + box("<br>".join(esc(text) for text in told), "#e03131")
+
+    def _list_text(self, state: RunState | None) -> str:
+        teaching = self._teaching
+        legs = {path: leg for leg in (teaching.check.legs if teaching.check is not None else ()) for path in leg.paths}
+        lit = state.steps if state is not None and not state.status.is_over else ()
+        rows = [
+            self._row(path, words_of(step), legs.get(path), path in lit) for path, step in teaching.program.all_steps()
+        ]
+        return f'<div style="margin:0 0.8em 0.6em;font-size:0.82em">{"".join(rows)}</div>' if rows else ""
+
+    def _row(self, path: StepPath, text: str, leg: CheckedLeg | None, is_lit: bool) -> str:
+        """One step: indented in its repeat, lit while it is carried out, with its time and tightest margin."""
+        about = ""
+        if leg is not None and leg.refusal is not None:
+            about = f'<span style="color:#e03131">✗ {esc(leg.refusal.check)}</span>'
+        elif leg is not None and leg.duration:
+            joint, margin = leg.tightest
+            about = f"{leg.duration:.2f} s" + (f" · {esc(joint)} {100 * margin:.0f} %" if joint else "")
+        style = "background:#2f9e4444;font-weight:bold;" if is_lit else ""
+        indent = 0.3 + 1.1 * (len(path) - 1)
+        return (
+            f'<div style="{style}padding:1px 4px 1px {indent}em;border-bottom:1px solid #8883;display:flex;'
+            f'justify-content:space-between"><span>{path_text(path)}&nbsp; {esc(text)}</span><span>{about}</span></div>'
+        )
+
+    def _open(self) -> None:
+        chosen = str(self._file.value)
+        if chosen in self._teaching.programs and chosen != self._teaching.program.name:
+            self._operator.guarded(lambda: self._teaching.open(chosen))
+        set_if_new(self._name, "value", self._teaching.program.name)
+
+    def _chosen(self) -> StepPath:
+        path = self._first()
+        if not path:
+            raise gemelo.BadArgument(self._kit.words("choose_step"))
+        return path
+
+    def _first(self) -> StepPath:
+        """The chosen step; empty for the program's beginning."""
+        return self._paths.get(str(self._step.value), ())
+
+    def _check(self) -> None:
+        self._teaching.plan_all()
+
+    def _run(self) -> None:
+        self._operator.forget_problem()
+        self._teaching.start(self._first())
+
+    def _add(self) -> None:
+        after = self._first()
+        place = self._teaching.insert(self._form.make(), after)
+        self._choose(place if after else ())
+
+    def _change(self) -> None:
+        self._teaching.change(self._chosen(), self._form.make())
+
+    def _shift(self, by: int) -> None:
+        self._choose(self._teaching.shift(self._chosen(), by))
+
+    def _choose(self, path: StepPath) -> None:
+        self._show_steps()
+        text = next((text for text, each in self._paths.items() if each == path), None)
+        if text is not None:
+            set_if_new(self._step, "value", text)
+
+    def _export(self) -> None:
+        from gemelo.programs import export_script
+
+        text = export_script(self._teaching.program, self._teaching.points, self._teaching.programs)
+        self._kit.client.send_file_download(f"{self._teaching.program.name}.py", text.encode())

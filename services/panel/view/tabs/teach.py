@@ -1,0 +1,107 @@
+"""The tab that teaches points: this pose under a name, with a picture, to go to, overwrite, rename and forget."""
+
+from __future__ import annotations
+
+import io
+
+import imageio.v3 as imageio
+import numpy as np
+
+import gemelo
+from services.panel.model.readings import Readings
+from services.panel.view.kit import Kit, esc, note, set_if_new, table
+from services.panel.view.units import text_of
+
+PICTURE = (180, 240)  # [pixels] height, width
+TO_DRAW = 5.0  # [s] that a browser may take for a picture
+BLANK = np.full((*PICTURE, 3), 128, dtype=np.uint8)
+
+
+class TeachTab:
+    """One point at a time is chosen."""
+
+    def __init__(self, kit: Kit) -> None:
+        self._kit, self._operator, self._teaching = kit, kit.operator, kit.operator.teaching
+        words, gui = kit.words, kit.gui
+        self._version = -1
+        self._names: tuple[str, ...] = ()
+        self._shown = ""
+        self._name = gui.add_text(words("name"), words("point_name", number=1))
+        kit.button(words("remember"), self._remember, color="green")
+        self._chosen = gui.add_dropdown(words("point"), (words("none"),))
+        self._chosen.on_update(lambda event: self._show())
+        self._picture = gui.add_image(BLANK, visible=False)
+        self._facts = kit.line()
+        kit.button(words("go_there"), self._go, color="green", needs="move")
+        kit.button(words("as_goal"), self._as_goal, color="blue")
+        kit.button(words("overwrite"), lambda: self._take(overwrite=self._require()), color="orange")
+        kit.button(
+            words("rename"), lambda: self._teaching.rename_point(self._require(), self._name.value), color="gray"
+        )
+        kit.button(words("remove"), lambda: self._teaching.remove_point(self._require()), color="red")
+        kit.reasons(move=words("go_there"))
+
+    def refresh(self, readings: Readings) -> None:
+        """The list of points."""
+        if self._teaching.version == self._version:
+            return
+        self._version = self._teaching.version
+        names = tuple(self._teaching.points)
+        if names != self._names:
+            fresh = [name for name in names if name not in self._names]
+            chosen = fresh[-1] if fresh and self._names else self._chosen.value
+            self._names = names
+            self._chosen.options = (self._kit.words("none"), *names)
+            set_if_new(self._chosen, "value", chosen if chosen in names else self._kit.words("none"))
+        self._shown = ""
+        self._show()
+
+    def _remember(self) -> None:
+        self._take()
+        number = len(self._teaching.points) + 1
+        set_if_new(self._name, "value", self._kit.words("point_name", number=number))
+
+    def _take(self, overwrite: str = "") -> None:
+        self._teaching.remember(overwrite or self._name.value, self._drawn(), overwrite=bool(overwrite))
+
+    def _rename(self) -> None:
+        self._teaching.rename_point(self._require(), self._name.value)
+
+    def _drawn(self) -> bytes | None:
+        """What this browser sees, as JPEG; None where it does not draw in time."""
+        try:
+            seen = self._kit.client.get_render(*PICTURE, timeout=TO_DRAW)
+        except (TimeoutError, RuntimeError):
+            return None
+        file = io.BytesIO()
+        imageio.imwrite(file, seen[:, :, :3], extension=".jpg")
+        return file.getvalue()
+
+    def _require(self) -> str:
+        if self._chosen.value not in self._names:
+            raise gemelo.BadArgument(self._kit.words("choose_point"))
+        return str(self._chosen.value)
+
+    def _as_goal(self) -> None:
+        self._operator.set_goal(self._teaching.points[self._require()].joints)
+
+    def _go(self) -> None:
+        self._as_goal()
+        self._operator.plan_and_execute()
+
+    def _show(self) -> None:
+        """The joint values and the picture of the chosen point."""
+        name = str(self._chosen.value)
+        if name == self._shown:
+            return
+        self._shown = name
+        point = self._teaching.points.get(name)
+        picture = point.picture if point is not None else None
+        is_there = picture is not None and picture.is_file()
+        if picture is not None and is_there:
+            self._picture.image = np.asarray(imageio.imread(picture))
+        set_if_new(self._picture, "visible", is_there)
+        joints = self._operator.arm.description.joints
+        rows = [(esc(joint.name), esc(text_of(joint, point.joints[joint.name]))) for joint in joints] if point else []
+        about = table(rows) if rows else note(esc(self._kit.words("no_points"))) if not self._names else ""
+        set_if_new(self._facts, "content", about)
