@@ -8,6 +8,7 @@ import logging
 import sys
 import threading
 import time
+import warnings
 from pathlib import Path
 
 import viser
@@ -15,6 +16,7 @@ import viser
 import gemelo
 from schemas.deployment import Deployment
 from services.panel.model.operator import Operator
+from services.panel.model.readings import Readings
 from services.panel.view.page import Page
 from services.panel.view.world import World
 from services.runtime.deployment import load_deployment
@@ -55,13 +57,21 @@ class Panel:
             if began - texts_at > 1.0 / TEXTS:
                 texts_at = began
                 for page in self._present():
-                    page.refresh(readings)
+                    self._refresh(page, readings)
             self.operator.wait(max(0.0, 1.0 / PICTURES - (time.monotonic() - began)))
 
     def close(self) -> None:
         """Ends the server; the arm brakes where the page has led it."""
         self.operator.close()
         self._server.stop()
+
+    def _refresh(self, page: Page, readings: Readings) -> None:
+        """A browser may go at any moment, with everything that was built for it."""
+        try:
+            page.refresh(readings)
+        except Exception:
+            if page in self._present():
+                raise
 
     def _present(self) -> list[Page]:
         with self._lock:
@@ -75,7 +85,9 @@ class Panel:
 
     def _close(self, client: viser.ClientHandle) -> None:
         with self._lock:
-            self._pages.pop(client.client_id, None)
+            page = self._pages.pop(client.client_id, None)
+        if page is not None:
+            page.close()
         self._log.info(f"browser {client.client_id} has gone; {len(self._present())} in all")
 
 
@@ -124,6 +136,7 @@ def main() -> None:
     parser.add_argument("--config", type=Path, default=None, metavar="FILE", help="deployment file [deploy/local.toml]")
     parser.add_argument("--log-level", default="info", choices=LEVELS)
     arguments = parser.parse_args()
+    warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")  # a browser that has just gone
     log, stop = line_logger(NAME, arguments.log_level), ShutdownRequest()
     try:
         with stop_on_signals(stop):

@@ -20,7 +20,7 @@ SCRIPT = """
   if (window.gemelo) return;
   window.gemelo = true;
   const buttons = () => [...document.querySelectorAll('button')];
-  const keys = {ArrowLeft: '◀', ArrowRight: '▶', ArrowUp: '▲', ArrowDown: '▼', PageUp: '⏶', PageDown: '⏷'};
+  const keys = {ArrowLeft: '◀', ArrowRight: '▶', ArrowUp: '▲', ArrowDown: '▼', PageUp: 'PgUp', PageDown: 'PgDn'};
   const isText = (t) => t.tagName === 'TEXTAREA' || t.isContentEditable || (t.tagName === 'INPUT'
     && !['range', 'checkbox', 'radio', 'button'].includes(t.type) && !['decimal', 'numeric'].includes(t.inputMode));
   const isNumber = (t) => t.tagName === 'INPUT' || (t.getAttribute && t.getAttribute('role') === 'slider');
@@ -56,7 +56,6 @@ SCRIPT = """
     const field = [...document.querySelectorAll('input')].find((i) => i.value.startsWith('CHANNEL'));
     const sent = (document.querySelector('[data-gemelo-sent]') || {dataset: {}}).dataset.gemeloSent || '';
     if (field) {
-      const row = field.closest('.mantine-Box-root, [class*=wrapper]') || field.parentElement;
       field.parentElement.parentElement.parentElement.parentElement.style.display = 'none';
       if (sent !== told) {
         told = sent;

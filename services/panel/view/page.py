@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Literal
 
 import viser
 
+from schemas.device import DeviceMode
 from services.panel.model.availability import reasons
 from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
@@ -30,6 +32,14 @@ WIDTH = 400.0  # [pixels] of the controls
 GOOD, BAD, NEUTRAL = "#2f9e44", "#e03131", "#868e96"
 
 
+@dataclass(frozen=True)
+class Look:
+    """What a browser's controls are built for."""
+
+    language: str = "en"
+    is_dark: bool = False
+
+
 class Page:
     """Built anew when the language or the colours change."""
 
@@ -39,16 +49,22 @@ class Page:
         self.lag = float("nan")  # [s] from a header that was sent to the word that it is drawn
         self._began = time.monotonic()
         self._marked = 0.0
-        self._language, self._is_dark, self._was_chosen = "en", False, False
+        self._wanted = Look()
+        self._was_chosen = False
+        self._built: Look | None = None
         self._told = 0
-        self._build()
 
     def refresh(self, readings: Readings) -> None:
-        """Shows what has changed."""
+        """Shows what has changed. All is built in here, by one thread: callbacks only say what is wanted."""
+        if self._built != self._wanted:
+            self._rebuild(self._wanted)
         now = time.monotonic()
         if now - self._marked > MARK:
             self._marked = now
         self._kit.refresh(reasons(self._operator.arm, readings))
+        is_held = readings.state is not None and readings.state.mode is DeviceMode.HOLD
+        set_if_new(self._hold, "visible", not is_held)
+        set_if_new(self._resume, "visible", is_held)
         set_if_new(self._header, "content", self._header_text(readings))
         self._show_problem()
         self._move.refresh(readings)
@@ -64,13 +80,14 @@ class Page:
 
     def close(self) -> None:
         """Takes away what it has put into the scene."""
-        self._scene.close()
+        if self._built is not None:
+            self._scene.close()
 
-    def _build(self) -> None:
-        self._words = words = Words(self._language)
+    def _build(self, look: Look) -> None:
+        self._words = words = Words(look.language)
         self._kit = kit = Kit(self.client, self._operator, words)
         gui = self.client.gui
-        gui.configure_theme(dark_mode=self._is_dark, show_logo=False, show_share_button=False, brand_color=BRAND)
+        gui.configure_theme(dark_mode=look.is_dark, show_logo=False, show_share_button=False, brand_color=BRAND)
         gui.set_panel_label(f"gemelo · {self._operator.arm.name}")
         gui.main_panel.dock_right()
         gui.main_panel.set_width(WIDTH)
@@ -101,28 +118,28 @@ class Page:
             self._scene = SceneTab(kit, self._world)
         with tabs.add_tab(words("tab_state")):
             self._state = StateTab(kit)
-            self._settings()
+            self._settings(look)
         self._add_commands()
         self._channel = gui.add_text(CHANNEL, CHANNEL)
         self._channel.on_update(lambda event: self._hear(event.target.value))
 
-    def _settings(self) -> None:
+    def _settings(self, look: Look) -> None:
         words, gui = self._words, self.client.gui
         language = gui.add_dropdown("Language / Idioma", tuple(NAMES.values()), initial_value=NAMES[words.language])
-        dark = gui.add_checkbox(words("dark"), self._is_dark)
+        dark = gui.add_checkbox(words("dark"), look.is_dark)
 
         @language.on_update
         def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
             if event.client_id is not None:
                 [chosen] = [key for key, name in NAMES.items() if name == event.target.value]
                 self._was_chosen = True
-                self._rebuild(chosen, self._is_dark)
+                self._wanted = replace(self._wanted, language=chosen)
 
         @dark.on_update
         def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
             if event.client_id is not None:
                 self._was_chosen = True
-                self._rebuild(self._language, event.target.value)
+                self._wanted = replace(self._wanted, is_dark=event.target.value)
 
     def _add_commands(self) -> None:
         """The same by keys, and in the palette that Ctrl-K opens."""
@@ -140,15 +157,13 @@ class Page:
         def _(event: viser.SceneClickEvent) -> None:
             self._world.place_goal(event)
 
-    def _rebuild(self, language: str, is_dark: bool) -> None:
-        if (language, is_dark) == (self._language, self._is_dark):
-            return
-        self._language, self._is_dark = language, is_dark
-        self._scene.close()
+    def _rebuild(self, look: Look) -> None:
+        self.close()
         with self.client.atomic():
             self.client.gui.reset()
             self._told = 0
-            self._build()
+            self._build(look)
+        self._built = look
 
     def _hear(self, text: str) -> None:
         browser = read_browser(text)
@@ -158,7 +173,7 @@ class Page:
         self.lag = max(0.0, time.monotonic() - self._began - browser.sent / 1000.0)
         if not self._was_chosen:
             self._was_chosen = True
-            self._rebuild(language_of(browser.language), browser.dark)
+            self._wanted = Look(language_of(browser.language), browser.dark)
 
     def _header_text(self, readings: Readings) -> str:
         words, state = self._words, readings.state

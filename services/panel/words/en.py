@@ -5,7 +5,7 @@ ENGLISH: dict[str, str] = {
     "stop": "STOP (space bar)",
     "hold": "Hold",
     "resume": "Resume",
-    "speed": "Speed of motions [%]",
+    "speed": "Speed [%]",
     "take_nearest": "Take the nearest that can",
     "understood": "Understood",
     "not_live": "No fresh state of the arm ({age} old).",

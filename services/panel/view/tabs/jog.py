@@ -16,7 +16,14 @@ from services.panel.view.units import jog_speed
 HOLD_RATE = 20.0  # [Hz] of a held button
 LINEAR, ANGULAR = 0.1, 1.0  # [m/s], [rad/s] of the tool at 100 %
 STEPS = (0.1, 1.0, 10.0, 30.0)  # [mm] and [deg] of one press
-KEYS = {("x", 1): "▲", ("x", -1): "▼", ("y", 1): "◀", ("y", -1): "▶", ("z", 1): "⏶", ("z", -1): "⏷"}  # of the keyboard
+KEYS = {
+    ("x", 1): "▲",
+    ("x", -1): "▼",
+    ("y", 1): "◀",
+    ("y", -1): "▶",
+    ("z", 1): "PgUp",
+    ("z", -1): "PgDn",
+}  # of the keyboard
 
 
 class JogTab:

@@ -1,0 +1,64 @@
+"""A browser, the whole stack with the page, and the arm as a script has it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, sync_playwright
+
+import gemelo
+from services.stack.stack import Stack
+from tests.gemelo.conftest import BROKER, NEEDED, make_ready
+from tests.optional import need
+from tests.panel.person import Person
+
+FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+SIZE = {"width": 900, "height": 640}  # small: the browser draws without a graphics card here
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Browser]:
+    need("chromium")
+    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def robot() -> str:
+    return "rm1"
+
+
+@pytest.fixture(scope="module")
+def twin(robot: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
+    out, programs = tmp_path_factory.mktemp("out"), tmp_path_factory.mktemp("programs")
+    environment = {"GEMELO_ROBOT": f"urdf/{robot}", "GEMELO_PATHS_PROGRAMS": str(programs)}
+    with (
+        Stack(broker=BROKER, out=out, processes=(*NEEDED, "panel"), environment=environment) as stack,
+        pytest.MonkeyPatch.context() as patch,
+    ):
+        for name, value in stack.deployment.items():
+            patch.setenv(name, value)
+        yield stack
+
+
+@pytest.fixture
+def arm(twin: Stack) -> Iterator[gemelo.Arm]:
+    """Referenced, armed, at rest in "home", at full speed, with an empty scene."""
+    twin.wait_ready(30.0)
+    with gemelo.connect(timeout=10.0) as connected:
+        make_ready(connected)
+        connected.move(named="home")
+        yield connected
+
+
+@pytest.fixture
+def person(twin: Stack, arm: gemelo.Arm, chromium: Browser) -> Iterator[Person]:
+    """Somebody who reads English, and has just opened the page."""
+    with Person(chromium, twin.deployment["GEMELO_PANEL_PORT"], "en-US", SIZE) as opened:
+        yield opened
+        opened.require_no_errors()

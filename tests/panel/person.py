@@ -1,0 +1,121 @@
+"""A person at the page: reads labels, presses buttons and keys, types numbers, drags what is drawn."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import TypeVar
+
+import imageio.v3 as imageio
+import numpy as np
+from playwright.sync_api import Browser, Locator, ViewportSize, expect
+
+T = TypeVar("T")
+
+PATIENCE = 60_000.0  # [ms] a loaded machine draws a picture in seconds
+RED, BLUE = (255, 38, 100), (45, 140, 255)  # of the gizmo's arrows along x and z
+
+
+class Person:
+    """One browser window."""
+
+    def __init__(self, browser: Browser, port: str, language: str, size: ViewportSize) -> None:
+        self._context = browser.new_context(viewport=size, locale=language)
+        self._address = f"http://127.0.0.1:{port}"
+        self.page = self._context.new_page()
+        self.page.set_default_timeout(PATIENCE)
+        self._errors: list[str] = []
+        self.page.on("pageerror", lambda error: self._errors.append(str(error)))
+
+    def __enter__(self) -> Person:
+        self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._context.close()
+
+    def open(self) -> None:
+        """Until the state is live and drawn."""
+        self.page.goto(self._address)
+        expect(self.page.locator("[data-gemelo-sent]")).to_be_attached(timeout=PATIENCE)
+        expect(self.page.get_by_role("tab").first).to_be_visible(timeout=PATIENCE)
+
+    def tab(self, name: str) -> None:
+        self.page.get_by_role("tab", name=name, exact=True).click()
+
+    def press(self, name: str) -> None:
+        self.button(name).click()
+
+    def button(self, name: str) -> Locator:
+        return self.page.get_by_role("button", name=name, exact=True).filter(visible=True)
+
+    def reads(self, text: str) -> None:
+        """Waits until the page says so."""
+        expect(self.page.get_by_text(text).filter(visible=True).first).to_be_visible(timeout=PATIENCE)
+
+    def types(self, label: str, value: object) -> None:
+        field = self.field(label)
+        field.fill(str(value))
+        field.press("Enter")
+
+    def chooses(self, label: str, option: str) -> None:
+        self.row(label).locator("input").first.click()
+        self.page.get_by_role("option", name=option, exact=True).filter(visible=True).click()
+
+    def ticks(self, label: str) -> None:
+        self.row(label).locator("input[type=checkbox]").click()
+
+    def field(self, label: str) -> Locator:
+        return self.row(label).locator("input, textarea").filter(visible=True).last
+
+    def value(self, label: str) -> float:
+        return float(self.field(label).input_value())
+
+    def row(self, label: str) -> Locator:
+        return self.page.locator("label").filter(has_text=label, visible=True).first.locator("xpath=../../..")
+
+    def picture(self) -> np.ndarray:
+        """(height, width, 3) what the person sees."""
+        return np.asarray(imageio.imread(io.BytesIO(self.page.screenshot())))[:, :, :3]
+
+    def drags_arrow(self, color: tuple[int, int, int], right: float, down: float) -> None:
+        """Takes the gizmo's arrow of that colour by its head and leads it so many pixels."""
+        x, y = self._place_of(color)
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
+        for part in range(1, 9):
+            self.page.mouse.move(x + right * part / 8, y + down * part / 8)
+        self.page.mouse.up()
+
+    def require_no_errors(self) -> None:
+        assert self._errors == []
+
+    def _place_of(self, color: tuple[int, int, int]) -> tuple[float, float]:
+        """The head of the arrow, where most pixels of its colour are."""
+
+        def found() -> np.ndarray:
+            apart = np.abs(self.picture().astype(int)[:, :490] - color).max(axis=2)
+            return np.argwhere(apart < 30)
+
+        pixels = until(found, lambda seen: len(seen) > 30)
+        head = _densest(pixels)
+        return float(head[1]), float(head[0])
+
+
+def _densest(pixels: np.ndarray) -> np.ndarray:
+    """(2,) row and column among the pixels with the most others within 6 pixels: an arrow's head, not its shaft."""
+    apart = np.abs(pixels[:, None, :] - pixels[None, :, :]).max(axis=2)
+    return pixels[int((apart < 6).sum(axis=1).argmax())]
+
+
+def until(look: Callable[[], T], is_so: Callable[[T], bool], patience: float = PATIENCE / 1000.0) -> T:
+    """What `look` gives once it is so; AssertionError after `patience` [s]."""
+    end = time.monotonic() + patience
+    while not is_so(seen := look()):
+        assert time.monotonic() < end, f"still {seen}"
+        time.sleep(0.01)
+    return seen
