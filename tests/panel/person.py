@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Locator, ViewportSize, expect
 T = TypeVar("T")
 
 PATIENCE = 60_000.0  # [ms] a loaded machine draws a picture in seconds
-RED, BLUE = (255, 38, 100), (45, 140, 255)  # of the gizmo's arrows along x and z
+BLUE = (45, 140, 255)  # of the gizmo's arrow along z
 
 
 class Person:
@@ -82,9 +82,9 @@ class Person:
         """(height, width, 3) what the person sees."""
         return np.asarray(imageio.imread(io.BytesIO(self.page.screenshot())))[:, :, :3]
 
-    def drags_arrow(self, color: tuple[int, int, int], right: float, down: float) -> None:
-        """Takes the gizmo's arrow of that colour by its head and leads it so many pixels."""
-        x, y = self._place_of(color)
+    def drags_down_arrow(self, color: tuple[int, int, int], right: float, down: float) -> None:
+        """Takes the gizmo's arrow of that colour, which points down, by its head and leads it so many pixels."""
+        x, y = self._tip_of(color)
         self.page.mouse.move(x, y)
         self.page.mouse.down()
         for part in range(1, 9):
@@ -94,22 +94,16 @@ class Person:
     def require_no_errors(self) -> None:
         assert self._errors == []
 
-    def _place_of(self, color: tuple[int, int, int]) -> tuple[float, float]:
-        """The head of the arrow, where most pixels of its colour are."""
+    def _tip_of(self, color: tuple[int, int, int]) -> tuple[float, float]:
+        """Within the lowest of all that has this colour in the drawing: the head of the arrow that points down."""
 
         def found() -> np.ndarray:
             apart = np.abs(self.picture().astype(int)[:, :490] - color).max(axis=2)
             return np.argwhere(apart < 30)
 
         pixels = until(found, lambda seen: len(seen) > 30)
-        head = _densest(pixels)
-        return float(head[1]), float(head[0])
-
-
-def _densest(pixels: np.ndarray) -> np.ndarray:
-    """(2,) row and column among the pixels with the most others within 6 pixels: an arrow's head, not its shaft."""
-    apart = np.abs(pixels[:, None, :] - pixels[None, :, :]).max(axis=2)
-    return pixels[int((apart < 6).sum(axis=1).argmax())]
+        row, column = pixels[pixels[:, 0] == pixels[:, 0].max()].mean(axis=0)
+        return float(column), float(row) - 5.0
 
 
 def until(look: Callable[[], T], is_so: Callable[[T], bool], patience: float = PATIENCE / 1000.0) -> T:

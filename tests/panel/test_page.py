@@ -45,11 +45,11 @@ def test_the_arrow_that_is_dragged_leads_the_goal_and_what_cannot_be_says_how_fa
     person: Person, arm: gemelo.Arm
 ) -> None:
     until(lambda: person.value(f"{LIFT} [mm]"), lambda value: value == 0.0)
-    person.drags_arrow(BLUE, 0, -60)
+    person.drags_down_arrow(BLUE, 0, -60)
     lifted = until(lambda: person.value(f"{LIFT} [mm]"), lambda value: value > 5.0)
     assert lifted <= 200.0
     assert not is_moving(arm)
-    person.drags_arrow(BLUE, 0, -400)
+    person.drags_down_arrow(BLUE, 0, -400)
     person.reads("Out of reach")
     person.reads("mm out of reach")
     person.press("Take the nearest that can")

@@ -74,6 +74,19 @@ def without_event(action: Callable[[], object]) -> Callable[[object], None]:
     return run
 
 
+class Mirror:
+    """Shows in an input what the twin says, only when that changes: what a person has just set stays until then."""
+
+    def __init__(self, handle: object) -> None:
+        self._handle, self._shown = handle, object()
+
+    def show(self, value: object) -> None:
+        """The newest of what the twin says."""
+        if value != self._shown:
+            self._shown = value
+            set_if_new(self._handle, "value", value)
+
+
 def set_if_new(handle: object, name: str, value: object) -> None:
     """Sends nothing where it is so already."""
     if getattr(handle, name) != value:

@@ -15,7 +15,7 @@ from services.panel.model.availability import reasons
 from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
 from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, read_browser, script_html
-from services.panel.view.kit import Kit, box, esc, set_if_new, without_event
+from services.panel.view.kit import Kit, Mirror, box, esc, set_if_new, without_event
 from services.panel.view.tabs.device import DeviceTab
 from services.panel.view.tabs.jog import JogTab
 from services.panel.view.tabs.move import MoveTab
@@ -76,7 +76,7 @@ class Page:
         pose = self._world.tool_pose
         self._state.refresh(readings, self.browser, self.lag, (*pose.position, *pose.orientation))
         if readings.state is not None:
-            set_if_new(self._speed, "value", round(100.0 * readings.state.speed))
+            self._shown_speed.show(round(100.0 * readings.state.speed))
 
     def close(self) -> None:
         """Takes away what it has put into the scene."""
@@ -97,6 +97,7 @@ class Page:
         self._hold = kit.button(words("hold"), self._operator.arm.hold, color="gray", needs="hold")
         self._resume = kit.button(words("resume"), self._operator.arm.resume, color="gray", needs="resume")
         self._speed = gui.add_slider(words("speed"), 0, 100, 1, 100)
+        self._shown_speed = Mirror(self._speed)
         self._speed.on_update(
             lambda event: self._operator.set_speed(event.target.value / 100.0) if event.client_id is not None else None
         )

@@ -7,7 +7,7 @@ from functools import partial
 import viser
 
 from services.panel.model.readings import Readings
-from services.panel.view.kit import Kit, box, esc, set_if_new, table
+from services.panel.view.kit import Kit, Mirror, box, esc, set_if_new, table
 from services.panel.view.units import text_of
 
 
@@ -28,7 +28,7 @@ class DeviceTab:
             arm=words("arm"), disarm=words("disarm"), home=words("home"), reference=words("reference"),
             reset=words("reset"),
         )  # fmt: skip
-        self._outputs = {output.name: self._output(output.name) for output in arm.description.outputs}
+        self._outputs = {output.name: Mirror(self._output(output.name)) for output in arm.description.outputs}
         with kit.gui.add_folder(words("virtual"), expand_by_default=False):
             for key, value in (("estop_press", 1.0), ("estop_release", 0.0)):
                 kit.button(words(key), partial(arm.device.inject, "estop", value=value), needs="inject")
@@ -48,7 +48,7 @@ class DeviceTab:
             rows.append((esc(words("inputs")), esc(", ".join(state.inputs) or "-")))
             rows.append((esc(words("link")), f"{1000 * state.round_trip:.1f} ms"))
             for name, handle in self._outputs.items():
-                set_if_new(handle, "value", name in state.outputs)
+                handle.show(name in state.outputs)
         set_if_new(self._facts, "content", table(rows) if rows else "")
         phases = ", ".join(f"{joint}: {phase}" for joint, phase in self._operator.homing.items())
         set_if_new(self._homing, "content", box(esc(words("homing", phases=phases)), "#1c7ed6") if phases else "")

@@ -10,7 +10,7 @@ import gemelo
 from services.arm.model.description import Joint
 from services.panel.model.motions import PLANNERS, MotionChoice
 from services.panel.model.readings import Readings
-from services.panel.view.kit import Kit, box, esc, note, set_if_new, table
+from services.panel.view.kit import Kit, Mirror, box, esc, note, set_if_new, table
 from services.panel.view.units import SHOWN, STEP, meant, shown, slider_range, text_of
 from services.panel.view.world import World
 
@@ -36,6 +36,7 @@ class MoveTab:
             named.on_update(lambda event: self._name(event))
         kit.button(words("goal_is_measured"), self._operator.follow_measured, color="gray")
         self._live = kit.gui.add_checkbox(words("live"), False, hint=words("live_hint"))
+        self._shown_live = Mirror(self._live)
         self._live.on_update(lambda event: self._switch_live(event))
         with kit.gui.add_folder(words("how"), expand_by_default=False):
             self._choices()
@@ -59,7 +60,7 @@ class MoveTab:
                 self._write_sliders()
         elif goal.source == self._client and time.monotonic() - self._touched > OWN_DRAG:
             self._write_sliders()
-        set_if_new(self._live, "value", self._operator.live.is_on)
+        self._shown_live.show(self._operator.live.is_on)
         if motions.version != self._plan_version or motions.is_moving or motions.is_planning:
             self._plan_version = motions.version
             set_if_new(self._plan, "content", self._plan_text())
