@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 import gemelo
-from gemelo.programs import CheckedLeg, RunState, RunStatus, StepPath, path_text, words_of
+from gemelo.programs import (
+    CheckedLeg,
+    ProgramCheck,
+    RunState,
+    RunStatus,
+    StepPath,
+    export_script,
+    path_text,
+    words_of,
+)
 from services.panel.model.readings import Readings
 from services.panel.view.kit import Kit, box, esc, note, set_if_new
 from services.panel.view.tabs.new_step import NewStep
@@ -85,16 +94,22 @@ class ProgramsTab:
         saved = "" if teaching.is_saved else note(esc(words("not_saved")))
         if teaching.is_checking:
             return saved + box(esc(words("checking")), "#1c7ed6")
-        if state is not None and (not state.status.is_over or teaching.check is None):
-            text = f"<b>{esc(words(f'run_{state.status.value}'))}</b> {esc(state.message)}"
-            return saved + box(text, COLORS[state.status])
-        check = teaching.check
+        return saved + self._run_text(state) + self._check_text(teaching.check)
+
+    def _run_text(self, state: RunState | None) -> str:
+        if state is None:
+            return ""
+        return box(
+            f"<b>{esc(self._kit.words(f'run_{state.status.value}'))}</b> {esc(state.message)}", COLORS[state.status]
+        )
+
+    def _check_text(self, check: ProgramCheck | None) -> str:
         if check is None:
-            return saved
+            return ""
         if check.ok:
-            return saved + box(esc(words("check_ok", duration=f"{check.duration:.1f}")), "#2f9e44")
+            return box(esc(self._kit.words("check_ok", duration=f"{check.duration:.1f}")), "#2f9e44")
         told = [str(mistake) for mistake in check.mistakes] + list(check.refusals)
-        return saved + box("<br>".join(esc(text) for text in told), "#e03131")
+        return box("<br>".join(esc(text) for text in told), "#e03131")
 
     def _list_text(self, state: RunState | None) -> str:
         teaching = self._teaching
@@ -112,7 +127,9 @@ class ProgramsTab:
             about = f'<span style="color:#e03131">✗ {esc(leg.refusal.check)}</span>'
         elif leg is not None and leg.duration:
             joint, margin = leg.tightest
-            about = f"{leg.duration:.2f} s" + (f" · {esc(joint)} {100 * margin:.0f} %" if joint else "")
+            about = f"{leg.duration:.2f} s" + (
+                f" · {esc(joint)} {100 * margin:.0f} % {esc(self._kit.words('left'))}" if joint else ""
+            )
         style = "background:#2f9e4444;font-weight:bold;" if is_lit else ""
         indent = 0.3 + 1.1 * (len(path) - 1)
         return (
@@ -161,7 +178,5 @@ class ProgramsTab:
             set_if_new(self._step, "value", text)
 
     def _export(self) -> None:
-        from gemelo.programs import export_script
-
         text = export_script(self._teaching.program, self._teaching.points, self._teaching.programs)
         self._kit.client.send_file_download(f"{self._teaching.program.name}.py", text.encode())
