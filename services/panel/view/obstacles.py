@@ -54,7 +54,7 @@ class Obstacles:
             if name in self._meshes and not item.attached:
                 pose = _matrix(handle)
                 corners = trimesh.transform_points(self._meshes[name].vertices, pose)[self._meshes[name].faces]
-                hits.append(_nearest_hit(origin, direction, corners))
+                hits.append(nearest_hit(origin, direction, corners))
         distances = [distance for distance in hits if np.isfinite(distance)]
         return origin + min(distances) * direction if distances else None
 
@@ -140,7 +140,7 @@ def _ground(origin: Array, direction: Array) -> float:
     return float(-origin[2] / direction[2]) if direction[2] < -1e-9 and origin[2] > 0.0 else np.inf
 
 
-def _nearest_hit(origin: Array, direction: Array, corners: Array) -> float:
+def nearest_hit(origin: Array, direction: Array, corners: Array) -> float:
     """[m] along the ray to the nearest of the triangles (t, 3, 3), inf for none (Moeller and Trumbore, 1997)."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     across = np.cross(direction, second)

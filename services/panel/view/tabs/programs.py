@@ -127,9 +127,9 @@ class ProgramsTab:
             about = f'<span style="color:#e03131">✗ {esc(leg.refusal.check)}</span>'
         elif leg is not None and leg.duration:
             joint, margin = leg.tightest
-            about = f"{leg.duration:.2f} s" + (
-                f" · {esc(joint)} {100 * margin:.0f} % {esc(self._kit.words('left'))}" if joint else ""
-            )
+            about = f"{leg.duration:.2f} s"
+            if joint:
+                about += f" · {esc(joint)} {100 * margin:.0f} % {esc(self._kit.words('left'))}"
         style = "background:#2f9e4444;font-weight:bold;" if is_lit else ""
         indent = 0.3 + 1.1 * (len(path) - 1)
         return (

@@ -1,0 +1,158 @@
+"""What the page knows without a browser and without a twin."""
+
+from __future__ import annotations
+
+import re
+import string
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+import gemelo
+from gemelo.programs import AnyStep, Program, Repeat, StepPath, Wait
+from schemas.device import DeviceMode, DeviceState
+from services.panel.model.availability import CHECKS
+from services.panel.model.problems import Problem, problem_of
+from services.panel.model.teaching import deleted, inserted, shifted
+from services.panel.view.browser import CHANNEL, Browser, read_browser, script_html
+from services.panel.view.obstacles import nearest_hit
+from services.panel.words.en import ENGLISH
+from services.panel.words.es import SPANISH
+from services.panel.words.words import Words, language_of
+
+PANEL = Path(__file__).parents[2] / "services/panel"
+READY = DeviceState(mode=DeviceMode.IDLE, armed=True, referenced=(True, True), name=("a", "b"))
+
+
+def fields(text: str) -> set[str]:
+    return {name for _, name, _, _ in string.Formatter().parse(text) if name}
+
+
+def test_both_languages_have_every_word_with_the_same_values_to_put_in():
+    assert ENGLISH.keys() == SPANISH.keys()
+    for key, text in ENGLISH.items():
+        assert fields(text) == fields(SPANISH[key]), key
+        assert SPANISH[key].strip()
+
+
+def test_every_word_that_the_page_asks_for_is_in_the_tables():
+    asked = {key for path in PANEL.rglob("*.py") for key in re.findall(r"words\(\s*\"([a-z_0-9]+)\"", path.read_text())}
+    assert len(asked) > 60
+    assert asked - {"key"} <= ENGLISH.keys()
+
+
+def test_every_reason_and_every_mode_has_its_words():
+    states = [
+        replace(READY, mode=mode, armed=armed, referenced=known, fault=fault)
+        for mode in DeviceMode
+        for armed in (True, False)
+        for known in ((True, True), (True, False))
+        for fault in (0, 3)
+    ]
+    for language in ("en", "es"):
+        words = Words(language)
+        assert all(words.reason(check(state)) is not None for check in CHECKS.values() for state in states)
+        assert all(words(f"mode_{mode.name.lower()}") for mode in DeviceMode)
+
+
+def test_what_cannot_be_done_now_says_why():
+    assert CHECKS["move"](READY) is None
+    assert CHECKS["move"](replace(READY, armed=False)) == ("drivers_off", "")
+    assert CHECKS["move"](replace(READY, referenced=(True, False))) == ("unreferenced", "b")
+    assert CHECKS["move"](replace(READY, mode=DeviceMode.ESTOP)) == ("in_fault", "ESTOP")
+    assert CHECKS["reset"](READY) == ("no_fault", "")
+    assert CHECKS["reset"](replace(READY, mode=DeviceMode.FAULT)) is None
+
+
+@pytest.mark.parametrize(
+    ("told", "language"), [("es-MX", "es"), ("es", "es"), ("en-GB", "en"), ("fr", "en"), ("", "en")]
+)
+def test_a_browser_s_language_is_the_nearest_of_ours(told: str, language: str):
+    assert language_of(told) == language
+
+
+def test_a_refusal_keeps_its_check_its_sentence_and_what_can():
+    refused = gemelo.Refused("too far", check="reach", nearest=gemelo.Target(position=(0.1, 0.2, 0.3)), remedy="nearer")
+    problem = problem_of(refused)
+    assert (problem.check, problem.text, problem.has_nearest, problem.is_refusal) == ("reach", "too far", True, True)
+    assert Words("es").problem(problem) == ("Fuera de alcance", "too far")
+    assert not problem_of(gemelo.Aborted("stopped")).is_refusal
+    assert Words("en").problem(Problem("odd", "never heard of")) == ("Refused", "odd")
+    assert "ZeroDivisionError" in problem_of(ZeroDivisionError("x")).text
+
+
+def test_what_a_browser_tells_is_read_and_rubbish_is_not():
+    told = read_browser(
+        f'{CHANNEL} {{"sent": 12.0, "language": "es", "rate": 60, "dark": true, "width": 9, "height": 8}}'
+    )
+    assert told == Browser(12.0, "es", 60.0, True, 9, 8)
+    for text in ("", CHANNEL, f"{CHANNEL} {{", f'{CHANNEL} {{"sent": "x"}}', "hello"):
+        assert read_browser(text) is None
+    assert "<script" not in script_html()
+
+
+STEPS = st.recursive(
+    st.lists(st.integers(0, 99).map(lambda number: Wait(time=float(number))), max_size=4).map(tuple),
+    lambda inner: st.lists(
+        st.one_of(
+            st.integers(0, 99).map(lambda number: Wait(time=float(number))),
+            inner.map(lambda steps: Repeat(count=2, steps=steps)),
+        ),
+        max_size=4,
+    ).map(tuple),
+    max_leaves=6,
+)
+
+
+def places(steps: tuple[AnyStep, ...]) -> list[StepPath]:
+    return [path for path, _ in Program("p", steps).all_steps()]
+
+
+def waits(steps: tuple[AnyStep, ...]) -> list[float]:
+    return [step.time for _, step in Program("p", steps).all_steps() if isinstance(step, Wait)]
+
+
+@given(steps=STEPS, data=st.data())
+def test_a_step_that_is_taken_out_and_put_back_leaves_the_program_as_it_was(
+    steps: tuple[AnyStep, ...], data: st.DataObject
+):
+    paths = places(steps)
+    if paths:
+        path = data.draw(st.sampled_from(paths))
+        step = Program("p", steps).step(path)
+        assert inserted(deleted(steps, path), path, step) == steps
+
+
+@given(steps=STEPS, data=st.data(), by=st.sampled_from([-1, 1]))
+def test_a_step_that_is_moved_is_the_only_one_that_moves_and_comes_back(
+    steps: tuple[AnyStep, ...], data: st.DataObject, by: int
+):
+    paths = places(steps)
+    if not paths:
+        return
+    path = data.draw(st.sampled_from(paths))
+    step = Program("p", steps).step(path)
+    to = shifted(steps, path, by)
+    moved = inserted(deleted(steps, path), to, step)
+    assert Program("p", moved).step(to) == step
+    assert sorted(waits(moved)) == sorted(waits(steps))
+    assert deleted(moved, to) == deleted(steps, path)
+    if to != path:
+        back = shifted(moved, to, -by)
+        assert inserted(deleted(moved, to), back, step) == steps
+
+
+@given(
+    at=st.tuples(*[st.floats(-0.9, 0.9)] * 2),
+    origin=st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(0.5, 3.0)),
+)
+def test_a_ray_meets_the_triangle_that_it_is_aimed_at(at: tuple[float, float], origin: tuple[float, float, float]):
+    corners = np.array([[[-1.0, -1.0, 0.0], [3.0, -1.0, 0.0], [-1.0, 3.0, 0.0]]])
+    aim = np.array([*at, 0.0]) - np.array(origin)
+    distance = float(np.linalg.norm(aim))
+    assert nearest_hit(np.array(origin), aim / distance, corners) == pytest.approx(distance)
+    assert nearest_hit(np.array(origin), -aim / distance, corners) == np.inf
