@@ -52,8 +52,7 @@ class Panel:
             began = time.monotonic()
             readings = self.operator.bus.read()
             self._arm.node.set_ready(readings.is_live, "" if readings.is_live else "no fresh joint_states")
-            with self._server.atomic():
-                self._world.update(readings)
+            self._world.update(readings)
             if began - texts_at > 1.0 / TEXTS:
                 texts_at = began
                 for page in self._present():

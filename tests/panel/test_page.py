@@ -107,9 +107,7 @@ def test_a_browser_that_dies_while_it_jogs_leaves_the_arm_at_rest(
 ) -> None:
     with Person(chromium, twin.deployment["GEMELO_PANEL_PORT"], "en-US", SIZE) as other:
         other.tab("Jog")
-        box = other.button(f"{ARM} +").bounding_box()
-        assert box is not None
-        other.page.mouse.move(box["x"] + 20, box["y"] + 10)
+        other.button(f"{ARM} +").hover()
         other.page.mouse.down()
         until(lambda: is_moving(arm), bool)
     died = time.monotonic()

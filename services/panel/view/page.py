@@ -28,6 +28,7 @@ from services.panel.words.words import NAMES, Words, language_of
 
 MARK = 1.0  # [s] between two marks by which a browser's lag is measured
 BRAND = (28, 126, 214)
+SLOW = 12.0  # [Hz] a browser that draws slower has no graphics card, and gets no shadows
 WIDTH = 400.0  # [pixels] of the controls
 GOOD, BAD, NEUTRAL = "#2f9e44", "#e03131", "#868e96"
 
@@ -52,6 +53,7 @@ class Page:
         self._wanted = Look()
         self._was_chosen = False
         self._built: Look | None = None
+        self._is_plain = False  # drawn without shadows
         self._told = 0
 
     def refresh(self, readings: Readings) -> None:
@@ -160,10 +162,9 @@ class Page:
 
     def _rebuild(self, look: Look) -> None:
         self.close()
-        with self.client.atomic():
-            self.client.gui.reset()
-            self._told = 0
-            self._build(look)
+        self.client.gui.reset()
+        self._told = 0
+        self._build(look)
         self._built = look
 
     def _hear(self, text: str) -> None:
@@ -171,6 +172,9 @@ class Page:
         if browser is None:
             return
         self.browser = browser
+        if 0.0 < browser.rate < SLOW and not self._is_plain:
+            self._is_plain = True
+            self.client.scene.configure_default_lights(cast_shadow=False)
         self.lag = max(0.0, time.monotonic() - self._began - browser.sent / 1000.0)
         if not self._was_chosen:
             self._was_chosen = True
