@@ -66,6 +66,10 @@ FIGURES = {
     "stop_ms": Row("stops:stop_ms", "ms", True),
     "chunk_ack_ms": Row("latency:chunk_ack_ms", "ms", True, "mosquitto"),
     "chunk_ack_ms_amqtt": Row("latency:chunk_ack_ms", "ms", True, "amqtt"),
+    "panel_cpu_percent": Row("panel:panel_cpu_percent", "% of one core", True),
+    "panel_lag_ms": Row("panel:panel_lag_ms", "ms", True),
+    "stop_key_ms": Row("panel:stop_key_ms", "ms", True),
+    "goal_drag_hz": Row("panel:goal_drag_hz", "1/s", True),
     "ready_s": Row("stack:ready_s", "s", True),
 }
 
