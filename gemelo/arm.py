@@ -14,7 +14,15 @@ from gemelo.homing import OnHoming, home
 from gemelo.homing_report import HomingReport
 from gemelo.jog import Jogging, Streaming, jog_command
 from gemelo.motion import Motion, Motions, OnMotion
-from gemelo.planning import Configurations, OnPlanProgress, Plan, find_configurations, find_poses, make_plan, require_valid
+from gemelo.planning import (
+    Configurations,
+    OnPlanProgress,
+    Plan,
+    find_configurations,
+    find_poses,
+    make_plan,
+    require_valid,
+)
 from gemelo.scene import Scene
 from gemelo.session import Session
 from gemelo.targets import as_target, ik_request, joint_state, request_of
