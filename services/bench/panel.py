@@ -5,7 +5,6 @@ A browser without a graphics card draws on the same cores, so all but `goal_drag
 
 from __future__ import annotations
 
-import os
 import shutil
 import time
 from collections.abc import Iterator
@@ -18,11 +17,12 @@ from playwright.sync_api import Page, WebSocket, sync_playwright
 
 import gemelo
 from schemas.joints import JointState
+from services.arm.model.description import load_arm
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile
 from services.bench.stack import Stacks, has_mosquitto
 from services.bench.stops import Wire
 from services.panel.model.goal import GoalSolver
-from services.runtime.deployment import load_deployment
+from services.runtime.deployment import load_deployment, project_root
 from services.stack.stack import Stack
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -144,7 +144,9 @@ def opened(stacks: Stacks) -> Iterator[Opened]:
 @contextmanager
 def _arm(stack: Stack) -> Iterator[gemelo.Arm]:
     """Armed and referenced."""
-    with _environment(stack), gemelo.connect(name="bench_page", timeout=10.0) as arm:
+    deployment = load_deployment(None, stack.environment)
+    robot = gemelo.Robot(deployment, load_arm(project_root() / deployment.robot))
+    with gemelo.connect(robot, name="bench_page", timeout=10.0) as arm:
         arm.device.arm()
         arm.reference()
         arm.move(named="home")
@@ -173,18 +175,3 @@ def _stopped(twin: Opened, wire: Wire, number: int) -> float:
     with suppress(gemelo.Aborted):
         motion.wait()
     return taken
-
-
-@contextmanager
-def _environment(stack: Stack) -> Iterator[None]:
-    """What connects in this process finds the stack."""
-    before = {name: os.environ.get(name) for name in stack.deployment}
-    os.environ.update(stack.deployment)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name)
-            else:
-                os.environ[name] = value
