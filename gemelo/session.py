@@ -29,7 +29,7 @@ R = TypeVar("R", bound=Message)
 PATIENCE = 2.0  # [s] for the first message of a topic, and for one that is late
 ON_ITS_WAY = 0.3  # [s] that a message may be which was measured before the last change
 IDLE_RATE = 1.0  # [Hz] of the thread's own step, which does nothing: messages wake it
-CLOSING = 1.0  # [s] that the thread may take to end
+CLOSING = 5.0  # [s] that the thread may take to end: one that outlives Python aborts the process
 _numbers = count(1)
 
 
