@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import gemelo
@@ -28,9 +27,9 @@ from gemelo.programs import (
     path_text,
     programs_folder,
 )
-from services.cli.errors import CommandError, ExitCode, unknown, usage
+from services.cli.errors import ExitCode, unknown, usage
 from services.cli.parser import Choices, Options, Parser, json_option
-from services.cli.session import load_robot
+from services.cli.session import connect_arm, load_robot, reported
 from services.cli.text_table import table
 
 PLAIN = re.compile(r"[\w.-]+")
@@ -67,7 +66,7 @@ def run_list(options: Options) -> ExitCode:
     """Every program with its steps, and the mistakes of its file."""
     robot = load_robot()
     programs = _programs(robot)
-    with _as_command_errors():
+    with reported(robot):
         points = Points.load(programs.folder, robot.description)
         rows = [_row(programs, name, robot, points) for name in programs]
     if options.json:
@@ -83,9 +82,9 @@ def run_check(options: Options) -> ExitCode:
     """Plans every leg from the end of the one before; exit code 1 where the program cannot run."""
     robot = load_robot()
     program, points, programs = _load(options.name, robot)
-    first = _first(options.first)
+    first = _first(options.first, robot)
     shown = None if options.json else _show_leg
-    with _as_command_errors(), gemelo.connect(robot) as arm:
+    with connect_arm(robot) as arm:
         check = check_program(arm, program, points, programs, first=first, on_leg=shown)
     print(json.dumps(_check_fields(check)) if options.json else _verdict(check))
     return ExitCode.OK if check.ok else ExitCode.FAILED
@@ -95,8 +94,8 @@ def run_program(options: Options) -> ExitCode:
     """Runs to the end; at Ctrl-C the arm decelerates, and it is said where it stopped."""
     robot = load_robot()
     program, points, programs = _load(options.name, robot)
-    first = _first(options.first)
-    with _as_command_errors(), gemelo.connect(robot) as arm:
+    first = _first(options.first, robot)
+    with connect_arm(robot) as arm:
         run = ProgramRun(arm, program, points, programs, on_change=None if options.json else _show_steps())
         run.start(first)
         state = _await(run, options.json)
@@ -113,7 +112,7 @@ def run_export(options: Options) -> ExitCode:
     """Writes the script into a file, or prints it."""
     robot = load_robot()
     program, points, programs = _load(options.name, robot)
-    with _as_command_errors():
+    with reported(robot):
         script = export_script(program, points, programs)
     if options.file == "-":
         print(script, end="")
@@ -135,28 +134,15 @@ EXIT_CODES = {
 }
 
 
-@contextmanager
-def _as_command_errors() -> Iterator[None]:
-    """Turns the errors of the API into sentences with exit codes."""
-    try:
-        yield
-    except gemelo.Lost as error:
-        raise CommandError(str(error), ExitCode.NO_STACK) from error
-    except gemelo.BadArgument as error:
-        raise usage(str(error)) from error
-    except gemelo.Error as error:
-        raise CommandError(str(error)) from error
-
-
 def _programs(robot: gemelo.Robot) -> Programs:
-    with _as_command_errors():
+    with reported(robot):
         return Programs(programs_folder(robot.deployment))
 
 
 def _load(name: str, robot: gemelo.Robot) -> tuple[Program, Points, Programs]:
     """The program with all that it needs; raises `CommandError` with every mistake of the files."""
     programs = _programs(robot)
-    with _as_command_errors():
+    with reported(robot):
         points = Points.load(programs.folder, robot.description)
         if name not in programs:
             programs.file(name)
@@ -166,8 +152,8 @@ def _load(name: str, robot: gemelo.Robot) -> tuple[Program, Points, Programs]:
         return programs[name], points, programs
 
 
-def _first(text: str) -> StepPath:
-    with _as_command_errors():
+def _first(text: str, robot: gemelo.Robot) -> StepPath:
+    with reported(robot):
         return parse_path(text) if text else ()
 
 
