@@ -12,7 +12,6 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterable
-from functools import partial
 
 from paho.mqtt import client as paho
 from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
@@ -125,7 +124,7 @@ class MqttLink:
         client.max_inflight_messages_set(0)  # no limit: a stop must not wait until a broker has acknowledged others
         client.on_socket_open = _send_at_once
         client.on_connect = self._on_connect
-        client.on_subscribe = partial(self._on_subscribe, client)
+        client.on_subscribe = self._on_subscribe
         client.on_disconnect = self._on_disconnect
         client.on_message = self._on_message
         return client
@@ -137,13 +136,14 @@ class MqttLink:
         client.subscribe([(self._prefix + kind, _qos(kind)) for kind in FROM_DEVICE])
 
     def _on_subscribe(
-        self, subscribed: DirectClient, _client: object, _data: object, _id: int, reasons: Iterable[object], _p: object
+        self, client: paho.Client, _data: object, _id: int, reasons: Iterable[object], _props: object
     ) -> None:
         """Only now nothing that the device answers can be missed."""
         if any(getattr(reason, "is_failure", False) for reason in reasons):
             self._lose(f"the MQTT broker at {self._address[0]}:{self._address[1]} lets us hear nothing: see its ACL")
             return
-        self._client = subscribed
+        assert isinstance(client, DirectClient)  # ours, see `_new_client`
+        self._client = client
         self._wake()
 
     def _on_disconnect(
