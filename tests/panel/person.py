@@ -15,6 +15,8 @@ from playwright.sync_api import Browser, Locator, ViewportSize, expect
 T = TypeVar("T")
 
 PATIENCE = 60_000.0  # [ms] a loaded machine draws a picture in seconds
+SCALE = 0.5  # of a picture's pixels to those of the page: a processor draws a quarter of them
+CONTROLS = 410  # [pixels] of the page
 BLUE = (45, 140, 255)  # of the gizmo's arrow along z
 
 
@@ -22,7 +24,10 @@ class Person:
     """One browser window."""
 
     def __init__(self, browser: Browser, port: str, language: str, size: ViewportSize) -> None:
-        self._context = browser.new_context(viewport=size, locale=language)
+        self._context = browser.new_context(viewport=size, locale=language, device_scale_factor=SCALE)
+        self._drawing = int(
+            SCALE * (size["width"] - CONTROLS)
+        )  # [pixels] of the picture that are drawn in three dimensions
         self._address = f"http://127.0.0.1:{port}"
         self.page = self._context.new_page()
         self.page.set_default_timeout(PATIENCE)
@@ -98,12 +103,12 @@ class Person:
         """Within the lowest of all that has this colour in the drawing: the head of the arrow that points down."""
 
         def found() -> np.ndarray:
-            apart = np.abs(self.picture().astype(int)[:, :490] - color).max(axis=2)
+            apart = np.abs(self.picture().astype(int)[:, : self._drawing] - color).max(axis=2)
             return np.argwhere(apart < 30)
 
-        pixels = until(found, lambda seen: len(seen) > 30)
+        pixels = until(found, lambda seen: len(seen) > 10)
         row, column = pixels[pixels[:, 0] == pixels[:, 0].max()].mean(axis=0)
-        return float(column), float(row) - 5.0
+        return float(column) / SCALE, float(row) / SCALE - 5.0
 
 
 def until(look: Callable[[], T], is_so: Callable[[T], bool], patience: float = PATIENCE / 1000.0) -> T:

@@ -97,8 +97,7 @@ def test_two_people_see_one_another_s_goal_and_a_page_that_is_reloaded_changes_n
         person.press("Plan and execute")
         other.reads("En movimiento")
         until(lambda: is_moving(arm), bool)
-        other.open()
-    person.open()
+        person.open()
     arrives(arm, ARM, -35.0)
 
 
@@ -113,7 +112,7 @@ def test_a_browser_that_dies_while_it_jogs_leaves_the_arm_at_rest(
     died = time.monotonic()
     rests(arm)
     assert time.monotonic() - died < 3.0  # the page's 0.2 s, the planner's 0.1 s, and its way to rest; and this machine
-    assert arm.device.mode.name == "IDLE"
+    until(lambda: arm.device.mode.name, lambda mode: mode == "IDLE")
 
 
 def test_live_sliders_do_not_jump_and_lead_the_arm(person: Person, arm: gemelo.Arm) -> None:
@@ -121,7 +120,8 @@ def test_live_sliders_do_not_jump_and_lead_the_arm(person: Person, arm: gemelo.A
     person.ticks("Live: the arm follows the sliders")
     until(lambda: person.value(f"{ARM} [°]"), lambda value: abs(value) < 0.1)
     assert not is_moving(arm)
-    person.types(f"{ARM} [°]", 25)
+    for value in (24, 25):  # viser drops what is typed in the moment in which it writes the field itself
+        person.types(f"{ARM} [°]", value)
     until(lambda: degrees(arm.joints[ARM]), lambda now: abs(now - 25.0) < 0.2)
     person.ticks("Live: the arm follows the sliders")
     rests(arm)

@@ -63,8 +63,15 @@ class LiveSliders:
             if any(speeds.values()):
                 self._jogging.hold(JogWish(joints=speeds))
             else:
-                self._jogging.release()
+                self._arrived(target)
             time.sleep(PERIOD)
+
+    def _arrived(self, target: Mapping[str, float]) -> None:
+        """Until a slider moves again others may lead the arm, and it is not drawn back."""
+        self._jogging.release()
+        with self._news:
+            if self._target is target:
+                self._target = {}
 
     def speeds(self, measured: Mapping[str, float], target: Mapping[str, float]) -> dict[str, float]:
         """[rad/s] or [m/s] by joint; all 0 where everything is near enough."""

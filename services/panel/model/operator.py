@@ -39,7 +39,7 @@ class Operator:
         self._changed = threading.Event()
         self.goal = GoalSolver(arm, self.wake)
         self.motions = Motions(arm, self.tell)
-        self.jogging = Jogging(arm, self.tell)
+        self.jogging = Jogging(arm, self._jog_refused)
         self.teaching = Teaching(arm, self.wake)
         self.live = LiveSliders(arm, self.jogging, self.bus)
 
@@ -64,6 +64,11 @@ class Operator:
         number = self._told.number + 1 if self._told is not None else 1
         self._told = ToldProblem(problem, time.monotonic(), number)
         self.wake()
+
+    def _jog_refused(self, problem: Problem) -> None:
+        """Something else leads the arm, or nothing may: the live sliders let go."""
+        self.live.switch(False)
+        self.tell(problem)
 
     @property
     def newest_problem(self) -> ToldProblem | None:

@@ -110,9 +110,9 @@ class MoveTab:
 
     def _switch_live(self, event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
         if event.client_id is not None:
+            self._operator.live.switch(event.target.value)
             if event.target.value:
                 self._operator.follow_measured()
-            self._operator.live.switch(event.target.value)
 
     def _take_nearest(self) -> None:
         problem = self._operator.goal.goal.problem
