@@ -69,7 +69,7 @@ class Person:
 
     def chooses(self, label: str, option: str) -> None:
         self.row(label).locator("input").first.click()
-        self.page.get_by_role("option", name=option, exact=True).filter(visible=True).click()
+        self.page.get_by_role("option", name=option).filter(visible=True).click()
 
     def ticks(self, label: str) -> None:
         self.row(label).locator("input[type=checkbox]").click()

@@ -150,7 +150,7 @@ def test_points_are_taught_and_a_program_of_them_is_checked_run_changed_and_run_
     until(lambda: arm.joints, lambda joints: _same(joints, taught[0]))
     person.reads("Done.")
     assert _same(arm.joints, taught[2])
-    person.chooses("Step", "3  go point='P2'")
+    person.chooses("Step", "3 go point='P2'")
     person.press("Delete the step")
     person.types("Name", "tour")
     person.press("Save")
