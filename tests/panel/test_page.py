@@ -200,7 +200,6 @@ def test_a_planner_that_is_killed_is_named_and_planning_goes_on_when_it_is_back(
     person.press("Plan")
     person.reads("planner")
     twin.wait_ready(30.0)
-    person.press("Understood")
     person.press("Plan and execute")
     arrives(arm, ARM, 20.0)
 
