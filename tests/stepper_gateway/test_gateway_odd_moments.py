@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import pytest
+
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceCommandKind, DeviceMode
+from schemas.device import DeviceCommandKind, DeviceMode, OutputCommand, ReferenceCommand
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTolerance, JointTrajectory, TrajectoryPoint
-from schemas.topics import JOINT_STATES
+from schemas.topics import DEVICE_STATE, JOINT_STATES
 from services.stepper_gateway.device.clock import ENOUGH, ClockSync
+from services.stepper_gateway.links.link import Kind
 from services.virtual_arm.virtual_arm import VirtualArm, rm1
 from tests.stepper_gateway.harness import assert_within_limits, move
 
@@ -242,3 +245,27 @@ def test_the_clock_is_found_again_after_this_machine_has_slept() -> None:
         clock.add(t0, t0 + asleep + 1_001_500, t0 + asleep + 1_001_500, t0 + 3000)
     assert clock.is_synchronised
     assert abs(clock.device_time(t0 * 1e-6) - (t0 + asleep + 1_000_000)) < 3000
+
+
+@pytest.mark.parametrize("wait", [0.0, 0.003, 0.006, 0.009, 0.012, 0.015, 0.018])
+def test_what_was_answered_is_true_for_whoever_acts_on_the_answer_at_once(wait: float) -> None:
+    rig = VirtualArm(referenced=False).ready()
+    rig.run(wait)  # the states come every 20 ms
+    assert not rig.goal(move(HOME, READY), "too early").accepted
+    rig.ask(ReferenceCommand(name=rm1().joint_names, position=HOME), 1)
+    assert rig.run(1.0, lambda: 1 in rig.answers)
+    assert rig.answers[1].accepted
+    assert rig.messages(DEVICE_STATE)[-1].referenced == (True, True, True)
+    verdict = rig.goal(move(HOME, READY))
+    assert verdict.accepted, verdict.reason
+    assert rig.finish()[0] == GoalStatusCode.SUCCEEDED
+
+
+def test_an_answer_does_not_wait_for_states_that_do_not_come() -> None:
+    rig = VirtualArm().ready()
+    rig.lost.add(Kind.STATE)
+    since = rig.now
+    rig.ask(OutputCommand(output="avanzar", on=True), 1)
+    assert rig.run(1.0, lambda: 1 in rig.answers)
+    assert rig.answers[1].accepted
+    assert rig.now - since < 0.3

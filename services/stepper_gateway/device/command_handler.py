@@ -79,15 +79,27 @@ class CommandHandler:
             return
         if reply.code in (Code.EXPIRED, Code.WRONG_BOOT):
             return self._insist(command, Code(reply.code), moment)
-        self._device.commands.remove(command)
         accepted = reply.code in (Code.OK, Code.DUPLICATE)
         if accepted and is_present:
             self._note(command, reply)
+            if not command.is_stop and command.tickets:
+                command.answer, command.answered = reply, moment.monotonic
+                return self.tell_shown(moment)
+        self._device.commands.remove(command)
         reason = self._device.unreachable_reason(moment) if accepted else self._complaint(command, reply)
         for ticket in command.tickets:
             self._answer(ticket, accepted, reason, reply.mode, sent=True)
         if not command.tickets and not accepted:
             self._device.event("command_refused", reason, moment)
+
+    def tell_shown(self, moment: Moment) -> None:
+        """Answer what the newest state shows, so that nobody who was answered is told of a time before.
+
+        A stop is answered at once.
+        """
+        for command, reply in self._device.commands.shown(self._device.session.latest, moment):
+            for ticket in command.tickets:
+                self._answer(ticket, True, self._device.unreachable_reason(moment), reply.mode, sent=True)
 
     def send_due(self, moment: Moment) -> None:
         """Send what is new or was not answered."""
@@ -108,6 +120,7 @@ class CommandHandler:
                 self._answer(ticket, False, self._silence(command, moment), sent=command.times_sent > 0)
             if command.is_own and command.kind == DeviceCommandKind.STOP:
                 self._controller.stop(moment)
+        self.tell_shown(moment)
         self.send_due(moment)
 
     def drop_all(self, reason: str) -> None:

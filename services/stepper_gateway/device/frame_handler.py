@@ -117,6 +117,7 @@ class FrameHandler:
         if not device.session.fits(state):
             self._components.abort_all(device.not_ready_reason(), moment)
             self._publish_device(state, moment)
+            self._components.command_handler.tell_shown(moment)
             return
         controller.on_state(state, arrival)
         point = controller.commanded(state)
@@ -129,6 +130,7 @@ class FrameHandler:
         self._components.goals.on_ack()
         self._components.goals.on_state(state, point, moment)
         self._components.stop_foreign_motion(moment)
+        self._components.command_handler.tell_shown(moment)
 
     def _publish(self, state: State, point: PathPoint, moment: Moment) -> None:
         reporter = self._device.reporter

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from schemas.device import DeviceCommandKind
 from services.stepper_gateway.device.clock import ClockSync
-from services.stepper_gateway.links.frames import ANY_BOOT, NEVER_EXPIRES, Command, CommandReply
+from services.stepper_gateway.links.frames import ANY_BOOT, NEVER_EXPIRES, Command, CommandReply, State
 from services.stepper_gateway.moment import Moment
 
 RETRY = 0.1  # [s]
@@ -15,6 +15,7 @@ REPEAT = (
     0.01  # [s] after which a stop that is asked for again is sent again at once; chosen: a flood costs 100 frames/s
 )
 TIME_TO_LIVE = 500_000  # [us]
+SHOWN_WITHIN = 0.2  # [s] that an answer waits for the state that shows it; chosen: ten states
 INTERNAL = 0  # ticket of the gateway's own commands
 EXCLUSIVE = (  # what a person has asked for would hit whatever is started before the answer
     DeviceCommandKind.STOP,
@@ -56,6 +57,8 @@ class PendingCommand:
     times_sent: int = 0
     needs_clock: bool = True  # false once a device has called a stop late: then it is sent without an expiry
     needs_boot: bool = True  # false once a device was another boot: then a stop is sent to whatever boot is there
+    answer: CommandReply | None = None  # that it is accepted; kept until a state shows what it did
+    answered: float = 0.0  # [s] monotonic
 
     @property
     def is_stop(self) -> bool:
@@ -108,7 +111,8 @@ class PendingCommands:
         """The frames to send now; to a device that is not reachable, or not known, only those that stop it."""
         frames = []
         for command in self._pending:
-            if moment.monotonic - command.sent >= RETRY and (is_reachable or command.is_stop):
+            may_be_sent = command.answer is None and (is_reachable or command.is_stop)
+            if may_be_sent and moment.monotonic - command.sent >= RETRY:
                 command.sent = moment.monotonic
                 command.times_sent += 1
                 command.needs_clock &= is_reachable  # one that is silent may read it whenever it wakes
@@ -126,16 +130,27 @@ class PendingCommands:
         return frames
 
     def find(self, reply: CommandReply) -> PendingCommand | None:
-        """The command under way that this reply belongs to."""
-        of_reply = (c for c in self._pending if c.cmd_id == reply.cmd_id and c.kind == reply.cmd)
-        return next(of_reply, None)
+        """The command under way that this reply belongs to and that was not answered before."""
+        unanswered = (c for c in self._pending if c.answer is None)
+        return next((c for c in unanswered if c.cmd_id == reply.cmd_id and c.kind == reply.cmd), None)
+
+    def shown(self, state: State | None, moment: Moment) -> list[tuple[PendingCommand, CommandReply]]:
+        """Accepted commands whose effect `state` shows, or that have waited for one long enough; they are over."""
+        told = []
+        for command in self._pending:
+            reply = command.answer
+            if reply is not None and (_is_since(state, reply) or moment.monotonic - command.answered >= SHOWN_WITHIN):
+                told.append((command, reply))
+        for command, _ in told:
+            self._pending.remove(command)
+        return told
 
     def remove(self, command: PendingCommand) -> None:
         self._pending.remove(command)
 
     def expired(self, moment: Moment) -> list[PendingCommand]:
         """Commands that the device has not answered in time; they are given up."""
-        late = [command for command in self._pending if moment.monotonic >= command.deadline]
+        late = [c for c in self._pending if c.answer is None and moment.monotonic >= c.deadline]
         self._pending = [command for command in self._pending if command not in late]
         return late
 
@@ -160,3 +175,8 @@ class PendingCommands:
         if command.is_stop and not (clock.is_synchronised and command.needs_clock):
             return NEVER_EXPIRES
         return clock.device_time(moment.monotonic) + TIME_TO_LIVE
+
+
+def _is_since(state: State | None, reply: CommandReply) -> bool:
+    """True if the device measured `state` after it had answered."""
+    return state is not None and state.boot_id == reply.boot_id and state.t_us > reply.t_us
