@@ -3,8 +3,10 @@
 .PHONY: help setup up down test check coverage format docs demo bench lock clean
 MAKEFLAGS += --no-print-directory
 bin := .venv/bin
-# On every core at once; the tests of whole stacks and of what their processes do in time come after them, one by one.
+# On every core at once; then the tests that start processes, a file on each core; then those that watch processes in time.
 side_by_side := $(addprefix tests/,arm bench demo firmware logger planner schemas stepper_gateway urdf visualizer)
+one_by_one := tests/stack
+file_by_file := $(filter-out $(side_by_side) $(one_by_one),$(patsubst %/,%,$(wildcard tests/*/)))
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' Makefile | column -t -s '|'
@@ -21,7 +23,8 @@ down: ## stop a twin that runs elsewhere
 test: setup ## all tests: Python, firmware, whole stack
 	@deploy/test_firmware
 	@$(bin)/pytest -rfE -n auto --maxprocesses 4 --dist worksteal $(side_by_side)
-	@$(bin)/pytest -rfE $(filter-out $(side_by_side),$(patsubst %/,%,$(wildcard tests/*/)))
+	@$(bin)/pytest -rfE -n auto --maxprocesses 4 --dist loadfile $(file_by_file)
+	@$(bin)/pytest -rfE $(one_by_one)
 	@deploy/optional
 
 check: setup ## ruff, mypy, import-linter, clang-format
