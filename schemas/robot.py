@@ -3,6 +3,9 @@
 Numbers that must be exact (gear ratios) are TOML strings holding a fraction or a decimal, for
 example "46.656" or "380/21"; everything else is SI unless the name says otherwise. Bounds stand with the types;
 those that depend on another field or file are checked by `services.arm`.
+
+An arm to plan and look at only leaves out [device], [[driver]], every [joint.motor] and whatever is wired to a pin, and
+[[joint]] too if it likes: `services.arm` generates a virtual device then. A tick rate that is left out is chosen there.
 """
 
 from __future__ import annotations
@@ -149,7 +152,7 @@ class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
     """The controller board."""
 
     name: KeyPart  # MQTT: gemelo/v1/<name>/...
-    tick_hz: Annotated[int, Meta(ge=10_000, le=100_000, multiple_of=1000)] = 50_000  # the firmware's bounds
+    tick_hz: Annotated[int, Meta(ge=10_000, le=100_000, multiple_of=1000)] = 0  # the firmware's bounds; 0: chosen
     queue_capacity: Annotated[int, Meta(ge=2, le=128)] = 128  # [knots], and the firmware's again
     sensor_hz: Annotated[int, Meta(ge=1, le=50)] = 10  # a divisor of 1000
     armed_at_boot: bool = True  # as it is where no enable pin is wired

@@ -42,8 +42,8 @@ def print_findings(folder: Path) -> ExitCode:
     findings = findings_in(folder)
     for finding in findings:
         print(finding)
-    errors = sum(finding.severity is Severity.ERROR for finding in findings)
-    print(f"{folder}: {errors} errors, {len(findings) - errors} warnings" if findings else f"{folder}: all is well")
+    errors, warnings = (sum(each.severity is kind for each in findings) for kind in (Severity.ERROR, Severity.WARNING))
+    print(f"{folder}: {errors} errors, {warnings} warnings" if errors or warnings else f"{folder}: all is well")
     return ExitCode.FAILED if errors else ExitCode.OK
 
 

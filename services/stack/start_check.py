@@ -6,7 +6,8 @@ import sys
 
 from schemas.deployment import Deployment, ViewerMode
 from schemas.errors import ConfigurationError
-from services.arm.model.description import load_arm
+from services.arm.model.description import Arm, load_arm, require_motors
+from services.arm.model.virtual_drive import NO_MOTORS
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.process.ports import PortTaken, require_free
 
@@ -15,7 +16,7 @@ def start_problems(deployment: Deployment) -> list[str]:
     """Every reason why this deployment cannot start on this machine, one sentence each; empty if it can."""
     found = []
     try:
-        load_arm(project_root() / deployment.robot)
+        require_motors(load_arm(project_root() / deployment.robot), deployment.device)
     except ConfigurationError as error:
         found.append(str(error))
     router, mqtt, viewer, panel = deployment.router, deployment.mqtt, deployment.viewer, deployment.panel
@@ -34,12 +35,21 @@ def start_problems(deployment: Deployment) -> list[str]:
 def main() -> int:
     """`python -m services.stack.start_check`: prints every problem to stderr; 0 if there is none, else 1."""
     try:
-        found = start_problems(load_deployment())
+        deployment = load_deployment()
+        found = start_problems(deployment)
     except ConfigurationError as error:
         found = [str(error)]
     for problem in found:
         print(f"gemelo: {problem}", file=sys.stderr)
+    if not found:
+        _say_virtual(load_arm(project_root() / deployment.robot))
     return 1 if found else 0
+
+
+def _say_virtual(arm: Arm) -> None:
+    """What a person is to know of an arm without motors, as the stack starts."""
+    if not arm.has_motors:
+        print(f"{arm.name}: {NO_MOTORS}; a virtual device is generated, at {arm.device.tick_hz / 1000:g} kHz")
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from contextlib import closing
 from pathlib import Path
 
 from schemas.deployment import Deployment, DeviceKind, Wire
-from services.arm.model.description import load_arm
+from services.arm.model.description import load_arm, require_motors
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
@@ -28,6 +28,7 @@ def run(node: Node, deployment: Deployment) -> None:
     """Serve until the node is stopped; ready while the device is online, synchronised and its state fresh."""
     sys.setswitchinterval(SWITCH_INTERVAL)
     arm = load_arm(project_root() / deployment.robot)
+    require_motors(arm, deployment.device)
     parameters = node.parameters(GatewayParameters)
     core = GatewayCore(arm, secrets.randbelow(2**31 - 1) + 1, parameters.value)
     shell = Shell(node, core, parameters)

@@ -7,9 +7,10 @@ import socket
 import msgspec
 import pytest
 
-from schemas.deployment import Deployment, MqttSection, RouterSection, ViewerMode, ViewerSection
+from schemas.deployment import Deployment, DeviceKind, MqttSection, RouterSection, ViewerMode, ViewerSection
 from services.stack.stack import free_ports
 from services.stack.start_check import main, start_problems
+from tests.arm.bare_arm import write_bare_arm
 
 
 @pytest.fixture
@@ -46,3 +47,14 @@ def test_a_word_that_the_deployment_does_not_know_is_refused_with_those_it_does(
     monkeypatch.setenv("GEMELO_MQTT_BROKER", "mosquito")
     assert main() == 1
     assert "known are amqtt, mosquitto" in capsys.readouterr().err
+
+
+def test_an_arm_without_motors_starts_with_a_virtual_device_and_is_refused_a_board(free, tmp_path, capsys, monkeypatch):
+    folder = write_bare_arm(tmp_path / "bare")
+    bare = msgspec.structs.replace(free, robot=str(folder))
+    assert start_problems(bare) == []
+    monkeypatch.setattr("services.stack.start_check.load_deployment", lambda: bare)
+    assert main() == 0
+    assert "no motors: to plan and look at only; a virtual device is generated, at" in capsys.readouterr().out
+    (problem,) = start_problems(msgspec.structs.replace(bare, device=DeviceKind.BOARD))
+    assert "a [joint.motor] for every joint" in problem

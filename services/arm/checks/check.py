@@ -9,7 +9,7 @@ import msgspec
 from schemas.robot import RobotFile
 from services.arm.checks.cross_check import check_with_yourdfpy
 from services.arm.checks.device import check_device
-from services.arm.checks.findings import Finding, Severity, error
+from services.arm.checks.findings import Finding, Severity, error, note
 from services.arm.checks.homing import check_homing
 from services.arm.checks.motors import check_motors
 from services.arm.checks.pull_out import check_pull_out
@@ -17,12 +17,24 @@ from services.arm.checks.srdf import check_srdf
 from services.arm.checks.urdf import check_urdf
 from services.arm.device.device_config import device_config
 from services.arm.errors import DescriptionError
-from services.arm.model.description import ROBOT_FILE, load_arm
-from services.arm.model.robot_file import dotted, line_of, not_finite, parse_toml, read_text, unknown_keys, where_of
+from services.arm.model.description import DEFAULT_URDF, ROBOT_FILE, load_arm
+from services.arm.model.robot_file import (
+    dotted,
+    line_of,
+    not_finite,
+    parse_toml,
+    read_text,
+    typed_robot,
+    unknown_keys,
+    where_of,
+)
 from services.arm.model.srdf import read_srdf
-from services.arm.model.urdf import read_urdf
+from services.arm.model.urdf import UrdfModel, read_urdf
+from services.arm.model.virtual_drive import NO_MOTORS, TO_DRIVE, lacks_motors, with_virtual_drive
 
 __all__ = ["Finding", "Severity", "check"]
+
+TYPES_REMEDY = "write a value of that type and range; docs/my_own_arm.md says what each key is"
 
 
 def check(folder: Path) -> list[Finding]:
@@ -34,17 +46,27 @@ def check(folder: Path) -> list[Finding]:
     except DescriptionError as problem:
         return [error(ROBOT_FILE, "file", str(problem), f"a robot is a folder with a {ROBOT_FILE}")]
     findings = [*_unknown_keys(data, text), *_not_finite(data, text)]
+    urdf_path = folder / str(data.get("urdf", DEFAULT_URDF))
     try:
-        robot = msgspec.convert(_known(data), RobotFile)
+        model = read_urdf(urdf_path)
+    except DescriptionError as problem:
+        return [*findings, error(urdf_path.name, "file", str(problem))]
+    try:
+        is_bare = lacks_motors(data, folder / ROBOT_FILE)
+        robot = typed_robot(with_virtual_drive(_known(data), model) if is_bare else _known(data))
+    except DescriptionError as problem:
+        return [*findings, error(ROBOT_FILE, "motors", str(problem), TO_DRIVE)]
     except msgspec.ValidationError as problem:
         subject = where_of(problem, text).removeprefix(", ") or "types"
-        return [*findings, error(ROBOT_FILE, subject, str(problem), "see schemas/robot.py")]
+        return [*findings, error(ROBOT_FILE, subject, str(problem), TYPES_REMEDY)]
     if not_finite(data):
         return findings
-    findings += _files(folder, robot)
+    findings += _files(folder, robot, model)
     if not any(finding.severity is Severity.ERROR for finding in findings):
         findings += _cross_checks(folder)
-    return sorted(findings, key=lambda finding: finding.severity is not Severity.ERROR)
+    if is_bare:
+        findings.append(note(ROBOT_FILE, "robot", NO_MOTORS, TO_DRIVE))
+    return sorted(findings, key=lambda finding: list(Severity).index(finding.severity))
 
 
 def _unknown_keys(data: dict[str, object], text: str) -> list[Finding]:
@@ -61,28 +83,26 @@ def _not_finite(data: dict[str, object], text: str) -> list[Finding]:
     ]
 
 
-def _known(data: dict[str, object]) -> object:
+def _known(data: dict[str, object]) -> dict[str, object]:
     """`data` without the keys that its types do not have, so that one of them does not hide what else is wrong."""
     unknown = {key.path for key in unknown_keys(data, "")}
 
     def keep(value: object, path: tuple[str | int, ...]) -> object:
         if isinstance(value, dict):
-            return {k: keep(v, (*path, k)) for k, v in value.items() if (*path, k) not in unknown}
+            return kept(value, path)
         if isinstance(value, list):
             return [keep(v, (*path, i)) for i, v in enumerate(value)]
         return value
 
-    return keep(data, ())
+    def kept(table: dict[str, object], path: tuple[str | int, ...]) -> dict[str, object]:
+        return {k: keep(v, (*path, k)) for k, v in table.items() if (*path, k) not in unknown}
+
+    return kept(data, ())
 
 
-def _files(folder: Path, robot: RobotFile) -> list[Finding]:
+def _files(folder: Path, robot: RobotFile, model: UrdfModel) -> list[Finding]:
     """Each file for itself, then the motors against the URDF."""
-    findings: list[Finding] = []
-    try:
-        model = read_urdf(folder / robot.urdf)
-    except DescriptionError as problem:
-        return [error(robot.urdf, "file", str(problem))]
-    findings += check_urdf(model, folder / robot.urdf)
+    findings = check_urdf(model, folder / robot.urdf)
     findings += check_motors(robot, model)
     findings += check_device(robot)
     findings += check_homing(robot, model)

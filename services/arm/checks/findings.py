@@ -7,10 +7,11 @@ from enum import StrEnum
 
 
 class Severity(StrEnum):
-    """An error must be corrected before the arm moves; a warning is reported only."""
+    """An error must be corrected before the arm moves; a warning is reported only; a note is nothing wrong."""
 
     ERROR = "error"
     WARNING = "warning"
+    NOTE = "note"
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,10 @@ class Finding:
 
 def error(file: str, subject: str, message: str, remedy: str = "") -> Finding:
     return Finding(Severity.ERROR, file, subject, message, remedy)
+
+
+def note(file: str, subject: str, message: str, remedy: str = "") -> Finding:
+    return Finding(Severity.NOTE, file, subject, message, remedy)
 
 
 def warning(file: str, subject: str, message: str, remedy: str = "") -> Finding:

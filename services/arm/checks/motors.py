@@ -12,6 +12,7 @@ from services.arm.model.description import ROBOT_FILE
 from services.arm.model.urdf import JointKind, Limit, UrdfJoint, UrdfModel
 from services.arm.motors.speed import speed_limits
 from services.arm.motors.steps import Q8, step_scale
+from services.arm.motors.tick import fastest_steps
 
 WIRE_RANGE = 2**31 / Q8  # [steps] that fit the wire's Q24.8
 COARSE = 0.02  # [rad] a step beyond which a joint is said to be coarse
@@ -127,8 +128,7 @@ def _pulses(drive: StepperJoint, driver: Driver, tick_hz: int, subject: str) -> 
     except DescriptionError:
         return []
     tick = 1e6 / tick_hz  # [us]
-    ticks = math.ceil(driver.step_high_us / tick - 1e-9) + math.ceil(driver.step_low_us / tick - 1e-9)
-    fastest = tick_hz / max(ticks, 1)
+    fastest = fastest_steps(driver, tick_hz)
     findings = []
     if rate > fastest:
         message = (

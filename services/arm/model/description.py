@@ -7,15 +7,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
+
+from schemas.deployment import DeviceKind
 from schemas.robot import DeviceRecord, Driver, Input, Output, RobotFile, Sensor, StepperJoint, Transmission
 from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.robot_file import read_robot_file
+from services.arm.model.robot_file import read_robot_data, read_text, typed_robot, where_of
 from services.arm.model.srdf import SrdfModel, read_srdf
 from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel, read_urdf
+from services.arm.model.virtual_drive import NO_MOTORS, TO_DRIVE, lacks_motors, with_virtual_drive
 from services.arm.motors.speed import speed_limits
 from services.arm.motors.steps import StepScale, step_scale
 
 ROBOT_FILE = "robot.toml"
+DEFAULT_URDF = "robot.urdf"
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,7 @@ class Arm:
     robot_path: Path
     base_frame: str
     tool_frame: str
+    has_motors: bool  # False: to plan and look at only, and `device` is a generated virtual one
     device: DeviceRecord
     drivers: tuple[Driver, ...]
     joints: tuple[Joint, ...]
@@ -104,9 +110,17 @@ class Arm:
 def load_arm(folder: Path) -> Arm:
     """The arm described in `folder`; raises `DescriptionError` with file, thing and value."""
     robot_path = Path(folder) / ROBOT_FILE
-    robot = read_robot_file(robot_path)
-    urdf_path, srdf_path = robot_path.with_name(robot.urdf), robot_path.with_name(robot.srdf)
-    model, srdf = read_urdf(urdf_path), read_srdf(srdf_path)
+    text = read_text(robot_path)
+    data = read_robot_data(robot_path, text)
+    urdf_path = robot_path.with_name(str(data.get("urdf", DEFAULT_URDF)))
+    model = read_urdf(urdf_path)
+    bare = lacks_motors(data, robot_path)
+    try:
+        robot = typed_robot(with_virtual_drive(data, model) if bare else data)
+    except msgspec.ValidationError as error:
+        raise DescriptionError(f"{robot_path}{where_of(error, text)}: {error}") from error
+    srdf_path = robot_path.with_name(robot.srdf)
+    srdf = read_srdf(srdf_path)
     _require_frames(robot, model, robot_path)
     drivers = {driver.name: driver for driver in robot.driver}
     joints = tuple(_joint(drive, drivers, model, robot_path) for drive in robot.joint)
@@ -119,6 +133,7 @@ def load_arm(folder: Path) -> Arm:
         robot_path=robot_path,
         base_frame=robot.base_frame,
         tool_frame=robot.tool_frame,
+        has_motors=not bare,
         device=robot.device,
         drivers=robot.driver,
         joints=joints,
@@ -130,6 +145,15 @@ def load_arm(folder: Path) -> Arm:
         disabled_collisions=frozenset(frozenset(pair) for pair in srdf.disabled),
         model=model,
     )
+
+
+def require_motors(arm: Arm, device: DeviceKind) -> None:
+    """Raises `DescriptionError` for an arm without motors at a real device, with what robot.toml lacks."""
+    if device is not DeviceKind.VIRTUAL and not arm.has_motors:
+        raise DescriptionError(
+            f'{arm.robot_path}: {NO_MOTORS}, so device = "{device}" has nothing to drive: {TO_DRIVE}; '
+            'or start it with device = "virtual"'
+        )
 
 
 def _joint(drive: StepperJoint, drivers: dict[str, Driver], model: UrdfModel, path: Path) -> Joint:

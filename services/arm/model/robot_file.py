@@ -13,6 +13,7 @@ import msgspec
 
 from schemas.robot import RobotFile
 from services.arm.errors import DescriptionError, suggestion
+from services.arm.motors.tick import chosen_tick
 
 Keys = tuple[str | int, ...]
 
@@ -26,18 +27,23 @@ class UnknownKey:
     hint: str
 
 
-def read_robot_file(path: Path) -> RobotFile:
-    """The typed robot.toml; raises `DescriptionError`."""
-    text = read_text(path)
+def read_robot_data(path: Path, text: str) -> dict[str, object]:
+    """The tables of robot.toml, whose keys are known and whose numbers are finite; raises `DescriptionError`."""
     data = parse_toml(path, text)
     for unknown in unknown_keys(data, text):
         raise DescriptionError(f"{path}, line {unknown.line}: unknown key `{dotted(unknown.path)}`{unknown.hint}")
     for key, value in not_finite(data):
         raise DescriptionError(f"{path}, line {line_of(key, text)}: `{dotted(key)}` is {value}: it must be finite")
-    try:
-        return msgspec.convert(data, RobotFile)
-    except msgspec.ValidationError as error:
-        raise DescriptionError(f"{path}{where_of(error, text)}: {error}") from error
+    return data
+
+
+def typed_robot(data: object) -> RobotFile:
+    """The tables as types, with a tick rate; raises `msgspec.ValidationError`."""
+    robot = msgspec.convert(data, RobotFile)
+    if robot.device.tick_hz:
+        return robot
+    device = msgspec.structs.replace(robot.device, tick_hz=chosen_tick(robot))
+    return msgspec.structs.replace(robot, device=device)
 
 
 def read_text(path: Path) -> str:

@@ -160,17 +160,23 @@ def _joint(element: ET.Element) -> UrdfJoint:
     kind = element.get("type", "")
     if kind not in set(JointKind):
         raise DescriptionError(f'{where}: type "{kind}" is not one of {", ".join(JointKind)}')
-    axis = element.find("axis")
     return UrdfJoint(
         name=name,
         kind=JointKind(kind),
         parent=_attribute(_child(element, "parent", where), "link", where),
         child=_attribute(_child(element, "child", where), "link", where),
         origin=_origin(element, where),
-        axis=(1.0, 0.0, 0.0) if axis is None else _unit(_triple(axis.get("xyz", "1 0 0"), where), where),
+        axis=_axis(element.find("axis"), kind, where),
         limit=_limit(element.find("limit"), where),
         mimic=_mimic(element.find("mimic"), where),
     )
+
+
+def _axis(element: ET.Element | None, kind: str, where: str) -> Triple:
+    """Of length one; a fixed joint's has no meaning, and exporters write zero there."""
+    if element is None or kind == JointKind.FIXED:
+        return (1.0, 0.0, 0.0)
+    return _unit(_triple(element.get("xyz", "1 0 0"), where), where)
 
 
 def _limit(element: ET.Element | None, where: str) -> Limit | None:
