@@ -112,8 +112,10 @@ COMMANDS = (
     Command(("param", "get"), "one parameter's present value", "node:run_get", "node:parameter_options"),
     Command(("param", "set"), "set a parameter of a running node", "node:run_set", "node:set_options"),
     Command(("log",), "follow the log of every node, until Ctrl-C", "node:run_log", "node:log_options"),
-    Command(("check",), "validate a robot's folder: references, limits, inertias, steps",
-            "robot_folder:run_check", "robot_folder:folder_option"),
+    Command(("import",), "make a robot's folder of a URDF or of a CAD export",
+            "import_robot:run", "import_robot:add_options"),
+    Command(("check",), "validate a robot's folder, an export's folder or a URDF: references, limits, inertias, steps",
+            "robot_folder:run_check", "robot_folder:check_option"),
     Command(("version",), "the versions of gemelo, of its wire protocol and of Python", "version:run"),
     Command(("completion",), "bash completion: source <(gemelo completion)", "completion:run"),
 )  # fmt: skip

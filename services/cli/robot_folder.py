@@ -14,6 +14,7 @@ from services.cli.text_table import table
 from services.cli.units import positive_length
 
 if TYPE_CHECKING:
+    from services.arm.checks.findings import Finding
     from services.arm.kinematics.collision_matrix import LinkPairData
 
 FIT = "services.collision_fitting.main"  # in a process of its own: the command line loads no planner
@@ -29,22 +30,45 @@ def folder_option(parser: Parser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="a robot's folder, as urdf/rm1")
 
 
+def check_option(parser: Parser) -> None:
+    """Adds the folder or URDF."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER_OR_URDF", help="a robot's folder, an export's, or a URDF")
+
+
 def run_check(options: Options) -> ExitCode:
-    """Checks a robot's folder."""
+    """Checks a robot's folder, or what `gemelo import` would read."""
     return print_findings(options.folder)
 
 
 def print_findings(folder: Path) -> ExitCode:
     """Prints every finding; FAILED if one of them is an error."""
     from services.arm.checks.check import Severity
-    from services.arm.checks.check import check as findings_in
 
-    findings = findings_in(folder)
+    findings = _findings(folder)
     for finding in findings:
         print(finding)
     errors, warnings = (sum(each.severity is kind for each in findings) for kind in (Severity.ERROR, Severity.WARNING))
     print(f"{folder}: {errors} errors, {warnings} warnings" if errors or warnings else f"{folder}: all is well")
     return ExitCode.FAILED if errors else ExitCode.OK
+
+
+def _findings(folder: Path) -> list[Finding]:
+    """Of a robot's folder; of a source for `gemelo import` where there is no robot.toml."""
+    from services.arm.checks.check import check as findings_in
+    from services.arm.model.description import ROBOT_FILE
+
+    if (folder / ROBOT_FILE).is_file():
+        return findings_in(folder)
+    from services.arm.errors import DescriptionError
+    from services.robot_import.mending import mend
+    from services.robot_import.source import find_source
+
+    try:
+        findings = mend(find_source(folder)).findings()
+    except DescriptionError as error:
+        raise CommandError(str(error)) from error
+    print(f"{folder} has no {ROBOT_FILE}: as `gemelo import {folder}` reads it, which mends what is a note")
+    return findings
 
 
 def fit_options(parser: Parser) -> None:

@@ -14,7 +14,7 @@ from services.arm.checks.homing import check_homing
 from services.arm.checks.motors import check_motors
 from services.arm.checks.pull_out import check_pull_out
 from services.arm.checks.srdf import check_srdf
-from services.arm.checks.urdf import check_urdf
+from services.arm.checks.urdf import check_urdf, fault_finding
 from services.arm.device.device_config import device_config
 from services.arm.errors import DescriptionError
 from services.arm.model.description import DEFAULT_URDF, ROBOT_FILE, load_arm
@@ -29,7 +29,7 @@ from services.arm.model.robot_file import (
     where_of,
 )
 from services.arm.model.srdf import read_srdf
-from services.arm.model.urdf import UrdfModel, read_urdf
+from services.arm.model.urdf import UrdfModel, survey_urdf
 from services.arm.model.virtual_drive import NO_MOTORS, TO_DRIVE, lacks_motors, with_virtual_drive
 
 __all__ = ["Finding", "Severity", "check"]
@@ -48,9 +48,10 @@ def check(folder: Path) -> list[Finding]:
     findings = [*_unknown_keys(data, text), *_not_finite(data, text)]
     urdf_path = folder / str(data.get("urdf", DEFAULT_URDF))
     try:
-        model = read_urdf(urdf_path)
+        model, faults = survey_urdf(urdf_path)
     except DescriptionError as problem:
         return [*findings, error(urdf_path.name, "file", str(problem))]
+    findings += [fault_finding(fault, urdf_path.name) for fault in faults]
     try:
         is_bare = lacks_motors(data, folder / ROBOT_FILE)
         robot = typed_robot(with_virtual_drive(_known(data), model) if is_bare else _known(data))

@@ -23,19 +23,21 @@ class Finding:
     subject: str  # for example: joint "brazo_joint"
     message: str
     remedy: str = ""
+    line: int = 0  # of the file, from 1; 0 where it is of no line
 
     def __str__(self) -> str:
         remedy = f" -> {self.remedy}" if self.remedy else ""
-        return f"{self.severity}: {self.file}: {self.subject}: {self.message}{remedy}"
+        line = f", line {self.line}" if self.line else ""
+        return f"{self.severity}: {self.file}{line}: {self.subject}: {self.message}{remedy}"
 
 
-def error(file: str, subject: str, message: str, remedy: str = "") -> Finding:
-    return Finding(Severity.ERROR, file, subject, message, remedy)
+def error(file: str, subject: str, message: str, remedy: str = "", line: int = 0) -> Finding:
+    return Finding(Severity.ERROR, file, subject, message, remedy, line)
 
 
-def note(file: str, subject: str, message: str, remedy: str = "") -> Finding:
-    return Finding(Severity.NOTE, file, subject, message, remedy)
+def note(file: str, subject: str, message: str, remedy: str = "", line: int = 0) -> Finding:
+    return Finding(Severity.NOTE, file, subject, message, remedy, line)
 
 
-def warning(file: str, subject: str, message: str, remedy: str = "") -> Finding:
-    return Finding(Severity.WARNING, file, subject, message, remedy)
+def warning(file: str, subject: str, message: str, remedy: str = "", line: int = 0) -> Finding:
+    return Finding(Severity.WARNING, file, subject, message, remedy, line)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 
 from schemas.robot import Driver, RobotFile, StepperJoint, Transmission
@@ -93,9 +92,6 @@ def _against_limits(
     if joint.kind is JointKind.CONTINUOUS:
         return findings
     findings += _against_mechanics(drive, limit, subject, unit)
-    if joint.kind is JointKind.REVOLUTE and limit.upper - limit.lower > 2.0 * math.tau:
-        message = f"travel of {limit.upper - limit.lower:.4g} rad is beyond two turns"
-        findings.append(warning(ROBOT_FILE, subject, message, "are these degrees?"))
     if not limit.lower <= drive.reference_position <= limit.upper:
         message = (
             f"reference_position {drive.reference_position:g} {unit} is outside {limit.lower:g} to {limit.upper:g}"

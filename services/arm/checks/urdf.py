@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from pathlib import Path
 
@@ -9,19 +10,23 @@ import numpy as np
 
 from services.arm.checks.findings import Finding, error, warning
 from services.arm.errors import suggestion
-from services.arm.model.urdf import Geometry, Inertial, JointKind, UrdfJoint, UrdfLink, UrdfModel
+from services.arm.model.urdf import NO_SHAPE, Geometry, Inertial, JointKind, Limit, UrdfJoint, UrdfLink, UrdfModel
+from services.arm.model.xml_reader import XmlFault
 
 COLLISION_REMEDY = "add a box or a cylinder, or let `gemelo collision fit --meshes` fit some"
 SHAPES = ("box", "cylinder", "sphere", "mesh")
+MOST_TRAVEL = {JointKind.REVOLUTE: 2.0 * math.tau, JointKind.PRISMATIC: 5.0}  # [rad] or [m]
+MOST_VELOCITY = {JointKind.REVOLUTE: 50.0, JointKind.CONTINUOUS: 50.0, JointKind.PRISMATIC: 10.0}  # [rad/s] or [m/s]
+FRAME_REMEDY = "leave <inertial> out where the link is a mere frame, else give a mass above 0"
 PLACEHOLDER_EFFORTS = (100.0, 300.0, 1000.0)  # what exporters write when nobody thought about it
 
 
-def check_urdf(model: UrdfModel, path: Path) -> list[Finding]:
-    """Everything about the URDF alone."""
+def check_urdf(model: UrdfModel, path: Path, has_meshes: bool = True) -> list[Finding]:
+    """Everything about the URDF alone; without its meshes' references where it is not yet in a robot's folder."""
     file = path.name
     findings = _tree(model, file)
     for link in model.links:
-        findings += _link(link, path)
+        findings += _link(link, path, has_meshes)
     for joint in model.joints:
         findings += _references(joint, model, file)
         if joint.kind is not JointKind.FIXED and joint.mimic is None:
@@ -29,20 +34,31 @@ def check_urdf(model: UrdfModel, path: Path) -> list[Finding]:
     return findings
 
 
+def fault_finding(fault: XmlFault, file: str) -> Finding:
+    """What could not be read, as a finding."""
+    return error(file, fault.where, fault.message, fault.remedy, fault.line)
+
+
 def _tree(model: UrdfModel, file: str) -> list[Finding]:
     """One root, every link once, every child once."""
     findings = []
-    for what, names in (("link", model.link_names), ("joint", model.joint_names)):
-        for name, count in Counter(names).items():
+    things: dict[str, tuple[UrdfLink | UrdfJoint, ...]] = {"link": model.links, "joint": model.joints}
+    for what, named in things.items():
+        for name, count in Counter(thing.name for thing in named).items():
             if count > 1:
-                findings.append(error(file, f'{what} "{name}"', f"is there {count} times", "names are unique"))
+                line = [thing.line for thing in named if thing.name == name][-1]
+                findings.append(error(file, f'{what} "{name}"', f"is there {count} times", "names are unique", line))
     children = [joint.child for joint in model.joints]
     for name, count in Counter(children).items():
         if count > 1:
             findings.append(error(file, f'link "{name}"', f"is the child of {count} joints", "a link has one parent"))
     roots = [name for name in model.link_names if name not in children]
     if len(roots) != 1:
-        findings.append(error(file, "tree", f"has {len(roots)} roots ({', '.join(roots)})", "join them with a joint"))
+        remedy = "join them with a fixed joint, or remove what is no part of the arm"
+        lines = [link.line for link in model.links if link.name in roots]
+        findings.append(
+            error(file, "tree", f"has {len(roots)} roots ({', '.join(roots)})", remedy, lines[-1] if lines else 0)
+        )
     loose = sorted(set(model.link_names) - _connected(model, roots))
     findings += [error(file, f'link "{x}"', "is not connected to a root: its joints form a ring") for x in loose]
     return findings
@@ -65,40 +81,66 @@ def _references(joint: UrdfJoint, model: UrdfModel, file: str) -> list[Finding]:
     for role, link in (("parent", joint.parent), ("child", joint.child)):
         if link not in model.link_names:
             hint = suggestion(link, model.link_names)
-            findings.append(error(file, f'joint "{joint.name}"', f'its {role} "{link}" is no link{hint}'))
-    if joint.mimic is not None and joint.mimic.joint not in model.joint_names:
-        hint = suggestion(joint.mimic.joint, model.joint_names)
-        findings.append(error(file, f'joint "{joint.name}"', f'mimics "{joint.mimic.joint}", which is no joint{hint}'))
-    return findings
+            message = f'its {role} "{link}" is no link{hint}'
+            findings.append(error(file, f'joint "{joint.name}"', message, line=joint.line))
+    return [*findings, *_mimic(joint, model, file)]
 
 
-def _link(link: UrdfLink, path: Path) -> list[Finding]:
+def _mimic(joint: UrdfJoint, model: UrdfModel, file: str) -> list[Finding]:
+    """A joint follows one that has a motor of its own."""
+    if joint.mimic is None or joint.kind is JointKind.FIXED:
+        return []
+    subject, name = f'joint "{joint.name}"', joint.mimic.joint
+    if name not in model.joint_names:
+        return [
+            error(
+                file,
+                subject,
+                f'mimics "{name}", which is no joint{suggestion(name, model.joint_names)}',
+                "",
+                joint.line,
+            )
+        ]
+    leader = model.joint(name)
+    if leader.kind is JointKind.FIXED or leader.mimic is not None:
+        how = "is fixed" if leader.kind is JointKind.FIXED else "follows another itself"
+        remedy = "name the joint that has the motor in <mimic>"
+        return [error(file, subject, f'mimics "{name}", which {how}', remedy, joint.line)]
+    return []
+
+
+def _link(link: UrdfLink, path: Path, has_meshes: bool) -> list[Finding]:
     subject = f'link "{link.name}"'
-    findings = [] if link.inertial is None else _inertial(link.inertial, subject, path.name)
+    findings = [] if link.inertial is None else _inertial(link.inertial, subject, path.name, link.line)
     for role, shapes in (("visual", link.visuals), ("collision", link.collisions)):
         for geometry in shapes:
-            findings += _geometry(geometry, role, subject, path)
-    if link.visuals and not link.collisions:
+            if has_meshes or geometry.mesh is None:
+                findings += _geometry(geometry, role, subject, path)
+    if has_meshes and link.visuals and not link.collisions:
         message = "can be seen but not touched: it has no <collision>"
-        findings.append(warning(path.name, subject, message, COLLISION_REMEDY))
+        findings.append(warning(path.name, subject, message, COLLISION_REMEDY, link.line))
     return findings
 
 
 def _geometry(geometry: Geometry, role: str, subject: str, path: Path) -> list[Finding]:
+    if geometry.shape == NO_SHAPE:
+        return []
     if geometry.shape not in SHAPES:
         remedy = "write <cylinder>" if geometry.shape == "capsule" else f"use {', '.join(SHAPES)}"
-        return [error(path.name, subject, f"<{geometry.shape}> in <{role}> is not URDF and would be ignored", remedy)]
+        message = f"<{geometry.shape}> in <{role}> is not URDF and would be ignored"
+        return [error(path.name, subject, message, remedy, geometry.line)]
     if geometry.mesh is None:
         return []
     if geometry.mesh.startswith("package://"):
-        return [_package(geometry.mesh, subject, path)]
+        return [_package(geometry.mesh, subject, path, geometry.line)]
     if not (path.parent / geometry.mesh.removeprefix("file://")).is_file():
         near = suggestion(geometry.mesh, [str(p.relative_to(path.parent)) for p in path.parent.glob("**/*.*")])
-        return [error(path.name, subject, f'mesh "{geometry.mesh}" is not there{near}', "put the file there")]
+        message = f'mesh "{geometry.mesh}" is not there{near}'
+        return [error(path.name, subject, message, "put the file there", geometry.line)]
     return []
 
 
-def _package(reference: str, subject: str, path: Path) -> Finding:
+def _package(reference: str, subject: str, path: Path, line: int) -> Finding:
     """A package:// path means nothing without ROS: say where the file is, if it is in this folder."""
     name = reference.rsplit("/", 1)[-1]
     found = sorted(path.parent.rglob(name))
@@ -107,38 +149,48 @@ def _package(reference: str, subject: str, path: Path) -> Finding:
         if found
         else f"put {name} into this folder and write its path relative to {path.name}"
     )
-    return error(path.name, subject, f'mesh "{reference}" is a ROS package path', remedy)
+    return error(path.name, subject, f'mesh "{reference}" is a ROS package path', remedy, line)
 
 
 def _limits(joint: UrdfJoint, file: str) -> list[Finding]:
-    subject, limit = f'joint "{joint.name}"', joint.limit
+    subject, limit, line = f'joint "{joint.name}"', joint.limit, joint.line
     if limit is None:
-        return [error(file, subject, "has no <limit>", "give lower, upper, effort and velocity")]
-    findings = []
-    if joint.kind is not JointKind.CONTINUOUS and not limit.lower < limit.upper:
-        findings.append(
-            error(file, subject, f"limits {limit.lower:g} to {limit.upper:g} leave no travel", "give lower < upper")
-        )
+        return [error(file, subject, "has no <limit>", "give lower, upper, effort and velocity", line)]
+    findings = [] if joint.kind is JointKind.CONTINUOUS else _travel(joint.kind, limit, subject, file, line)
     for name, value in (("velocity", limit.velocity), ("effort", limit.effort)):
         if not value > 0.0:
-            findings.append(error(file, subject, f"its {name} limit is {value:g}", "give a value above 0"))
+            findings.append(error(file, subject, f"its {name} limit is {value:g}", "give a value above 0", line))
+    if limit.velocity > MOST_VELOCITY[joint.kind]:
+        slides = joint.kind is JointKind.PRISMATIC
+        message = f"its velocity limit of {limit.velocity:g} {'m/s' if slides else 'rad/s'} is implausible"
+        asked = "are these mm/s?" if slides else "are these degrees per second?"
+        findings.append(warning(file, subject, message, asked, line))
     if limit.effort in PLACEHOLDER_EFFORTS:
-        findings.append(
-            warning(
-                file, subject, f"effort {limit.effort:g} looks like an exporter's placeholder", "give the motor's own"
-            )
-        )
+        message = f"effort {limit.effort:g} looks like an exporter's placeholder"
+        findings.append(warning(file, subject, message, "give the motor's own", line))
     return findings
 
 
-def _inertial(inertial: Inertial, subject: str, file: str) -> list[Finding]:
+def _travel(kind: JointKind, limit: Limit, subject: str, file: str, line: int) -> list[Finding]:
+    travel = limit.upper - limit.lower
+    if not travel > 0.0:
+        message = f"limits {limit.lower:g} to {limit.upper:g} leave no travel"
+        return [error(file, subject, message, "give lower < upper", line)]
+    if travel > MOST_TRAVEL[kind]:
+        slides = kind is JointKind.PRISMATIC
+        message = f"travel of {travel:.4g} {'m is beyond 5 m' if slides else 'rad is beyond two turns'}"
+        return [warning(file, subject, message, "are these mm?" if slides else "are these degrees?", line)]
+    return []
+
+
+def _inertial(inertial: Inertial, subject: str, file: str, line: int) -> list[Finding]:
     """A real body: positive mass, positive principal moments, none above the sum of the other two."""
     if not inertial.mass > 0.0:
-        return [error(file, subject, f"its mass is {inertial.mass:g} kg", "give a mass above 0")]
-    ixx, ixy, ixz, iyy, iyz, izz = inertial.inertia
-    low, middle, high = np.linalg.eigvalsh(np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])).tolist()
+        return [error(file, subject, f"its mass is {inertial.mass:g} kg", FRAME_REMEDY, line)]
+    low, middle, high = principal_moments(inertial)
     if low <= 0.0:
-        return [error(file, subject, f"a principal moment of inertia is {low:.3g} kg m^2", "they are all above 0")]
+        message = f"a principal moment of inertia is {low:.3g} kg m^2"
+        return [error(file, subject, message, "they are all above 0", line)]
     if low + middle < high * (1.0 - 1e-6):
         return [
             error(
@@ -146,6 +198,14 @@ def _inertial(inertial: Inertial, subject: str, file: str) -> list[Finding]:
                 subject,
                 f"principal moments {low:.3g} + {middle:.3g} < {high:.3g} kg m^2: no body has such inertia",
                 "compute them from the shape; for a box m/12 (b^2 + c^2)",
+                line,
             )
         ]
     return []
+
+
+def principal_moments(inertial: Inertial) -> tuple[float, float, float]:
+    """[kg m^2] in rising order."""
+    ixx, ixy, ixz, iyy, iyz, izz = inertial.inertia
+    low, middle, high = np.linalg.eigvalsh(np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])).tolist()
+    return low, middle, high

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
 from services.arm.errors import DescriptionError
 from services.arm.model.robot_file import read_text
+from services.arm.model.xml_reader import Triple as Triple
+from services.arm.model.xml_reader import XmlFault, XmlReader, joined, parse_xml
 
-Triple = tuple[float, float, float]
 ZERO: Triple = (0.0, 0.0, 0.0)
+DEFAULT_AXIS: Triple = (1.0, 0.0, 0.0)
+NO_SHAPE = "nothing"  # of a geometry that cannot be read
 
 
 class JointKind(StrEnum):
@@ -63,6 +66,7 @@ class UrdfJoint:
     axis: Triple
     limit: Limit | None
     mimic: Mimic | None
+    line: int = field(default=0, compare=False)  # of the file
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,7 @@ class Geometry:
     mesh: str | None = None
     origin: Origin = Origin()
     scale: Triple = (1.0, 1.0, 1.0)
+    line: int = field(default=0, compare=False)  # of the file
 
 
 @dataclass(frozen=True)
@@ -95,6 +100,7 @@ class UrdfLink:
     inertial: Inertial | None
     visuals: tuple[Geometry, ...]
     collisions: tuple[Geometry, ...]
+    line: int = field(default=0, compare=False)  # of the file
 
 
 @dataclass(frozen=True)
@@ -127,139 +133,119 @@ def next_named(name: str, joints: tuple[UrdfJoint, ...]) -> UrdfJoint:
 
 
 def read_urdf(path: Path) -> UrdfModel:
-    """The URDF in `path`; raises `DescriptionError` naming the file and the element."""
-    text = read_text(path)
+    """The URDF in `path`; raises `DescriptionError` naming the file and every element that is wrong."""
+    model, faults = survey_urdf(path)
+    if faults:
+        raise DescriptionError(f"{path}: {joined(faults)}")
+    return model
+
+
+def survey_urdf(path: Path) -> tuple[UrdfModel, list[XmlFault]]:
+    """What can be read of the URDF in `path`, and every fault; raises `DescriptionError` where it is no URDF."""
     try:
-        root = ET.fromstring(text)
-    except ET.ParseError as error:
-        raise DescriptionError(f"{path}: not XML: {error}") from error
-    if root.tag != "robot":
-        raise DescriptionError(f"{path}: the root element is <{root.tag}>, it must be <robot>")
-    try:
-        links = tuple(_link(element) for element in root.findall("link"))
-        joints = tuple(_joint(element) for element in root.findall("joint"))
+        return urdf_of(read_text(path))
     except DescriptionError as error:
-        raise DescriptionError(f"{path}: {error}") from error
-    return UrdfModel(root.get("name", ""), links, joints)
+        raise error if str(path) in str(error) else DescriptionError(f"{path}: {error}") from error
 
 
-def _link(element: ET.Element) -> UrdfLink:
-    name = _attribute(element, "name", "a <link>")
-    inertial = element.find("inertial")
+def urdf_of(text: str) -> tuple[UrdfModel, list[XmlFault]]:
+    """What can be read of a URDF's text, and every fault; raises `DescriptionError` where it is no URDF."""
+    return model_of(parse_xml(text))
+
+
+def model_of(xml: XmlReader) -> tuple[UrdfModel, list[XmlFault]]:
+    """As `urdf_of`, of elements that are parsed."""
+    if xml.root.tag != "robot":
+        raise DescriptionError(f"the root element is <{xml.root.tag}>, it must be <robot>")
+    links = tuple(_link(xml, element) for element in xml.root.findall("link"))
+    joints = tuple(_joint(xml, element) for element in xml.root.findall("joint"))
+    return UrdfModel(xml.root.get("name", ""), links, joints), xml.faults
+
+
+def _link(xml: XmlReader, element: ET.Element) -> UrdfLink:
+    name = xml.text(element, "name", "a <link>")
+    where, inertial = f'link "{name}"', element.find("inertial")
     return UrdfLink(
         name=name,
-        inertial=None if inertial is None else _inertial(inertial, f'link "{name}"'),
-        visuals=tuple(_geometry(item, f'link "{name}"') for item in element.findall("visual")),
-        collisions=tuple(_geometry(item, f'link "{name}"') for item in element.findall("collision")),
+        inertial=None if inertial is None else _inertial(xml, inertial, where),
+        visuals=tuple(_geometry(xml, item, where) for item in element.findall("visual")),
+        collisions=tuple(_geometry(xml, item, where) for item in element.findall("collision")),
+        line=xml.lines.get(element, 0),
     )
 
 
-def _joint(element: ET.Element) -> UrdfJoint:
-    name = _attribute(element, "name", "a <joint>")
+def _joint(xml: XmlReader, element: ET.Element) -> UrdfJoint:
+    name = xml.text(element, "name", "a <joint>")
     where = f'joint "{name}"'
-    kind = element.get("type", "")
-    if kind not in set(JointKind):
-        raise DescriptionError(f'{where}: type "{kind}" is not one of {", ".join(JointKind)}')
+    kind = _kind(xml, element, where)
     return UrdfJoint(
         name=name,
-        kind=JointKind(kind),
-        parent=_attribute(_child(element, "parent", where), "link", where),
-        child=_attribute(_child(element, "child", where), "link", where),
-        origin=_origin(element, where),
-        axis=_axis(element.find("axis"), kind, where),
-        limit=_limit(element.find("limit"), where),
-        mimic=_mimic(element.find("mimic"), where),
+        kind=kind,
+        parent=xml.text(xml.child(element, "parent", where), "link", where),
+        child=xml.text(xml.child(element, "child", where), "link", where),
+        origin=_origin(xml, element, where),
+        axis=_axis(xml, element.find("axis"), kind, where),
+        limit=_limit(xml, element.find("limit"), where),
+        mimic=_mimic(xml, element.find("mimic"), where),
+        line=xml.lines.get(element, 0),
     )
 
 
-def _axis(element: ET.Element | None, kind: str, where: str) -> Triple:
+def _kind(xml: XmlReader, element: ET.Element, where: str) -> JointKind:
+    """Fixed, where it is none that is known."""
+    kind = element.get("type", "")
+    if kind in set(JointKind):
+        return JointKind(kind)
+    remedy = "make it fixed, or of several revolute and prismatic ones" if kind in ("floating", "planar") else ""
+    xml.fault(element, where, f'type "{kind}" is not one of {", ".join(JointKind)}', remedy)
+    return JointKind.FIXED
+
+
+def _axis(xml: XmlReader, element: ET.Element | None, kind: JointKind, where: str) -> Triple:
     """Of length one; a fixed joint's has no meaning, and exporters write zero there."""
-    if element is None or kind == JointKind.FIXED:
-        return (1.0, 0.0, 0.0)
-    return _unit(_triple(element.get("xyz", "1 0 0"), where), where)
-
-
-def _limit(element: ET.Element | None, where: str) -> Limit | None:
-    if element is None:
-        return None
-    return Limit(*(_number(element, key, where, 0.0) for key in ("lower", "upper", "effort", "velocity")))
-
-
-def _mimic(element: ET.Element | None, where: str) -> Mimic | None:
-    if element is None:
-        return None
-    joint = _attribute(element, "joint", f"{where}, <mimic>")
-    return Mimic(joint, _number(element, "multiplier", where, 1.0), _number(element, "offset", where, 0.0))
-
-
-def _inertial(element: ET.Element, where: str) -> Inertial:
-    mass = _number(_child(element, "mass", where), "value", where)
-    tensor = _child(element, "inertia", where)
-    ixx, ixy, ixz, iyy, iyz, izz = (_number(tensor, k, where) for k in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
-    return Inertial(mass, (ixx, ixy, ixz, iyy, iyz, izz), _origin(element, where))
-
-
-def _geometry(element: ET.Element, where: str) -> Geometry:
-    geometry = _child(element, "geometry", f"{where}, <{element.tag}>")
-    if len(geometry) != 1:
-        raise DescriptionError(f"{where}: a <geometry> has {len(geometry)} shapes, it must have one")
-    shape = geometry[0]
-    origin = _origin(element, where)
-    if shape.tag == "mesh":
-        scale = _triple(shape.get("scale", "1 1 1"), f"{where}, <mesh>")
-        return Geometry("mesh", _attribute(shape, "filename", f"{where}, <mesh>"), origin, scale)
-    return Geometry(shape.tag, origin=origin)
-
-
-def _origin(element: ET.Element, where: str) -> Origin:
-    origin = element.find("origin")
-    if origin is None:
-        return Origin()
-    return Origin(_triple(origin.get("xyz", "0 0 0"), where), _triple(origin.get("rpy", "0 0 0"), where))
-
-
-def _child(element: ET.Element, tag: str, where: str) -> ET.Element:
-    found = element.find(tag)
-    if found is None:
-        raise DescriptionError(f"{where}: <{tag}> is missing")
-    return found
-
-
-def _attribute(element: ET.Element, name: str, where: str) -> str:
-    value = element.get(name)
-    if not value:
-        raise DescriptionError(f"{where}: attribute `{name}` of <{element.tag}> is missing")
-    return value
-
-
-def _number(element: ET.Element, name: str, where: str, default: float | None = None) -> float:
-    text = element.get(name)
-    if text is None:
-        if default is None:
-            raise DescriptionError(f"{where}: attribute `{name}` of <{element.tag}> is missing")
-        return default
-    return _finite(text, f"{where}: `{name}` of <{element.tag}>")
-
-
-def _triple(text: str, where: str) -> Triple:
-    numbers = [_finite(word, where) for word in text.split()]
-    if len(numbers) != 3:
-        raise DescriptionError(f'{where}: "{text}" must be three numbers')
-    return numbers[0], numbers[1], numbers[2]
-
-
-def _finite(text: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError as error:
-        raise DescriptionError(f'{where}: "{text}" is not a number') from error
-    if not math.isfinite(value):
-        raise DescriptionError(f"{where}: {text} is not finite")
-    return value
-
-
-def _unit(axis: Triple, where: str) -> Triple:
+    if element is None or kind is JointKind.FIXED:
+        return DEFAULT_AXIS
+    axis = xml.triple(element, "xyz", DEFAULT_AXIS, where)
     length = math.sqrt(sum(value * value for value in axis))
     if length < 1e-9:
-        raise DescriptionError(f"{where}: the axis is zero")
+        xml.fault(element, where, "the axis is zero", 'write the direction that it turns about, as xyz="0 0 1"')
+        return DEFAULT_AXIS
     return axis[0] / length, axis[1] / length, axis[2] / length
+
+
+def _limit(xml: XmlReader, element: ET.Element | None, where: str) -> Limit | None:
+    if element is None:
+        return None
+    return Limit(*(xml.number(element, key, where, 0.0) for key in ("lower", "upper", "effort", "velocity")))
+
+
+def _mimic(xml: XmlReader, element: ET.Element | None, where: str) -> Mimic | None:
+    if element is None:
+        return None
+    joint = xml.text(element, "joint", f"{where}, <mimic>")
+    return Mimic(joint, xml.number(element, "multiplier", where, 1.0), xml.number(element, "offset", where, 0.0))
+
+
+def _inertial(xml: XmlReader, element: ET.Element, where: str) -> Inertial:
+    mass = xml.number(xml.child(element, "mass", where), "value", where)
+    tensor = xml.child(element, "inertia", where)
+    ixx, ixy, ixz, iyy, iyz, izz = (xml.number(tensor, k, where) for k in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+    return Inertial(mass, (ixx, ixy, ixz, iyy, iyz, izz), _origin(xml, element, where))
+
+
+def _geometry(xml: XmlReader, element: ET.Element, where: str) -> Geometry:
+    geometry, line = xml.child(element, "geometry", f"{where}, <{element.tag}>"), xml.lines.get(element, 0)
+    if len(geometry) != 1:
+        if xml.lines.get(geometry):
+            xml.fault(element, where, f"a <geometry> has {len(geometry)} shapes, it must have one")
+        return Geometry(NO_SHAPE, line=line)
+    shape, origin = geometry[0], _origin(xml, element, where)
+    if shape.tag == "mesh":
+        scale = xml.triple(shape, "scale", (1.0, 1.0, 1.0), f"{where}, <mesh>")
+        return Geometry("mesh", xml.text(shape, "filename", f"{where}, <mesh>"), origin, scale, line)
+    return Geometry(shape.tag, origin=origin, line=line)
+
+
+def _origin(xml: XmlReader, element: ET.Element, where: str) -> Origin:
+    origin = element.find("origin")
+    return Origin(xml.triple(origin, "xyz", ZERO, where), xml.triple(origin, "rpy", ZERO, where))

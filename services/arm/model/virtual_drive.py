@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from services.arm.errors import DescriptionError
-from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
+from services.arm.model.urdf import JointKind, Limit, UrdfJoint, UrdfModel
 
 VIRTUAL_DRIVER = "virtual"  # the name of the generated [[driver]]
 NO_MOTORS = "no motors: to plan and look at only"
@@ -83,6 +83,7 @@ def _joint(written: Table, name: object, joint: UrdfJoint | None, number: int) -
     limit = joint.limit if joint is not None else None
     velocity = limit.velocity if limit is not None and limit.velocity > 0.0 else UNKNOWN_VELOCITY
     slides = joint is not None and joint.kind is JointKind.PRISMATIC
+    is_continuous = joint is not None and joint.kind is JointKind.CONTINUOUS
     travel = math.tau * PINION_RADIUS if slides else math.tau  # for a turn
     rack = {"transmission": "rack_and_pinion", "pinion_radius": PINION_RADIUS} if slides else {}
     table: Table = {
@@ -90,6 +91,7 @@ def _joint(written: Table, name: object, joint: UrdfJoint | None, number: int) -
         "wire_name": f"q{number}",
         "max_speed_rpm": 60.0 * velocity / travel,
         "ramp_time": RAMP_TIME,
+        "reference_position": 0.0 if limit is None or is_continuous else _nearest_zero(limit),
         **rack,
         **written,
     }
@@ -97,6 +99,11 @@ def _joint(written: Table, name: object, joint: UrdfJoint | None, number: int) -
     turns = rpm / 60.0 if isinstance(rpm, (int, float)) and rpm > 0.0 else 1.0  # [rev/s]
     pulses = max(COARSEST, min(FINEST_SLIDE if slides else FINEST, math.floor(MOST_RATE / turns)))
     return {**table, "motor": {"driver": VIRTUAL_DRIVER, "pulses_per_turn": pulses}}
+
+
+def _nearest_zero(limit: Limit) -> float:
+    """[rad] or [m] within the limits."""
+    return min(max(0.0, limit.lower), max(limit.lower, limit.upper))
 
 
 def _tables(value: object) -> Iterator[Table]:

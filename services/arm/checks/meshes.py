@@ -1,0 +1,130 @@
+"""Checks of the URDF's meshes: that they open, are in metres, bound a volume, and weigh what the link weighs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from services.arm.checks.findings import Finding, error, warning
+from services.arm.model.urdf import Geometry, UrdfLink, UrdfModel
+
+# Tuning constants: chosen, where a line does not say measured or standard.
+IN_MILLIMETRES = 5.0  # longest side in the file's unit from which on a link's mesh is not in metres
+SMALLEST = 0.001  # [m] of its longest side
+FLAT = 1e-3  # thickness as a share of the longest side below which a mesh bounds no volume
+LIGHTEST, HEAVIEST = 15.0, 20_000.0  # [kg/m^3] light foam, tungsten: no part of an arm is beyond
+MILLIMETRE_REMEDY = 'write scale="0.001 0.001 0.001"'
+
+
+@dataclass(frozen=True)
+class MeshFacts:
+    """What a file holds, in its own unit: its longest and its shortest side, its volume, inertia of density 1."""
+
+    longest: float
+    thickness: float
+    volume: float
+    center: tuple[float, ...]  # (3,) of volume
+    inertia: tuple[float, ...]  # (9,) of the volume with density 1, about `center`
+
+    @property
+    def is_flat(self) -> bool:
+        """True if it bounds no volume."""
+        return self.thickness < FLAT * self.longest
+
+
+Facts = Callable[[Geometry], MeshFacts | str | None]
+
+
+def facts_of(file: Path) -> MeshFacts | str:
+    """Of a mesh file, or why it cannot be read."""
+    import trimesh  # half a second
+
+    try:
+        mesh = trimesh.load_scene(file).to_mesh()
+        vertices = np.asarray(mesh.vertices, dtype=float)
+        if not len(mesh.faces):
+            return "it holds no triangle"
+        used = vertices[np.unique(mesh.faces)]
+        if not np.isfinite(used).all():
+            return "a corner of it is not finite"
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)  # for the volume: exporters write every corner thrice
+        whole = mesh if mesh.is_watertight else mesh.convex_hull
+        volume = abs(float(whole.volume))
+        return MeshFacts(float(np.ptp(used, axis=0).max()), _thickness(used), volume,
+                         tuple(whole.center_mass), tuple(np.ravel(whole.moment_inertia)))  # fmt: skip
+    except ImportError as problem:
+        return f"there is no reader for {file.suffix}: {problem}"
+    except Exception as problem:  # whatever its many readers raise for a damaged file, and the hull for a flat one
+        if "used" in locals():
+            return MeshFacts(float(np.ptp(used, axis=0).max()), 0.0, 0.0, (0.0,) * 3, (0.0,) * 9)
+        return f"it cannot be read: {type(problem).__name__}: {problem}"
+
+
+def _thickness(points: np.ndarray) -> float:
+    """Of the points (n, 3) along the axis on which they spread least."""
+    across = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2]
+    return float(np.ptp(points @ across.T, axis=0).min())
+
+
+def check_meshes(model: UrdfModel, file: str, facts: Facts) -> list[Finding]:
+    """Every mesh once a link; `facts` gives None for what is no mesh or not there, which others say."""
+    findings: list[Finding] = []
+    for link in model.links:
+        seen: set[str | None] = set()
+        for geometry in (*link.visuals, *link.collisions):
+            if geometry.mesh is not None and geometry.mesh not in seen:
+                seen.add(geometry.mesh)
+                findings += _mesh(geometry, facts(geometry), f'link "{link.name}"', file)
+        findings += _density(link, file, facts)
+    return findings
+
+
+def is_in_millimetres(geometry: Geometry, facts: MeshFacts) -> bool:
+    """True if it is 1000 times too large as it is scaled now."""
+    return facts.longest * max(map(abs, geometry.scale)) > IN_MILLIMETRES
+
+
+def _mesh(geometry: Geometry, facts: MeshFacts | str | None, subject: str, file: str) -> list[Finding]:
+    if facts is None:
+        return []
+    mesh, line = f'mesh "{geometry.mesh}"', geometry.line
+    if isinstance(facts, str):
+        return [error(file, subject, f"{mesh}: {facts}", "export it again, as .stl or .obj", line)]
+    longest = facts.longest * max(map(abs, geometry.scale))
+    if is_in_millimetres(geometry, facts):
+        return [error(file, subject, f"{mesh} is {longest:.4g} m long: it is in millimetres", MILLIMETRE_REMEDY, line)]
+    if longest < SMALLEST:
+        return [warning(file, subject, f"{mesh} is {1000.0 * longest:.3g} mm long", "see its scale", line)]
+    if facts.is_flat:
+        thickness = 1000.0 * facts.thickness * max(map(abs, geometry.scale))  # [mm]
+        message = f"{mesh} bounds no volume: it is {thickness:.2g} mm thick"
+        return [warning(file, subject, message, "export the solid, or leave it out", line)]
+    return []
+
+
+def _density(link: UrdfLink, file: str, facts: Facts) -> list[Finding]:
+    """Mass over the volume of the link's meshes; a link with other visuals is not judged."""
+    volume = link_volume(link, facts)
+    if link.inertial is None or not link.inertial.mass > 0.0 or not volume:
+        return []
+    density = link.inertial.mass / volume
+    if LIGHTEST <= density <= HEAVIEST:
+        return []
+    message = (
+        f"{link.inertial.mass:g} kg in {1e6 * volume:.4g} cm^3 are {density:.3g} kg/m^3: no material has that density"
+    )
+    return [warning(file, f'link "{link.name}"', message, "correct its mass, or the unit of its meshes", link.line)]
+
+
+def link_volume(link: UrdfLink, facts: Facts) -> float:
+    """[m^3] of its visual meshes; 0 where one of them is no mesh, flat, in another unit or cannot be read."""
+    total = 0.0
+    for visual in link.visuals:
+        known = facts(visual)
+        if not isinstance(known, MeshFacts) or known.is_flat or is_in_millimetres(visual, known):
+            return 0.0
+        total += known.volume * abs(float(np.prod(visual.scale)))
+    return total

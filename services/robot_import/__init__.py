@@ -1,0 +1,1 @@
+"""A CAD export becomes a robot's folder: `gemelo import`."""

@@ -1,0 +1,252 @@
+"""What is wrong with a source, all at once; what has one answer is mended in the elements, and said."""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+from services.arm.checks.findings import Finding, Severity, error, note
+from services.arm.checks.meshes import Facts, MeshFacts, check_meshes, facts_of, is_in_millimetres, link_volume
+from services.arm.checks.urdf import check_urdf, fault_finding, principal_moments
+from services.arm.model.urdf import Geometry, JointKind, UrdfLink, UrdfModel, model_of
+from services.arm.model.xml_reader import XmlReader, parse_xml
+from services.robot_import.source import Source
+
+MOVES = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
+
+
+@dataclass
+class Mended:
+    """The elements of a source as they are to be written, and what was said of them."""
+
+    source: Source
+    xml: XmlReader
+    files: dict[str, Path]  # mesh references as written, and the files that they mean
+    notes: list[Finding] = field(default_factory=list)
+    errors: list[Finding] = field(default_factory=list)
+
+    @property
+    def model(self) -> UrdfModel:
+        """As it is now, with what cannot be read left at a default."""
+        return model_of(XmlReader(self.xml.root, self.xml.lines))[0]
+
+    def findings(self) -> list[Finding]:
+        """Everything: errors, warnings, and what is mended."""
+        model, faults = model_of(XmlReader(self.xml.root, self.xml.lines))
+        file = self.source.urdf.name
+        found = [*self.errors, *(fault_finding(fault, file) for fault in faults)]
+        found += [*check_urdf(model, self.source.urdf, has_meshes=False), *check_meshes(model, file, self.facts)]
+        return sorted([*found, *self.notes], key=lambda each: list(Severity).index(each.severity))
+
+    def facts(self, geometry: Geometry) -> MeshFacts | str | None:
+        """Of its mesh; None where it is none or its file is not there."""
+        file = self.files.get(geometry.mesh or "")
+        return None if file is None else _facts(file)
+
+    def say(self, element: ET.Element, subject: str, message: str, remedy: str) -> None:
+        """Notes what is mended."""
+        self.notes.append(note(self.source.urdf.name, subject, message, remedy, self.xml.lines.get(element, 0)))
+
+
+@lru_cache(maxsize=256)
+def _facts(file: Path) -> MeshFacts | str:
+    return facts_of(file)
+
+
+def mend(source: Source) -> Mended:
+    """The source, mended; raises `DescriptionError` where it is no URDF at all."""
+    xml = parse_xml(source.text)
+    model_of(xml)
+    xml.faults.clear()
+    mended = Mended(source, xml, {})
+    for step in (_names, _references, _axes, _mimics, _millimetres, _flat, _frames, _inertias, _unseen):
+        step(mended)
+    return mended
+
+
+def safe_name(text: str, known: set[str], allowed: str = r"[^A-Za-z0-9_.-]+") -> str:
+    """ "Brazo nº 1" as Brazo_n_1: ASCII, and no other of `known`, to which it is added."""
+    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    stem = re.sub(allowed, "_", plain).strip("_") or "part"
+    name, number = stem, 2
+    while name in known:
+        name, number = f"{stem}_{number}", number + 1
+    known.add(name)
+    return name
+
+
+def _names(mended: Mended) -> None:
+    """Blanks and accents in names of links and joints."""
+    for tag, roles in (("link", ("parent", "child")), ("joint", ())):
+        elements = [element for element in mended.xml.root.findall(tag) if element.get("name")]
+        known = {element.get("name", "") for element in elements}
+        for element in elements:
+            old = element.get("name", "")
+            if re.fullmatch(r"[A-Za-z0-9_.-]+", old):
+                continue
+            new = safe_name(old, known)
+            element.set("name", new)
+            mended.say(element, f'{tag} "{old}"', "its name has blanks or letters that commands do not take", f"{new}")
+            for joint in mended.xml.root.findall("joint"):
+                for role in (joint.find(word) for word in roles or ("mimic",)):
+                    if role is not None and role.get(tag) == old:
+                        role.set(tag, new)
+
+
+def _references(mended: Mended) -> None:
+    """The files that meshes mean; a missing one is an error."""
+    by_package: dict[str, int] = {}
+    for link, _, _, mesh in _meshes(mended):
+        reference = mesh.get("filename", "")
+        found = mended.source.find(reference) if reference else None
+        if found is None and reference:
+            message = f'mesh "{reference}" is not there{mended.source.near(reference)}'
+            line = mended.xml.lines.get(mesh, 0)
+            file = mended.source.urdf.name
+            mended.errors.append(error(file, _subject(link), message, f"put it below {mended.source.root}", line))
+        elif found is not None:
+            mended.files[reference] = found
+            if reference.startswith("package://"):
+                package = reference.split("/")[2]
+                by_package[package] = by_package.get(package, 0) + 1
+    for package, count in by_package.items():
+        message = f"{count} meshes are named by the ROS package path package://{package}"
+        mended.notes.append(note(mended.source.urdf.name, "meshes", message, "relative paths, the files copied"))
+
+
+def _axes(mended: Mended) -> None:
+    for joint in mended.xml.root.findall("joint"):
+        axis = joint.find("axis")
+        numbers = None if axis is None else _numbers(axis.get("xyz", "1 0 0"))
+        if axis is None or numbers is None:
+            continue
+        length = math.sqrt(sum(value * value for value in numbers))
+        where = f'joint "{joint.get("name")}"'
+        if joint.get("type") not in MOVES:
+            if length < 1e-9:
+                mended.say(axis, where, "a fixed joint's axis is zero, which is harmless", "left out")
+            joint.remove(axis)
+        elif length >= 1e-9 and abs(length - 1.0) > 1e-6:
+            text = " ".join(f"{value / length:.9g}" for value in numbers)
+            mended.say(axis, where, f'its axis "{axis.get("xyz")}" is {length:.4g} long, not 1', f'xyz="{text}"')
+            axis.set("xyz", text)
+
+
+def _mimics(mended: Mended) -> None:
+    for joint in mended.xml.root.findall("joint"):
+        mimic = joint.find("mimic")
+        if mimic is not None and joint.get("type") in MOVES:
+            message = f'follows joint "{mimic.get("joint")}"'
+            mended.say(mimic, f'joint "{joint.get("name")}"', message, "it gets no motor of its own")
+
+
+def _millimetres(mended: Mended) -> None:
+    for link, item, geometry, mesh in _meshes(mended):
+        known = mended.facts(geometry)
+        if isinstance(known, MeshFacts) and is_in_millimetres(geometry, known):
+            scale = " ".join(f"{0.001 * value:.9g}" for value in geometry.scale)
+            length = known.longest * max(map(abs, geometry.scale))
+            message = f'mesh "{geometry.mesh}" in <{item.tag}> is {length:.4g} m long: it is in millimetres'
+            mesh.set("scale", scale)
+            mended.say(mesh, _subject(link), message, f'scale="{scale}"')
+
+
+def _flat(mended: Mended) -> None:
+    """A mesh without volume is drawn nowhere and fitted to nothing."""
+    for link, item, geometry, mesh in _meshes(mended):
+        known = mended.facts(geometry)
+        if isinstance(known, MeshFacts) and known.is_flat:
+            message = f'mesh "{geometry.mesh}" in <{item.tag}> bounds no volume'
+            link.remove(item)
+            mended.say(mesh, _subject(link), message, "left out")
+
+
+def _frames(mended: Mended) -> None:
+    for link, model in _links(mended):
+        inertial = link.find("inertial")
+        if inertial is not None and model.inertial is not None and model.inertial.mass == 0.0:
+            link.remove(inertial)
+            mended.say(inertial, _subject(link), "its mass is 0 kg: it is a mere frame", "<inertial> left out")
+
+
+def _inertias(mended: Mended) -> None:
+    """One that no body has becomes that of the meshes, of even density and of the same mass."""
+    for link, model in _links(mended):
+        inertial, known = link.find("inertial"), model.inertial
+        if inertial is None or known is None or not known.mass > 0.0:
+            continue
+        low, middle, high = principal_moments(known)
+        if low > 0.0 and low + middle >= high * (1.0 - 1e-6):
+            continue
+        message = f"its principal moments {low:.3g}, {middle:.3g}, {high:.3g} kg m^2 are of no body"
+        link.remove(inertial)
+        even = _even_density(model, known.mass, mended.facts)
+        if even is not None:
+            link.insert(0, even)
+            mended.xml.lines[even] = mended.xml.lines.get(inertial, 0)
+        remedy = "left out" if even is None else f"that of its mesh at {known.mass:g} kg of even density"
+        mended.say(inertial, _subject(link), message, remedy)
+
+
+def _unseen(mended: Mended) -> None:
+    """A link with collision meshes alone is drawn with them."""
+    for link in mended.xml.root.findall("link"):
+        if link.find("visual") is not None:
+            continue
+        for collision in link.findall("collision"):
+            visual = ET.fromstring(ET.tostring(collision))
+            visual.tag = "visual"
+            link.insert(0, visual)
+            mended.say(collision, _subject(link), "has a <collision>, but no <visual>", "drawn with the same shape")
+
+
+def _even_density(link: UrdfLink, mass: float, facts: Facts) -> ET.Element | None:
+    """<inertial> of a link with one visual mesh; None for others."""
+    volume = link_volume(link, facts)
+    known = facts(link.visuals[0]) if len(link.visuals) == 1 else None
+    if not volume or not isinstance(known, MeshFacts) or len({abs(value) for value in link.visuals[0].scale}) != 1:
+        return None
+    scale, origin = abs(link.visuals[0].scale[0]), link.visuals[0].origin
+    if any(origin.rpy):
+        return None
+    moments = [mass / known.volume * scale**2 * value for value in known.inertia]
+    center = [place + scale * value for place, value in zip(origin.xyz, known.center, strict=True)]
+    element = ET.Element("inertial")
+    ET.SubElement(element, "origin", xyz=" ".join(f"{value:.6g}" for value in center), rpy="0 0 0")
+    ET.SubElement(element, "mass", value=f"{mass:.6g}")
+    names = {"ixx": 0, "ixy": 1, "ixz": 2, "iyy": 4, "iyz": 5, "izz": 8}
+    ET.SubElement(element, "inertia", {name: f"{moments[place]:.6g}" for name, place in names.items()})
+    return element
+
+
+def _meshes(mended: Mended) -> Iterator[tuple[ET.Element, ET.Element, Geometry, ET.Element]]:
+    """Link, visual or collision, how it was read, and its <mesh>."""
+    for link, model in _links(mended):
+        shapes = zip(
+            (*link.findall("visual"), *link.findall("collision")), (*model.visuals, *model.collisions), strict=True
+        )
+        for item, geometry in list(shapes):
+            mesh = item.find("geometry/mesh")
+            if mesh is not None:
+                yield link, item, geometry, mesh
+
+
+def _links(mended: Mended) -> list[tuple[ET.Element, UrdfLink]]:
+    return list(zip(mended.xml.root.findall("link"), mended.model.links, strict=True))
+
+
+def _subject(link: ET.Element) -> str:
+    return f'link "{link.get("name")}"'
+
+
+def _numbers(text: str) -> list[float] | None:
+    try:
+        return [float(word) for word in text.split()]
+    except ValueError:
+        return None

@@ -1,0 +1,41 @@
+"""The meshes of an imported arm, below its own folder under names that every program takes."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from services.arm.errors import DescriptionError
+from services.robot_import.mending import Mended, safe_name
+
+KEPT = (".stl", ".glb")  # the viewer, the page and the fitting read these; other formats become .glb
+NOT_IN_A_FILE = r"[^a-z0-9_-]+"
+
+
+def copy_meshes(mended: Mended, folder: Path) -> int:
+    """Copies every mesh that the elements name into `folder`/meshes, rewrites their references, returns the number."""
+    names: dict[Path, str] = {}
+    known: set[str] = set()
+    for mesh in mended.xml.root.iter("mesh"):
+        reference = mesh.get("filename", "")
+        file = mended.files[reference]
+        if file not in names:
+            names[file] = _copy(file, folder / "meshes", safe_name(file.stem.lower(), known, NOT_IN_A_FILE))
+        mesh.set("filename", f"meshes/{names[file]}")
+    return len(names)
+
+
+def _copy(file: Path, folder: Path, stem: str) -> str:
+    """The name in `folder`; raises `DescriptionError` for what trimesh cannot read."""
+    folder.mkdir(exist_ok=True)
+    ending = file.suffix.lower()
+    if ending in KEPT:
+        shutil.copyfile(file, folder / f"{stem}{ending}")
+        return f"{stem}{ending}"
+    import trimesh  # half a second
+
+    try:
+        trimesh.load_scene(file).export(folder / f"{stem}.glb")
+    except Exception as error:  # whatever its many readers raise for a damaged file
+        raise DescriptionError(f"{file} cannot be read: {type(error).__name__}: {error}") from error
+    return f"{stem}.glb"

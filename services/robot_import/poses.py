@@ -1,0 +1,88 @@
+"""The named states of an imported arm: `home` and `ready`, where nothing touches, and its SRDF."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.errors import DescriptionError
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
+from services.arm.model.urdf import JointKind, UrdfJoint
+
+Array = NDArray[np.float64]
+
+# Tuning constants: chosen, where a line does not say measured or standard.
+CLEAR = 0.008  # [m] between links that may touch, in a named state: twice what plans keep
+TRIES = 3000
+INSET = 0.01  # of the travel from a limit to `home`
+READY = 0.4  # of the way from the middle to the limits, at most, for `ready`
+NEAREST_READY = 0.3  # [rad] or share of a slide's travel that `ready` must be away from `home`
+SEED = 0
+
+
+def zero_state(joints: Sequence[UrdfJoint]) -> dict[str, float]:
+    """0 [rad] or [m] for every joint, or near the limit that is nearest to it."""
+    lower, upper = np.array([_range(joint) for joint in joints]).T
+    return dict(zip([joint.name for joint in joints], _zero(lower, upper).tolist(), strict=True))
+
+
+def _zero(lower: Array, upper: Array) -> Array:
+    inset = INSET * (upper - lower)
+    inside = np.round(np.clip(0.0, lower + inset, upper - inset), 4)
+    return np.where((lower <= 0.0) & (upper >= 0.0), 0.0, inside)
+
+
+def named_states(arm: Arm) -> dict[str, dict[str, float]]:
+    """`home`, near zero, and `ready`, away from it [rad] or [m]; raises `DescriptionError` where none is free."""
+    checker = Kinematics(arm).collisions
+    urdf = [arm.model.joint(name) for name in arm.joint_names]
+    lower, upper = np.array([_range(joint) for joint in urdf]).T
+    home = _first_free(checker.distance, _around(_zero(lower, upper), lower, upper), "home", arm)
+    middle, half = (lower + upper) / 2.0, (upper - lower) / 2.0
+    least = np.minimum(NEAREST_READY, 0.2 * (upper - lower))
+    away = (each for each in _around(middle + READY * 0.5 * half, lower, upper) if (abs(each - home) >= least).any())
+    ready = _first_free(checker.distance, away, "ready", arm)
+    rounded = {"home": np.clip(np.round(home, 4), lower, upper), "ready": np.clip(np.round(ready, 4), lower, upper)}
+    return {name: dict(zip(arm.joint_names, state.tolist(), strict=True)) for name, state in rounded.items()}
+
+
+def _around(center: Array, lower: Array, upper: Array) -> Iterator[Array]:
+    """(n,) the center, then random ones that lie farther and farther away."""
+    random = np.random.default_rng(SEED)
+    for number in range(TRIES):
+        reach = number / TRIES * (upper - lower)
+        yield np.clip(center + reach * random.uniform(-1.0, 1.0, len(center)), lower, upper)
+
+
+def _first_free(distance: Callable[[Array], float], states: Iterator[Array], name: str, arm: Arm) -> Array:
+    for state in states:
+        if distance(state) > CLEAR:
+            return state
+    raise DescriptionError(
+        f'{arm.urdf_path}: no configuration of {TRIES} is free of contact for the state "{name}": see with '
+        "`gemelo collision matrix` which links touch always, and correct their shapes"
+    )
+
+
+def _range(joint: UrdfJoint) -> tuple[float, float]:
+    """[rad] or [m]; a turn for a joint without limits."""
+    if joint.kind is JointKind.CONTINUOUS or joint.limit is None:
+        return -math.pi, math.pi
+    return joint.limit.lower, joint.limit.upper
+
+
+def srdf_text(name: str, joints: Sequence[str], states: Mapping[str, Mapping[str, float]]) -> str:
+    """An SRDF with the group `arm` and its states [rad] or [m], and no pair of links yet."""
+    lines = ['<?xml version="1.0"?>', f"<robot name={quoteattr(name)}>", '  <group name="arm">']
+    lines += [f"    <joint name={quoteattr(joint)}/>" for joint in joints]
+    lines += ["  </group>"]
+    for state, values in states.items():
+        lines.append(f'  <group_state name={quoteattr(state)} group="arm">')
+        lines += [f'    <joint name={quoteattr(joint)} value="{values[joint]:.9g}"/>' for joint in joints]
+        lines.append("  </group_state>")
+    return "\n".join([*lines, "</robot>", ""])

@@ -1,0 +1,104 @@
+"""What a URDF cannot say, asked of a person: from a file of answers, by defaults, or on the terminal."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from services.arm.errors import DescriptionError, suggestion
+
+T = TypeVar("T")
+
+
+class Questions:
+    """Each question has a key, by which its answer is kept and can be given again."""
+
+    def __init__(self, given: dict[str, str], takes_defaults: bool) -> None:
+        self.answers: dict[str, str] = {}
+        self._given, self._takes_defaults = given, takes_defaults
+
+    def ask(self, key: str, question: str, default: str, parse: Callable[[str], T]) -> T:
+        """The answer as `parse` reads it; raises `DescriptionError` where a given one is refused."""
+        if key in self._given:
+            return self._parsed(key, self._given[key], parse)
+        if self._takes_defaults or not sys.stdin.isatty():
+            return self._parsed(key, default, parse)
+        while True:
+            print(f"  {question} [{default}] ", end="", flush=True)
+            said = sys.stdin.readline()
+            if not said:
+                raise DescriptionError(f"nobody answers {key}: say --yes for the defaults")
+            try:
+                return self._parsed(key, said.strip() or default, parse)
+            except DescriptionError as error:
+                print(f"  {error}")
+
+    def unused(self) -> list[str]:
+        """What was given and never asked, with a hint: a misspelt key has no effect."""
+        left = [key for key in self._given if key not in self.answers]
+        return [f'"{key}"{suggestion(key, self.answers)}' for key in left]
+
+    def _parsed(self, key: str, text: str, parse: Callable[[str], T]) -> T:
+        try:
+            value = parse(text)
+        except ValueError as error:
+            raise DescriptionError(f'{key} = "{text}": {error}') from error
+        self.answers[key] = text
+        return value
+
+
+def read_answers(file: Path) -> dict[str, str]:
+    """Of a file that an import wrote; raises `DescriptionError`."""
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise DescriptionError(f"{file}: cannot be read as answers: {error}") from error
+    for key, value in data.items():
+        if isinstance(value, (dict, list)):
+            raise DescriptionError(f'{file}: "{key}" is no single answer: write "{key}" = "..."')
+    return {key: value if isinstance(value, str) else str(value).lower() for key, value in data.items()}
+
+
+def answers_text(answers: dict[str, str]) -> str:
+    """As `read_answers` reads them."""
+    lines = [f"{json.dumps(key)} = {json.dumps(value)}" for key, value in answers.items()]
+    return "# What `gemelo import` asked, for `--answers`.\n" + "\n".join(lines) + "\n"
+
+
+def yes_or_no(text: str) -> bool:
+    """Raises ValueError."""
+    words = {"yes": True, "y": True, "si": True, "s": True, "true": True, "no": False, "n": False, "false": False}
+    if text.lower() not in words:
+        raise ValueError("say yes or no")
+    return words[text.lower()]
+
+
+def number(text: str) -> float:
+    """A finite one; raises ValueError."""
+    value = float(text)
+    if not abs(value) < float("inf"):
+        raise ValueError("it is not finite")
+    return value
+
+
+def above_zero(text: str) -> float:
+    """Raises ValueError."""
+    value = number(text)
+    if not value > 0.0:
+        raise ValueError("it must be above 0")
+    return value
+
+
+def one_of(*words: str) -> Callable[[str], str]:
+    """A reader that raises ValueError for every other word."""
+
+    def read(text: str) -> str:
+        if text not in words:
+            raise ValueError(f"it is none of {', '.join(words)}")
+        return text
+
+    return read

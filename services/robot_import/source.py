@@ -1,0 +1,120 @@
+"""The URDF of a CAD export, and the files that its mesh references mean: ROS 1 and 2 packages, plain folders, xacro."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import unquote
+
+from services.arm.errors import DescriptionError, suggestion
+from services.arm.model.robot_file import read_text
+
+UP = 3  # folders above the URDF in which its package may be
+XACRO = ".xacro"
+NO_XACRO = (
+    "it is xacro, and the Python package `xacro` is not installed: install it into .venv, or expand the file "
+    "where ROS is (`xacro robot.urdf.xacro > robot.urdf`) and import that"
+)
+
+
+@dataclass(frozen=True)
+class Source:
+    """A URDF's text, expanded where it was xacro, and the folder to look for its meshes in."""
+
+    urdf: Path
+    root: Path
+    text: str
+
+    def find(self, reference: str) -> Path | None:
+        """The file that a mesh's `filename` means, None where there is none or several could be meant."""
+        for path in self._candidates(unquote(reference.replace("\\", "/"))):
+            if path.is_file():
+                return path
+        name = Path(reference.replace("\\", "/")).name
+        alike = [path for path in _files(self.root) if path.name.lower() in (name.lower(), unquote(name).lower())]
+        return alike[0] if len(alike) == 1 else None
+
+    def near(self, reference: str) -> str:
+        """A hint at the file with the most similar name."""
+        return suggestion(Path(reference).name, [path.name for path in _files(self.root) if _is_mesh(path)])
+
+    def _candidates(self, reference: str) -> Iterator[Path]:
+        scheme, _, rest = reference.rpartition("://")
+        above = (self.urdf.parent, *self.urdf.parents[1:UP], self.root)
+        if scheme in ("package", "model"):
+            package, _, inside = rest.partition("/")
+            yield from (folder / inside for folder in above if package in (folder.name, _package_name(folder)))
+            yield from (folder / package / inside for folder in above)
+            yield from (folder / inside for folder in above)
+        elif scheme == "file":
+            yield Path(rest if rest.startswith("/") else f"/{rest}")
+            yield self.urdf.parent / rest.lstrip("/")
+        else:
+            yield from (folder / reference for folder in above)
+
+
+def find_source(given: Path) -> Source:
+    """The source at a URDF, a xacro file or an export's folder; raises `DescriptionError`."""
+    if given.is_file():
+        return Source(given, given.parent, _text(given))
+    if not given.is_dir():
+        raise DescriptionError(f"{given}: there is no such file or folder")
+    urdf = _urdf_in(given)
+    return Source(urdf, given, _text(urdf))
+
+
+def _urdf_in(folder: Path) -> Path:
+    """The only URDF; or, where there is none, the only xacro file that is a robot."""
+    urdfs = [path for path in _files(folder) if path.suffix.lower() == ".urdf"]
+    found = urdfs or [path for path in _files(folder) if path.suffix.lower() == XACRO and _is_robot(path)]
+    if not found:
+        raise DescriptionError(f"{folder}: there is no .urdf and no .xacro of a robot in it")
+    if len(found) > 1:
+        names = ", ".join(str(path.relative_to(folder)) for path in found[:6])
+        raise DescriptionError(f"{folder}: there are {len(found)} robots in it ({names}): name one of these files")
+    return found[0]
+
+
+def _is_robot(path: Path) -> bool:
+    """True if it is a robot's own file, and not one with macros for others."""
+    text = path.read_text(encoding="utf-8", errors="replace")
+    return re.search(r"<robot\b[^>]*\bname\s*=", text) is not None and ("<link" in text or "<xacro:" in text)
+
+
+def _text(path: Path) -> str:
+    text = read_text(path)
+    is_xacro = path.suffix.lower() == XACRO or "<xacro:" in text
+    return _expanded(path) if is_xacro else text
+
+
+def _expanded(path: Path) -> str:
+    """By the package `xacro`; raises `DescriptionError` where it is not installed or refuses the file."""
+    try:
+        import xacro
+    except ImportError:
+        raise DescriptionError(f"{path}: {NO_XACRO}") from None
+    try:
+        return str(xacro.process_file(str(path)).toxml())
+    except Exception as error:  # xacro's own, and those of Python expressions in it
+        raise DescriptionError(f"{path}: xacro cannot expand it: {type(error).__name__}: {error}") from error
+
+
+def _package_name(folder: Path) -> str:
+    """Of the package.xml there; "" where there is none."""
+    try:
+        return ET.parse(folder / "package.xml").getroot().findtext("name", "").strip()
+    except (OSError, ET.ParseError):
+        return ""
+
+
+def _files(folder: Path) -> list[Path]:
+    """All that are not hidden, sorted."""
+    paths = (path for path in folder.rglob("*") if path.is_file())
+    return sorted(path for path in paths if not any(part.startswith(".") for part in path.relative_to(folder).parts))
+
+
+def _is_mesh(path: Path) -> bool:
+    return path.suffix.lower() in (".stl", ".obj", ".dae", ".glb", ".gltf", ".ply")
