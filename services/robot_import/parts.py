@@ -35,15 +35,16 @@ class DriverPart:
 
 MOTORS = (
     MotorPart("NEMA 17", 200, "1", 300.0,
-              "1.8 degrees a step: NEMA ICS 16 frame and makers' sheets (as 17HS4401); 300 RPM: where pull-out curves "
-              "of such motors at 24 V begin to fall"),
+              "1.8 degrees a step: NEMA ICS 16 frame and makers' sheets (as 17HS4401); 300 RPM: chosen, where the "
+              "pull-out curves of such motors at 24 V begin to fall"),
     MotorPart("NEMA 23", 200, "1", 300.0,
-              "1.8 degrees a step: NEMA ICS 16 frame and makers' sheets (as 23HS22); 300 RPM: where pull-out curves of "
-              "such motors at 24 V begin to fall"),
-    MotorPart("28BYJ-48", 32, "25792/405", 15.0,
+              "1.8 degrees a step: NEMA ICS 16 frame and makers' sheets (as 23HS22); 300 RPM: chosen, where the "
+              "pull-out curves of such motors at 24 V begin to fall"),
+    MotorPart("28BYJ-48", 32, "25792/405", 10.0,
               "32 full steps a turn (5.625 degrees / 64 in half steps) and a gearbox nominally 1/64: maker's sheet; "
-              "63.684 = 32/9 x 22/11 x 26/9 x 31/10 by counting its teeth; 15 RPM: the pull-in rate of 500 full "
-              "steps/s in the sheet. Unipolar: cut its centre tap for a step and direction driver"),
+              "63.684 = 32/9 x 22/11 x 26/9 x 31/10 by counting its teeth; 10 RPM: chosen between the sheet's idle "
+              "in-traction and out-traction rates (600 and 1000 half steps/s are 8.8 and 14.7 RPM). Unipolar: cut "
+              "its centre tap for a step and direction driver"),
 )  # fmt: skip
 DRIVERS = (
     DriverPart("A4988", 1.0, 1.0, 0.2, 1.0, (1, 2, 4, 8, 16), 16,
@@ -53,7 +54,7 @@ DRIVERS = (
     DriverPart("TMC2209", 0.2, 0.2, 0.1, 1.0, (8, 16, 32, 64), 16,
                "Trinamic TMC2209 datasheet, STEP/DIR timing: 100 ns high and low, 20 ns set-up, here with room for "
                "their input filter; microsteps by its pins MS1 and MS2"),
-    DriverPart("DM542", 2.5, 2.5, 5.0, 200.0, (2, 4, 8, 16, 32, 64, 128), 8,
+    DriverPart("DM542", 2.5, 2.5, 5.0, 200.0, (2, 4, 5, 8, 10, 16, 20, 25, 32, 40, 50, 64, 100, 125, 128), 8,
                "Leadshine DM542 manual: pulses of 2.5 us, direction 5 us ahead, 200 ms after enabling"),
 )  # fmt: skip
 # GPIOs of an ESP32 that are free for outputs and have no say in how it boots, by pairs of step and direction.

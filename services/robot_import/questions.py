@@ -25,8 +25,10 @@ class Questions:
         """The answer as `parse` reads it; raises `DescriptionError` where a given one is refused."""
         if key in self._given:
             return self._parsed(key, self._given[key], parse)
-        if self._takes_defaults or not sys.stdin.isatty():
+        if self._takes_defaults:
             return self._parsed(key, default, parse)
+        if not sys.stdin.isatty():
+            raise DescriptionError(f"there is nobody to ask for {key}: say --yes for the defaults, or give --answers")
         while True:
             print(f"  {question} [{default}] ", end="", flush=True)
             said = sys.stdin.readline()

@@ -1,0 +1,178 @@
+"""What an import refuses, all at once; and what a person says to it: motors, answers, --force."""
+
+from __future__ import annotations
+
+import importlib.util
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from services.arm.checks.check import check
+from services.arm.checks.findings import Severity
+from services.arm.model.description import load_arm
+from services.cli.errors import ExitCode
+from services.cli.main import run
+from tests.robot_import.exports import by_hand, joint, link, mesh, package, solidworks, workspace, write
+
+
+def broken(root: Path) -> Path:
+    """An export whose faults have no one answer."""
+    folder = package(root / "broken_description", "broken_description")
+    mesh(folder / "meshes", "base_link.STL")
+    (folder / "meshes" / "arm.STL").write_bytes(b"no mesh at all")
+    write(
+        folder / "urdf" / "broken.urdf", "broken",
+        link("base_link", "package://broken_description/meshes/base_link.STL"),
+        link("arm", "package://broken_description/meshes/arm.STL"),
+        link("hand", "package://broken_description/meshes/base_lnik.STL"),
+        '<link name="loose"/>',
+        joint("one", "base_link", "arm", axis="0 0 0"),
+        joint("two", "arm", "hnad", rest='<limit lower="-1" upper="1,5" effort="1" velocity="1"/>'),
+        joint("three", "arm", "hand", kind="planar"),
+    )  # fmt: skip
+    return folder
+
+
+FAULTS = (
+    ("line 7", 'joint "one"', "the axis is zero"),
+    ("line 8", 'joint "two"', '"1,5" is not a number', 'write "1.5"'),
+    ("line 8", 'joint "two"', '"hnad" is no link', '"hand"'),
+    ("line 9", 'joint "three"', 'type "planar"'),
+    ("has 2 roots", "loose", "join them with a fixed joint"),
+    ('link "hand"', "base_lnik.STL", "is not there", '"base_link.STL"'),
+    ('link "arm"', "arm.STL", "it holds no triangle", "export it again"),
+)
+
+
+@pytest.mark.parametrize("words", [["import"], ["check"]])
+def test_everything_that_is_wrong_is_said_at_once_by_import_and_by_check(
+    tmp_path: Path, words: list[str], capsys: pytest.CaptureFixture[str]
+):
+    source = broken(tmp_path)
+    more = ["--output", str(tmp_path / "urdf"), "--yes"] if words == ["import"] else []
+    assert run([*words, str(source), *more]) is ExitCode.FAILED
+    said = [line for line in capsys.readouterr().out.splitlines() if line.startswith("error: ")]
+    for fault in FAULTS:
+        assert any(all(word in line for word in fault) for line in said), (fault, said)
+    assert not (tmp_path / "urdf").exists()
+
+
+def test_check_of_a_bare_urdf_and_of_its_folder_says_what_import_mends(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    urdf = by_hand(tmp_path).source
+    for given in (urdf, tmp_path):
+        assert run(["check", str(given)]) is ExitCode.OK
+        said = capsys.readouterr().out
+        assert "its mass is 0 kg: it is a mere frame -> <inertial> left out" in said
+        assert f"{given}: all is well" in said
+    assert run(["check", str(solidworks(tmp_path / "sw").source)]) is ExitCode.FAILED
+    said = capsys.readouterr().out
+    assert "its velocity limit is 0 -> give a value above 0" in said
+    assert "leave no travel" in said
+
+
+def test_a_folder_without_a_robot_or_with_several_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    for words, text in (
+        (["import", str(tmp_path)], "there is no .urdf and no .xacro"),
+        (["check", str(tmp_path / "nobody")], "there is no such file or folder"),
+    ):
+        assert run(words) is ExitCode.FAILED
+        assert text in capsys.readouterr().err
+    write(tmp_path / "a.urdf", "a", link("x"))
+    write(tmp_path / "b.urdf", "b", link("x"))
+    assert run(["import", str(tmp_path)]) is ExitCode.FAILED
+    assert "there are 2 robots in it (a.urdf, b.urdf): name one" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(importlib.util.find_spec("xacro") is not None, reason="xacro is installed and expands it")
+def test_xacro_without_its_package_says_what_would_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    file = tmp_path / "arm.urdf.xacro"
+    file.write_text('<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arm prefix="l"/></robot>')
+    for given in (file, tmp_path):
+        assert run(["import", str(given)]) is ExitCode.FAILED
+        assert "the Python package `xacro` is not installed: install it" in capsys.readouterr().err
+
+
+def test_xacro_is_expanded_where_its_package_is_installed(tmp_path: Path):
+    pytest.importorskip("xacro")
+    box = '<visual><geometry><box size="0.05 0.05 ${length}"/></geometry></visual>'
+    (tmp_path / "arm.urdf.xacro").write_text(
+        '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="length" value="0.2"/>'
+        f'<xacro:macro name="part" params="name"><link name="${{name}}">{box}</link></xacro:macro>'
+        '<xacro:part name="one"/><xacro:part name="two"/>' + joint("turn", "one", "two") + "</robot>"
+    )
+    assert run(["import", str(tmp_path), "--yes", "--output", str(tmp_path / "urdf")]) is ExitCode.OK
+    assert load_arm(tmp_path / "urdf" / "arm").joint_names == ("turn",)
+
+
+def test_motors_are_written_with_their_sources_and_the_speeds_that_follow(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    """Also: with --answers the same robot is written again, and a switch homes its joint."""
+    source, output = str(by_hand(tmp_path / "source").source), tmp_path / "urdf"
+    words = ["import", source, "--output", str(output), "--name", "arm"]
+    assert run([*words, "--motor", "nema 23", "--driver", "dm542", "--yes"]) is ExitCode.OK
+    said = capsys.readouterr().out
+    assert 'joint "joint1": 19.1 RPM are 509 steps/s, 509 steps/s^2; DM542 takes 200000 steps/s (0% used)' in said
+    assert "at a tick of 20 us (50 kHz" in said
+    arm = load_arm(output / "arm")
+    assert arm.has_motors
+    assert {driver.name for driver in arm.drivers} == {"DM542"}
+    assert "# Leadshine DM542 manual" in (output / "arm" / "robot.toml").read_text()
+    assert "NEMA ICS 16" in (output / "arm" / "robot.toml").read_text()
+
+    answers = output / "arm" / "import.toml"
+    text = answers.read_text()
+    for key, value in (("joint1.switch", "lower"), ("joint2.ratio", "380/21"), ("finger1.motor", "28BYJ-48")):
+        assert f'"{key}"' in text
+        old = tomllib.loads(text)[key]
+        text = text.replace(f'"{key}" = "{old}"', f'"{key}" = "{value}"')
+    mine = tmp_path / "mine.toml"
+    mine.write_text(f'{text}"joint1.switch_pin" = 34\n')
+    assert run([*words, "--answers", str(mine), "--yes"]) is ExitCode.FAILED
+    assert "give --force" in capsys.readouterr().err
+    assert run([*words, "--answers", str(mine), "--yes", "--force"]) is ExitCode.OK
+    arm = load_arm(output / "arm")
+    assert arm.joint("joint1").drive.homing is not None
+    assert arm.joint("joint2").drive.motor.gear_ratio == "380/21"
+    assert arm.joint("finger1").drive.motor.gear_ratio == "25792/405"
+    assert [finding for finding in check(arm.folder) if finding.severity is Severity.ERROR] == []
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ('"motor" = "nema 17"', 'nothing asks for "motor"; did you mean "motors"'),
+        ('"motors" = "perhaps"', 'motors = "perhaps": say yes or no'),
+        ('"tool_frame" = "hand"', 'tool_frame = "hand": no such link'),
+        ('"motors" = "yes"\n"joint1.motor" = "NEMA 99"', 'no motor "NEMA 99" in the table: there is NEMA 17'),
+        ('"motors" = "yes"\n"joint1.microsteps" = "7"', "TMC2209 does 8, 16, 32, 64"),
+        ('"motors" = "yes"\n"joint1.ratio" = "4,7"', "neither a decimal nor a fraction"),
+    ],
+)
+def test_a_wrong_answer_is_refused_with_what_would_do(
+    tmp_path: Path, line: str, text: str, capsys: pytest.CaptureFixture[str]
+):
+    (tmp_path / "answers.toml").write_text(line)
+    source = str(by_hand(tmp_path / "source").source)
+    words = ["import", source, "--output", str(tmp_path / "urdf"), "--answers", str(tmp_path / "answers.toml"), "--yes"]
+    assert run(words) is ExitCode.FAILED
+    assert text in capsys.readouterr().err
+    assert not (tmp_path / "urdf").exists()
+
+
+def test_where_nobody_can_be_asked_it_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    assert run(["import", str(by_hand(tmp_path).source), "--output", str(tmp_path / "urdf")]) is ExitCode.FAILED
+    assert "there is nobody to ask for tool_frame: say --yes for the defaults" in capsys.readouterr().err
+    assert not (tmp_path / "urdf").exists()
+
+
+def test_the_source_itself_is_never_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    source = workspace(tmp_path / "arm").source.parent
+    assert (
+        run(["import", str(source), "--output", str(tmp_path), "--name", "arm", "--yes", "--force"]) is ExitCode.FAILED
+    )
+    assert "which is to be replaced: give --name" in capsys.readouterr().err
+    assert (source / "src").is_dir()

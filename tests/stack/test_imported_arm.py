@@ -1,0 +1,36 @@
+"""An export of a CAD program, imported by one command, moves in the whole stack at once: nobody wrote anything."""
+
+from __future__ import annotations
+
+from schemas.actions import GoalStatusCode
+from schemas.motion import FollowJointTrajectoryGoal
+from schemas.planning import NamedGoal, PlanCode, PlanRequest
+from schemas.topics import PLAN
+from services.cli.errors import ExitCode
+from services.cli.main import run
+from services.stack.stack import Stack
+from tests.robot_import.exports import solidworks
+from tests.stack.gemelo import gemelo
+from tests.stack.person import Operator
+
+NEEDED = ("router", "broker", "virtual_esp32", "stepper_gateway", "planner")
+
+
+def test_an_imported_export_makes_its_first_move_on_a_generated_device(tmp_path, capsys):
+    export = solidworks(tmp_path / "download")
+    assert run(["import", str(export.source), "--yes", "--output", str(tmp_path / "urdf")]) is ExitCode.OK
+    last = capsys.readouterr().out.splitlines()[-1]
+    robot = last.removeprefix("GEMELO_ROBOT=").removesuffix(" make up")
+    with Stack(out=tmp_path / "out", processes=NEEDED, environment={"GEMELO_ROBOT": robot}) as stack:
+        person = Operator(stack)
+        try:
+            for name in ("ready", "home"):
+                plan = person.node.call(PLAN, PlanRequest(goal=NamedGoal(name=name)), timeout=5.0)
+                assert plan.code is PlanCode.SUCCESS, plan.refusal
+                outcome = person.follow.send(FollowJointTrajectoryGoal(trajectory=plan.trajectory)).wait(
+                    plan.duration + 10.0
+                )
+                assert outcome.status is GoalStatusCode.SUCCEEDED, outcome
+            assert "virtual" in gemelo(stack, "device", "status")
+        finally:
+            person.close()
