@@ -147,14 +147,17 @@ def _mimics(mended: Mended) -> None:
 
 
 def _millimetres(mended: Mended) -> None:
-    for link, item, geometry, mesh in _meshes(mended):
+    said: set[str | None] = set()  # most are in <visual> and in <collision>
+    for link, _, geometry, mesh in _meshes(mended):
         known = mended.facts(geometry)
         if isinstance(known, MeshFacts) and is_in_millimetres(geometry, known):
             scale = " ".join(f"{0.001 * value:.9g}" for value in geometry.scale)
             length = known.longest * max(map(abs, geometry.scale))
-            message = f'mesh "{geometry.mesh}" in <{item.tag}> is {length:.4g} m long: it is in millimetres'
+            message = f'mesh "{geometry.mesh}" is {length:.4g} m long: it is in millimetres'
             mesh.set("scale", scale)
-            mended.say(mesh, _subject(link), message, f'scale="{scale}"')
+            if geometry.mesh not in said:
+                mended.say(mesh, _subject(link), message, f'scale="{scale}"')
+            said.add(geometry.mesh)
 
 
 def _flat(mended: Mended) -> None:
