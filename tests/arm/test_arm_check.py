@@ -195,3 +195,22 @@ def test_a_mesh_that_cannot_be_opened_is_an_error(copy: Path):
     assert finding.severity is Severity.ERROR
     assert "yourdfpy cannot load it" in finding.message
     assert "brazo_link.glb" in finding.remedy
+
+
+@pytest.mark.parametrize(
+    ("scale", "mass", "severity", "message"),
+    [
+        ("1000", "0.465", Severity.ERROR, "m long: it is in millimetres"),
+        ("1", "46.5", Severity.WARNING, "no material has that density"),
+    ],
+)
+def test_a_mesh_in_another_unit_and_a_link_of_no_density_are_named(
+    copy: Path, scale: str, mass: str, severity: Severity, message: str
+):
+    scaled = f'meshes/brazo_link.glb" scale="{scale} {scale} {scale}"'
+    edit(copy / "robot.urdf", 'meshes/brazo_link.glb"', scaled)
+    edit(copy / "robot.urdf", '<mass value="0.465"/>', f'<mass value="{mass}"/>')
+    (finding,) = check(copy)
+    assert finding.severity is severity
+    assert message in finding.message
+    assert finding.line

@@ -11,6 +11,7 @@ from services.arm.checks.cross_check import check_with_yourdfpy
 from services.arm.checks.device import check_device
 from services.arm.checks.findings import Finding, Severity, error, note
 from services.arm.checks.homing import check_homing
+from services.arm.checks.meshes import check_meshes, mesh_facts
 from services.arm.checks.motors import check_motors
 from services.arm.checks.pull_out import check_pull_out
 from services.arm.checks.srdf import check_srdf
@@ -122,4 +123,5 @@ def _cross_checks(folder: Path) -> list[Finding]:
         device_config(arm)
     except DescriptionError as problem:
         return [error(ROBOT_FILE, "robot", str(problem))]
-    return check_with_yourdfpy(arm)
+    # The meshes themselves only where yourdfpy has opened them all.
+    return check_with_yourdfpy(arm) or check_meshes(arm.model, arm.urdf_path.name, mesh_facts(arm.urdf_path.parent))

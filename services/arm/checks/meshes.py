@@ -38,6 +38,20 @@ class MeshFacts:
 Facts = Callable[[Geometry], MeshFacts | str | None]
 
 
+def mesh_facts(folder: Path) -> Facts:
+    """Of the meshes of a robot's folder, each file read once."""
+    known: dict[str, MeshFacts | str] = {}
+
+    def facts(geometry: Geometry) -> MeshFacts | str | None:
+        if geometry.mesh is None:
+            return None
+        if geometry.mesh not in known:
+            known[geometry.mesh] = facts_of(folder / geometry.mesh.removeprefix("file://"))
+        return known[geometry.mesh]
+
+    return facts
+
+
 def facts_of(file: Path) -> MeshFacts | str:
     """Of a mesh file, or why it cannot be read."""
     import trimesh  # half a second
