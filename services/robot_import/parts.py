@@ -1,4 +1,8 @@
-"""Common motors and drivers with the source of each figure: the defaults of what a URDF cannot say."""
+"""Common motors and drivers with the source of each figure: the defaults of what a URDF cannot say.
+
+The timings of A4988 and DRV8825 are those that RepRapFirmware's table of drivers gives, those of the TMC2209 stand in
+section 13.1 of its datasheet; copies of a part may be slower: read the sheet of the one at hand.
+"""
 
 from __future__ import annotations
 
