@@ -22,6 +22,8 @@ KeyPart = Annotated[str, Meta(pattern="^[A-Za-z0-9_-]+$")]  # part of a key on t
 Pin = Annotated[int, Meta(ge=0, le=63)]  # GPIO
 NotNegative = Annotated[float, Meta(ge=0.0)]
 Positive = Annotated[float, Meta(gt=0.0)]
+LEAST_CLEARANCE, MOST_CLEARANCE, CLEARANCE = 0.0005, 0.05, 0.004  # [m] bounds and default of what is kept free
+Clearance = Annotated[float, Meta(ge=LEAST_CLEARANCE, le=MOST_CLEARANCE)]  # [m]
 AtLeastHalfAStep = Annotated[float, Meta(ge=0.5)]  # rounding to whole steps alone is off by as much
 
 
@@ -169,6 +171,7 @@ class RobotFile(RobotRecord, frozen=True, kw_only=True):
     group: str = "arm"
     base_frame: str = "base_link"
     tool_frame: str
+    clearance: Clearance = CLEARANCE  # [m] that a plan keeps between things that may not touch, unless it says another
     device: DeviceRecord
     driver: tuple[Driver, ...]
     joint: tuple[StepperJoint, ...]

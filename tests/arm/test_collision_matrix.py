@@ -12,6 +12,8 @@ from services.arm.kinematics.kinematics import Kinematics
 from services.arm.kinematics.self_collisions import SelfCollisionChecker
 from services.arm.model.description import load_arm
 from services.arm.model.srdf_edit import entries, with_pairs
+from tests.arm.editing import edit
+from tests.arm.plates import add_rigid_plates, add_turning_disc
 
 TEXT = """<robot name="r">
   <!-- <disable_collisions link1="a" link2="z" reason="Never"/> is what a person thought once -->
@@ -88,3 +90,26 @@ def test_changes_leave_everything_else_as_it_was() -> None:
 def test_a_text_without_an_end_is_refused() -> None:
     with pytest.raises(ValueError, match="no </robot>"):
         with_pairs("<robot>", {("a", "b"): "Never"})
+
+
+def test_links_rigid_to_one_another_are_excused_however_near_they_stand(copy: Path) -> None:
+    add_rigid_plates(copy, gap=0.002)
+    found = {frozenset(each.pair): each for each in collision_matrix(load_arm(copy), samples=30)}
+    plates = found[frozenset(("left_plate", "right_plate"))]
+    assert plates.reason is DisabledReason.RIGID
+    assert plates.nearest == pytest.approx(0.002, abs=1e-6)
+    assert all(each.reason is not None for pair, each in found.items() if pair <= {"base_link", "left_plate"})
+
+
+@pytest.mark.parametrize(("gap", "reason"), [(0.0016, DisabledReason.ALWAYS), (0.0045, None), (0.008, "Never")])
+def test_links_never_farther_apart_than_the_clearance_are_excused(copy: Path, gap: float, reason: str | None) -> None:
+    add_turning_disc(copy, gap)
+    found = {frozenset(each.pair): each.reason for each in collision_matrix(load_arm(copy), samples=30)}
+    assert found[frozenset(("rest_plate", "disc"))] == reason
+
+
+def test_the_robots_own_clearance_says_which_links_are_always_near(copy: Path) -> None:
+    add_turning_disc(copy, gap=0.0016)
+    edit(copy / "robot.toml", 'tool_frame = "efector_link"', 'tool_frame = "efector_link"\nclearance = 0.001')
+    found = {frozenset(each.pair): each.reason for each in collision_matrix(load_arm(copy), samples=30)}
+    assert found[frozenset(("rest_plate", "disc"))] is None

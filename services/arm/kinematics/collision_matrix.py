@@ -1,4 +1,4 @@
-"""The allowed collision matrix by sampling: adjacent links, links always in collision, links never in collision.
+"""The allowed collision matrix by sampling: adjacent links, links rigid to one another, links always or never near.
 
 As MoveIt's setup assistant does it, but what seems never to be near is also searched for nearer configurations.
 """
@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.kinematics.self_collisions import LinkPair, SelfCollisionChecker
 from services.arm.model.description import Arm
+from services.arm.model.urdf import JointKind
 
 Array = NDArray[np.float64]
 
 SAMPLES = 4000
 SEED = 0
-NEVER_BELOW = 0.005  # [m] that must stay between two links for them to be never near
+SPARE = 0.001  # [m] beyond the arm's clearance, which must stay between two links for them to be never near
 SEARCHES = 4  # from the nearest samples of a pair
 STEPS = 60
 SHRINK = 0.9
@@ -31,7 +32,8 @@ class DisabledReason(StrEnum):
     """Why a pair is not checked; an SRDF's other reasons are a person's."""
 
     ADJACENT = "Adjacent"
-    ALWAYS = "Always"
+    RIGID = "Rigid"  # no joint moves them against one another
+    ALWAYS = "Always"  # never farther apart than the clearance
     NEVER = "Never"
 
 
@@ -49,7 +51,7 @@ def collision_matrix(arm: Arm, samples: int = SAMPLES) -> list[LinkPairData]:
     """Every pair of links that have collision shapes; the same arm gives the same matrix."""
     kinematics = Kinematics(arm)
     bare = replace(arm, disabled_collisions=frozenset())
-    checker = SelfCollisionChecker(bare, kinematics.model, kinematics.configuration)
+    checker = SelfCollisionChecker(bare, kinematics.model, kinematics.configuration, with_rigid=True)
     random = np.random.default_rng(SEED)
     configurations = _configurations(arm, samples, random)
     distances = [checker.distances(configuration) for configuration in configurations]
@@ -68,12 +70,15 @@ def _pair_data(
     nearest, farthest = float(seen.min()), float(seen.max())
     if are_adjacent(arm, *pair):
         return LinkPairData(pair, DisabledReason.ADJACENT, nearest, farthest)
-    if farthest <= 0.0:
+    if are_rigid_links(arm, *pair):
+        return LinkPairData(pair, DisabledReason.RIGID, nearest, farthest)
+    if farthest <= arm.clearance:
         return LinkPairData(pair, DisabledReason.ALWAYS, nearest, farthest)
-    if nearest > NEVER_BELOW:
+    never_below = arm.clearance + SPARE
+    if nearest > never_below:
         starts = configurations[np.argsort(seen, kind="stable")[:SEARCHES]]
         nearest = min(nearest, *(_nearest_from(arm, checker, pair, start, random) for start in starts))
-    return LinkPairData(pair, DisabledReason.NEVER if nearest > NEVER_BELOW else None, nearest, farthest)
+    return LinkPairData(pair, DisabledReason.NEVER if nearest > never_below else None, nearest, farthest)
 
 
 def _nearest_from(
@@ -110,6 +115,19 @@ def _limits(arm: Arm) -> tuple[Array, Array]:
 def are_adjacent(arm: Arm, first: str, second: str) -> bool:
     """True if one joint is between two links; links without a shape in between do not count."""
     return second in _neighbours(arm, first) or first in _neighbours(arm, second)
+
+
+def are_rigid_links(arm: Arm, first: str, second: str) -> bool:
+    """True if there are only fixed joints between two links."""
+    return _rigid_root(arm, first) == _rigid_root(arm, second)
+
+
+def _rigid_root(arm: Arm, link: str) -> str:
+    """The link next to the moving joint, or the root, that carries `link` by fixed joints."""
+    above = {joint.child: joint for joint in arm.model.joints}
+    while link in above and above[link].kind is JointKind.FIXED:
+        link = above[link].parent
+    return link
 
 
 def _neighbours(arm: Arm, link: str) -> Iterator[str]:

@@ -20,11 +20,12 @@ LinkPair = tuple[str, str]
 class SelfCollisionChecker:
     """Distances between the links that may not touch; joint values are (n,) [rad] or [m] in the arm's order."""
 
-    def __init__(self, arm: Arm, model: pin.Model, configuration: JointMapping) -> None:
+    def __init__(self, arm: Arm, model: pin.Model, configuration: JointMapping, with_rigid: bool = False) -> None:
+        """Links that no joint can move apart are checked `with_rigid` only: nothing can be done about them."""
         self._model = model
         self._configuration = configuration
         self._geometry = load_collision_geometry(arm, model)
-        self._pairs = _add_pairs(arm, model, self._geometry)
+        self._pairs = _add_pairs(arm, model, self._geometry, with_rigid)
         self._data = model.createData()
         self._geometry_data = self._geometry.createData()
         self.reach = reach_of(arm, model, self._geometry)
@@ -89,17 +90,25 @@ def load_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
     return geometry
 
 
-def _add_pairs(arm: Arm, model: pin.Model, geometry: pin.GeometryModel) -> list[LinkPair]:
+def _add_pairs(arm: Arm, model: pin.Model, geometry: pin.GeometryModel, with_rigid: bool) -> list[LinkPair]:
     """Adds every pair of shapes on different links that is not disabled; returns the link names in the same order."""
     links = [model.frames[shape.parentFrame].name for shape in geometry.geometryObjects]
     pairs: list[LinkPair] = []
     for first in range(len(links)):
         for second in range(first + 1, len(links)):
             one, other = links[first], links[second]
+            if not with_rigid and are_rigid(geometry, first, second):
+                continue
             if one != other and not arm.collisions_are_disabled(one, other):
                 geometry.addCollisionPair(pin.CollisionPair(first, second))
                 pairs.append((one, other))
     return pairs
+
+
+def are_rigid(geometry: pin.GeometryModel, first: int, second: int) -> bool:
+    """True if no joint moves these two shapes against one another."""
+    shapes = geometry.geometryObjects
+    return bool(shapes[first].parentJoint == shapes[second].parentJoint)
 
 
 def reach_of(arm: Arm, model: pin.Model, geometry: pin.GeometryModel) -> Array:

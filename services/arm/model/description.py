@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 
 from schemas.deployment import DeviceKind
-from schemas.robot import DeviceRecord, Driver, Input, Output, RobotFile, Sensor, StepperJoint, Transmission
+from schemas.robot import CLEARANCE, DeviceRecord, Driver, Input, Output, RobotFile, Sensor, StepperJoint, Transmission
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.robot_file import read_robot_data, read_text, typed_robot, where_of
 from services.arm.model.srdf import SrdfModel, read_srdf
@@ -71,6 +71,7 @@ class Arm:
     partial_states: dict[str, dict[str, float]]  # of groups that have only some of the joints
     disabled_collisions: frozenset[frozenset[str]]  # pairs of links
     model: UrdfModel
+    clearance: float = CLEARANCE  # [m] that plans keep between things that may not touch
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -144,6 +145,7 @@ def load_arm(folder: Path) -> Arm:
         partial_states=_partial_states(srdf, robot.group, joints),
         disabled_collisions=frozenset(frozenset(pair) for pair in srdf.disabled),
         model=model,
+        clearance=robot.clearance,
     )
 
 

@@ -91,7 +91,7 @@ class WorldGeometry:
         """Two links as the SRDF has it; an attached object is no part of its link for the SRDF."""
         first, second = self.shape_names[one], self.shape_names[other]
         links = self._links
-        if other >= links and self._joints[one] == self._joints[other]:
+        if self._joints[one] == self._joints[other]:
             return False
         if allows(self._scene.allowed, first, second):
             return False
