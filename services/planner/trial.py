@@ -1,0 +1,147 @@
+"""The end of `gemelo check`: random configurations of a robot, and plans between the free ones.
+
+`python -m services.planner.trial ROBOT_FOLDER` prints its findings as JSON, one a line; none where plans succeed.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.joints import JointState
+from schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse
+from services.arm.checks.findings import Finding, error, warning
+from services.arm.kinematics.self_collisions import LinkPair
+from services.arm.model.description import Arm, load_arm
+from services.planner.core import Planner
+from services.planner.request.deadline import Deadline
+
+Array = NDArray[np.float64]
+
+# Tuning constants: chosen, where a line does not say measured or standard.
+CONFIGURATIONS = 300
+PLANS = 30
+SEED = 0
+SECONDS = 4.0  # for all of it, once the planner is ready: what has not begun by then is left out
+ALLOWED = 2.0  # [s] for one plan
+LEAST_FREE = 0.01  # share of the configurations: with less, plans have nowhere to go
+OFTEN = 0.5  # of how often the most frequent pair is near: rarer ones are not named
+MOST_NAMED = 3  # findings about pairs, and about plans
+
+
+def trial(arm: Arm, seconds: float = SECONDS) -> list[Finding]:
+    """What keeps plans from succeeding, by name; empty where they do."""
+    planner = Planner(arm)
+    planner.prepare()
+    deadline = Deadline(time.monotonic, seconds, time.monotonic())
+    findings = list(_named_states(planner))
+    free, near, count = _sampled(planner, deadline)
+    if len(free) < max(2, LEAST_FREE * count):
+        return [*findings, *_nowhere_free(arm, near, count)]
+    return [*findings, *_plans(planner, free, deadline)]
+
+
+def _named_states(planner: Planner) -> Iterator[Finding]:
+    """Of the states of the SRDF that do not keep the clearance, the nearest pair."""
+    world, arm = planner.checker.world, planner.arm
+    for name, state in arm.named_states.items():
+        contacts = world.contacts(state, arm.clearance)
+        if contacts:
+            nearest = contacts[0]
+            apart = f"{nearest.first} and {nearest.second} are {_mm(nearest.distance)} apart"
+            said = f"{apart}, {_mm(arm.clearance)} stay free"
+            remedy = "move the state, correct the shapes, or set a smaller `clearance` in robot.toml"
+            yield warning(arm.srdf_path.name, f'state "{name}"', said, remedy)
+
+
+def _sampled(planner: Planner, deadline: Deadline) -> tuple[list[Array], dict[LinkPair, list[float]], int]:
+    """The free configurations (n,) among random ones; of the others each near pair with its distances [m]; how many
+    there were."""
+    world, arm, random = planner.checker.world, planner.arm, np.random.default_rng(SEED)
+    free: list[Array] = []
+    near: dict[LinkPair, list[float]] = {}
+    count, half = 0, deadline.share(0.5)
+    while count < CONFIGURATIONS and not (count > 1 and half.has_passed()):
+        configuration = _drawn(arm, random)
+        count += 1
+        if planner.checker.keeps(configuration, arm.clearance):
+            free.append(configuration)
+            continue
+        for contact in world.contacts(configuration, arm.clearance):
+            near.setdefault((contact.first, contact.second), []).append(contact.distance)
+    return free, near, count
+
+
+def _drawn(arm: Arm, random: np.random.Generator) -> Array:
+    """(n,) [rad] or [m], uniform within the limits; a whole turn where there are none."""
+    lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
+    bounds = np.where(np.isfinite(lower), lower, -np.pi), np.where(np.isfinite(upper), upper, np.pi)
+    return random.uniform(*bounds)
+
+
+def _nowhere_free(arm: Arm, near: dict[LinkPair, list[float]], count: int) -> list[Finding]:
+    """The pairs that are in the way most often, with how near they come."""
+    most = sorted(near.items(), key=lambda item: -len(item[1]))
+    most = [item for item in most if len(item[1]) > OFTEN * len(most[0][1])][:MOST_NAMED]
+    remedy = f"`gemelo collision matrix {arm.folder} --write` excuses what is always near; else correct the shapes"
+    return [
+        error(
+            arm.srdf_path.name,
+            f"pair {first} and {second}",
+            f"nearer than the clearance of {_mm(arm.clearance)} in {len(distances)} of {count} random configurations "
+            f"({_mm(min(distances))} to {_mm(max(distances))}), so hardly any plan can succeed",
+            remedy,
+        )
+        for (first, second), distances in most
+    ]
+
+
+def _plans(planner: Planner, free: list[Array], deadline: Deadline) -> Iterator[Finding]:
+    """One finding for each reason that plans between free configurations fail for, the most frequent first."""
+    failed: Counter[str] = Counter()
+    said: dict[str, str] = {}
+    tried = 0
+    for start, goal in list(pairwise(free))[:PLANS]:
+        if tried and deadline.has_passed():
+            break
+        tried += 1
+        response = _planned(planner, start, goal)
+        if response.code is not PlanCode.SUCCESS and response.refusal is not None:
+            failed[response.refusal.subject] += 1
+            said.setdefault(response.refusal.subject, f"{response.refusal.message} -> {response.refusal.remedy}")
+    severe = error if 2 * sum(failed.values()) > tried else warning
+    for subject, times in failed.most_common(MOST_NAMED):
+        message = f"{times} of {tried} plans between free configurations fail: {said[subject]}"
+        yield severe(planner.arm.urdf_path.name, f"plans, {subject or 'any'}", message)
+
+
+def _planned(planner: Planner, start: Array, goal: Array) -> PlanResponse:
+    names = planner.arm.joint_names
+    request = PlanRequest(
+        start=JointState(name=names, position=tuple(start.tolist())),
+        goal=JointGoal(name=names, position=tuple(goal.tolist())),
+        allowed_time=ALLOWED,
+    )
+    return planner.plan(request, None, clock=time.monotonic)
+
+
+def _mm(distance: float) -> str:
+    return f"{1000.0 * distance:.1f} mm"
+
+
+def main() -> None:
+    """Prints the findings."""
+    for finding in trial(load_arm(Path(sys.argv[1]))):
+        print(msgspec.json.encode(finding).decode())
+
+
+if __name__ == "__main__":
+    main()

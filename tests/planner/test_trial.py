@@ -1,0 +1,64 @@
+"""The trial at the end of `gemelo check`: plans succeed, or what keeps them from it is named."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from services.arm.checks.findings import Severity
+from services.arm.model.description import load_arm
+from services.cli.errors import ExitCode
+from services.cli.main import run
+from services.planner.trial import trial
+from tests.arm.editing import edit
+from tests.arm.plates import add_rigid_plates, add_turning_disc
+
+LONG = 60.0  # [s]: every configuration and plan is tried however loaded the machine is
+
+
+@pytest.fixture
+def copy(rm1_folder: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(rm1_folder, tmp_path / "rm1"))
+
+
+@pytest.mark.parametrize("robot", ["rm1", "parol6"])
+def test_plans_of_the_shipped_robots_succeed(rm1_folder: Path, robot: str):
+    assert trial(load_arm(rm1_folder.parent / robot), LONG) == []
+
+
+def test_a_pair_that_is_always_near_is_named_with_how_near_it_is(copy: Path):
+    add_turning_disc(copy, gap=0.0016)
+    findings = trial(load_arm(copy), LONG)
+    pairs = [finding for finding in findings if finding.subject.startswith("pair")]
+    assert [finding.severity for finding in pairs] == [Severity.ERROR]
+    assert {"rest_plate", "disc"} <= set(pairs[0].subject.split())
+    assert "300 of 300 random configurations (1.6 mm to 1.6 mm)" in pairs[0].message
+    assert "gemelo collision matrix" in pairs[0].remedy
+
+
+def test_a_state_that_does_not_keep_the_clearance_is_named(copy: Path):
+    add_turning_disc(copy, gap=0.0016)
+    named = [finding.message for finding in trial(load_arm(copy), LONG) if finding.subject == 'state "home"']
+    assert len(named) == 1
+    assert {"disc", "rest_plate", "1.6"} <= set(named[0].split())
+    assert "4.0 mm stay free" in named[0]
+
+
+def test_a_written_matrix_leaves_a_working_robot(copy: Path, capsys: pytest.CaptureFixture[str]):
+    add_rigid_plates(copy, gap=0.0016)
+    add_turning_disc(copy, gap=0.0041 - 0.0002)
+    assert run(["collision", "matrix", str(copy), "--write"]) is ExitCode.OK
+    assert trial(load_arm(copy), LONG) == []
+
+
+def test_check_says_all_is_well_only_where_plans_succeed(copy: Path, capsys: pytest.CaptureFixture[str]):
+    assert run(["check", str(copy)]) is ExitCode.OK
+    assert "all is well" in capsys.readouterr().out
+    edit(copy / "robot.toml", 'tool_frame = "efector_link"', 'tool_frame = "efector_link"\nclearance = 0.002')
+    add_turning_disc(copy, gap=0.0016)
+    assert run(["check", str(copy)]) is ExitCode.FAILED
+    said = capsys.readouterr().out
+    assert "all is well" not in said
+    assert "nearer than the clearance of 2.0 mm" in said
