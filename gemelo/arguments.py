@@ -49,5 +49,6 @@ class Target(ToolGoal, total=False):
     planner: str  # "native", "RRTConnect", "RRTstar", "BITstar" or "PRM"
     seed: int  # the same seed, the same plan
     time_optimal: bool  # as fast as can be, without a limit of the jerk
+    clearance: float  # [m] that stays free between what may not touch, 0.5 mm to 50 mm; the robot's own if left out
     allowed_time: float  # [s] for planning
     from_joints: Joints  # plan from there; from where the arm is if left out

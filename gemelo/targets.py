@@ -30,6 +30,7 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
+from schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
 from services.arm.errors import suggestion
 from services.arm.frames.transforms import from_rpy
 from services.arm.model.description import Arm as Description
@@ -58,6 +59,7 @@ def request_of(arm: Description, target: Target, look_up: LookUp) -> PlanRequest
         velocity_scaling=speed,
         acceleration_scaling=_share("acceleration", target.get("acceleration", speed)),
         allowed_time=_positive("allowed_time", target.get("allowed_time", 5.0), "s", LONGEST_PLAN),
+        clearance=_clearance(target),
         motion=_motion_of(target),
         timing=Timing.TIME_OPTIMAL if target.get("time_optimal") else Timing.JERK_LIMITED,
     )
@@ -315,6 +317,17 @@ def _share(name: str, value: float) -> float:
     if not 0.0 < found <= 1.0:
         hint = f": {found:g} per cent is {found / 100.0:g}" if 1.0 < found <= 100.0 else ""
         raise BadArgument(f"{name}={found:g} is not in (0, 1], a share of the joints' limits{hint}")
+    return found
+
+
+def _clearance(target: Target) -> float | None:
+    """[m], or None: the robot's own."""
+    if "clearance" not in target:
+        return None
+    found = number("clearance", target["clearance"])
+    if not LEAST_CLEARANCE <= found <= MOST_CLEARANCE:
+        hint = f": if it is in millimetres, write gemelo.mm({found:g})" if found > MOST_CLEARANCE else ""
+        raise BadArgument(f"clearance={found:g} m is not from {LEAST_CLEARANCE:g} to {MOST_CLEARANCE:g} m{hint}")
     return found
 
 

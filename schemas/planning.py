@@ -105,6 +105,7 @@ class PlanRequest(Message, frozen=True, kw_only=True):
     velocity_scaling: float = 1.0
     acceleration_scaling: float = 1.0
     allowed_time: float = 1.0  # [s]
+    clearance: float | None = None  # [m] to keep between what may not touch; absent: the robot's own
     motion: Motion = FreeMotion()
     timing: Timing = Timing.JERK_LIMITED
     step_policy: StepPolicy = StepPolicy.SLOW_DOWN

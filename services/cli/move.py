@@ -46,6 +46,9 @@ def add_options(parser: Parser) -> None:
     _motion_options(parser.add_argument_group("on which path (any that is free, if nothing is said)"))
     parser.add_argument("--speed", type=share, metavar="SHARE", help="of the velocity limits, as 50%%")
     parser.add_argument("--time", type=seconds, metavar="TIME", help="that planning may take, as 3 or 3s")
+    parser.add_argument(
+        "--clearance", type=length, metavar="DISTANCE", help="that stays free, from 0.5mm to 50mm; else the robot's own"
+    )
     parser.add_argument("--plan-only", action="store_true", help="plan, and do not move")
     parser.add_argument("--json", action="store_true", help="one JSON object in SI units instead of a line")
 

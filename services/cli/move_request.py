@@ -21,6 +21,7 @@ from schemas.planning import (
     Timing,
     WaypointGoal,
 )
+from schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
 from services.arm.frames.transforms import from_rpy
 from services.cli.errors import unknown, usage
 from services.cli.parser import Options
@@ -36,7 +37,7 @@ ORIENTATION = ("quaternion", "rpy", "axis", "along", "free_axis")
 GOAL_OPTIONS = (
     "quaternion", "rpy", "axis", "along", "free_axis", "frame", "line", "arc", "center", "ptp", "via", "blend",
     "tool_speed", "tool_acceleration", "fraction", "max_step", "jump", "time_optimal", "planner", "seed", "speed",
-    "time", "plan_only",
+    "time", "clearance", "plan_only",
 )  # fmt: skip
 TOOL_MOTION = ("tool_speed", "tool_acceleration", "fraction", "max_step", "jump")
 
@@ -50,7 +51,7 @@ def request_from(options: Options, arm: Arm) -> PlanRequest:
     if not 0.0 < time <= LONGEST_TIME:
         raise usage(f"--time {time:g} is not in (0, {LONGEST_TIME:g}] s")
     timing = Timing.TIME_OPTIMAL if options.time_optimal else Timing.JERK_LIMITED
-    return replace(request, motion=motion_of(options), allowed_time=time, timing=timing)
+    return replace(request, motion=motion_of(options), allowed_time=time, clearance=_clearance(options), timing=timing)
 
 
 def goal_of(arm: Arm, to: Sequence[float] | None, joints: Sequence[str], named: str | None) -> Goal:
@@ -96,6 +97,15 @@ def motion_of(options: Options) -> Motion:
     if options.ptp:
         return PointToPoint()
     return FreeMotion(planner_id=options.planner or "", seed=options.seed or 0)
+
+
+def _clearance(options: Options) -> float | None:
+    """[m], or None: the robot's own. Raises `CommandError` for what no plan may keep."""
+    value: float | None = options.clearance
+    if value is not None and not LEAST_CLEARANCE <= value <= MOST_CLEARANCE:
+        least, most = 1000.0 * LEAST_CLEARANCE, 1000.0 * MOST_CLEARANCE
+        raise usage(f"--clearance {1000.0 * value:g}mm is not from {least:g}mm to {most:g}mm")
+    return value
 
 
 def _with_orientation(goal: Goal, options: Options) -> Goal:

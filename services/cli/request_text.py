@@ -34,7 +34,8 @@ def request_text(request: PlanRequest, arm: Arm) -> str:
     speed = f"at {100.0 * request.velocity_scaling:g} % speed" if request.velocity_scaling != 1.0 else ""
     timing = "without a jerk limit" if request.timing is Timing.TIME_OPTIMAL else ""
     time = f"planned within {request.allowed_time:g} s" if request.allowed_time != 1.0 else ""
-    return _joined([goal_text(request.goal, arm), motion_text(request.motion), speed, timing, time])
+    clearance = "" if request.clearance is None else f"{1000.0 * request.clearance:g} mm from everything"
+    return _joined([goal_text(request.goal, arm), motion_text(request.motion), speed, timing, clearance, time])
 
 
 def goal_text(goal: Goal, arm: Arm) -> str:

@@ -20,11 +20,12 @@ from schemas.planning import (
     PlanResponse,
     WaypointGoal,
 )
+from schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.planner.cartesian.tool_motions import ToolMotions
 from services.planner.collision.checker import CollisionChecker
-from services.planner.collision.clearance import CLEARANCE, first_collision
+from services.planner.collision.clearance import first_collision
 from services.planner.collision.world import World
 from services.planner.kinematics.goals import Goals
 from services.planner.path.path import STRAIGHT, PathNotFound, Start
@@ -37,6 +38,7 @@ from services.planner.request.deadline import CancelFlag, Deadline, Stopwatch, e
 from services.planner.request.refusals import (
     LEAST_SCALING,
     PlanRefused,
+    clearance_refused,
     malformed,
     no_path_around,
     scaling_refused,
@@ -78,7 +80,7 @@ class Planner:
         """Does now what the first plan in the newest world would wait for: seconds, in which the links are filled with
         spheres, and a large mesh with distances."""
         self.checker.begin()
-        self.checker.native(CLEARANCE)
+        self.checker.native(self.checker.clearance)
         self._search.prepare()
 
     def plan(
@@ -125,6 +127,7 @@ class Planner:
     ) -> PlanResponse:
         _require_known(request)
         limits = self._limits(request)
+        self.checker.clearance = self._clearance(request)
         start = resolve_start(self.arm, request.start, present, age)
         margin = self._start_margin(start, deadline)
         builder = TrajectoryBuilder(self.arm, self.checker, request, limits, margin, watch)
@@ -163,7 +166,7 @@ class Planner:
         touching: list[Start] = []
         goals: list[Start] = []
         for goal in self._configurations(context):
-            if not self.checker.keeps(goal, CLEARANCE):
+            if not self.checker.keeps(goal, self.checker.clearance):
                 touching.append(goal)
             else:
                 try:
@@ -176,7 +179,7 @@ class Planner:
         if goals:
             if isinstance(request.motion, FreeMotion):
                 return self._around(request.motion, np.array(goals), context)
-            raise self._collision_refusals.line(context.start, goals[0], context.margin)
+            raise self._collision_refusals.line(context.start, goals[0], context.margin, context.deadline)
         if touching:
             raise self._collision_refusals.goal(request.goal, touching[0], context.start, context.deadline)
         raise timed_out()
@@ -210,9 +213,8 @@ class Planner:
                     )
                 return context.builder.path(path), path.planner_id
             except PathNotFound as not_found:
-                raise no_path_around(
-                    not_found.reason, self._collision_refusals.line(start, tuple(goals[0].tolist()), margin)
-                ) from not_found
+                line = self._collision_refusals.line(start, tuple(goals[0].tolist()), margin, context.deadline)
+                raise no_path_around(not_found.reason, line) from not_found
             except TrajectoryTouches as touching:
                 refusal = self._collision_refusals.path(touching.configuration, margin)
             if context.deadline.has_passed():
@@ -237,14 +239,22 @@ class Planner:
                 raise scaling_refused(name, value)
         return joint_limits(self.arm, request.velocity_scaling, request.acceleration_scaling)
 
+    def _clearance(self, request: PlanRequest) -> float:
+        """[m] that this plan keeps free; raises `PlanRefused` for what no plan may keep."""
+        asked = self.arm.clearance if request.clearance is None else request.clearance
+        if not LEAST_CLEARANCE <= asked <= MOST_CLEARANCE:
+            raise clearance_refused(asked)
+        return asked
+
     def _start_margin(self, start: Start, deadline: Deadline) -> float:
         """[m] to keep on the way: an arm that already stands nearer than the clearance may come away from there."""
-        if self.checker.keeps(start, CLEARANCE / NEAR_START):
-            return CLEARANCE
+        clearance = self.checker.clearance
+        if self.checker.keeps(start, clearance / NEAR_START):
+            return clearance
         distance = self.checker.distance(start)
         if distance <= 0.0:
             raise self._collision_refusals.start(start, deadline)
-        return min(CLEARANCE, NEAR_START * distance)
+        return min(clearance, NEAR_START * distance)
 
 
 def _require_known(request: PlanRequest) -> None:

@@ -75,9 +75,16 @@ def test_a_free_motion_names_its_planner_and_seed():
     assert asked.allowed_time == 3.0
 
 
+def test_a_clearance_is_a_length_within_its_range():
+    assert request("--named left --clearance 1.5mm").clearance == 0.0015
+    assert request("--named left --clearance 0.5mm").clearance == 0.0005
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        ("--named left --clearance 0.4mm", "--clearance 0.4mm is not from 0.5mm to 50mm"),
+        ("--named left --clearance 4", "--clearance 4000mm is not from 0.5mm to 50mm"),
         ("--named left --rpy 0 0 0", "--rpy goes with --to"),
         ("--to 0.2 0.1 0.1 --blend 10mm", "--blend goes with --via"),
         ("--to 0.2 0.1 0.1 --tool-speed 10", "--tool-speed goes with --line"),

@@ -64,6 +64,8 @@ BAD = [
     ({"named": "ready", "speed": 0}, "speed=0 is not in (0, 1]"),
     ({"named": "ready", "acceleration": -1}, "acceleration=-1 is not in (0, 1]"),
     ({"named": "ready", "allowed_time": 0}, "allowed_time=0 is not above 0"),
+    ({"named": "ready", "clearance": 4}, "clearance=4 m is not from 0.0005 to 0.05 m: if it is in millimetres, write"),
+    ({"named": "ready", "clearance": 0.0004}, "clearance=0.0004 m is not from 0.0005 to 0.05 m"),
     ({"named": "ready", "blend": 0.01}, "blend= does not go with a goal without via="),
     ({"named": "ready", "tool_speed": 0.1}, "tool_speed= does not go with a free motion"),
     ({"named": "ready", "ptp": True, "line": True}, "one path at a time, not line and ptp"),
@@ -95,6 +97,11 @@ def test_arguments_become_the_goal_that_they_name(rm1: Description) -> None:
         position=(0.2, 0.1, 0.1), tool_axis=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0), frame="brazo_link"
     )
     assert request(rm1, pose=HERE).goal == PoseGoal(position=HERE.position, orientation=HERE.orientation)
+
+
+def test_the_clearance_is_the_robots_own_unless_it_is_given(rm1: Description) -> None:
+    assert request(rm1, named="ready").clearance is None
+    assert request(rm1, named="ready", clearance=gemelo.mm(1)).clearance == 0.001
 
 
 def test_arguments_become_the_motion_that_they_name(rm1: Description) -> None:

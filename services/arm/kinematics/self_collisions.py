@@ -22,6 +22,7 @@ class SelfCollisionChecker:
 
     def __init__(self, arm: Arm, model: pin.Model, configuration: JointMapping, with_rigid: bool = False) -> None:
         """Links that no joint can move apart are checked `with_rigid` only: nothing can be done about them."""
+        self.clearance = arm.clearance  # [m]
         self._model = model
         self._configuration = configuration
         self._geometry = load_collision_geometry(arm, model)

@@ -30,6 +30,7 @@ class CollisionChecker:
     def __init__(self, world: World) -> None:
         self.newest = world
         self.world = world
+        self.clearance = world.clearance  # [m] of the plan at hand
         self._spheres = sphere_check(world.arm)
 
     def begin(self) -> World:

@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from schemas.robot import CLEARANCE, LEAST_CLEARANCE
+from services.planner.request.deadline import NEVER, Deadline
+
+__all__ = ["CLEARANCE"]  # the default of what robots and requests may say
+
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-CLEARANCE = 0.004  # [m] that links which may not touch keep between them
 ROUNDING = 0.0002  # [m] more, for a configuration that is rounded before it is told
+TOLD = 5e-5  # [m] that distances are told to at least
 MOST_LOOKS = 50_000
 
 
 class DistanceChecker(Protocol):
     """Distances of the arm to itself, or to everything around it as well."""
+
+    @property
+    def clearance(self) -> float:
+        """[m] that is to stay free between things that may not touch."""
 
     @property
     def reach(self) -> Array:
@@ -38,18 +48,29 @@ class PathChecker(DistanceChecker, Protocol):
         or None."""
 
 
-def first_collision(checker: DistanceChecker, positions: Array, margin: float) -> Array | None:
-    """The first configuration along the rows of `positions` (m, n) that does not keep `margin` [m], or None."""
-    return _walk(checker, positions, margin)[1]
+def first_collision(
+    checker: DistanceChecker, positions: Array, margin: float, deadline: Deadline = NEVER
+) -> Array | None:
+    """The first configuration along the rows of `positions` (m, n) that does not keep `margin` [m]; None where there is
+    none, or none before the deadline."""
+    return _walk(checker, positions, margin, deadline)[1]
 
 
-def last_free(checker: DistanceChecker, start: Array, goal: Array) -> Array:
+def last_free(checker: DistanceChecker, start: Array, goal: Array, deadline: Deadline = NEVER) -> Array:
     """The last configuration (n,) [rad] or [m] on the straight line from `start` to `goal` before anything comes nearer
-    than allowed."""
-    return _walk(checker, np.vstack((start, goal)), CLEARANCE + ROUNDING)[0]
+    than the clearance, as far as the deadline lets it be followed."""
+    return _walk(checker, np.vstack((start, goal)), checker.clearance + ROUNDING, deadline)[0]
 
 
-def _walk(checker: DistanceChecker, positions: Array, margin: float) -> tuple[Array, Array | None]:
+def usable_clearance(distance: float, margin: float) -> float | None:
+    """The clearance [m], of whole tenths of a millimetre and below `margin`, that two things `distance` [m] apart would
+    keep; None where that is less than any that may be asked for."""
+    tenths = math.floor((distance - TOLD) * 1e4)
+    usable = min(tenths * 1e-4, margin - 1e-4)
+    return round(usable, 4) if usable >= LEAST_CLEARANCE - 1e-9 else None
+
+
+def _walk(checker: DistanceChecker, positions: Array, margin: float, deadline: Deadline) -> tuple[Array, Array | None]:
     """The last configuration that keeps the margin, and the first one after it that does not.
 
     Between two looks no point of the arm moves farther than the clearance just seen, or than half the margin where
@@ -64,7 +85,7 @@ def _walk(checker: DistanceChecker, positions: Array, margin: float) -> tuple[Ar
         clearance = checker.distance(configuration) - margin
         if clearance <= 0.0:
             return last, configuration
-        if along >= end:
+        if along >= end or deadline.has_passed():
             return configuration, None
         last = configuration
         along = min(end, along + max(clearance, least))

@@ -61,6 +61,11 @@ class World:
         self._sweep = ContinuousCheck(arm, kinematics, self._geometry, self.distances)
 
     @property
+    def clearance(self) -> float:
+        """[m] that is to stay free between things that may not touch: the robot's own."""
+        return self.arm.clearance
+
+    @property
     def version(self) -> int:
         """Of the scene."""
         return self.scene.version

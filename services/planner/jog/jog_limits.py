@@ -7,18 +7,17 @@ import math
 from schemas.planning import JogLimit
 from services.arm.kinematics.self_collisions import LinkPair
 from services.arm.model.description import Joint
-from services.planner.collision.clearance import CLEARANCE
 
 
-def collision(names: LinkPair, distance: float) -> JogLimit:
-    """`distance` [m] between the two now; they keep the clearance, or may only come away."""
+def collision(names: LinkPair, distance: float, clearance: float) -> JogLimit:
+    """`distance` [m] between the two now; they keep the `clearance` [m], or may only come away."""
     subject = " and ".join(names)
-    if distance >= CLEARANCE:
-        said = f"collision of {subject} ({_mm(distance)} apart, {1e3 * CLEARANCE:g} mm stay free)"
-        return JogLimit(check="collision", subject=subject, value=distance, limit=CLEARANCE, message=said)
+    if distance >= clearance:
+        said = f"collision of {subject} ({_mm(distance)} apart, {1e3 * clearance:g} mm stay free)"
+        return JogLimit(check="collision", subject=subject, value=distance, limit=clearance, message=said)
     how = f"{_mm(distance)} apart" if distance > 0.0 else f"{_mm(-distance)} inside one another"
     said = f"contact of {subject} ({how}: they may only come away, slowly)"
-    return JogLimit(check="contact", subject=subject, value=distance, limit=CLEARANCE, message=said)
+    return JogLimit(check="contact", subject=subject, value=distance, limit=clearance, message=said)
 
 
 def joint_limit(joint: Joint, position: float, velocity: float) -> JogLimit:

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.planning import JogLimit
-from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.world import World
 from services.planner.jog.braking import Braking
 from services.planner.jog.jog_limits import collision
@@ -26,7 +25,7 @@ class Obstacles:
     """Of one world."""
 
     def __init__(self, world: World, braking: Braking) -> None:
-        self._reach = world.reach
+        self._reach, self._clearance = world.reach, world.clearance
         self._nearness = Nearness(world)
         self._braking = braking
         self._here: Array = np.zeros(len(world.reach))
@@ -38,7 +37,7 @@ class Obstacles:
 
     def most_out_of_contact(self, wanted: Array) -> tuple[float, JogLimit | None]:
         """The share of a velocity at which nothing that is too near already moves too fast."""
-        pairs = self._nearness.pairs_within(CLEARANCE)
+        pairs = self._nearness.pairs_within(self._clearance)
         if not pairs.size:
             return 1.0, None
         most = CONTACT_SPEED / max(CONTACT_SPEED, float(self._nearness.speeds(wanted, pairs).max()))
@@ -50,7 +49,7 @@ class Obstacles:
         Conservative advancement, pair by pair; two that are nearer than they should be already may only come away.
         """
         displacement = self._braking.displacement_to_rest(velocity)
-        floor = CLEARANCE + SLACK + self._straying(velocity)
+        floor = self._clearance + SLACK + self._straying(velocity)
         pairs = self._nearness.pairs_within(floor, displacement)
         before = self._nearness.distances(pairs)
         closing = self._hardly_known(displacement, pairs, before, floor)
@@ -106,7 +105,7 @@ class Obstacles:
 
     def _said(self, pairs: Pairs, distances: Array) -> JogLimit:
         nearest = int(np.argmin(distances))
-        return collision(self._nearness.names(int(pairs[nearest])), float(distances[nearest]))
+        return collision(self._nearness.names(int(pairs[nearest])), float(distances[nearest]), self._clearance)
 
 
 def comes_away(before: Array | float, after: Array | float) -> NDArray[np.bool_]:

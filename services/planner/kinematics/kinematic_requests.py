@@ -22,7 +22,7 @@ from schemas.planning import (
 from schemas.scene import Contact
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
-from services.planner.collision.clearance import CLEARANCE, DistanceChecker, last_free
+from services.planner.collision.clearance import DistanceChecker, last_free
 from services.planner.collision.world import World
 from services.planner.kinematics.goals import INVALID, Goals, Start
 from services.planner.kinematics.pose_goals import FARTHEST
@@ -92,7 +92,7 @@ class KinematicRequests:
             self._require_limits(request, asked)
         except PlanRefused as refused:
             return ValidityResponse(code=refused.code, refusal=refused.refusal)
-        contacts = tuple(world.contacts(asked, CLEARANCE))
+        contacts = tuple(world.contacts(asked, world.clearance))
         if not contacts:
             return ValidityResponse(code=PlanCode.SUCCESS)
         touching = self._touching(asked, self._nearest_free(asked, present, age, world), contacts, world)
@@ -112,13 +112,21 @@ class KinematicRequests:
         except PlanRefused:
             return ()
         last = last_free(world, np.array(standing), np.array(asked))
-        return tuple(last.tolist()) if world.distance(last) > CLEARANCE else ()
+        return tuple(last.tolist()) if world.distance(last) > world.clearance else ()
 
     def _touching(self, asked: Start, nearest: Start, contacts: Sequence[Contact], world: World) -> PlanRefused:
         pairs = [(contact.first, contact.second) for contact in contacts]
         remedy = "take the nearest configuration that is free" if nearest else "choose another configuration"
         return in_collision(
-            PlanCode.GOAL_IN_COLLISION, "there", pairs, CLEARANCE, nearest, remedy, asked, world.objects
+            PlanCode.GOAL_IN_COLLISION,
+            "there",
+            pairs,
+            world.clearance,
+            nearest,
+            remedy,
+            asked,
+            world.objects,
+            contacts[0].distance,
         )
 
     def _standing(self, given: JointState | None, present: JointState | None, age: float) -> Start:
@@ -147,15 +155,16 @@ class KinematicRequests:
 
 def _free(configurations: list[Start], checker: DistanceChecker) -> list[Start]:
     """Those that touch nothing; raises `PlanRefused` where all do."""
-    free = [configuration for configuration in configurations if checker.distance(configuration) > CLEARANCE]
+    free = [configuration for configuration in configurations if checker.distance(configuration) > checker.clearance]
     if free:
         return free
     where = (
         "in every configuration for this pose" if len(configurations) > 1 else "in the only configuration for this pose"
     )
     remedy = "ask for another pose, or for configurations that touch as well (avoid_collisions false)"
-    pairs = checker.pairs_within(configurations[0], CLEARANCE)
-    raise in_collision(PlanCode.GOAL_IN_COLLISION, where, pairs, CLEARANCE, (), remedy)
+    pairs, near = checker.pairs_within(configurations[0], checker.clearance), checker.distance(configurations[0])
+    code, clearance = PlanCode.GOAL_IN_COLLISION, checker.clearance
+    raise in_collision(code, where, pairs, clearance, (), remedy, distance=near)
 
 
 def _at_rest(state: JointState | None) -> JointState | None:

@@ -14,7 +14,7 @@ from schemas.planning import PlanCode, PoseGoal, Refusal
 from services.arm.frames.transforms import IDENTITY, Rigid, compose, inverse
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
-from services.planner.collision.clearance import CLEARANCE, DistanceChecker, last_free
+from services.planner.collision.clearance import DistanceChecker, last_free
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.kinematics.pose_goals import as_goal
 from services.planner.kinematics.targets import POSITION_TOLERANCE, Target
@@ -69,7 +69,7 @@ class UnreachableRefusals:
         return min(free, key=lambda q: target.misses(self._kinematics.tool(q))[0])
 
     def _drawn_back(self, near: Array, configuration: Array) -> Array:
-        if self._collisions.distance(configuration) > CLEARANCE:
+        if self._collisions.distance(configuration) > self._collisions.clearance:
             return configuration
         return last_free(self._collisions, near, configuration)
 
@@ -79,7 +79,7 @@ class UnreachableRefusals:
         turned: list[Array] = []
         for configuration in self._ik.nearest(place, near, deadline)[:NEAREST_TRIED]:
             attempt = self._ik.descend(place, self._ik.descend(light, configuration).positions)
-            if attempt.is_solution and self._collisions.distance(attempt.positions) > CLEARANCE:
+            if attempt.is_solution and self._collisions.distance(attempt.positions) > self._collisions.clearance:
                 turned.append(attempt.positions)
         return min(turned, key=lambda q: target.misses(self._kinematics.tool(q))[1], default=fallback)
 
@@ -140,7 +140,7 @@ class UnreachableRefusals:
             back = np.array(compose(frame, ((x, y, z), IDENTITY[1]))[0])
             attempt = self._ik.descend(Target(back), configuration)
             if deadline.has_passed() or (
-                attempt.is_solution and self._collisions.distance(attempt.positions) > CLEARANCE
+                attempt.is_solution and self._collisions.distance(attempt.positions) > self._collisions.clearance
             ):
                 return (x, y, z)
         return tuple(local.tolist())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +12,7 @@ from schemas.message import Vector
 from schemas.planning import Goal, JointGoal, NamedGoal, PlanCode, PoseGoal, WaypointGoal
 from services.arm.model.description import Arm
 from services.planner.collision.checker import CollisionChecker
-from services.planner.collision.clearance import CLEARANCE, ROUNDING, first_collision, last_free
+from services.planner.collision.clearance import ROUNDING, first_collision, last_free, usable_clearance
 from services.planner.kinematics.goals import Goals
 from services.planner.path.path import Start
 from services.planner.pipeline.nearest_free import jog_words, nearest_free
@@ -18,6 +20,10 @@ from services.planner.request.deadline import Deadline
 from services.planner.request.refusals import PlanRefused, in_collision
 
 Array = NDArray[np.float64]
+
+# Tuning constants: chosen, where a line does not say measured or standard.
+DECIMALS = 5  # of [m] to which a distance is told: coal's last ones depend on what it was asked before
+LOOKS = 33  # at distances on a straight path that is refused, for the clearance that would do
 
 
 class CollisionRefusals:
@@ -34,7 +40,7 @@ class CollisionRefusals:
 
         `standing` as in `Goals.candidates`.
         """
-        last = last_free(self._checker, np.array(start), np.array(goal))
+        last = last_free(self._checker, np.array(start), np.array(goal), deadline)
         values = dict(zip(self._arm.joint_names, (round(value, 4) for value in last.tolist()), strict=True))
         match asked:
             case PoseGoal():
@@ -44,7 +50,9 @@ class CollisionRefusals:
             case NamedGoal() | WaypointGoal():
                 nearest = tuple(values.values())
         remedy = f"the farthest it can go on the straight path there: {self._named(tuple(values.values()))}"
-        return self.refusal(PlanCode.GOAL_IN_COLLISION, "at the goal", np.array(goal), CLEARANCE, nearest, remedy)
+        at_goal, margin = np.array(goal), self._checker.clearance
+        remedy += self._smaller(self._checker.distance(at_goal), margin)
+        return self.refusal(PlanCode.GOAL_IN_COLLISION, "at the goal", at_goal, margin, nearest, remedy)
 
     def start(self, start: Start, deadline: Deadline) -> PlanRefused:
         """The refusal of `start` (n,) [rad] or [m], in which something touches, with the nearest configuration that
@@ -59,13 +67,16 @@ class CollisionRefusals:
         refused = self.refusal(PlanCode.START_STATE_IN_COLLISION, where, np.array(start), 0.0, (), remedy)
         return PlanRefused(refused.code, msgspec.structs.replace(refused.refusal, nearest_free=shown))
 
-    def line(self, start: Start, goal: Start, margin: float) -> PlanRefused:
+    def line(self, start: Start, goal: Start, margin: float, deadline: Deadline) -> PlanRefused:
         """The refusal of the straight joint path from `start` to `goal`, (n,) [rad] or [m], that does not keep `margin`
-        [m], with the first configuration that touches."""
-        found = first_collision(self._checker, np.array((start, goal)), margin)
-        touching = np.array(goal) if found is None else found
+        [m], with the first configuration that touches; with any that does, where the deadline leaves no time."""
+        rows = np.array((start, goal))
+        found = first_collision(self._checker, rows, margin, deadline)
+        touching = self._checker.touching(rows, margin) if found is None else found
+        touching = np.array(goal) if touching is None else touching
         named = ", ".join(self._arm.state_names)
         remedy = f"go via another configuration, for example a named one ({named})"
+        remedy += self._smaller(self._least_on(rows, deadline), margin)
         return self.refusal(PlanCode.PLANNING_FAILED, "on the straight path to the goal", touching, margin, (), remedy)
 
     def path(self, touching: Array, margin: float) -> PlanRefused:
@@ -86,9 +97,25 @@ class CollisionRefusals:
         """The refusal of `configuration` (n,) [rad] or [m], which does not keep `margin` [m] in the plan's world, with
         the names of both; `nearest` is in the goal's own form."""
         world = self._checker.world
-        pairs = world.pairs_within(configuration, margin + ROUNDING) or [("?", "?")]
+        contacts = world.contacts(configuration, margin + ROUNDING)
+        pairs = [(contact.first, contact.second) for contact in contacts] or [("?", "?")]
+        near = round(contacts[0].distance, DECIMALS) if contacts else None
         standing = tuple(configuration.tolist())
-        return in_collision(code, where, pairs, margin, nearest, remedy, standing, world.objects)
+        return in_collision(code, where, pairs, margin, nearest, remedy, standing, world.objects, near)
+
+    def _least_on(self, rows: Array, deadline: Deadline) -> float:
+        """The least distance [m] at `LOOKS` places on a straight path (2, n); 0 where the time does not do for them."""
+        least = math.inf
+        for share in np.linspace(0.0, 1.0, LOOKS).tolist():
+            if least <= 0.0 or deadline.has_passed():
+                return 0.0
+            least = min(least, self._checker.distance(rows[0] + share * (rows[1] - rows[0])))
+        return least
+
+    def _smaller(self, distance: float, margin: float) -> str:
+        """The clearance that would do for things `distance` [m] apart, for the end of a remedy; empty if none would."""
+        usable = usable_clearance(distance, margin)
+        return "" if usable is None else f"; or ask for a clearance of {1000.0 * usable:g} mm, which would do"
 
     def _named(self, configuration: Start) -> str:
         pairs = zip(self._arm.joints, configuration, strict=True)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from services.arm.model.description import Arm, Joint
 from services.planner.collision.checker import CollisionChecker
-from services.planner.collision.clearance import CLEARANCE
 from services.planner.jog.jog_obstacles import CONTACT_SPEED, comes_away
 from services.planner.path.path import Start
 from services.planner.request.deadline import Deadline
@@ -19,7 +18,7 @@ from services.planner.request.deadline import Deadline
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-FREE = CLEARANCE + 0.001  # [m] that is clear of everything there, so that a plan can begin
+SPARE = 0.001  # [m] beyond the clearance that is clear of everything there, so that a plan can begin
 NEAREST, FARTHEST, GROWTH = 0.003, 0.15, 1.25  # [m] that any point of the arm moves at most on the ways that are tried
 DIRECTIONS = 24  # of all joints together, at each distance, besides those of one joint
 LEAST_REACH = 0.02  # [m/rad] of a joint that moves hardly anything
@@ -44,7 +43,7 @@ def nearest_free(arm: Arm, checker: CollisionChecker, start: Start, deadline: De
     for row in _around(arm, checker.reach, np.array(start)):
         if deadline.has_passed():
             break
-        if checker.keeps(row, FREE):
+        if checker.keeps(row, checker.clearance + SPARE):
             found = FreeConfiguration(tuple(row.tolist()), _comes_away(checker, np.array(start), row))
             if found.can_be_jogged:
                 return found
@@ -88,7 +87,7 @@ def _comes_away(checker: CollisionChecker, start: Array, end: Array) -> bool:
     """True if no pair that is closer than the clearance gets closer along the straight joint path."""
     before: dict[tuple[str, str], float] | None = None
     for share in np.linspace(0.0, 1.0, LOOKS + 1).tolist():
-        near = checker.contacts(start + share * (end - start), CLEARANCE)
+        near = checker.contacts(start + share * (end - start), checker.clearance)
         now = {(each.first, each.second): each.distance for each in near}
         if before is not None and any(
             not comes_away(before.get(pair, math.inf), distance) for pair, distance in now.items()

@@ -15,7 +15,6 @@ from services.arm.model.description import Arm
 from services.planner.cartesian.path_points import Run, states_of_runs
 from services.planner.cartesian.tool_motions import points_of
 from services.planner.collision.checker import CollisionChecker
-from services.planner.collision.clearance import CLEARANCE
 from services.planner.kinematics.goals import Goals
 from services.planner.path.path import STRAIGHT, PathNotFound, Start
 from services.planner.path.path_curve import RoundedLines, rounded_runs
@@ -67,7 +66,7 @@ class WaypointPlanner:
         for point in points_of(goal):
             touching: Start | None = None
             for configuration in self._goals.candidates(point, chosen[-1], deadline, start):
-                if self._checker.keeps(configuration, CLEARANCE):
+                if self._checker.keeps(configuration, self._checker.clearance):
                     chosen.append(configuration)
                     break
                 touching = touching or configuration
@@ -92,7 +91,7 @@ class WaypointPlanner:
                     )
             except PathNotFound as not_found:
                 raise no_path_around(
-                    not_found.reason, self._collision_refusals.line(begin, end, context.margin)
+                    not_found.reason, self._collision_refusals.line(begin, end, context.margin, context.deadline)
                 ) from not_found
             rows.append(path.corners[1:])
             planner_id = path.planner_id

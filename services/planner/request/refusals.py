@@ -7,6 +7,7 @@ from enum import StrEnum
 
 from schemas.message import Vector
 from schemas.planning import PlanCode, Refusal
+from schemas.robot import LEAST_CLEARANCE, MOST_CLEARANCE
 from services.arm.errors import nearest_name, suggestion
 from services.arm.model.description import Arm, Joint
 
@@ -59,6 +60,24 @@ def scaling_refused(which: str, value: float) -> PlanRefused:
             nearest=(1.0 if value > 1.0 else 0.1,),
             message=f"{which} is {value}: {must}",
             remedy=f"give {which} in (0, 1]; 1 is the arm's full speed",
+        ),
+    )
+
+
+def clearance_refused(value: float) -> PlanRefused:
+    """The refusal of a clearance of `value` [m], which no plan may keep."""
+    least, most = 1000.0 * LEAST_CLEARANCE, 1000.0 * MOST_CLEARANCE
+    nearest = min(max(value, LEAST_CLEARANCE), MOST_CLEARANCE)
+    return PlanRefused(
+        PlanCode.INVALID_GOAL_CONSTRAINTS,
+        Refusal(
+            check="clearance",
+            subject="clearance",
+            value=value,
+            limit=nearest,
+            nearest=(nearest,),
+            message=f"clearance is {1000.0 * value:g} mm: it must be from {least:g} mm to {most:g} mm",
+            remedy=f"ask for {1000.0 * nearest:g} mm, or for none: then the robot's own counts",
         ),
     )
 
@@ -166,26 +185,35 @@ def in_collision(
     remedy: str,
     configuration: Vector = (),
     objects: Mapping[str, str] | None = None,
+    distance: float | None = None,
 ) -> PlanRefused:
     """The refusal of `configuration` (n,) [rad] or [m], in which two links, or a link and one of the scene's `objects`
-    (their kinds by name), do not keep `margin` [m]; `nearest` is in the goal's own form."""
+    (their kinds by name), do not keep `margin` [m]; the first two are `distance` [m] apart; `nearest` is in the goal's
+    own form."""
     known = objects or {}
     shown = [[f"{known[name]} {name}" if name in known else name for name in pair] for pair in pairs]
     named = " and ".join(f"{first} with {second}" for first, second in shown)
     is_own = not any(name in known for pair in pairs for name in pair)
     near = f"would be nearer than {1000 * margin:.2g} mm" if margin > 0.0 else "touch"
+    apart = "" if distance is None or margin <= 0.0 else f": {_apart(distance)}"
     return PlanRefused(
         code,
         Refusal(
             check="self-collision" if is_own else "collision",
             subject=" / ".join(pairs[0]),
+            value=distance,
             limit=margin,
             nearest=nearest,
             configuration=configuration,
-            message=f"{where}, {named} {near}",
+            message=f"{where}, {named} {near}{apart}",
             remedy=remedy,
         ),
     )
+
+
+def _apart(distance: float) -> str:
+    """How near [m] two things are, in words."""
+    return f"{1000.0 * distance:.2g} mm apart" if distance > 0.0 else "they touch"
 
 
 def no_path_around(why: SearchFailure, blocked: PlanRefused) -> PlanRefused:
@@ -212,6 +240,8 @@ def no_path_around(why: SearchFailure, blocked: PlanRefused) -> PlanRefused:
         Refusal(
             check="clearance",
             subject=subject,
+            value=blocked.refusal.value,
+            limit=blocked.refusal.limit,
             configuration=configuration,
             message=f"{told} {where} is too near to something for the native planner, which is cautious",
             remedy='ask for planner_id "RRTConnect", which looks at the exact shapes',

@@ -15,7 +15,7 @@ from schemas.scene import Contacts, PlanningScene, SceneRequest, SceneResponse
 from schemas.topics import CONTACTS, SCENE, SCENE_EDIT
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
-from services.planner.collision.clearance import CLEARANCE, ROUNDING
+from services.planner.collision.clearance import ROUNDING
 from services.planner.collision.scene_shapes import SceneError
 from services.planner.collision.world import World
 from services.planner.request.start_state import STALE_AFTER
@@ -51,7 +51,7 @@ class SceneKeeper:
         """Shows what touches where a plan was refused, until one succeeds."""
         refusal = response.refusal
         if refusal is not None and refusal.configuration:
-            margin = CLEARANCE if refusal.limit is None else refusal.limit
+            margin = self._arm.clearance if refusal.limit is None else refusal.limit
             touching = tuple(self.world.contacts(refusal.configuration, margin + ROUNDING))
             names = self._arm.joint_names
             self._contacts.put(
