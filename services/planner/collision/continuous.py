@@ -10,13 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
-
-from services.arm.kinematics.kinematics import Kinematics
-from services.arm.kinematics.self_collisions import driver_of, shape_reach
-from services.arm.model.description import Arm
-from services.planner.collision.world_geometry import WorldGeometry
 
 Array = NDArray[np.float64]
 Look = Callable[[Array, Sequence[int]], Array]
@@ -27,11 +21,11 @@ MOST_LOOKS = 50_000
 
 
 class ContinuousCheck:
-    """For one world; `look(configuration, pairs)` says how far apart [m] these pairs are."""
+    """For one world; `look(configuration, pairs)` says how far apart [m] these pairs are, of which `reach` (k, n) says
+    how far at most [m] they move against one another per unit of each joint."""
 
-    def __init__(self, arm: Arm, kinematics: Kinematics, geometry: WorldGeometry, look: Look) -> None:
-        self._look = look
-        self.reach: Array = _pair_reach(arm, kinematics.model, geometry)
+    def __init__(self, reach: Array, look: Look) -> None:
+        self.reach, self._look = reach, look
 
     def touching(self, positions: Array, margin: float) -> Array | None:
         """Any configuration along the rows of `positions` (m, n) at which a pair is nearer than `margin` [m], or
@@ -65,16 +59,3 @@ def _at(place: float, rows: Array) -> Array:
     first = min(int(place), len(rows) - 1)
     share = place - first
     return np.asarray(rows[first] if share == 0.0 else (1.0 - share) * rows[first] + share * rows[first + 1])
-
-
-def _pair_reach(arm: Arm, model: pin.Model, geometry: WorldGeometry) -> Array:
-    """(k, n) how far at most [m] the two shapes of each pair move against one another per unit of each joint."""
-    shapes = geometry.model.geometryObjects
-    carriers = [{joint for joint in model.supports[shape.parentJoint] if joint > 0} for shape in shapes]
-    reach = np.zeros((len(geometry.pairs), len(arm.joints)))
-    for row, (one, other) in enumerate(geometry.pairs):
-        for joint in carriers[one] ^ carriers[other]:
-            moved = shapes[one if joint in carriers[one] else other]
-            source, scale = driver_of(arm, model, joint)
-            reach[row, source] += scale * shape_reach(arm, model, moved, joint)
-    return reach

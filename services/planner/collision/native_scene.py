@@ -19,12 +19,18 @@ def native_scene(
     links = [link.name for link in arm.model.links if link.collisions]
     carried = [_attachment(item, scene, links, folders) for item in scene.objects if item.attached]
     names = [*links, *(item.name for item in carried)]
+    may_touch = bool(scene.allowed or carried)
     around = [
-        replace(shape_of(item, folders), touching=_touching(item, scene, names))
+        _obstacle(item, _touching(item, scene, names) if may_touch else frozenset(), folders)
         for item in scene.objects
         if not item.attached
     ]
     return around, carried
+
+
+def _obstacle(item: SceneObject, touching: frozenset[str], folders: Sequence[Path]) -> CollisionShape:
+    shape = shape_of(item, folders)
+    return replace(shape, touching=touching) if touching else shape
 
 
 def _attachment(item: SceneObject, scene: PlanningScene, links: list[str], folders: Sequence[Path]) -> Attachment:

@@ -18,6 +18,7 @@ Folders = Sequence[Path]
 
 ANY = "*"
 # Tuning constants: chosen, where a line does not say measured or standard.
+MOST_KNOWN = 2048  # objects whose solids are kept: those of a scene before a change and after it
 LARGEST = 1e4  # [m] that a size or a coordinate may have
 
 
@@ -26,7 +27,24 @@ class SceneError(ValueError):
 
 
 def shape_of(item: SceneObject, folders: Folders = ()) -> CollisionShape:
-    """The object as a solid, its pose in its own frame; mesh files are looked for in `folders`. Raises `SceneError`."""
+    """The object as a solid, its pose in its own frame; mesh files are looked for in `folders`. Raises `SceneError`.
+
+    Of an equal object the same solid, but of one whose file may have changed.
+    """
+    return _shape_of(item, folders) if is_read_from_a_file(item) else _known(item)
+
+
+def is_read_from_a_file(item: SceneObject) -> bool:
+    """True for a mesh whose content is not in the message."""
+    return isinstance(item.shape, MeshShape) and bool(item.shape.path)
+
+
+@lru_cache(maxsize=MOST_KNOWN)
+def _known(item: SceneObject) -> CollisionShape:
+    return _shape_of(item, ())
+
+
+def _shape_of(item: SceneObject, folders: Folders) -> CollisionShape:
     if not 0.0 <= item.padding <= LARGEST:
         raise SceneError(f'object "{item.name}": padding is {item.padding:g} m; give 0 m or more')
     kind, size, mesh = _form(item, folders)

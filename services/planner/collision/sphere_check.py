@@ -121,7 +121,8 @@ def cancel_flag() -> CancelFlag:
 def show_scene(planner: NativePlanner, world: World) -> None:
     """Replaces what the planner is to keep clear of by the scene of `world`; raises ValueError for an unusable one."""
     obstacles, attachments = native_scene(world.arm, world.scene, world.folders)
-    planner.set_scene(())
+    if planner.attached or attachments:
+        planner.set_scene(())
     for name in planner.attached:
         planner.detach(name)
     for attachment in attachments:

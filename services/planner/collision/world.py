@@ -19,6 +19,7 @@ from services.arm.kinematics.kinematics import Kinematics
 from services.arm.kinematics.self_collisions import LinkPair
 from services.arm.model.description import Arm
 from services.planner.collision.continuous import ContinuousCheck
+from services.planner.collision.pair_distances import PairDistances
 from services.planner.collision.world_geometry import LowerBounds, WorldGeometry
 from services.planner.collision_geometry.coal_shapes import is_inside
 
@@ -54,11 +55,10 @@ class World:
         self._bounds = LowerBounds(self._geometry)
         self._data = kinematics.model.createData()
         self._placed = self._geometry.model.createData()
-        for index in self._bounds.pairs:
-            self._placed.deactivateCollisionPair(index)
+        self._distances = PairDistances(self._geometry)
         self.reach: Array = self._geometry.reach
         self._sides: dict[tuple[int, int], Side] = {}  # the shapes' numbers, outer first
-        self._sweep = ContinuousCheck(arm, kinematics, self._geometry, self.distances)
+        self._sweep = ContinuousCheck(self._geometry.pair_reach, self.distances)
 
     @property
     def clearance(self) -> float:
@@ -169,8 +169,7 @@ class World:
 
     def _exact(self, index: int) -> float:
         """[m] between the two shapes of a pair, less their padding."""
-        result = pin.computeDistance(self._geometry.model, self._placed, index)
-        distance = float(result.min_distance)
+        distance = float(self._distances.of(self._placed, index).min_distance)
         if distance > 0.0 and self._is_swallowed(index, distance):
             distance = -distance
         return distance - self._geometry.padding[index]
@@ -196,6 +195,6 @@ class World:
 
     def _point_between(self, index: int) -> tuple[float, ...]:
         """(3,) [m] in the base frame, of the distance that was computed last for this pair."""
-        result = self._placed.distanceResults[index]
+        result = self._distances.newest(self._placed, index)
         middle = 0.5 * (result.getNearestPoint1() + result.getNearestPoint2())
         return tuple(self._kinematics.base.actInv(middle).tolist())

@@ -5,114 +5,108 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from schemas.scene import PlanningScene, SceneObject
+from schemas.scene import AllowedPair, PlanningScene
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.kinematics.self_collisions import LinkPair, load_collision_geometry, reach_of
+from services.arm.kinematics.self_collisions import LinkPair
 from services.arm.model.description import Arm
-from services.planner.collision.scene_shapes import SceneError, allows, shape_of
-from services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
-from services.planner.collision_geometry.shapes import CollisionShape, matrix_of
+from services.planner.collision.arm_geometry import Mask, arm_geometry
+from services.planner.collision.scene_shapes import ANY, SceneError
 
 Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
-ENDLESS = 1e6  # [m]
-FEW = 100  # pairs of solids: coal is done with them before numpy has said which of them matter
+FEW = 100  # pairs: coal is done with them before numpy has said which of them matter
 
 
 class WorldGeometry:
     """Built once for one state of the scene; one entry a shape, links first, and one a pair that is checked."""
 
     def __init__(self, arm: Arm, kinematics: Kinematics, scene: PlanningScene, folders: Sequence[Path]) -> None:
-        self._arm, self._kinematics, self._scene = arm, kinematics, scene
-        self.model = load_collision_geometry(arm, kinematics.model)
-        links = [kinematics.model.frames[shape.parentFrame].name for shape in self.model.geometryObjects]
-        self.shape_names = [*links, *(item.name for item in scene.objects)]
-        self.meshes = [mesh_of(shape.geometry) for shape in self.model.geometryObjects]
-        paddings = [0.0] * len(links)
-        for item in scene.objects:
-            shape = shape_of(item, folders)
-            self.model.addGeometryObject(self._placed(item, shape))
-            self.meshes.append(shape.mesh)
-            paddings.append(shape.padding)
-        self._require_all(len(links) + len(scene.objects))
-        self._links = len(links)
-        self._joints = [int(shape.parentJoint) for shape in self.model.geometryObjects]
-        self.pairs, self.direct = self._checked()
+        self._scene = scene
+        own = arm_geometry(arm, kinematics)
+        self._own, self._links = own, len(own.names)
+        self.model = own.model.copy()
+        self.shape_names = [*own.names, *(item.name for item in scene.objects)]
+        self._require_distinct()
+        objects = own.placed(scene, folders)
+        for each in objects:
+            self.model.addGeometryObject(each.placed)
+        self._require_all(len(self.shape_names))
+        self.meshes = [*own.meshes, *(each.shape.mesh for each in objects)]
+        joints = np.array([*own.joints, *(each.joint for each in objects)], dtype=int)
+        self.moving: list[int] = np.flatnonzero(joints).tolist()
+        both, self.direct = self._checked(joints)
+        self.pairs: list[tuple[int, int]] = [(one, other) for one, other in both.tolist()]
         self.names: list[LinkPair] = [(self.shape_names[one], self.shape_names[other]) for one, other in self.pairs]
-        self.padding = [paddings[one] + paddings[other] for one, other in self.pairs]
-        self.boxes = np.array([_box(shape.geometry) for shape in self.model.geometryObjects])
-        self.moving = [index for index, joint in enumerate(self._joints) if joint != 0]
-        self.reach: Array = reach_of(arm, kinematics.model, self.model)
+        paddings = np.array([0.0] * self._links + [each.shape.padding for each in objects])
+        self.padding: list[float] = paddings[both].sum(axis=1).tolist()
+        self.boxes = np.array([*own.boxes, *(each.box for each in objects)])
+        per_shape = np.array([*own.reach, *(each.reach for each in objects)])
+        self.reach: Array = per_shape.max(axis=0, initial=0.0) @ own.drivers
+        self.pair_reach: Array = _between(per_shape, both) @ own.drivers
 
-    def _placed(self, item: SceneObject, shape: CollisionShape) -> pin.GeometryObject:
-        pose = matrix_of(shape.pose)
-        inner = pin.SE3(pose[:3, :3], pose[:3, 3])
-        if not item.attached:
-            return pin.GeometryObject(item.name, 0, 0, self._kinematics.base.act(inner), geometry_of(shape))
-        model = self._kinematics.model
-        if item.frame not in self._arm.model.link_names:
-            raise SceneError(
-                f'object "{item.name}" is attached to "{item.frame}", which {self._arm.name} does not have'
-            )
-        number = model.getFrameId(item.frame)
-        frame = model.frames[number]
-        placement = frame.placement.act(inner)
-        return pin.GeometryObject(item.name, int(frame.parentJoint), number, placement, geometry_of(shape))
+    def _require_distinct(self) -> None:
+        objects = self.shape_names[self._links :]
+        if len(set(objects)) != len(objects):
+            raise SceneError("two objects of the scene have one name; give one of them another")
 
     def _require_all(self, expected: int) -> None:
         """A shape that silently is not there would make everything look free."""
         if self.model.ngeoms != expected:
             raise SceneError(f"the checker has {self.model.ngeoms} of {expected} shapes; are two objects of one name?")
 
-    def _checked(self) -> tuple[list[tuple[int, int]], int]:
-        """The pairs that a joint can move apart and that nothing allows to touch, known to the model as well.
+    def _checked(self, joints: NDArray[np.int_]) -> tuple[NDArray[np.int_], int]:
+        """The pairs (k, 2) that a joint can move apart and that nothing allows to touch: links among themselves, then
+        solids, then meshes.
 
-        The first of them, as many as the second result says, are worth looking at in every configuration: links among
-        themselves, and solids while there are few.
+        The first of them, as many as the second result says, are known to the model as well and worth looking at in
+        every configuration: there are few.
         """
-        count = len(self.shape_names)
-        pairs = [
-            (one, other) for one in range(count) for other in range(one + 1, count) if self._is_checked(one, other)
-        ]
-        own = [pair for pair in pairs if pair[1] < self._links]
-        others = [pair for pair in pairs if pair[1] >= self._links]
-        meshes = [(one, other) for one, other in others if self.meshes[one] or self.meshes[other]]
-        solids = [(one, other) for one, other in others if not (self.meshes[one] or self.meshes[other])]
-        for one, other in own + solids + meshes:
-            self.model.addCollisionPair(pin.CollisionPair(one, other))
-        return own + solids + meshes, len(own) + (len(solids) if len(solids) <= FEW else 0)
-
-    def _is_checked(self, one: int, other: int) -> bool:
-        """Two links as the SRDF has it; an attached object is no part of its link for the SRDF."""
-        first, second = self.shape_names[one], self.shape_names[other]
         links = self._links
-        if self._joints[one] == self._joints[other]:
-            return False
-        if allows(self._scene.allowed, first, second):
-            return False
-        if other < links:
-            return first != second and not self._arm.collisions_are_disabled(first, second)
-        return second not in self._touched(one) and first not in self._touched(other)
+        mask = joints[:, None] != joints[None, :]
+        mask[:links, :links] = self._own.checked
+        mask &= ~self._allowed()
+        both = np.argwhere(np.triu(mask, 1))
+        is_mesh = np.array([mesh is not None for mesh in self.meshes])
+        has_object = both[:, 1] >= links
+        kind = np.where(has_object, 1 + is_mesh[both].any(axis=1), 0)
+        both = both[np.argsort(kind, kind="stable")]
+        count = np.cumsum(np.bincount(kind, minlength=3))
+        direct = max((int(some) for some in count[:2] if some <= FEW), default=0)
+        for one, other in both[:direct].tolist():
+            self.model.addCollisionPair(pin.CollisionPair(one, other))
+        return both, direct
 
-    def _touched(self, index: int) -> tuple[str, ...]:
-        if index < self._links:
-            return ()
-        item = self._scene.objects[index - self._links]
-        return (item.frame, *item.touch_links) if item.attached else ()
+    def _allowed(self) -> Mask:
+        """(shapes, shapes) True for pairs that the scene allows to touch, or an attached object's touch links do; an
+        attached object is no part of its link for the SRDF."""
+        names, links = np.array(self.shape_names, dtype=object), self._links
+        allowed = np.zeros((len(names), len(names)), dtype=bool)
+        for pair in self._scene.allowed:
+            allowed |= _either(pair, names)
+        for index, item in enumerate(self._scene.objects, start=links):
+            if item.attached:
+                touched = np.isin(names, (item.frame, *item.touch_links))
+                allowed[index] |= touched
+                allowed[:, index] |= touched
+        return allowed
 
 
-def _box(geometry: coal.CollisionGeometry) -> Array:
-    """(2, 3) centre and half sizes [m] of a box around the shape in its own frame."""
-    if isinstance(geometry, coal.Halfspace):
-        return np.array([[0.0, 0.0, -ENDLESS], [np.inf, np.inf, ENDLESS]])
-    geometry.computeLocalAABB()
-    low, high = geometry.aabb_local.min_, geometry.aabb_local.max_
-    return np.array([0.5 * (low + high), 0.5 * (high - low)])
+def _either(pair: AllowedPair, names: NDArray[np.object_]) -> Mask:
+    """(shapes, shapes) True where the pair names both, in either order."""
+    first, second = (np.full(len(names), name == ANY) | (names == name) for name in (pair.first, pair.second))
+    both = np.outer(first, second)
+    return np.asarray(both | both.T)
+
+
+def _between(reach: Array, both: NDArray[np.int_]) -> Array:
+    """(k, joints) how far at most [m] the two shapes of each pair (k, 2) move against one another per unit of each
+    joint, from the reach of each shape (shapes, joints); joints that carry both do not count."""
+    one, other = reach[both[:, 0]], reach[both[:, 1]]
+    return np.where((one > 0.0) != (other > 0.0), one + other, 0.0)
 
 
 class LowerBounds:

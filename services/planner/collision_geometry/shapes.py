@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,10 +72,13 @@ class CollisionShape:
         if abs(math.hypot(*self.pose[1]) - 1.0) > 1e-3:
             raise ValueError(f'"{self.name}": its rotation is no unit quaternion (x, y, z, w)')
 
-    @property
+    @cached_property
     def matrix(self) -> Array:
-        """The pose as a homogeneous transform (4, 4), translation in [m], with its quaternion brought to length 1."""
-        return matrix_of(self.pose)
+        """The pose as a homogeneous transform (4, 4), translation in [m], with its quaternion brought to length 1; not
+        to be written to."""
+        matrix = matrix_of(self.pose)
+        matrix.flags.writeable = False
+        return matrix
 
     @property
     def rotation(self) -> Array:
@@ -84,15 +88,17 @@ class CollisionShape:
 
 def matrix_of(pose: Rigid) -> Array:
     """The homogeneous transform (4, 4), translation in [m], of a translation and a quaternion of any length but 0."""
-    x, y, z, w = np.array(pose[1]) / np.linalg.norm(pose[1])
-    matrix = np.eye(4)
-    matrix[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    matrix[:3, 3] = pose[0]
-    return matrix
+    length = math.hypot(*pose[1])
+    x, y, z, w = (value / length for value in pose[1])
+    a, b, c = pose[0]
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), a],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), b],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), c],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,6 +21,7 @@ Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 ATTACHED_SHARE = 1.0 / 40.0  # of an attached thing's longest side may be bulge: it is covered while somebody waits
+MOST_KNOWN = 2048  # obstacles that are kept: those of a scene before a change and after it
 OBSTACLES = 64  # the first obstacle's number in a contact: kMaxParts
 ROUNDING = 2e-5  # [m] for every metre of reach: a float has 24 bits; measured: native/README.md
 
@@ -81,7 +83,7 @@ class Assembly:
             for second in range(first + 1, len(parts))
             if self._is_checked(parts[first][:2], parts[second][:2], held)
         ]
-        obstacles = [obstacle_of(shape, shape.matrix, touching=_bits(shape, names)) for shape in shapes]
+        obstacles = [_obstacle(shape, _bits(shape, names)) for shape in shapes]
         both = np.array(pairs, dtype=np.int32).reshape(-1, 2)
         world = motion.world(self._chain, [part for _, _, part in parts], both, obstacles)
         covers = [*self.covers.values(), *(one.cover for one in held.values())]
@@ -117,9 +119,8 @@ class Assembly:
 
 
 def _require_distinct(shapes: Sequence[CollisionShape]) -> None:
-    names = [shape.name for shape in shapes]
-    for name in names:
-        if names.count(name) > 1:
+    for name, count in Counter(shape.name for shape in shapes).items():
+        if count > 1:
             raise ValueError(f'the scene has "{name}" twice')
 
 
@@ -136,6 +137,11 @@ def _bulge(shapes: Sequence[CollisionShape]) -> float:
     longest = [max(shape.size, default=0.0) for shape in shapes]
     longest += [float(np.ptp(shape.mesh.vertices, axis=0).max()) for shape in shapes if shape.mesh is not None]
     return max(BULGE, ATTACHED_SHARE * max(longest, default=0.0))
+
+
+@lru_cache(maxsize=MOST_KNOWN)
+def _obstacle(shape: CollisionShape, touching: int) -> motion.Obstacle:
+    return obstacle_of(shape, shape.matrix, touching=touching)
 
 
 def obstacle_of(shape: CollisionShape, pose: Array, padding: float = 0.0, touching: int = 0) -> motion.Obstacle:

@@ -1,0 +1,124 @@
+"""What a world needs of the arm's own shapes, whatever stands around it: read and computed once for one arm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from schemas.scene import PlanningScene, SceneObject
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.kinematics.self_collisions import driver_of, load_collision_geometry, shape_reach
+from services.arm.model.description import Arm
+from services.planner.collision.scene_shapes import SceneError, is_read_from_a_file, shape_of
+from services.planner.collision_geometry.coal_shapes import geometry_of, mesh_of
+from services.planner.collision_geometry.shapes import CollisionShape
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# Tuning constants: chosen, where a line does not say measured or standard.
+ENDLESS = 1e6  # [m]
+
+
+class PlacedObject(NamedTuple):
+    """An object of a scene, as pinocchio has it: on which joint (0: the base), the box (2, 3) around it, and its
+    reach (joints,) as `ArmGeometry.reach_of`."""
+
+    shape: CollisionShape
+    placed: pin.GeometryObject
+    joint: int
+    box: Array
+    reach: Array
+
+
+class ArmGeometry:
+    """The links' shapes in the URDF's order; a joint is one of pinocchio's, mimics included, but for the universe."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics) -> None:
+        self.arm, self.pinocchio, self._base = arm, kinematics.model, kinematics.base
+        self.model = load_collision_geometry(arm, kinematics.model)
+        shapes = list(self.model.geometryObjects)
+        self.names = [kinematics.model.frames[shape.parentFrame].name for shape in shapes]
+        self.joints = np.array([int(shape.parentJoint) for shape in shapes], dtype=int)
+        self.meshes = [mesh_of(shape.geometry) for shape in shapes]
+        self.boxes = np.array([box_of(shape.geometry) for shape in shapes])
+        self.drivers = self._drivers()
+        self.reach = np.array([self.reach_of(shape) for shape in shapes])
+        self.checked = self._checked()
+        self._placed: dict[SceneObject, PlacedObject] = {}
+
+    def placed(self, scene: PlanningScene, folders: Sequence[Path]) -> list[PlacedObject]:
+        """The objects of a scene; those of the scene before it are computed no second time, but what is read from a
+        file."""
+        known = self._placed
+        placed = [known.get(item) or self._place(item, folders) for item in scene.objects]
+        lasting = zip(scene.objects, placed, strict=True)
+        self._placed = {item: each for item, each in lasting if not is_read_from_a_file(item)}
+        return placed
+
+    def _place(self, item: SceneObject, folders: Sequence[Path]) -> PlacedObject:
+        shape = shape_of(item, folders)
+        inner = pin.SE3(shape.matrix[:3, :3], shape.matrix[:3, 3])
+        geometry = geometry_of(shape)
+        if not item.attached:
+            placed = pin.GeometryObject(item.name, 0, 0, self._base.act(inner), geometry)
+            return PlacedObject(shape, placed, 0, box_of(geometry), np.zeros(len(self.drivers)))
+        if item.frame not in self.arm.model.link_names:
+            raise SceneError(f'object "{item.name}" is attached to "{item.frame}", which {self.arm.name} does not have')
+        number = self.pinocchio.getFrameId(item.frame)
+        frame = self.pinocchio.frames[number]
+        joint = int(frame.parentJoint)
+        placed = pin.GeometryObject(item.name, joint, number, frame.placement.act(inner), geometry)
+        return PlacedObject(shape, placed, joint, box_of(geometry), self.reach_of(placed))
+
+    def reach_of(self, shape: pin.GeometryObject) -> Array:
+        """(joints,) [m/rad] or [m/m] that any point of the shape moves at most per unit of each joint; 0 for those that
+        do not carry it."""
+        reach = np.zeros(self.pinocchio.njoints - 1)
+        for joint in self.pinocchio.supports[shape.parentJoint]:
+            if joint > 0:
+                reach[joint - 1] = shape_reach(self.arm, self.pinocchio, shape, joint)
+        return reach
+
+    def _drivers(self) -> Array:
+        """(joints, n) the ratio of each joint's motion to that of the arm's joint that drives it."""
+        drivers = np.zeros((self.pinocchio.njoints - 1, len(self.arm.joints)))
+        for joint in range(1, self.pinocchio.njoints):
+            source, scale = driver_of(self.arm, self.pinocchio, joint)
+            drivers[joint - 1, source] = scale
+        return drivers
+
+    def _checked(self) -> Mask:
+        """(shapes, shapes) True for pairs on links that a joint moves apart and that the SRDF does not allow to
+        touch."""
+        allowed = np.array(
+            [[one == two or self.arm.collisions_are_disabled(one, two) for two in self.names] for one in self.names]
+        )
+        return np.asarray(~allowed & (self.joints[:, None] != self.joints[None, :]))
+
+
+_KNOWN: WeakKeyDictionary[Kinematics, ArmGeometry] = WeakKeyDictionary()
+
+
+def arm_geometry(arm: Arm, kinematics: Kinematics) -> ArmGeometry:
+    """The geometry of `arm`; built once for as long as its kinematics are in use."""
+    known = _KNOWN.get(kinematics)
+    if known is None or known.arm is not arm:
+        known = _KNOWN[kinematics] = ArmGeometry(arm, kinematics)
+    return known
+
+
+def box_of(geometry: coal.CollisionGeometry) -> Array:
+    """(2, 3) centre and half sizes [m] of a box around the shape in its own frame."""
+    if isinstance(geometry, coal.Halfspace):
+        return np.array([[0.0, 0.0, -ENDLESS], [np.inf, np.inf, ENDLESS]])
+    geometry.computeLocalAABB()
+    low, high = geometry.aabb_local.min_, geometry.aabb_local.max_
+    return np.array([0.5 * (low + high), 0.5 * (high - low)])

@@ -1,0 +1,138 @@
+"""Taking in a scene: what belongs to the arm is computed once, what stood there before is not computed again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from schemas.frames import Transform
+from schemas.scene import AllowedPair, MeshShape, PlanningScene, SceneObject
+from services.arm.kinematics import self_collisions
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.kinematics.self_collisions import driver_of, shape_reach
+from services.arm.model.description import Arm, load_arm
+from services.bench.scene_intake import drawn_scene
+from services.planner.collision import arm_geometry
+from services.planner.collision.world import World
+from tests.planner.test_world import configurations, stl_box
+
+SEVEN = Path(__file__).parent / "arms" / "seven"
+OBJECTS = 40
+
+
+def with_load(scene: PlanningScene, link: str) -> PlanningScene:
+    """The first object attached to a link, the second one allowed to touch everything."""
+    first, second, *others = scene.objects
+    held = msgspec.structs.replace(first, attached=True, frame=link, pose=Transform(translation=(0.0, 0.0, 0.1)))
+    allowed = (AllowedPair(first=second.name, second="*"),)
+    return PlanningScene(version=scene.version, objects=(held, second, *others), allowed=allowed)
+
+
+@pytest.fixture(scope="module", params=["rm1", "parol6", "seven"])
+def arm(request: pytest.FixtureRequest, rm1_folder: Path) -> Arm:
+    return load_arm(SEVEN if request.param == "seven" else rm1_folder.parent / request.param)
+
+
+class Counted:
+    """How often something is called."""
+
+    def __init__(self, function: object) -> None:
+        self._function, self.calls = function, 0
+
+    def __call__(self, *arguments: object, **more: object) -> object:
+        self.calls += 1
+        return self._function(*arguments, **more)  # type: ignore[operator]
+
+
+def test_a_scene_costs_no_walk_along_the_chain_for_what_stands_still(arm: Arm, monkeypatch: pytest.MonkeyPatch):
+    reach, load = Counted(arm_geometry.shape_reach), Counted(arm_geometry.load_collision_geometry)
+    monkeypatch.setattr(arm_geometry, "shape_reach", reach)
+    monkeypatch.setattr(self_collisions, "shape_reach", reach)
+    monkeypatch.setattr(arm_geometry, "load_collision_geometry", load)
+    kinematics = Kinematics(arm)
+    reach.calls = 0
+    World(arm, kinematics)
+    for_the_arm = reach.calls
+    assert for_the_arm > 0
+    for seed in range(3):
+        World(arm, kinematics, drawn_scene(seed, OBJECTS))
+    assert (reach.calls, load.calls) == (for_the_arm, 1)
+
+
+def test_one_object_more_is_one_object_computed(arm: Arm, monkeypatch: pytest.MonkeyPatch):
+    scene = drawn_scene(1, OBJECTS + 1)
+    fewer = PlanningScene(version=1, objects=scene.objects[:OBJECTS])
+    kinematics = Kinematics(arm)
+    World(arm, kinematics, fewer)
+    made = Counted(arm_geometry.geometry_of)
+    monkeypatch.setattr(arm_geometry, "geometry_of", made)
+    World(arm, kinematics, scene)
+    assert made.calls == 1
+
+
+def test_the_reach_of_pairs_is_what_the_chain_between_them_gives(arm: Arm):
+    kinematics = Kinematics(arm)
+    world = World(arm, kinematics, with_load(drawn_scene(2, 12), arm.tool_frame))
+    geometry, model = world._geometry, kinematics.model
+    shapes = geometry.model.geometryObjects
+    carriers = [{joint for joint in model.supports[shape.parentJoint] if joint > 0} for shape in shapes]
+    expected = np.zeros((len(geometry.pairs), len(arm.joints)))
+    for row, (one, other) in enumerate(geometry.pairs):
+        for joint in carriers[one] ^ carriers[other]:
+            moved = shapes[one if joint in carriers[one] else other]
+            source, scale = driver_of(arm, model, joint)
+            expected[row, source] += scale * shape_reach(arm, model, moved, joint)
+    assert world.pair_reach == pytest.approx(expected, abs=1e-12)
+    assert world.reach == pytest.approx(self_collisions.reach_of(arm, model, geometry.model), abs=1e-12)
+
+
+def test_distances_are_pinocchios_however_the_world_was_come_by(arm: Arm):
+    """Of every pair of shapes, after objects have come, moved and gone."""
+    kinematics = Kinematics(arm)
+    for seed in range(3):
+        World(arm, kinematics, drawn_scene(seed, OBJECTS))
+    scene = with_load(drawn_scene(2, OBJECTS), arm.tool_frame)
+    world = World(arm, kinematics, scene)
+    assert world.pairs == World(arm, Kinematics(arm), scene).pairs
+    geometry = world._geometry.model.copy()
+    geometry.removeAllCollisionPairs()
+    for one, other in world._geometry.pairs:
+        geometry.addCollisionPair(pin.CollisionPair(one, other))
+    data, placed = kinematics.model.createData(), geometry.createData()
+    numbers = range(len(world.pair_names))
+    for configuration in configurations(arm, 10):
+        q = kinematics.configuration.to_pinocchio(configuration)
+        pin.computeDistances(kinematics.model, data, geometry, placed, q)
+        expected = [result.min_distance for result in placed.distanceResults]
+        assert world.distances(configuration, list(numbers)) == pytest.approx(expected, abs=5e-6)
+        assert world.distance(configuration) == pytest.approx(min(expected), abs=5e-6)
+
+
+def test_what_is_allowed_to_touch_is_not_checked_and_nothing_else_is_left_out(arm: Arm):
+    scene = with_load(drawn_scene(2, 12), arm.tool_frame)
+    world = World(arm, Kinematics(arm), scene)
+    links = [link.name for link in arm.model.links if link.collisions]
+    held, free, *others = (item.name for item in scene.objects)
+    pairs = {frozenset(pair) for pair in world.pairs}
+    assert not any(free in pair for pair in pairs)
+    assert frozenset((held, arm.tool_frame)) not in pairs
+    assert {frozenset((held, other)) for other in others} <= pairs
+    moving = [link for link in links if frozenset((link, others[0])) in pairs]
+    assert moving
+    assert {frozenset((link, other)) for link in moving for other in others} <= pairs
+
+
+def test_a_mesh_file_that_has_changed_is_read_again(arm: Arm, tmp_path: Path):
+    item = SceneObject(name="block", shape=MeshShape(path="block.stl"), pose=Transform(translation=(3.0, 0.0, 0.0)))
+    scene, kinematics = PlanningScene(version=1, objects=(item,)), Kinematics(arm)
+    (tmp_path / "block.stl").write_bytes(stl_box(0.1))
+    small = World(arm, kinematics, scene, (tmp_path,))
+    (tmp_path / "block.stl").write_bytes(stl_box(0.5))
+    large = World(arm, kinematics, scene, (tmp_path,))
+    there = configurations(arm, 1)[0]
+    numbers = [number for number, pair in enumerate(large.pair_names) if "block" in pair]
+    assert (small.distances(there, numbers) > large.distances(there, numbers) + 0.3).all()
