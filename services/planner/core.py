@@ -25,7 +25,6 @@ from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.planner.cartesian.tool_motions import ToolMotions
 from services.planner.collision.checker import CollisionChecker
-from services.planner.collision.clearance import first_collision
 from services.planner.collision.world import World
 from services.planner.kinematics.goals import Goals
 from services.planner.path.path import STRAIGHT, PathNotFound, Start
@@ -34,10 +33,11 @@ from services.planner.pipeline.collision_refusals import CollisionRefusals
 from services.planner.pipeline.planning_context import PlanningContext
 from services.planner.pipeline.trajectory_builder import TrajectoryBuilder, TrajectoryTouches, VerifiedTrajectory
 from services.planner.pipeline.waypoints import WaypointPlanner
-from services.planner.request.deadline import CancelFlag, Deadline, Stopwatch, endless
+from services.planner.request.deadline import NEVER, CancelFlag, Deadline, DeadlinePassed, Stopwatch, endless
 from services.planner.request.refusals import (
     LEAST_SCALING,
     PlanRefused,
+    SearchFailure,
     clearance_refused,
     malformed,
     no_path_around,
@@ -53,6 +53,7 @@ Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
 PATH_POINTS = 100
 MOST_GOALS = 8  # configurations of one goal that are tried
+LATEST = 0.06  # of the time allowed, beyond it: then every question about collisions ends the plan
 LONGEST = 120.0  # [s] that may be allowed
 ATTEMPTS = 3  # searches, where the finished path fails its verification
 NEAR_START = 0.9  # of the distance at the start is kept on the way, where that is less than the clearance
@@ -96,12 +97,15 @@ class Planner:
 
         Another thread may set `cancel`, and see on `watch` what the plan is at.
         """
-        self.checker.begin()
         watch, deadline = watch or Stopwatch(clock), Deadline(clock, request.allowed_time, clock(), cancel)
+        self.checker.deadline = deadline.extended(LATEST)
+        self.checker.begin()
         try:
             response = self._plan(request, present, age, deadline, watch)
         except PlanRefused as refused:
             response = PlanResponse(code=refused.code, refusal=refused.refusal, fraction=refused.fraction)
+        finally:
+            self.checker.deadline = self.checker.world.deadline = NEVER
         scene = self.checker.world.scene
         return msgspec.structs.replace(
             response, times=watch.times, scene_version=scene.version, scene_epoch=scene.epoch
@@ -130,7 +134,7 @@ class Planner:
         self.checker.clearance = self._clearance(request)
         start = resolve_start(self.arm, request.start, present, age)
         margin = self._start_margin(start, deadline)
-        builder = TrajectoryBuilder(self.arm, self.checker, request, limits, margin, watch)
+        builder = TrajectoryBuilder(self.arm, self.checker, request, limits, margin, watch, deadline.extended(LATEST))
         context = PlanningContext(request, start, limits, margin, builder, deadline, watch)
         fraction, stopped_by = 1.0, None
         if isinstance(request.motion, LinearMotion | CircularMotion):
@@ -165,21 +169,23 @@ class Planner:
         """The straight line to the first configuration to which there is one, or else a path around to any."""
         touching: list[Start] = []
         goals: list[Start] = []
+        blocked: list[Array] = []
         for goal in self._configurations(context):
             if not self.checker.keeps(goal, self.checker.clearance):
                 touching.append(goal)
             else:
                 try:
                     return context.builder.line(context.start, goal), STRAIGHT
-                except TrajectoryTouches:
+                except TrajectoryTouches as line:
                     goals.append(goal)
+                    blocked.append(line.configuration)
             if context.deadline.has_passed() or len(goals) == MOST_GOALS:
                 break
         request = context.request
         if goals:
             if isinstance(request.motion, FreeMotion):
-                return self._around(request.motion, np.array(goals), context)
-            raise self._collision_refusals.line(context.start, goals[0], context.margin, context.deadline)
+                return self._around(request.motion, np.array(goals), blocked[0], context)
+            raise self._collision_refusals.line(context.start, goals[0], context.margin, context.deadline, blocked[0])
         if touching:
             raise self._collision_refusals.goal(request.goal, touching[0], context.start, context.deadline)
         raise timed_out()
@@ -195,8 +201,11 @@ class Planner:
                 return
             yield configuration
 
-    def _around(self, motion: FreeMotion, goals: Array, context: PlanningContext) -> tuple[VerifiedTrajectory, str]:
-        """A path around what is on the straight one; another one, where the finished trajectory touches."""
+    def _around(
+        self, motion: FreeMotion, goals: Array, blocked: Array, context: PlanningContext
+    ) -> tuple[VerifiedTrajectory, str]:
+        """A path around what is on the straight one to the first goal, where it touches in `blocked` (n,); another one,
+        where the finished trajectory touches."""
         start, margin = context.start, context.margin
         refusal: PlanRefused | None = None
         for attempt in range(ATTEMPTS):
@@ -212,9 +221,10 @@ class Planner:
                         context.watch,
                     )
                 return context.builder.path(path), path.planner_id
-            except PathNotFound as not_found:
-                line = self._collision_refusals.line(start, tuple(goals[0].tolist()), margin, context.deadline)
-                raise no_path_around(not_found.reason, line) from not_found
+            except (PathNotFound, DeadlinePassed) as not_found:
+                reason = not_found.reason if isinstance(not_found, PathNotFound) else SearchFailure.TIMED_OUT
+                line = self._collision_refusals.line(start, tuple(goals[0].tolist()), margin, context.deadline, blocked)
+                raise no_path_around(reason, line) from not_found
             except TrajectoryTouches as touching:
                 refusal = self._collision_refusals.path(touching.configuration, margin)
             if context.deadline.has_passed():
@@ -225,9 +235,9 @@ class Planner:
         """Raises `PlanRefused` where the scene has changed since the plan was begun and is in its way now."""
         if self.checker.newest is self.checker.world:
             return
-        world = self.checker.begin()
+        self.checker.begin()
         margin = self._start_margin(trajectory.points[0].positions, deadline)
-        touching = first_collision(world, sample(trajectory).positions, margin)
+        touching = self.checker.touching(sample(trajectory).positions, margin)
         if touching is not None:
             where = "in the scene as it has become meanwhile"
             raise self._collision_refusals.refusal(PlanCode.PLANNING_FAILED, where, touching, margin, (), "plan again")

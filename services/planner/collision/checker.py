@@ -14,6 +14,7 @@ from schemas.scene import Contact
 from services.arm.kinematics.self_collisions import LinkPair
 from services.planner.collision.sphere_check import sphere_check
 from services.planner.collision.world import Positions, World
+from services.planner.request.deadline import NEVER
 
 if TYPE_CHECKING:
     from services.planner.native.native_planner import NativePlanner
@@ -31,11 +32,14 @@ class CollisionChecker:
         self.newest = world
         self.world = world
         self.clearance = world.clearance  # [m] of the plan at hand
+        self.deadline = NEVER  # after which no question of the plan at hand is answered, but by `PlanRefused`
         self._spheres = sphere_check(world.arm)
 
     def begin(self) -> World:
         """Makes the newest world the one that counts, and returns it."""
+        self.world.deadline = NEVER
         self.world = self.newest
+        self.world.deadline = self.deadline
         return self.world
 
     def native(self, margin: float) -> NativePlanner | None:
@@ -49,14 +53,17 @@ class CollisionChecker:
 
     def keeps(self, positions: Positions, margin: float) -> bool:
         """True if everything is farther than `margin` [m] in this configuration (n,)."""
+        self.deadline.check()
         return self._spheres.is_free(self.world, positions, margin) or self.world.distance(positions) > margin
 
     def distance(self, positions: Positions) -> float:
         """Distance [m] of the nearest pair, as `World.distance`."""
+        self.deadline.check()
         return self.world.distance(positions)
 
     def touching(self, positions: Array, margin: float) -> Array | None:
         """A configuration (n,) on the polyline through `positions` (m, n) nearer than `margin` [m], or None."""
+        self.deadline.check()
         if len(positions) < 2:
             return self.world.touching(positions, margin)
         found = self._spheres.resolve(self.world, positions, margin)
@@ -74,4 +81,5 @@ class CollisionChecker:
 
     def contacts(self, positions: Positions, margin: float = 0.0) -> list[Contact]:
         """The pairs nearer than `margin` [m] with distance and point, as `World.contacts`."""
+        self.deadline.check()
         return self.world.contacts(positions, margin)

@@ -80,15 +80,16 @@ def _walk(checker: DistanceChecker, positions: Array, margin: float, deadline: D
     end = float(moved[-1])
     least = max(0.5 * margin, end / MOST_LOOKS)
     along, last = 0.0, positions[0]
-    while True:
+    while not deadline.has_passed():
         configuration = _configuration_at(along, moved, positions)
         clearance = checker.distance(configuration) - margin
         if clearance <= 0.0:
             return last, configuration
-        if along >= end or deadline.has_passed():
+        if along >= end:
             return configuration, None
         last = configuration
         along = min(end, along + max(clearance, least))
+    return last, None
 
 
 def _movement(checker: DistanceChecker, positions: Array) -> Array:

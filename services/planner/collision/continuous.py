@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from services.planner.request.deadline import NEVER, Deadline
+
 Array = NDArray[np.float64]
 Look = Callable[[Array, Sequence[int]], Array]
 
@@ -27,13 +29,14 @@ class ContinuousCheck:
     def __init__(self, reach: Array, look: Look) -> None:
         self.reach, self._look = reach, look
 
-    def touching(self, positions: Array, margin: float) -> Array | None:
-        """Any configuration along the rows of `positions` (m, n) at which a pair is nearer than `margin` [m], or
-        None."""
+    def touching(self, positions: Array, margin: float, deadline: Deadline = NEVER) -> Array | None:
+        """Any configuration along the rows of `positions` (m, n) at which a pair is nearer than `margin` [m], or None;
+        raises `PlanRefused` once the deadline has passed."""
         moved = self._movement(positions)
         finest = max(FINEST * margin, float(moved[-1].max(initial=0.0)) / MOST_LOOKS)
         waiting = [(0.0, float(len(positions) - 1), np.arange(len(self.reach)), moved[0], moved[-1])]
         while waiting:
+            deadline.check()
             low, high, pairs, left, right = waiting.pop()
             middle = 0.5 * (low + high)
             configuration = _at(middle, positions)

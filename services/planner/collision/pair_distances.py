@@ -10,6 +10,7 @@ import coal
 import pinocchio as pin
 
 from services.planner.collision.world_geometry import WorldGeometry
+from services.planner.request.deadline import NEVER
 
 
 class PairDistances:
@@ -19,11 +20,17 @@ class PairDistances:
         self._model, self._pairs, self._known = geometry.model, geometry.pairs, geometry.direct
         self._shapes = geometry.model.geometryObjects
         self._request = coal.DistanceRequest()
+        self.deadline = NEVER
+        is_mesh = [mesh is not None for mesh in geometry.meshes]
+        self._is_slow = [is_mesh[one] or is_mesh[other] for one, other in geometry.pairs]
         self._pair: dict[int, tuple[coal.ComputeDistance, coal.DistanceResult]] = {}
         self._poses = [coal.Transform3s() for _ in geometry.boxes]
 
     def of(self, placed: pin.GeometryData, index: int) -> coal.DistanceResult:
-        """The distance of a pair and its nearest points, in the frame of `placed`."""
+        """The distance of a pair and its nearest points, in the frame of `placed`; raises `PlanRefused` once the
+        deadline has passed, for pairs with a mesh: one may take as long as a thousand others."""
+        if self._is_slow[index]:
+            self.deadline.check()
         if index < self._known:
             return pin.computeDistance(self._model, placed, index)
         distance, result = self._pair.get(index) or self._made(index)

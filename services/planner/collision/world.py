@@ -22,6 +22,7 @@ from services.planner.collision.continuous import ContinuousCheck
 from services.planner.collision.pair_distances import PairDistances
 from services.planner.collision.world_geometry import LowerBounds, WorldGeometry
 from services.planner.collision_geometry.coal_shapes import is_inside
+from services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
@@ -64,6 +65,15 @@ class World:
     def clearance(self) -> float:
         """[m] that is to stay free between things that may not touch: the robot's own."""
         return self.arm.clearance
+
+    @property
+    def deadline(self) -> Deadline:
+        """Of the plan that asks: once it has passed, questions that may take long raise `PlanRefused`."""
+        return self._distances.deadline
+
+    @deadline.setter
+    def deadline(self, deadline: Deadline) -> None:
+        self._distances.deadline = deadline
 
     @property
     def version(self) -> int:
@@ -129,7 +139,7 @@ class World:
     def touching(self, positions: Array, margin: float) -> Array | None:
         """Any configuration along the rows of `positions` (m, n) at which something is nearer than `margin` [m], or
         None."""
-        return self._sweep.touching(positions, margin)
+        return self._sweep.touching(positions, margin, self.deadline)
 
     def pairs_within(self, positions: Positions, margin: float = 0.0) -> list[LinkPair]:
         """The pairs of names nearer than `margin` [m], each once."""

@@ -60,7 +60,7 @@ class WorldGeometry:
 
     def _checked(self, joints: NDArray[np.int_]) -> tuple[NDArray[np.int_], int]:
         """The pairs (k, 2) that a joint can move apart and that nothing allows to touch: links among themselves, then
-        solids, then meshes.
+        objects, then all with a mesh.
 
         The first of them, as many as the second result says, are known to the model as well and worth looking at in
         every configuration: there are few.
@@ -72,7 +72,7 @@ class WorldGeometry:
         both = np.argwhere(np.triu(mask, 1))
         is_mesh = np.array([mesh is not None for mesh in self.meshes])
         has_object = both[:, 1] >= links
-        kind = np.where(has_object, 1 + is_mesh[both].any(axis=1), 0)
+        kind = np.where(is_mesh[both].any(axis=1), 2, has_object)
         both = both[np.argsort(kind, kind="stable")]
         count = np.cumsum(np.bincount(kind, minlength=3))
         direct = max((int(some) for some in count[:2] if some <= FEW), default=0)

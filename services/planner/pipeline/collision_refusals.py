@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 import msgspec
 import numpy as np
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 DECIMALS = 5  # of [m] to which a distance is told: coal's last ones depend on what it was asked before
+GRACE = 0.03  # of the time allowed, for the refusal of a plan that has used it up
 LOOKS = 33  # at distances on a straight path that is refused, for the clearance that would do
 
 
@@ -40,6 +42,7 @@ class CollisionRefusals:
 
         `standing` as in `Goals.candidates`.
         """
+        deadline = deadline.extended(GRACE)
         last = last_free(self._checker, np.array(start), np.array(goal), deadline)
         values = dict(zip(self._arm.joint_names, (round(value, 4) for value in last.tolist()), strict=True))
         match asked:
@@ -51,13 +54,15 @@ class CollisionRefusals:
                 nearest = tuple(values.values())
         remedy = f"the farthest it can go on the straight path there: {self._named(tuple(values.values()))}"
         at_goal, margin = np.array(goal), self._checker.clearance
-        remedy += self._smaller(self._checker.distance(at_goal), margin)
+        remedy += self._smaller(self._checker.world.distance(at_goal), margin)
         return self.refusal(PlanCode.GOAL_IN_COLLISION, "at the goal", at_goal, margin, nearest, remedy)
 
     def start(self, start: Start, deadline: Deadline) -> PlanRefused:
         """The refusal of `start` (n,) [rad] or [m], in which something touches, with the nearest configuration that
         touches nothing."""
-        remedy, nearest = self._remedy(start), nearest_free(self._arm, self._checker, start, deadline)
+        remedy, nearest = self._remedy(start), None
+        with suppress(PlanRefused):  # what has not been found in time is not told
+            nearest = nearest_free(self._arm, self._checker, start, deadline)
         if nearest is not None and nearest.can_be_jogged:
             words = jog_words(self._arm, self._checker.reach, start, nearest.configuration)
             remedy = f"`{words}` leads out; or {remedy}"
@@ -67,13 +72,12 @@ class CollisionRefusals:
         refused = self.refusal(PlanCode.START_STATE_IN_COLLISION, where, np.array(start), 0.0, (), remedy)
         return PlanRefused(refused.code, msgspec.structs.replace(refused.refusal, nearest_free=shown))
 
-    def line(self, start: Start, goal: Start, margin: float, deadline: Deadline) -> PlanRefused:
+    def line(self, start: Start, goal: Start, margin: float, deadline: Deadline, known: Array) -> PlanRefused:
         """The refusal of the straight joint path from `start` to `goal`, (n,) [rad] or [m], that does not keep `margin`
-        [m], with the first configuration that touches; with any that does, where the deadline leaves no time."""
-        rows = np.array((start, goal))
+        [m], with the first configuration that touches; with the one that is `known`, where the time does not do."""
+        rows, deadline = np.array((start, goal)), deadline.extended(GRACE)
         found = first_collision(self._checker, rows, margin, deadline)
-        touching = self._checker.touching(rows, margin) if found is None else found
-        touching = np.array(goal) if touching is None else touching
+        touching = known if found is None else found
         named = ", ".join(self._arm.state_names)
         remedy = f"go via another configuration, for example a named one ({named})"
         remedy += self._smaller(self._least_on(rows, deadline), margin)

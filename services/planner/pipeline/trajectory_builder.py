@@ -15,7 +15,7 @@ from services.planner.collision.clearance import PathChecker
 from services.planner.path.curve import TurnsOnTheSpot
 from services.planner.path.path import Array, Path, Start
 from services.planner.path.smoothing import stopping
-from services.planner.request.deadline import Stopwatch
+from services.planner.request.deadline import NEVER, Deadline, Stopwatch
 from services.planner.request.refusals import PlanRefused, not_verified
 from services.planner.timing.profile import JointLimits, NoProfile, stop_and_go
 from services.planner.timing.time_optimal import time_optimal_path
@@ -51,10 +51,18 @@ class TrajectoryBuilder:
     """For one request: its limits, its policy, and what must be kept clear of."""
 
     def __init__(
-        self, arm: Arm, checker: PathChecker, request: PlanRequest, limits: JointLimits, margin: float, watch: Stopwatch
+        self,
+        arm: Arm,
+        checker: PathChecker,
+        request: PlanRequest,
+        limits: JointLimits,
+        margin: float,
+        watch: Stopwatch,
+        deadline: Deadline = NEVER,
     ) -> None:
+        """Past the `deadline` nothing is begun: `PlanRefused` is raised."""
         self._arm, self._checker, self._request = arm, checker, request
-        self._limits, self._margin, self._watch = limits, margin, watch
+        self._limits, self._margin, self._watch, self._deadline = limits, margin, watch, deadline
 
     def line(self, start: Start, goal: Start) -> VerifiedTrajectory:
         """The straight line of the joints from `start` to `goal`, (n,) [rad] or [m]; raises `TrajectoryTouches` or
@@ -82,12 +90,14 @@ class TrajectoryBuilder:
         """Straight from corner to corner (m, n), with a stop at each, timed as asked; raises `PlanRefused`."""
         if self._request.timing is Timing.TIME_OPTIMAL:
             return self._along(stopping(corners))
+        self._deadline.check()
         with self._watch.phase("timing"):
             return _timed(lambda: stop_and_go(self._arm.joint_names, corners.tolist(), self._limits))
 
     def _along(self, control: Array) -> JointTrajectory:
         """On the uniform cubic B-spline of `control`, timed as asked; raises `TurnsOnTheSpot` or `PlanRefused`."""
         names = self._arm.joint_names
+        self._deadline.check()
         with self._watch.phase("timing"):
             if self._request.timing is Timing.TIME_OPTIMAL:
                 return _timed(lambda: time_optimal_path(names, control, self._limits))
@@ -113,6 +123,7 @@ class TrajectoryBuilder:
         return VerifiedTrajectory(trajectory, margins, scale)
 
     def _require_free(self, rows: Array) -> None:
+        self._deadline.check()
         touching = self._checker.touching(rows, self._margin)
         if touching is not None:
             raise TrajectoryTouches(touching)
@@ -123,7 +134,7 @@ class TrajectoryBuilder:
         except PlanRefused:
             if self._request.step_policy is StepPolicy.REFUSE:
                 raise
-        scale = feasible_scale(self._arm, trajectory)
+        scale = feasible_scale(self._arm, trajectory, self._deadline)
         slower = slowed(trajectory, scale) if scale else trajectory
         return slower, require_feasible(self._arm, slower), scale
 

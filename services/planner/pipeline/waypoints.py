@@ -81,7 +81,8 @@ class WaypointPlanner:
         rows, planner_id = [np.array(configurations[:1])], STRAIGHT
         for begin, end in pairwise(configurations):
             leg = np.array((begin, end))
-            if self._checker.touching(leg, context.margin) is None:
+            touching = self._checker.touching(leg, context.margin)
+            if touching is None:
                 rows.append(leg[1:])
                 continue
             try:
@@ -90,9 +91,9 @@ class WaypointPlanner:
                         leg[0], leg[1:], context.margin, motion.planner_id, motion.seed, context.deadline, context.watch
                     )
             except PathNotFound as not_found:
-                raise no_path_around(
-                    not_found.reason, self._collision_refusals.line(begin, end, context.margin, context.deadline)
-                ) from not_found
+                deadline, margin = context.deadline, context.margin
+                blocked = self._collision_refusals.line(begin, end, margin, deadline, touching)
+                raise no_path_around(not_found.reason, blocked) from not_found
             rows.append(path.corners[1:])
             planner_id = path.planner_id
         return np.vstack(rows), planner_id

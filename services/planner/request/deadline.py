@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from schemas.planning import PlanningTimes
-from services.planner.request.refusals import timed_out
+from services.planner.request.refusals import PlanRefused, timed_out
 
 
 def endless() -> float:
@@ -23,6 +23,14 @@ class CancelFlag(Protocol):
     def set(self) -> None: ...
 
     def is_set(self) -> bool: ...
+
+
+class DeadlinePassed(PlanRefused):
+    """The refusal (TIMED_OUT) of a plan whose deadline has passed, from wherever it is at."""
+
+    def __init__(self) -> None:
+        refused = timed_out()
+        super().__init__(refused.code, refused.refusal)
 
 
 @dataclass(frozen=True)
@@ -51,7 +59,11 @@ class Deadline:
     def check(self) -> None:
         """Raises `PlanRefused` (TIMED_OUT) if the deadline has passed."""
         if self.has_passed():
-            raise timed_out()
+            raise DeadlinePassed
+
+    def extended(self, part: float) -> Deadline:
+        """A deadline later by `part` of the time allowed, for the answer to one that has passed."""
+        return replace(self, allowed=(1.0 + part) * self.allowed)
 
     def share(self, part: float) -> Deadline:
         """A deadline within this one: only `part`, in (0, 1], of the time that is left."""

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.planning import PlanCode, Refusal, StepMargin
 from services.arm.model.description import Arm, Joint
+from services.planner.request.deadline import NEVER, Deadline
 from services.planner.request.refusals import PlanRefused
 from services.planner.timing.profile import LONGEST
 from services.planner.verification.verify import at_times
@@ -136,9 +137,9 @@ def require_feasible(arm: Arm, trajectory: JointTrajectory) -> tuple[StepMargin,
     )
 
 
-def feasible_scale(arm: Arm, trajectory: JointTrajectory) -> float:
+def feasible_scale(arm: Arm, trajectory: JointTrajectory, deadline: Deadline = NEVER) -> float:
     """The largest dimensionless time scale in (0, 1] that the steppers can follow, by bisection; 0.0 where none above 1
-    % is, or none in a time that a plan may take."""
+    % is, or none in a time that a plan may take; raises `PlanRefused` once the deadline has passed."""
     slowest = max(SLOWEST, trajectory.points[-1].time_from_start / LONGEST)
     if slowest >= 1.0 or not _can(arm, slowed(trajectory, slowest)):
         return 0.0
@@ -146,6 +147,7 @@ def feasible_scale(arm: Arm, trajectory: JointTrajectory) -> float:
         return 1.0
     low, high = slowest, 1.0
     for _ in range(HALVINGS):
+        deadline.check()
         middle = 0.5 * (low + high)
         low, high = (middle, high) if _can(arm, slowed(trajectory, middle)) else (low, middle)
         if high - low < 1e-3 * low:

@@ -42,6 +42,10 @@ def nothing(*_: object) -> None:
     """Nobody wants to know."""
 
 
+class Late(Exception):
+    """The plan was not made in its time; its process is still at it, until `settle`."""
+
+
 class WorkerDied(Exception):
     """The process has ended."""
 
@@ -77,9 +81,15 @@ class Process:
                 self._hear(Shown, START, on_tick)
                 self._told = scene
 
+    def settle(self, seconds: float) -> None:
+        """After `Late`: lets the process end its job within `seconds` [s], or replaces it."""
+        with suppress(TimeoutError, WorkerDied), self._replaced_where_it_fails():
+            self._send(Cancel())
+            self._hear(Planned, seconds)
+
     def plan(self, pending_plan: PendingPlan, job: Job, seconds: float) -> PlanResponse:
-        """The worker's response; raises `TimeoutError` after `seconds` [s], `Cancelled` or `WorkerDied`. A process that
-        did not end its job is replaced."""
+        """The worker's response; raises `Late` after `seconds` [s], `Cancelled` or `WorkerDied`. A process that did not
+        end its job after a cancel is replaced."""
         with self._replaced_where_it_fails():
             self._send(job)
             needs_toppra = job.request.timing is Timing.TIME_OPTIMAL
@@ -92,6 +102,8 @@ class Process:
                 self._send(Cancel())
                 self._hear(Planned, STOPS_WITHIN)
                 raise
+            except TimeoutError as error:
+                raise Late from error
             self._has_toppra = self._has_toppra or needs_toppra
             return planned.response
 

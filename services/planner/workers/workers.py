@@ -18,10 +18,12 @@ from schemas.scene import PlanningScene
 from services.planner.core import LONGEST
 from services.planner.workers.jobs import Job
 from services.planner.workers.pending_plan import Answer, Cancelled, PendingPlan
-from services.planner.workers.process import Process, WorkerDied
+from services.planner.workers.process import Late, Process, WorkerDied
 
 MOST = 2  # processes: as many as small computers have cores for it
-GRACE = 1.0  # [s] beyond the allowed time in which a worker ends its plan by itself
+LATEST = 0.08  # of the allowed time, beyond it: then the plan is answered, whatever its process does
+LEAST_LATE = 0.02  # [s] of that at least: what the way to the process and back may take
+GRACE = 1.0  # [s] after that answer in which a process ends its plan by itself
 PATIENCE = 5.0  # [s] for a thread to see that its process is gone
 AGAIN = 3  # plans of one request, where the scene changes or the process dies meanwhile
 MOST_DEATHS = 1  # after which a plan is made again: one that ends two processes may end every one
@@ -132,7 +134,9 @@ class Workers:
             if pending_plan is None:
                 break
             if pending_plan.begin():
-                pending_plan.end(self._planned(process, pending_plan))
+                is_late = self._answer(process, pending_plan)
+                if is_late:
+                    process.settle(GRACE)
                 prepared = None
         process.close()
 
@@ -141,6 +145,15 @@ class Workers:
         with suppress(TimeoutError, WorkerDied):
             process.be_ready()
             process.show(scene)
+
+    def _answer(self, process: Process, pending_plan: PendingPlan) -> bool:
+        """True if the process is still at a plan that has been answered because its time was over."""
+        try:
+            pending_plan.end(self._planned(process, pending_plan))
+        except Late:
+            pending_plan.end(self._late(pending_plan))
+            return True
+        return False
 
     def _planned(self, process: Process, pending_plan: PendingPlan) -> PlanResponse | None:
         """A plan in the scene as it is at the plan's end; None for one that was cancelled."""
@@ -154,7 +167,7 @@ class Workers:
                 present, age = self._present()
                 job = Job(request=request, present=present, age=age)
                 began = time.monotonic()
-                response = process.plan(pending_plan, job, min(max(0.0, request.allowed_time), LONGEST) + GRACE)
+                response = process.plan(pending_plan, job, _longest(request))
             except Cancelled:
                 return None
             except TimeoutError:
@@ -184,6 +197,12 @@ class Workers:
         return PlanResponse(
             code=PlanCode.TIMED_OUT, refusal=refusal, scene_version=scene.version, scene_epoch=scene.epoch
         )
+
+
+def _longest(request: PlanRequest) -> float:
+    """[s] from the beginning of a plan to its answer."""
+    allowed = min(max(0.0, request.allowed_time), LONGEST)
+    return allowed + max(LATEST * allowed, LEAST_LATE)
 
 
 def _with_what_is_left(request: PlanRequest, began: float | None) -> PlanRequest:
