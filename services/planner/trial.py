@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import time
 from collections import Counter
@@ -42,11 +43,18 @@ def trial(arm: Arm, seconds: float = SECONDS) -> list[Finding]:
     planner = Planner(arm)
     planner.prepare()
     deadline = Deadline(time.monotonic, seconds, time.monotonic())
-    findings = list(_named_states(planner))
+    findings = [*_large_models(planner), *_named_states(planner)]
     free, near, count = _sampled(planner, deadline)
     if len(free) < max(2, LEAST_FREE * count):
         return [*findings, *_nowhere_free(arm, near, count)]
     return [*findings, *_plans(planner, free, deadline)]
+
+
+def _large_models(planner: Planner) -> Iterator[Finding]:
+    """Of links whose shapes become more spheres than are sensible."""
+    core, file = planner.checker.native(planner.arm.clearance), planner.arm.urdf_path.name
+    for link, (said, remedy) in core.large_links.items() if core else ():
+        yield warning(file, f'link "{link}"', said, remedy)
 
 
 def _named_states(planner: Planner) -> Iterator[Finding]:
@@ -139,6 +147,7 @@ def _mm(distance: float) -> str:
 
 def main() -> None:
     """Prints the findings."""
+    logging.basicConfig(format="%(message)s", level=logging.INFO)  # to the standard error: how large models are made
     for finding in trial(load_arm(Path(sys.argv[1]))):
         print(msgspec.json.encode(finding).decode())
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,9 +21,12 @@ from services.planner.native.sphere_cover import BULGE, SphereCover, cover_shape
 
 Array = NDArray[np.float64]
 
+log = logging.getLogger(__name__)
+
 # Tuning constants: chosen, where a line does not say measured or standard.
 ATTACHED_SHARE = 1.0 / 40.0  # of an attached thing's longest side may be bulge: it is covered while somebody waits
 MOST_KNOWN = 2048  # obstacles that are kept: those of a scene before a change and after it
+MOST_SPHERES = 1500  # of a link: those of rm1 and parol6 together have less
 OBSTACLES = 64  # the first obstacle's number in a contact: kMaxParts
 ROUNDING = 2e-5  # [m] for every metre of reach: a float has 24 bits; measured: native/README.md
 
@@ -57,7 +62,7 @@ class Assembly:
     def __init__(self, arm: Arm, bulge: float) -> None:
         self.arm = arm
         shapes = link_shapes(arm)
-        self.covers = {link: cover_shapes(several, bulge) for link, several in shapes.items()}
+        self.covers = {link: _told_cover(arm, link, shapes, bulge) for link in shapes}
         self._frames = frames_of(arm)
         self._chain = motion.chain(self._frames.links, self._frames.numbers, len(arm.joints))
         self._links = {link: self._part(link, shapes[link], cover) for link, cover in self.covers.items()}
@@ -116,6 +121,30 @@ class Assembly:
         if name in held or second_name in held:
             return True
         return not self.arm.collisions_are_disabled(link, second_link)
+
+
+def _told_cover(arm: Arm, link: str, shapes: Mapping[str, Sequence[CollisionShape]], bulge: float) -> SphereCover:
+    """The link's spheres; what takes long, or is large, is said in the log."""
+    several, number = shapes[link], list(shapes).index(link) + 1
+    triangles = sum(len(shape.mesh.faces) for shape in several if shape.mesh is not None)
+    place = f'{arm.name}, link "{link}" ({number} of {len(shapes)})'
+    if triangles:
+        log.info("%s: spheres around %d triangles ...", place, triangles)
+    began = time.monotonic()
+    cover = cover_shapes(several, bulge)
+    if triangles:
+        log.info("%s: %d spheres after %.1f s", place, len(cover.spheres), time.monotonic() - began)
+    if len(cover.spheres) > MOST_SPHERES:
+        log.warning("%s: %s; %s", place, *too_many(arm, len(cover.spheres)))
+    return cover
+
+
+def too_many(arm: Arm, spheres: int) -> tuple[str, str]:
+    """What more than `MOST_SPHERES` of a link mean, and the remedy."""
+    return (
+        f"its collision shapes become {spheres} spheres, more than {MOST_SPHERES}, so that every check takes longer",
+        f"`gemelo collision fit {arm.folder} --meshes --write` makes boxes, cylinders and capsules of its meshes",
+    )
 
 
 def _require_distinct(shapes: Sequence[CollisionShape]) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from services.arm.model.description import Arm
 from services.planner.collision_geometry.shapes import Attachment, CollisionShape
-from services.planner.native.assembly import Assembly
+from services.planner.native.assembly import MOST_SPHERES, Assembly, too_many
 from services.planner.native.binding import CancelFlag as NativeCancelFlag
 from services.planner.native.binding import motion
 from services.planner.native.paths import Effort, FailureReason, FreePath, NoPath
@@ -57,6 +57,12 @@ class NativePlanner:
     def covers(self) -> Mapping[str, SphereCover]:
         """Each link's spheres, in its own frame, and how far they bulge."""
         return self._assembly.covers
+
+    @property
+    def large_links(self) -> Mapping[str, tuple[str, str]]:
+        """The links whose shapes become more spheres than are sensible, each with what that means and the remedy."""
+        counts = {link: len(cover.spheres) for link, cover in self.covers.items()}
+        return {link: too_many(self.arm, count) for link, count in counts.items() if count > MOST_SPHERES}
 
     @property
     def sphere_count(self) -> int:

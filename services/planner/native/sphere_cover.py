@@ -18,6 +18,7 @@ from services.planner.collision_geometry.link_shapes import solid_of
 from services.planner.collision_geometry.shapes import CollisionShape
 from services.planner.collision_geometry.solids import Capsule, Solid
 from services.planner.native.binding import motion
+from services.planner.native.model_cache import cached_rows
 
 Array = NDArray[np.float64]
 
@@ -47,11 +48,28 @@ def cover_shapes(shapes: Sequence[CollisionShape], bulge: float) -> SphereCover:
 
 
 def _placed(shape: CollisionShape, bulge: float) -> SphereCover:
-    cover = mesh_cover(*shape.mesh.arrays, bulge) if shape.mesh else cover_of(solid_of(shape), bulge)
+    cover = kept_cover(shape, bulge)
     spheres = cover.spheres.copy()
     spheres[:, :3] = spheres[:, :3] @ shape.rotation.T + shape.pose[0]
     spheres[:, 3] += shape.padding
     return SphereCover(spheres, cover.bulge)
+
+
+def kept_cover(shape: CollisionShape, bulge: float) -> SphereCover:
+    """The spheres [m] of a shape about its own origin, from the disk where they have been made before."""
+    if shape.mesh is None:
+        return cover_of(solid_of(shape), bulge)
+    vertices, faces = shape.mesh.arrays
+    content = b"".join(
+        (np.float64(bulge).tobytes(), np.int64(len(vertices)).tobytes(), vertices.tobytes(), faces.tobytes())
+    )
+    rows = cached_rows(content, lambda: _as_rows(mesh_cover(vertices, faces, bulge)))
+    return SphereCover(rows[:-1], float(rows[-1, 0]))
+
+
+def _as_rows(cover: SphereCover) -> Array:
+    """(n + 1, 4) the spheres, and the bulge in the last row."""
+    return np.vstack((cover.spheres, (cover.bulge, 0.0, 0.0, 0.0)))
 
 
 @lru_cache(maxsize=256)

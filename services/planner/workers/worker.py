@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import logging
 import os
 import signal
 import sys
@@ -71,6 +72,7 @@ def main() -> None:
     folder, project = Path(sys.argv[1]), Path(sys.argv[2])
     jobs: SimpleQueue[AtHand | Show] = SimpleQueue()
     threading.Thread(target=_read, args=(sys.stdin.buffer, jobs, answers), daemon=True).start()
+    logging.basicConfig(format="planner worker: %(message)s", level=logging.INFO)
     planner = Planner(load_arm(folder))
     planner.prepare()
     gc.freeze()  # else a collection looks through all that was loaded, 20 ms in the middle of a plan

@@ -1,0 +1,162 @@
+"""Spheres of meshes on the disk: made once, shared by processes, made again where they are damaged."""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from services.arm.model.description import Arm, load_arm
+from services.arm.stl import read_stl
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
+from services.planner.native import model_cache, sphere_cover
+from services.planner.native.model_cache import FOLDER, cache_folder, cached_rows
+from services.planner.native.native_planner import NativePlanner
+from services.planner.native.sphere_cover import kept_cover
+from services.planner.trial import trial
+from tests.arm.plates import add_plate
+from tests.planner.test_world import stl_box
+
+BULGE = 0.02  # [m]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv(FOLDER, str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """A number for every time that spheres are made."""
+    times: list[int] = []
+    make = sphere_cover.mesh_cover
+
+    def counted(*arguments: object) -> object:
+        times.append(len(times))
+        return make(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(sphere_cover, "mesh_cover", counted)
+    return times
+
+
+def cube(half: float = 0.05) -> CollisionShape:
+    triangles = read_stl(stl_box(half))
+    return CollisionShape("cube", ShapeKind.MESH, mesh=TriangleMesh(triangles.vertices, triangles.faces))
+
+
+def test_equal_meshes_are_covered_once_and_alike(made: list[int]):
+    first, second = kept_cover(cube(), BULGE), kept_cover(cube(), BULGE)
+    fresh = sphere_cover.mesh_cover(*cube().mesh.arrays, BULGE)  # type: ignore[union-attr]
+    assert made == [0, 1]  # the second one is this test's own
+    for cover in (first, second):
+        assert np.array_equal(cover.spheres, fresh.spheres)
+        assert cover.bulge == fresh.bulge
+
+
+def test_another_mesh_or_bulge_or_maker_is_another_model(made: list[int], monkeypatch: pytest.MonkeyPatch):
+    kept_cover(cube(), BULGE)
+    kept_cover(cube(0.06), BULGE)
+    kept_cover(cube(), 2.0 * BULGE)
+    monkeypatch.setattr(model_cache, "_maker", lambda: b"compiled anew")
+    kept_cover(cube(), BULGE)
+    assert len(made) == 4
+
+
+@pytest.mark.parametrize("damage", ["", "short", "one bit"])
+def test_a_damaged_file_is_made_again(made: list[int], folder: Path, damage: str, caplog: pytest.LogCaptureFixture):
+    expected = kept_cover(cube(), BULGE)
+    (file,) = folder.glob("*.rows")
+    content = bytearray(file.read_bytes())
+    content[-3] ^= 4
+    file.write_bytes({"": b"", "short": bytes(content[:50]), "one bit": bytes(content)}[damage])
+    again = kept_cover(cube(), BULGE)
+    assert np.array_equal(again.spheres, expected.spheres)
+    assert f"{file} is damaged" in caplog.text
+    kept_cover(cube(), BULGE)
+    assert len(made) == 2
+
+
+def test_who_comes_at_the_same_time_waits_and_makes_nothing(folder: Path):
+    """Processes and threads alike: whoever opens the lock has it alone."""
+    made: list[int] = []
+
+    def make() -> np.ndarray:
+        made.append(1)
+        return np.arange(4.0 * 5000).reshape(-1, 4)
+
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(lambda _: cached_rows(b"the same", make), range(8)))
+    assert all(np.array_equal(rows, found[0]) for rows in found)
+    assert len(made) == 1
+    assert [file.suffix for file in folder.iterdir() if file.suffix != ".lock"] == [".rows"]
+
+
+def test_a_folder_that_cannot_be_written_is_no_reason_not_to_plan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, made: list[int], caplog: pytest.LogCaptureFixture
+):
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setenv(FOLDER, str(tmp_path / "file"))
+    assert len(kept_cover(cube(), BULGE).spheres) > 0
+    assert "cannot be written" in caplog.text
+    assert made == [0]
+
+
+def test_the_folder_is_the_platforms_where_none_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    monkeypatch.delenv(FOLDER)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache_folder() == tmp_path / "gemelo"
+
+
+def test_only_so_many_files_are_kept(monkeypatch: pytest.MonkeyPatch, folder: Path):
+    monkeypatch.setattr(model_cache, "MOST_FILES", 3)
+    for number in range(6):
+        cached_rows(bytes([number]), lambda: np.zeros((1, 4)))
+    assert len(list(folder.glob("*.rows"))) == 3
+
+
+@pytest.fixture
+def meshed(rm1_folder: Path, tmp_path: Path) -> Arm:
+    """rm1 with a mesh on two links."""
+    shutil.copytree(rm1_folder, tmp_path / "rm1")
+    (tmp_path / "rm1" / "cube.stl").write_bytes(stl_box(0.02))
+    add_plate(tmp_path / "rm1", "low_cube", "base_link", 0.0, -0.6, '<mesh filename="cube.stl"/>')
+    add_plate(tmp_path / "rm1", "arm_cube", "brazo_link", 0.0, 0.6, '<mesh filename="cube.stl"/>')
+    return load_arm(tmp_path / "rm1")
+
+
+def test_another_process_finds_what_the_first_has_made(meshed: Arm, made: list[int], folder: Path):
+    program = (
+        "import sys; from pathlib import Path; from services.arm.model.description import load_arm; "
+        "from services.planner.native.native_planner import NativePlanner; NativePlanner(load_arm(Path(sys.argv[1])))"
+    )
+    subprocess.run([sys.executable, "-c", program, str(meshed.folder)], check=True)
+    assert len(list(folder.glob("*.rows"))) == 1  # both links have the same mesh
+    NativePlanner(meshed)
+    assert made == []
+
+
+def test_the_log_says_how_far_it_is_and_which_model_is_too_large(
+    meshed: Arm, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+):
+    monkeypatch.setattr("services.planner.native.assembly.MOST_SPHERES", 5)
+    with caplog.at_level(logging.INFO):
+        NativePlanner(meshed)
+    assert 'link "low_cube" (6 of 6): spheres around 12 triangles ...' in caplog.text
+    assert 'link "arm_cube" (5 of 6): spheres around 12 triangles ...' in caplog.text
+    assert f"`gemelo collision fit {meshed.folder} --meshes --write`" in caplog.text
+
+
+def test_the_trial_names_a_model_that_is_too_large_with_the_remedy(meshed: Arm, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("services.planner.native.native_planner.MOST_SPHERES", 5)
+    found = [finding for finding in trial(meshed, 0.0) if finding.subject == 'link "arm_cube"']
+    assert len(found) == 1
+    assert "spheres, more than" in found[0].message
+    assert "gemelo collision fit" in found[0].remedy
