@@ -136,7 +136,7 @@ def test_a_process_that_does_not_come_back_is_killed_and_replaced(stack: Stack, 
     began = time.monotonic()
     stack.ask(PlanRequest(goal=NamedGoal(name="ready"), start=HOME, allowed_time=0.2))
     assert stack.answer().code is PlanCode.TIMED_OUT
-    assert time.monotonic() - began < 0.2 + module.GRACE + 5.0
+    assert time.monotonic() - began < 0.2 + module.GRACE  # the answer does not wait for the process
     stack.ask(EASY)
     assert stack.answer().code is PlanCode.SUCCESS
     assert not process.is_running()
