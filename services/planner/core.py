@@ -97,9 +97,9 @@ class Planner:
 
         Another thread may set `cancel`, and see on `watch` what the plan is at.
         """
-        watch, deadline = watch or Stopwatch(clock), Deadline(clock, request.allowed_time, clock(), cancel)
-        self.checker.deadline = deadline.extended(LATEST)
         self.checker.begin()
+        watch, deadline = watch or Stopwatch(clock), Deadline(clock, request.allowed_time, clock(), cancel)
+        self.checker.deadline = self.checker.world.deadline = deadline.extended(LATEST)
         try:
             response = self._plan(request, present, age, deadline, watch)
         except PlanRefused as refused:
