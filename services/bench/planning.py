@@ -116,7 +116,7 @@ PROGRAM = """
 import sys
 sys.modules["services.planner.native.binding"] = None
 from services.bench.planning import print_runs
-print_runs(int(sys.argv[1]))
+print_runs(int(sys.argv[1]), float(sys.argv[2]))
 """
 
 
@@ -142,23 +142,23 @@ def plan_python_ms() -> Figure:
     return of_samples([run.took for run in runs], PYTHON_GOAL, reference, note)
 
 
-def runs_without_core(count: int) -> list[Run]:
-    """The first `count` problems of each scene, planned in a process that cannot import the core."""
-    command = [sys.executable, "-c", PROGRAM, str(count)]
+def runs_without_core(count: int, allowed: float = ALLOWED) -> list[Run]:
+    """The first `count` problems of each scene, planned in a process without the core, `allowed` [s] each."""
+    command = [sys.executable, "-c", PROGRAM, str(count), str(allowed)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=PYTHON_TIMEOUT)
     if done.returncode != 0:
         raise NotMeasured(f"the process without the core ended with {done.returncode}: {done.stderr.strip()[-300:]}")
     return msgspec.json.decode(done.stdout.splitlines()[-1], type=list[Run])
 
 
-def print_runs(count: int) -> None:
-    """Plans the first `count` problems of each scene and prints the runs as JSON."""
+def print_runs(count: int, allowed: float) -> None:
+    """Plans the first `count` problems of each scene in `allowed` [s] each, and prints the runs as JSON."""
     planners = (Planner(rm1()), Planner(parol6()))
     gc.freeze()  # as the planner's workers do
     runs = [
         Run(trial.took, trial.worked, trial.is_solved, trial.response.planner_id)
         for planner in planners
         for name in SCENES
-        for trial in trials(planner, name, count)
+        for trial in trials(planner, name, count, allowed=allowed)
     ]
     print(msgspec.json.encode(runs).decode())

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from schemas.motion import JointTrajectory
 from schemas.planning import PlanningTimes, PlanResponse
 from services.bench.figures import quantile
-from services.bench.problems.problem_sets import COUNT, Problem, problem_set, request_of
+from services.bench.problems.problem_sets import ALLOWED, COUNT, Problem, problem_set, request_of
 from services.bench.scenes import SCENES, parol6, rm1
 from services.planner.collision.world import World
 from services.planner.core import Planner
@@ -65,18 +65,20 @@ def every_trial() -> dict[str, list[Trial]]:
     return by_scene
 
 
-def trials(planner: Planner, name: str, count: int = COUNT, planner_id: str = "") -> list[Trial]:
-    """The first `count` problems of the scene `name`."""
+def trials(
+    planner: Planner, name: str, count: int = COUNT, planner_id: str = "", allowed: float = ALLOWED
+) -> list[Trial]:
+    """The first `count` problems of the scene `name`, with `allowed` [s] for each."""
     planner.set_world(World(planner.arm, planner.kinematics, SCENES[name]))
     chosen = problem_set(planner.arm.name, name).problems[:count]
     for problem in chosen[:WARMING]:
-        trial(planner, problem, planner_id)
-    return [trial(planner, problem, planner_id) for problem in chosen]
+        trial(planner, problem, planner_id, allowed)
+    return [trial(planner, problem, planner_id, allowed) for problem in chosen]
 
 
-def trial(planner: Planner, problem: Problem, planner_id: str) -> Trial:
+def trial(planner: Planner, problem: Problem, planner_id: str, allowed: float = ALLOWED) -> Trial:
     """Plans one problem."""
-    request = request_of(problem, planner.arm, planner.kinematics, planner_id)
+    request = request_of(problem, planner.arm, planner.kinematics, planner_id, allowed)
     began, before = time.perf_counter(), time.process_time()
     response = planner.plan(request, None, clock=time.perf_counter)
     took, worked = (time.perf_counter() - began) * 1e3, (time.process_time() - before) * 1e3

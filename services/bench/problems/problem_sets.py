@@ -67,15 +67,17 @@ def _text(each: ProblemSet) -> str:
     return head + "[\n" + ",\n".join(msgspec.json.encode(problem).decode() for problem in each.problems) + "]}"
 
 
-def request_of(problem: Problem, arm: Arm, kinematics: Kinematics, planner_id: str = "") -> PlanRequest:
-    """The request that a client sends for `problem`."""
+def request_of(
+    problem: Problem, arm: Arm, kinematics: Kinematics, planner_id: str = "", allowed: float = ALLOWED
+) -> PlanRequest:
+    """The request that a client sends for `problem`, with `allowed` [s] for it."""
     names = arm.joint_names
     return PlanRequest(
         goal=tool_pose(arm, kinematics, problem.goal)
         if problem.is_pose
         else JointGoal(name=names, position=problem.goal),
         start=JointState(name=names, position=problem.start),
-        allowed_time=ALLOWED,
+        allowed_time=allowed,
         motion=FreeMotion(planner_id=planner_id),
     )
 
