@@ -195,8 +195,7 @@ def test_a_process_that_dies_idle_is_replaced_unasked_and_not_called_ready_meanw
     until(lambda: stack.workers.are_ready)
     (process,) = planning_processes()
     process.kill()
-    process.wait(PATIENCE)
-    assert not stack.workers.are_ready
+    until(lambda: not stack.workers.are_ready)
     until(lambda: stack.workers.are_ready)
     assert [each.pid for each in planning_processes()] != [process.pid]
 
