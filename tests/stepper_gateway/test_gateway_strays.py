@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from msgspec.structs import replace
 
 from firmware.bindings.device import Device
@@ -11,6 +12,7 @@ from schemas.topics import JOINT_STATES
 from services.arm.device.device_config import device_config
 from services.runtime.serial_frames import packet
 from services.stepper_gateway.links.frames import (
+    Ack,
     Code,
     Command,
     CommandReply,
@@ -54,6 +56,22 @@ def test_a_replayed_heartbeat_from_far_ahead_holds_nothing() -> None:
     rig.device.receive(encode(replace(beat, counter=beat.counter + 2**24)))
     assert rig.finish()[0] == GoalStatusCode.SUCCEEDED
     assert "hold" not in rig.events()
+
+
+@pytest.mark.parametrize("fields", [{"next_seq": 2**31}, {"seq": 2**31}, {"seq": 2**31, "next_seq": 2**31}])
+@pytest.mark.parametrize("code", [Code.OK, Code.GAP, Code.VELOCITY_LIMIT])
+def test_an_answer_to_a_chunk_that_was_never_sent_is_counted_and_stalls_nothing(
+    code: Code, fields: dict[str, int]
+) -> None:
+    rig = moving_rig()
+    stream = rig.core.controller.stream
+    assert stream is not None
+    forged = Ack(boot_id=stream.boot_id, stream=stream.id, seq=stream.next_seq - 1, next_seq=stream.next_seq, code=code)
+    before = rig.core.bad_frames
+    rig.receive(Kind.TRAJ_ACK, encode(replace(forged, **fields)))
+    status, result = rig.finish()
+    assert status == GoalStatusCode.SUCCEEDED, result.error_string
+    assert rig.core.bad_frames == before + 1
 
 
 def test_a_device_that_misses_heartbeats_which_are_sent_gets_a_fresh_session() -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from schemas.device import DeviceMode
 from services.arm.model.description import Joint
 from services.stepper_gateway.device.clock import ClockSync
-from services.stepper_gateway.links.frames import NO_JOINT, Ack, Chunk, ChunkFlag, Code, State, code_name
+from services.stepper_gateway.links.frames import NO_JOINT, Ack, BadFrame, Chunk, ChunkFlag, Code, State, code_name
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.commanded_path import CommandedPath, PathPoint
 from services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot
@@ -112,7 +112,12 @@ class Stream:
         )
 
     def on_ack(self, ack: Ack, arrival: float) -> tuple[float, list[SentChunk]]:
-        """Round trip [s] of the chunk, 0 if it is not known any more, and the chunks to send again now."""
+        """Round trip [s] of the chunk, 0 if it is not known any more, and the chunks to send again now.
+
+        Raises `BadFrame` for the answer to a chunk that was never sent.
+        """
+        if ack.seq >= self.next_seq or (ack.code != Code.WRONG_STREAM and ack.next_seq > self.next_seq):
+            raise BadFrame(f"an answer to chunk {max(ack.seq, ack.next_seq - 1)}, of {self.next_seq} that were sent")
         chunk = next((c for c in self.unacked if c.seq == ack.seq), None)
         round_trip = arrival - chunk.sent if chunk is not None else 0.0
         if chunk is not None:
@@ -132,7 +137,7 @@ class Stream:
     def on_state(self, state: State) -> None:
         """A state whose stream is this one: acknowledges chunks, and says how far the path is played."""
         self._play = state
-        self._acknowledge(state.next_seq)
+        self._acknowledge(min(state.next_seq, self.next_seq))
         self.log.prune(state.play_us)
 
     def overdue(self, now: float) -> list[SentChunk]:
