@@ -78,6 +78,7 @@ class ProgramRun:
         self._controls = Controls()
         self._execution: Execution | None = None
         self._thread: threading.Thread | None = None
+        self._stops = 0
 
     @property
     def state(self) -> RunState:
@@ -88,8 +89,9 @@ class ProgramRun:
         """Runs from the step `first` on, or only that step if `one_step`; returns at once.
 
         Raises `ProgramError` with the program's mistakes, `BadArgument` where there is no such step, and `Error` while
-        it runs already.
+        it runs already. A `stop` that comes meanwhile lets nothing begin.
         """
+        stops = self._stops
         with self._lock:
             if self._thread is not None and self._thread.is_alive():
                 raise Error(f'program "{self.program.name}" is {self._state.status}: stop it before it starts again')
@@ -98,6 +100,8 @@ class ProgramRun:
             legs = legs_of(self.program, programs, first)
             self._controls = Controls(pauses_after_one=one_step)
             self._execution = Execution(self._arm, legs, dict(self._points), self._controls, self._on_leg)
+            if stops != self._stops:
+                self._controls.stop.set()
             self._put(RunState(self.program.name, RunStatus.RUNNING, started_at=time.time()))
             self._thread = threading.Thread(target=self._run, args=(self._execution,), name="program", daemon=True)
             self._thread.start()
@@ -137,10 +141,10 @@ class ProgramRun:
 
     def stop(self) -> None:
         """The arm decelerates on its path, and the run is over; returns at once, `wait` when it rests."""
-        if self._execution is None or self._state.status.is_over:
-            return
-        self._controls.stop.set()  # without the lock: a stop waits for nobody's answer
-        self._execution.cancel()
+        self._stops += 1  # without the lock: a stop waits for nobody's answer
+        self._controls.stop.set()
+        if self._execution is not None:
+            self._execution.cancel()
         self._arm.wake()
 
     def wait(self, timeout: float | None = None) -> RunState:

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import UserDict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from gemelo.programs import (
     Detach,
     Go,
     Line,
+    Point,
     Points,
     Program,
     ProgramRun,
@@ -127,6 +129,28 @@ def test_three_points_are_taught_run_changed_and_run_again_and_the_script_ends_t
         command, cwd=twin.root, env={**twin.environment, "PYTHONPATH": str(twin.root)}, check=True, timeout=90
     )
     assert arm.joints == ended
+
+
+class StopsWhenRead(UserDict[str, Point]):
+    """Points at whose sight somebody presses Stop: in the middle of a start."""
+
+    run: ProgramRun | None = None
+
+    def __iter__(self) -> Iterator[str]:
+        if self.run is not None:
+            self.run.stop()
+        return super().__iter__()
+
+
+def test_a_stop_in_the_middle_of_a_start_lets_nothing_begin(cell: Cell) -> None:
+    points, before = StopsWhenRead(), cell.arm.joints
+    run = points.run = ProgramRun(cell.arm, Program("job", (Go(state="left"),)), points, cell.programs)
+    run.start()
+    assert run.wait(LONGEST).status is RunStatus.STOPPED
+    assert cell.arm.joints == before
+    points.run = None
+    run.start()
+    assert run.wait(LONGEST).status is RunStatus.DONE
 
 
 def test_the_check_says_what_the_run_then_does_and_the_arm_does_not_wait_between_legs(cell: Cell) -> None:

@@ -40,6 +40,7 @@ class Teaching:
         self.check: ProgramCheck | None = None
         self.is_checking = False
         self._run: ProgramRun | None = None
+        self._stops = 0
         self.version = 0  # +1 with every change
 
     @property
@@ -134,6 +135,7 @@ class Teaching:
 
     def start(self, first: StepPath, *, one_step: bool = False) -> None:
         """Runs it from a step on. Only a person says so: nothing of the page starts it anew by itself."""
+        stops = self._stops
         with self._lock:
             if self.is_running:
                 raise gemelo.Error(f'program "{self.program.name}" runs already')
@@ -142,6 +144,8 @@ class Teaching:
             )
             self._run = run
         run.start(first, one_step=one_step)
+        if stops != self._stops:
+            run.stop()
 
     def step(self, first: StepPath) -> None:
         """One step, then it pauses."""
@@ -160,7 +164,8 @@ class Teaching:
         self._require_run().resume()
 
     def stop(self) -> None:
-        """Ends the run; the arm decelerates."""
+        """Ends the run, also one that is just being started; the arm decelerates."""
+        self._stops += 1
         run = self._run
         if run is not None:
             run.stop()
