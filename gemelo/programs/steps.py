@@ -141,7 +141,9 @@ def words_of(step: Step) -> str:
         return f"repeat {step.count} times"
     if isinstance(step, Speed):
         return f"speed {step.share * 100.0:g}%"
-    said = " ".join(f"{name}={_short(value)}" for name, value in given.items() if name != "do")
+    usual = {field.encode_name: field.default for field in msgspec.structs.fields(step)}
+    told = {name: value for name, value in given.items() if name != "do" and value != usual.get(name)}
+    said = " ".join(f"{name}={_short(value)}" for name, value in told.items())
     return f"{given['do']} {said}"
 
 

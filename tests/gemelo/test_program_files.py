@@ -35,6 +35,7 @@ from gemelo.programs import (
     parse_path,
     path_text,
     read_program,
+    words_of,
 )
 from gemelo.programs.reading import parse_program
 from gemelo.programs.steps import KINDS
@@ -336,3 +337,8 @@ def test_the_programs_of_the_project_have_no_mistakes_on_any_arm(root: Path, rob
     assert "tour" in programs
     for name in programs:
         assert find_mistakes_in_file(programs.file(name), load_arm(root / "urdf" / robot), {}, programs) == ()
+
+
+def test_a_line_about_a_step_tells_what_it_was_given_and_nothing_that_is_usual() -> None:
+    assert words_of(Go(point="P", blend=0.0 / 1000.0)) == "go point='P'"
+    assert words_of(Go(point="P", blend=0.01)) == "go point='P' blend=0.01"
