@@ -17,6 +17,7 @@ import gemelo
 from schemas.deployment import Deployment
 from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
+from services.panel.view.own_pages import own_pages_only
 from services.panel.view.page import Page
 from services.panel.view.world import World
 from services.runtime.deployment import load_deployment
@@ -38,7 +39,7 @@ class Panel:
         self._pages: dict[int, Page] = {}
         self._lock = threading.Lock()
         self.operator = Operator(arm)
-        with contextlib.redirect_stdout(None):  # its own greeting
+        with contextlib.redirect_stdout(None), own_pages_only(deployment.panel.host):  # without its own greeting
             self._server = viser.ViserServer(deployment.panel.host, deployment.panel.port, verbose=False)
         self._world = World(self._server, self.operator)
         self._server.on_client_connect(self._open)

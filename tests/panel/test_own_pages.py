@@ -1,0 +1,61 @@
+"""Another site's page in the same browser cannot reach the arm; no stack is needed for it."""
+
+from __future__ import annotations
+
+import urllib.request
+from collections.abc import Iterator
+from urllib.error import HTTPError
+
+import pytest
+import viser
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from services.panel.view.own_pages import objection, own_names, own_pages_only
+
+PROTOCOL = [f"viser-v{viser.__version__}"]
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    with own_pages_only("127.0.0.1"):
+        server = viser.ViserServer("127.0.0.1", 0, verbose=False)
+    yield f"127.0.0.1:{server.get_port()}"
+    server.stop()
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "https://{address}.evil.example", "http://127.0.0.1:1", "null"]
+)
+def test_a_page_of_another_site_is_refused(address: str, origin: str) -> None:
+    with pytest.raises(InvalidStatus) as refused:
+        connect(f"ws://{address}", origin=origin.format(address=address), subprotocols=PROTOCOL)
+    assert refused.value.response.status_code == 403
+    assert b"may not lead the arm" in (refused.value.response.body or b"")
+
+
+@pytest.mark.parametrize("origin", ["http://{address}", None])
+def test_its_own_page_and_a_program_are_served(address: str, origin: str | None) -> None:
+    with connect(f"ws://{address}", origin=origin and origin.format(address=address), subprotocols=PROTOCOL) as page:
+        assert page.recv(timeout=10.0)
+    with urllib.request.urlopen(f"http://{address}", timeout=10.0) as answer:
+        assert answer.status == 200
+
+
+def test_a_name_that_somebody_else_points_here_is_refused(address: str) -> None:
+    request = urllib.request.Request(f"http://{address}", headers={"Host": "rebound.example:8088"})
+    with pytest.raises(HTTPError, match="403"):
+        urllib.request.urlopen(request, timeout=10.0)
+
+
+@pytest.mark.parametrize(
+    "host", ["localhost:8088", "[::1]:8088", "192.168.1.7:8088", "lab-pc:8088", "LAB-PC", "lab-pc.local"]
+)
+def test_this_machine_goes_by_its_names_and_addresses(host: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("socket.gethostname", lambda: "lab-pc")
+    assert objection(host, f"http://{host}", own_names("0.0.0.0")) == ""
+
+
+@pytest.mark.parametrize("host", [None, "", "[", "evil.example", "127.0.0.1.evil.example"])
+def test_no_name_and_a_broken_one_are_refused_with_the_names_that_count(host: str | None) -> None:
+    assert "localhost" in objection(host, None, own_names("127.0.0.1"))
