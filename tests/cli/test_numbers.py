@@ -83,6 +83,7 @@ OPTIONS = (
     Option(f"move {LINE} --jump {{}}", ANGLE, "move.motion.jump_threshold"),
     Option(f"move {LINE} --fraction {{}}", SHARE, "move.motion.least_fraction"),
     Option("move --named ready --speed {}", SHARE, "move.velocity_scaling"),
+    Option("move --named ready --clearance {}", LENGTH, "move.clearance"),
     Option("move --named ready --time {}", TIME, "move.allowed_time"),
     Option("ik --to 0 {} 0", LENGTH, "ik.goal.position[1]"),
     Option("ik --to 0 0 0 --rpy 0 0 {}", ANGLE, "turned(ik.goal.orientation, 2)"),
@@ -160,7 +161,7 @@ def test_every_spelling_of_a_number_is_the_same_in_si(option):
 @each_option
 def test_a_number_without_a_unit_is_si_or_refused_with_its_readings(option, capsys):
     if option.quantity.bare:
-        assert si_of(option, "0.25") == pytest.approx(0.25)
+        assert si_of(option, "0.03") == pytest.approx(0.03)
         return
     said = refusal_of(option, "0.25", capsys)
     readings = said.rstrip().rstrip("?").split("0.25 what: ")[1].split(" or ")
@@ -176,7 +177,7 @@ def test_zero_needs_no_unit(option, capsys):
     except (CommandError, SystemExit) as error:
         said = capsys.readouterr().err or str(error)
         assert "what:" not in said
-        assert "not above 0" in said or "not in (0" in said
+        assert "not above 0" in said or "not in (0" in said or "0mm is not from" in said
 
 
 @each_option

@@ -50,7 +50,14 @@ def test_the_first_hour_goes_as_it_is_told(fresh: Person, twin: Stack) -> None:
 
 
 def switches_on(person: Person, arm: gemelo.Arm) -> None:
+    person.reads("En reposo")
     person.tab("Equipo")
+    person.press("Apagar los motores")
+    until(lambda: not arm.device.state.armed, bool)
+    declares(person, arm)
+
+
+def declares(person: Person, arm: gemelo.Arm) -> None:
     person.press("Encender los motores")
     until(lambda: arm.device.state.armed, bool)
     person.press("Declarar la referencia")
@@ -135,8 +142,7 @@ def breaks_it(person: Person, arm: gemelo.Arm) -> None:
     person.reads("Parada de emergencia")
     person.press("Soltar la parada de emergencia")
     person.press("Borrar el fallo")
-    switches_on(person, arm)
-    person.page.get_by_text("Lo que podría hacer una mano").filter(visible=True).first.click()
+    declares(person, arm)
 
 
 def text_of(folder: Path) -> str:
