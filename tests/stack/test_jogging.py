@@ -118,7 +118,7 @@ def test_keys_during_a_planned_motion_are_refused_and_do_not_disturb_it(stack, o
         outcome = handle.wait(plan.duration + 10.0)
         typist.type("x")
         assert typist.ended() == ExitCode.OK
-    assert outcome.status is GoalStatusCode.SUCCEEDED, outcome
+    assert outcome.status is GoalStatusCode.SUCCEEDED, outcome.result.error_string
     assert outcome.result.executed_steps == outcome.result.commanded_steps
     require_smooth(operator, errors)
 
@@ -153,7 +153,7 @@ def test_a_goal_that_begins_where_the_keys_have_led_takes_over_without_a_jump(st
         typist.hold(UP, 1.0)
         assert typist.until("a goal is being carried out", 5.0), typist.shown
         outcome = handle.wait(plan.duration + 10.0)
-        assert outcome.status is GoalStatusCode.SUCCEEDED, outcome
+        assert outcome.status is GoalStatusCode.SUCCEEDED, outcome.result.error_string
         typist.type("x")
         assert typist.ended() == ExitCode.OK
     require_smooth(operator, errors)

@@ -62,5 +62,5 @@ def test_a_process_that_stands_still_for_seconds_costs_the_move_at_most(stack, o
     operator.node.wait(1.0)
     assert not jumps(operator.arm, operator.seen)
     again, _ = operator.move_again()
-    assert again.status is GoalStatusCode.SUCCEEDED
+    assert again.status is GoalStatusCode.SUCCEEDED, again.result.error_string
     assert stack.pid(name) == paused
