@@ -115,13 +115,13 @@ def puts_something_in_the_way(person: Person, arm: gemelo.Arm) -> None:
 
 def teaches(person: Person, arm: gemelo.Arm, folder: Path) -> None:
     person.tab("Enseñar")
-    for name in ("A", "B", "C"):
+    for name in ("Uno", "Dos", "Tres"):
         arm.move(joints={"brazo_joint": arm.joints["brazo_joint"] - 0.1})
         person.types("Nombre", name)
         person.press("Recordar esta posición")
         until(lambda name=name: f'"{name}"' in text_of(folder) or f".{name}]" in text_of(folder), bool)
     person.tab("Programas")
-    for name in ("A", "B", "C"):
+    for name in ("Uno", "Dos", "Tres"):
         person.chooses("Adónde", name)
         person.press("Añadir tras el paso")
         person.reads(f"go point='{name}'")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from math import degrees
 from pathlib import Path
 
@@ -92,14 +93,14 @@ def test_two_people_see_one_another_s_goal_and_a_page_that_is_reloaded_changes_n
 ) -> None:
     with Person(chromium, twin.deployment["GEMELO_PANEL_PORT"], "es-MX", SIZE) as other:
         other.reads("En reposo")
-        other.types(f"{ARM} [°]", -120)
-        until(lambda: person.value(f"{ARM} [°]"), lambda value: value == -120.0)
-        person.types("Speed [%]", 10)
+        other.types(f"{ARM} [°]", -90)
+        until(lambda: person.value(f"{ARM} [°]"), lambda value: value == -90.0)
+        person.types("Speed [%]", 25)
         person.press("Plan and execute")
         other.reads("En movimiento")
         until(lambda: is_moving(arm), bool)
         person.open()
-    arrives(arm, ARM, -120.0)
+    arrives(arm, ARM, -90.0)
 
 
 def test_a_browser_that_dies_while_it_jogs_leaves_the_arm_at_rest(
@@ -122,16 +123,18 @@ def test_live_sliders_do_not_jump_and_lead_the_arm(person: Person, arm: gemelo.A
     until(lambda: person.value(f"{ARM} [°]"), lambda value: abs(value) < 0.1)
     assert not is_moving(arm)
     try:
-        until(lambda: _typed(person, arm, 25.0), lambda now: abs(now - 25.0) < 0.2)
+        until(lambda: _led_to_25(person, arm), lambda now: abs(now - 25.0) < 0.2)
     finally:
         person.ticks("Live: the arm follows the sliders")
     rests(arm)
 
 
-def _typed(person: Person, arm: gemelo.Arm, value: float) -> float:
-    """[deg] of the arm after that was typed; viser drops it in the moment in which it writes the field itself."""
-    person.types(f"{ARM} [°]", value)
-    rests(arm)
+def _led_to_25(person: Person, arm: gemelo.Arm) -> float:
+    """[deg] of the arm soon after; viser drops what is typed in the moment in which it writes the field itself."""
+    for value in (24, 25):
+        person.types(f"{ARM} [°]", value)
+    with suppress(AssertionError):
+        until(lambda: degrees(arm.joints[ARM]), lambda now: abs(now - 25.0) < 0.2, 10.0)
     return degrees(arm.joints[ARM])
 
 
