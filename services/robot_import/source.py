@@ -15,8 +15,8 @@ from services.arm.model.robot_file import read_text
 UP = 3  # folders above the URDF in which its package may be
 XACRO = ".xacro"
 NO_XACRO = (
-    "it is xacro, and the Python package `xacro` is not installed: install it into .venv, or expand the file "
-    "where ROS is (`xacro robot.urdf.xacro > robot.urdf`) and import that"
+    "it is xacro, and the Python package `xacro` is not installed: run `make setup`, which brings it, "
+    "or expand the file where ROS is (`xacro robot.urdf.xacro > robot.urdf`) and import that"
 )
 
 
@@ -43,11 +43,10 @@ class Source:
 
     def _candidates(self, reference: str) -> Iterator[Path]:
         scheme, _, rest = reference.rpartition("://")
-        above = (self.urdf.parent, *self.urdf.parents[1:UP], self.root)
+        above = (*_above(self.urdf), self.root)
         if scheme in ("package", "model"):
             package, _, inside = rest.partition("/")
-            yield from (folder / inside for folder in above if package in (folder.name, _package_name(folder)))
-            yield from (folder / package / inside for folder in above)
+            yield from (folder / inside for folder in _package_folders(package, above))
             yield from (folder / inside for folder in above)
         elif scheme == "file":
             yield Path(rest if rest.startswith("/") else f"/{rest}")
@@ -94,12 +93,42 @@ def _expanded(path: Path) -> str:
     """By the package `xacro`; raises `DescriptionError` where it is not installed or refuses the file."""
     try:
         import xacro
+        from xacro import substitution_args
     except ImportError:
         raise DescriptionError(f"{path}: {NO_XACRO}") from None
+    installed = substitution_args._eval_find
+    substitution_args._eval_find = lambda package: str(_found_package(package, path))  # else it asks ROS where it is
     try:
         return str(xacro.process_file(str(path)).toxml())
+    except DescriptionError:
+        raise
     except Exception as error:  # xacro's own, and those of Python expressions in it
         raise DescriptionError(f"{path}: xacro cannot expand it: {type(error).__name__}: {error}") from error
+    finally:
+        substitution_args._eval_find = installed
+
+
+def _found_package(package: str, path: Path) -> Path:
+    """The folder that `$(find package)` in the file at `path` means; raises `DescriptionError`."""
+    above = _above(path)
+    for folder in _package_folders(package, above):
+        if folder.is_dir():
+            return folder
+    looked_in = ", ".join(str(folder) for folder in above)
+    raise DescriptionError(
+        f'{path}: $(find {package}): there is no package "{package}" in {looked_in}: copy its folder into one of them'
+    )
+
+
+def _above(path: Path) -> tuple[Path, ...]:
+    """The folders of which one may be the file's package, the innermost first."""
+    return tuple(path.absolute().parents[: UP + 1])
+
+
+def _package_folders(package: str, above: tuple[Path, ...]) -> Iterator[Path]:
+    """Where the ROS package of that name may lie: one of these folders, or a folder in one of them."""
+    yield from (folder for folder in above if package in (folder.name, _package_name(folder)))
+    yield from (folder / package for folder in above)
 
 
 def _package_name(folder: Path) -> str:

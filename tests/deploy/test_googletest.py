@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from services.runtime.deployment import project_root
+from tests.optional import need
 
 FIRMWARE = project_root() / "firmware"
 TOOLS = ["c++", "cc", "ninja", "sh", "uname", "ld", "as", "ar", "ranlib", "dpkg-deb", "tar", "cp"]
@@ -57,8 +58,8 @@ def computer(tmp_path: Path) -> Computer:
     return Computer(tmp_path)
 
 
-@pytest.mark.skipif(shutil.which("dpkg-deb") is None, reason="dpkg-deb is Debian's")
 def test_without_googletest_its_package_is_unpacked_into_the_build_folder(computer: Computer):
+    need("dpkg")
     tree = computer.sources("usr/src/googletest")
     (tree / "DEBIAN").mkdir()
     (tree / "DEBIAN/control").write_text(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+import sys
 import tomllib
 from pathlib import Path
 
@@ -86,25 +86,57 @@ def test_a_folder_without_a_robot_or_with_several_is_said(tmp_path: Path, capsys
     assert "there are 2 robots in it (a.urdf, b.urdf): name one" in capsys.readouterr().err
 
 
-@pytest.mark.skipif(importlib.util.find_spec("xacro") is not None, reason="xacro is installed and expands it")
-def test_xacro_without_its_package_says_what_would_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_xacro_without_its_package_says_what_would_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setitem(sys.modules, "xacro", None)
     file = tmp_path / "arm.urdf.xacro"
     file.write_text('<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arm prefix="l"/></robot>')
     for given in (file, tmp_path):
         assert run(["import", str(given)]) is ExitCode.FAILED
-        assert "the Python package `xacro` is not installed: install it" in capsys.readouterr().err
+        assert "the Python package `xacro` is not installed: run `make setup`" in capsys.readouterr().err
 
 
-def test_xacro_is_expanded_where_its_package_is_installed(tmp_path: Path):
-    pytest.importorskip("xacro")
-    box = '<visual><geometry><box size="0.05 0.05 ${length}"/></geometry></visual>'
-    (tmp_path / "arm.urdf.xacro").write_text(
-        '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="length" value="0.2"/>'
-        f'<xacro:macro name="part" params="name"><link name="${{name}}">{box}</link></xacro:macro>'
+PARTS = (
+    '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="length" value="0.2"/>'
+    '<xacro:macro name="part" params="name"><link name="${name}"><visual><geometry>'
+    '<box size="0.05 0.05 ${length}"/></geometry></visual></link></xacro:macro></robot>'
+)
+
+
+def xacro_package(folder: Path, package: str) -> Path:
+    """A ROS package whose robot includes its macros by `$(find package)`: the robot's file."""
+    (folder / "urdf").mkdir(parents=True)
+    (folder / "package.xml").write_text("<package><name>arm_description</name></package>")
+    (folder / "urdf/parts.xacro").write_text(PARTS)
+    robot = folder / "urdf/arm.urdf.xacro"
+    robot.write_text(
+        '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+        f'<xacro:include filename="$(find {package})/urdf/parts.xacro"/>'
         '<xacro:part name="one"/><xacro:part name="two"/>' + joint("turn", "one", "two") + "</robot>"
     )
-    assert run(["import", str(tmp_path), "--yes", "--output", str(tmp_path / "urdf")]) is ExitCode.OK
-    assert load_arm(tmp_path / "urdf" / "arm").joint_names == ("turn",)
+    return robot
+
+
+def test_xacro_is_expanded_with_the_packages_beside_it(tmp_path: Path):
+    robot = xacro_package(tmp_path / "any name", "arm_description")
+    for number, given in enumerate((tmp_path, robot)):
+        output = tmp_path / f"urdf{number}"
+        assert run(["import", str(given), "--yes", "--output", str(output)]) is ExitCode.OK
+        assert load_arm(output / "arm").joint_names == ("turn",)
+
+
+def test_xacro_that_cannot_be_expanded_says_what_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    robot = xacro_package(tmp_path / "arm", "other_description")
+    assert run(["import", str(robot)]) is ExitCode.FAILED
+    assert (
+        f'there is no package "other_description" in {robot.parent}, {robot.parent.parent},' in capsys.readouterr().err
+    )
+    robot.write_text(robot.read_text().replace("other_description", "arm").replace('"one"', '"${nobody}"'))
+    assert run(["import", str(robot)]) is ExitCode.FAILED
+    said = capsys.readouterr().err
+    assert "arm.urdf.xacro: xacro cannot expand it" in said
+    assert "nobody" in said
 
 
 def test_motors_are_written_with_their_sources_and_the_speeds_that_follow(
