@@ -71,6 +71,7 @@ class Kinematics:
         [m]; one computation gives both."""
         q = self._configuration.to_pinocchio(positions)
         jacobian = pin.computeFrameJacobian(self._model, self._data, q, self._tool, pin.LOCAL_WORLD_ALIGNED)
+        jacobian = jacobian.reshape(6, -1)  # of a single column pinocchio makes (6,)
         placement = self._in_base(pin.updateFramePlacement(self._model, self._data, self._tool))
         jacobian = self._configuration.fold(jacobian)
         if not self._base_is_root:
