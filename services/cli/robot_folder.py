@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import msgspec
-
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.text_table import table
@@ -20,7 +18,6 @@ if TYPE_CHECKING:
     from services.arm.kinematics.collision_matrix import LinkPairData
 
 FIT = "services.collision_fitting.main"  # in a process of its own: the command line loads no planner
-TRIAL = "services.planner.trial"  # as FIT
 BULGE = 0.005  # [m] that a sphere may reach beyond its link
 FIT_EXAMPLES = """examples:
   gemelo collision fit urdf/parol6
@@ -62,9 +59,11 @@ def _findings(folder: Path) -> list[Finding]:
     from services.arm.model.description import ROBOT_FILE
 
     if (folder / ROBOT_FILE).is_file():
+        from services.robot_import.trial import trial_findings
+
         findings = findings_in(folder)
         is_broken = any(finding.severity is Severity.ERROR for finding in findings)
-        return findings if is_broken else [*findings, *_trial(folder)]
+        return findings if is_broken else [*findings, *trial_findings(folder)]
     from services.arm.errors import DescriptionError
     from services.robot_import.mending import mend
     from services.robot_import.source import find_source
@@ -75,17 +74,6 @@ def _findings(folder: Path) -> list[Finding]:
         raise CommandError(str(error)) from error
     print(f"{folder} has no {ROBOT_FILE}: as `gemelo import {folder}` reads it, which mends what is a note")
     return findings
-
-
-def _trial(folder: Path) -> list[Finding]:
-    """What keeps plans from succeeding that nothing else has found; takes some seconds."""
-    from services.arm.checks.findings import Finding, error
-
-    ended = subprocess.run([sys.executable, "-m", TRIAL, str(folder)], check=False, stdout=subprocess.PIPE, text=True)
-    found = [msgspec.json.decode(line, type=Finding) for line in ended.stdout.splitlines()]
-    if ended.returncode != 0:
-        found.append(error(folder.name, "trial", f"ended with {ended.returncode}: what it said stands above"))
-    return found
 
 
 def fit_options(parser: Parser) -> None:

@@ -14,7 +14,7 @@ from services.arm.motors.speed import speed_limits
 from services.arm.motors.steps import exact_ratio
 from services.arm.motors.tick import fastest_steps
 from services.robot_import.parts import PINS, SWITCH_PINS, DriverPart, MotorPart, driver_named, motor_named
-from services.robot_import.questions import Questions, above_zero, one_of, yes_or_no
+from services.robot_import.questions import Questions, above_zero, one_of, whole, yes_or_no
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 PINION_RADIUS = 0.01  # [m]
@@ -85,15 +85,17 @@ def _ask(joint: UrdfJoint, number: int, questions: Questions, motor: str, driver
 
 
 def _microsteps(text: str, driver: DriverPart) -> int:
-    if int(text) not in driver.microsteps:
+    value = whole(text)
+    if value not in driver.microsteps:
         raise ValueError(f"{driver.name} does {', '.join(map(str, driver.microsteps))}")
-    return int(text)
+    return value
 
 
 def _pin(text: str) -> int:
-    if not 0 <= int(text) <= 63:
+    value = whole(text)
+    if not 0 <= value <= 63:
         raise ValueError("a GPIO is 0 to 63")
-    return int(text)
+    return value
 
 
 def driven_toml(drives: Sequence[JointDrive], device: str, reference: Mapping[str, float]) -> str:

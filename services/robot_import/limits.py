@@ -44,17 +44,22 @@ def _complete(joint: UrdfJoint, element: ET.Element, mended: Mended, questions: 
     if limit is None or not limit.effort > 0.0:
         ask("effort", EFFORT)
     if wanted:
-        _write(joint, element, wanted, mended)
+        is_given = all(questions.was_given(f"{joint.name}.{key}") for key in wanted)
+        _write(joint, element, wanted, mended, is_given)
 
 
-def _write(joint: UrdfJoint, element: ET.Element, wanted: dict[str, float], mended: Mended) -> None:
+def _write(joint: UrdfJoint, element: ET.Element, wanted: dict[str, float], mended: Mended, is_given: bool) -> None:
     limit = element.find("limit")
     if limit is None:
         limit = ET.SubElement(element, "limit")
         mended.xml.lines[limit] = joint.line
     was = ", ".join(f"{key} {limit.get(key, 'missing')}" for key in wanted)
     now = " ".join(f'{key}="{value:.9g}"' for key, value in wanted.items())
-    mended.say(limit, f'joint "{joint.name}"', f"its limits lack sense ({was})", f"{now}: see that it is so")
+    subject, message = f'joint "{joint.name}"', f"its limits lack sense ({was})"
+    if is_given:
+        mended.say(limit, subject, message, now)
+    else:
+        mended.warn(limit, subject, message, f"{now} by default: correct it in robot.urdf")
     for key, value in wanted.items():
         limit.set(key, f"{value:.9g}")
 

@@ -11,13 +11,14 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from services.arm.checks.findings import Finding, Severity, error, note
+from services.arm.checks.findings import Finding, Severity, error, note, warning
 from services.arm.checks.meshes import Facts, MeshFacts, check_meshes, facts_of, is_in_millimetres, link_volume
 from services.arm.checks.urdf import check_urdf, fault_finding, principal_moments
 from services.arm.model.urdf import Geometry, JointKind, UrdfLink, UrdfModel, model_of
 from services.arm.model.xml_reader import XmlReader, parse_xml
 from services.robot_import.source import Source
 
+FOREIGN = ("gazebo", "transmission", "ros2_control", "sensor")
 MOVES = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
 
 
@@ -53,6 +54,10 @@ class Mended:
         """Notes what is mended."""
         self.notes.append(note(self.source.urdf.name, subject, message, remedy, self.xml.lines.get(element, 0)))
 
+    def warn(self, element: ET.Element, subject: str, message: str, remedy: str) -> None:
+        """Warns of what a default stands for that nobody has given."""
+        self.notes.append(warning(self.source.urdf.name, subject, message, remedy, self.xml.lines.get(element, 0)))
+
 
 @lru_cache(maxsize=256)
 def _facts(file: Path) -> MeshFacts | str:
@@ -65,7 +70,7 @@ def mend(source: Source) -> Mended:
     model_of(xml)
     xml.faults.clear()
     mended = Mended(source, xml, {})
-    for step in (_names, _references, _axes, _mimics, _millimetres, _flat, _frames, _inertias, _unseen):
+    for step in (_foreign, _names, _references, _axes, _mimics, _millimetres, _flat, _frames, _inertias, _unseen):
         step(mended)
     return mended
 
@@ -79,6 +84,21 @@ def safe_name(text: str, known: set[str], allowed: str = r"[^A-Za-z0-9_.-]+") ->
         name, number = f"{stem}_{number}", number + 1
     known.add(name)
     return name
+
+
+def _foreign(mended: Mended) -> None:
+    """What is neither kinematics nor shape: elements of simulators and drivers, and pictures on surfaces."""
+    root = mended.xml.root
+    for tag in FOREIGN:
+        elements = root.findall(tag)
+        for element in elements:
+            root.remove(element)
+        if elements:
+            mended.say(elements[0], f"<{tag}>", f"{len(elements)} of these say nothing that is used here", "left out")
+    for material in root.iter("material"):
+        for texture in material.findall("texture"):
+            material.remove(texture)
+            mended.say(texture, "<texture>", f'"{texture.get("filename")}" is not drawn', "left out")
 
 
 def _names(mended: Mended) -> None:

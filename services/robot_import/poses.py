@@ -21,7 +21,8 @@ CLEAR = 0.008  # [m] between links that may touch, in a named state: twice what 
 TRIES = 3000
 INSET = 0.01  # of the travel from a limit to `home`
 READY = 0.4  # of the way from the middle to the limits, at most, for `ready`
-NEAREST_READY = 0.3  # [rad] or share of a slide's travel that `ready` must be away from `home`
+# That one joint of `ready` must be away from `home`: so much [rad] or [m], or so large a share of its travel if less.
+NEAREST_READY, NEAREST_READY_SHARE = 0.3, 0.2
 SEED = 0
 
 
@@ -44,7 +45,7 @@ def named_states(arm: Arm) -> dict[str, dict[str, float]]:
     lower, upper = np.array([_range(joint) for joint in urdf]).T
     home = _first_free(checker.distance, _around(_zero(lower, upper), lower, upper), "home", arm)
     middle, half = (lower + upper) / 2.0, (upper - lower) / 2.0
-    least = np.minimum(NEAREST_READY, 0.2 * (upper - lower))
+    least = np.minimum(NEAREST_READY, NEAREST_READY_SHARE * (upper - lower))
     away = (each for each in _around(middle + READY * 0.5 * half, lower, upper) if (abs(each - home) >= least).any())
     ready = _first_free(checker.distance, away, "ready", arm)
     rounded = {"home": np.clip(np.round(home, 4), lower, upper), "ready": np.clip(np.round(ready, 4), lower, upper)}

@@ -20,12 +20,14 @@ class Questions:
     def __init__(self, given: dict[str, str], takes_defaults: bool) -> None:
         self.answers: dict[str, str] = {}
         self._given, self._takes_defaults = given, takes_defaults
+        self._by_default: set[str] = set()
 
     def ask(self, key: str, question: str, default: str, parse: Callable[[str], T]) -> T:
         """The answer as `parse` reads it; raises `DescriptionError` where a given one is refused."""
         if key in self._given:
             return self._parsed(key, self._given[key], parse)
         if self._takes_defaults:
+            self._by_default.add(key)
             return self._parsed(key, default, parse)
         if not sys.stdin.isatty():
             raise DescriptionError(f"there is nobody to ask for {key}: say --yes for the defaults, or give --answers")
@@ -38,6 +40,10 @@ class Questions:
                 return self._parsed(key, said.strip() or default, parse)
             except DescriptionError as error:
                 print(f"  {error}")
+
+    def was_given(self, key: str) -> bool:
+        """True if a person said it: in the file of answers, or on the terminal, where even a default was looked at."""
+        return key in self.answers and key not in self._by_default
 
     def unused(self) -> list[str]:
         """What was given and never asked, with a hint: a misspelt key has no effect."""
@@ -79,9 +85,20 @@ def yes_or_no(text: str) -> bool:
     return words[text.lower()]
 
 
+def whole(text: str) -> int:
+    """Raises ValueError."""
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError("it is no whole number") from None
+
+
 def number(text: str) -> float:
     """A finite one; raises ValueError."""
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        raise ValueError("it is no number") from None
     if not abs(value) < float("inf"):
         raise ValueError("it is not finite")
     return value

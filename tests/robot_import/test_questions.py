@@ -13,7 +13,7 @@ import pytest
 
 from services.arm.errors import DescriptionError
 from services.robot_import.parts import DRIVERS, MOTORS, driver_named, motor_named
-from services.robot_import.questions import Questions, above_zero, answers_text, read_answers, yes_or_no
+from services.robot_import.questions import Questions, above_zero, answers_text, read_answers, whole, yes_or_no
 
 
 @contextlib.contextmanager
@@ -30,13 +30,16 @@ def test_a_wrong_answer_is_asked_again_and_an_empty_one_is_the_default(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     questions = Questions({}, takes_defaults=False)
-    with typed(monkeypatch, "perhaps\nyes\n\n-3\n0.4\n"):
+    with typed(monkeypatch, "perhaps\nyes\n\nfast\n-3\n0.4\nmany\n16\n"):
         assert questions.ask("motors", "does it have motors?", "no", yes_or_no) is True
         assert questions.ask("a b.motor", "its motor", "NEMA 17", motor_named).full_steps == 200
         assert questions.ask("velocity", "how fast", "1", above_zero) == 0.4
+        assert questions.ask("microsteps", "how many", "8", whole) == 16
     said = capsys.readouterr().out
     assert 'motors = "perhaps": say yes or no' in said
+    assert 'velocity = "fast": it is no number' in said
     assert "it must be above 0" in said
+    assert 'microsteps = "many": it is no whole number' in said
     assert "its motor [NEMA 17]" in said
     (tmp_path / "answers.toml").write_text(answers_text(questions.answers))
     assert read_answers(tmp_path / "answers.toml") == questions.answers

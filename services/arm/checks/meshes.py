@@ -58,23 +58,23 @@ def facts_of(file: Path) -> MeshFacts | str:
 
     try:
         mesh = trimesh.load_scene(file).to_mesh()
-        vertices = np.asarray(mesh.vertices, dtype=float)
-        if not len(mesh.faces):
-            return "it holds no triangle"
-        used = vertices[np.unique(mesh.faces)]
-        if not np.isfinite(used).all():
-            return "a corner of it is not finite"
-        mesh.merge_vertices(merge_tex=True, merge_norm=True)  # for the volume: exporters write every corner thrice
-        whole = mesh if mesh.is_watertight else mesh.convex_hull
-        volume = abs(float(whole.volume))
-        return MeshFacts(float(np.ptp(used, axis=0).max()), _thickness(used), volume,
-                         tuple(whole.center_mass), tuple(np.ravel(whole.moment_inertia)))  # fmt: skip
     except ImportError as problem:
         return f"there is no reader for {file.suffix}: {problem}"
-    except Exception as problem:  # whatever its many readers raise for a damaged file, and the hull for a flat one
-        if "used" in locals():
-            return MeshFacts(float(np.ptp(used, axis=0).max()), 0.0, 0.0, (0.0,) * 3, (0.0,) * 9)
+    except Exception as problem:  # whatever its many readers raise for a damaged file
         return f"it cannot be read: {type(problem).__name__}: {problem}"
+    if not len(mesh.faces):
+        return "it holds no triangle"
+    used = np.asarray(mesh.vertices, dtype=float)[np.unique(mesh.faces)]
+    if not np.isfinite(used).all():
+        return "a corner of it is not finite"
+    longest = float(np.ptp(used, axis=0).max())
+    try:
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)  # for the volume: exporters write every corner thrice
+        whole = mesh if mesh.is_watertight else mesh.convex_hull
+        volume, center, inertia = abs(float(whole.volume)), tuple(whole.center_mass), whole.moment_inertia
+    except Exception:  # the hull of what is flat, by qhull
+        return MeshFacts(longest, 0.0, 0.0, (0.0,) * 3, (0.0,) * 9)
+    return MeshFacts(longest, _thickness(used), volume, center, tuple(np.ravel(inertia)))
 
 
 def _thickness(points: np.ndarray) -> float:
