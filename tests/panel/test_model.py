@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import string
 from pathlib import Path
@@ -15,13 +16,14 @@ from msgspec.structs import replace
 import gemelo
 from gemelo.programs import AnyStep, Program, Repeat, StepPath, Wait
 from schemas.device import DeviceMode, DeviceState
+from services.arm.model.description import load_arm
 from services.panel.model.availability import CHECKS
 from services.panel.model.problems import Problem, problem_of
 from services.panel.model.teaching import deleted, inserted, shifted
 from services.panel.view.browser import CHANNEL, Browser, read_browser, script_html
 from services.panel.view.obstacles import nearest_hit
 from services.panel.words.en import ENGLISH
-from services.panel.words.es import SPANISH
+from services.panel.words.es import REFUSALS, SPANISH
 from services.panel.words.words import Words, language_of
 
 PANEL = Path(__file__).parents[2] / "services/panel"
@@ -83,6 +85,40 @@ def test_a_refusal_keeps_its_check_its_sentence_and_what_can():
     assert not problem_of(gemelo.Aborted("stopped")).is_refusal
     assert Words("en").problem(Problem("odd", "never heard of")) == ("Refused", "odd")
     assert "ZeroDivisionError" in problem_of(ZeroDivisionError("x")).text
+
+
+JOINTS = {
+    joint.name: joint for joint in load_arm(Path(__file__).parents[2] / "urdf/rm1").joints
+}  # turning: brazo_joint; sliding: efector_joint
+
+
+@pytest.mark.parametrize(
+    ("check", "subject", "value", "limit", "said"),
+    [
+        ("joint limit", "brazo_joint", math.pi, math.radians(169.0), "brazo_joint: 180.00 ° está más allá de su "
+         "límite de 169.00 °."),
+        ("joint limit", "efector_joint", 0.25, 0.2, "250.00 mm está más allá de su límite de 200.00 mm."),
+        ("moving start", "efector_joint", 0.01, 0.001, "se mueve a 10.00 mm/s"),
+        ("reach", "tool position", 0.1234, 0.0, "Ese punto queda 123.4 mm fuera del alcance"),
+        ("reach", "z", 0.4, 0.2, "llega en z hasta 200.0 mm, no hasta 400.0 mm"),
+        ("collision", "efector_link / post", 0.0012, 0.004, "y post quedarían a 1.2 mm; deben quedar 4.0 mm"),
+        ("self-collision", "a / b", None, 0.004, "a y b, del mismo brazo, se tocarían."),
+        ("orientation", "orientation", math.radians(12.0), 0.0, "faltan 12.0°"),
+        ("allowed time", "allowed_time", None, None, "No se encontró un camino"),
+        ("joint limit", "brazo_joint", None, None, "in English"),  # without its value there is no sentence
+    ],
+)  # fmt: skip
+def test_refusals_are_said_in_spanish_with_their_values(check, subject, value, limit, said):
+    problem = problem_of(gemelo.Refused("in English", check=check, subject=subject, value=value, limit=limit))
+    assert said in Words("es", JOINTS).problem(problem)[1]
+    assert Words("en", JOINTS).problem(problem)[1] == "in English"
+
+
+def test_every_refusal_in_spanish_is_one_that_the_planner_gives():
+    planner = "".join(path.read_text() for path in (PANEL.parent / "planner").rglob("*.py"))
+    checks = {key.removesuffix("_axis").removesuffix("_unknown") for key in REFUSALS}
+    for check in checks:
+        assert f'"{check.replace("_", " ")}"' in planner or f'"{check.replace("_", "-")}"' in planner, check
 
 
 def test_what_a_browser_tells_is_read_and_rubbish_is_not():

@@ -22,6 +22,9 @@ class Problem:
     remedy: str = ""
     nearest: gemelo.Target = field(default_factory=lambda: gemelo.Target())
     contacts: tuple[Contact, ...] = ()
+    subject: str = ""  # of the check: a joint, a pair "one / other", an axis
+    value: float | None = None  # of the subject, in the unit of the check
+    limit: float | None = None  # that the value is beyond
     is_refusal: bool = True  # False: something moved, and ended before its goal
 
     @property
@@ -32,7 +35,10 @@ class Problem:
 def problem_of(error: Exception) -> Problem:
     """The error as a problem; one that is not of `gemelo` keeps its kind in the text."""
     if isinstance(error, gemelo.Refused):
-        return Problem(str(error), error.check, error.remedy, error.nearest, error.contacts)
+        return Problem(
+            str(error), error.check, error.remedy, error.nearest, error.contacts,
+            error.subject, error.value, error.limit,
+        )  # fmt: skip
     if isinstance(error, gemelo.Aborted):
         return Problem(str(error), error.status.name.lower(), is_refusal=False)
     if isinstance(error, gemelo.Error):

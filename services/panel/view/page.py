@@ -86,7 +86,8 @@ class Page:
             self._scene.close()
 
     def _build(self, look: Look) -> None:
-        self._words = words = Words(look.language)
+        joints = {joint.name: joint for joint in self._operator.arm.description.joints}
+        self._words = words = Words(look.language, joints)
         self._kit = kit = Kit(self.client, self._operator, words)
         gui = self.client.gui
         gui.configure_theme(dark_mode=look.is_dark, show_logo=False, show_share_button=False, brand_color=BRAND)

@@ -231,3 +231,23 @@ SPANISH: dict[str, str] = {
     "text_busy": "Se está haciendo otro plan: espere, o pulse Parar.",
     "text_no_plan": "Pulse antes Planificar.",
 }
+
+# The planner's refusals, by their check; "_axis" where the subject is x, y or z, "_unknown" where there is no value.
+REFUSALS: dict[str, str] = {
+    "joint_limit": "{subject}: {value} está más allá de su límite de {limit}.",
+    "start_state": "{subject} está en {value}, más allá de su límite de {limit}: muévala a mano hasta dentro y declare "
+    "otra vez la referencia.",
+    "moving_start": "{subject} se mueve a {value}, y un plan empieza en reposo: espere, o pulse Parar.",
+    "reach": "Ese punto queda {value} fuera del alcance de la herramienta.",
+    "reach_axis": "La herramienta llega en {subject} hasta {limit}, no hasta {value}.",
+    "orientation": "La herramienta no puede girarse así: faltan {value}.",
+    "collision": "{first} y {second} quedarían a {value}; deben quedar {limit} libres.",
+    "collision_unknown": "{first} y {second} se tocarían.",
+    "self_collision": "{first} y {second}, del mismo brazo, quedarían a {value}; deben quedar {limit} libres.",
+    "self_collision_unknown": "{first} y {second}, del mismo brazo, se tocarían.",
+    "joint_state": "El último estado del brazo tiene {value}, más de {limit}: no se sabe dónde está. Vea si el equipo "
+    "está conectado.",
+    "joint_state_unknown": "Aún no llegó ningún estado del brazo. Vea si el equipo está conectado.",
+    "allowed_time_unknown": "No se encontró un camino en el tiempo permitido: dele más tiempo, o elija una meta más "
+    "cercana.",
+}

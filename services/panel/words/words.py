@@ -5,17 +5,20 @@ from __future__ import annotations
 from services.panel.model.availability import Reason
 from services.panel.model.problems import Problem
 from services.panel.words.en import ENGLISH
-from services.panel.words.es import SPANISH
+from services.panel.words.es import REFUSALS, SPANISH
+from services.panel.words.refusals import Joints, sentence_of
 
 TABLES = {"en": ENGLISH, "es": SPANISH}
+SENTENCES: dict[str, dict[str, str]] = {"en": {}, "es": REFUSALS}  # in English the planner's own are shown
 NAMES = {"en": "English", "es": "Español"}
 
 
 class Words:
     """`words("key", name=value)` is the text of the key with its values put in."""
 
-    def __init__(self, language: str) -> None:
+    def __init__(self, language: str, joints: Joints | None = None) -> None:
         self.language = language if language in TABLES else "en"
+        self._joints = joints or {}
         self._table = TABLES[self.language]
 
     def __call__(self, key: str, **values: object) -> str:
@@ -27,11 +30,11 @@ class Words:
         return "" if reason is None else self(f"reason_{reason[0]}", value=reason[1])
 
     def problem(self, problem: Problem) -> tuple[str, str]:
-        """A heading for the check, in this language, and the sentence of the part of the twin that refused."""
+        """A heading for the check, and a sentence; where this language has none, that of the part that refused."""
         key = f"check_{problem.check.replace(' ', '_').replace('-', '_')}"
         heading = self._table.get(key, self._table["check_other"] if problem.is_refusal else self._table["check_ended"])
         known = self._table.get(f"text_{problem.text.replace(' ', '_')}")
-        return heading, known or problem.text
+        return heading, known or sentence_of(problem, self._joints, SENTENCES[self.language]) or problem.text
 
 
 def language_of(browser: str) -> str:

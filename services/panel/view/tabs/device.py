@@ -7,8 +7,8 @@ from functools import partial
 import viser
 
 from services.panel.model.readings import Readings
+from services.panel.model.units import text_of
 from services.panel.view.kit import Kit, Mirror, box, esc, set_if_new, table
-from services.panel.view.units import text_of
 
 
 class DeviceTab:

@@ -10,8 +10,8 @@ from services.arm.frames.transforms import from_rpy, multiply
 from services.arm.model.description import Joint
 from services.panel.model.jogging import JogWish
 from services.panel.model.readings import Readings
+from services.panel.model.units import jog_speed
 from services.panel.view.kit import Kit, box, esc, note, set_if_new, without_event
-from services.panel.view.units import jog_speed
 
 HOLD_RATE = 20.0  # [Hz] of a held button
 LINEAR, ANGULAR = 0.1, 1.0  # [m/s], [rad/s] of the tool at 100 %

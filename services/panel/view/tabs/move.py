@@ -10,8 +10,8 @@ import gemelo
 from services.arm.model.description import Joint
 from services.panel.model.motions import PLANNERS, MotionChoice
 from services.panel.model.readings import Readings
+from services.panel.model.units import SHOWN, STEP, meant, shown, slider_range, text_of
 from services.panel.view.kit import Kit, Mirror, box, esc, note, set_if_new, table
-from services.panel.view.units import SHOWN, STEP, meant, shown, slider_range, text_of
 from services.panel.view.world import World
 
 OWN_DRAG = 0.6  # [s] after its own change a browser's slider is not written: the finger may still be on it

@@ -8,9 +8,9 @@ import numpy as np
 from viser.transforms import SO3
 
 from services.panel.model.readings import Readings
+from services.panel.model.units import text_of
 from services.panel.view.browser import Browser
 from services.panel.view.kit import Kit, esc, note, set_if_new, table
-from services.panel.view.units import text_of
 
 LOG_LINES = 8
 

@@ -9,8 +9,8 @@ import numpy as np
 
 import gemelo
 from services.panel.model.readings import Readings
+from services.panel.model.units import text_of
 from services.panel.view.kit import Kit, esc, note, set_if_new, table
-from services.panel.view.units import text_of
 
 PICTURE = (180, 240)  # [pixels] height, width
 TO_DRAW = 5.0  # [s] that a browser may take for a picture

@@ -1,0 +1,68 @@
+"""A planner's refusal in another language: made from its check, subject, value and limit, not from its sentence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+from services.arm.model.description import Joint
+from services.panel.model.problems import Problem
+from services.panel.model.units import text_of
+
+Joints = Mapping[str, Joint]  # by name
+Show = Callable[[Problem, Joints, float], str]
+
+
+def sentence_of(problem: Problem, joints: Joints, templates: Mapping[str, str]) -> str | None:
+    """The template of its check with its values put in; None where there is none, or a value that it needs is missing.
+
+    A check whose subject is an axis of the tool ("x") has a template of its own, "reach x"; one whose value is unknown
+    has the template "collision unknown".
+    """
+    place = problem.check.replace("-", " ").replace(" ", "_")
+    variant = "axis" if problem.subject in ("x", "y", "z") else "unknown" if problem.value is None else ""
+    template = templates.get(f"{place}_{variant}" if variant else place)
+    if template is None:
+        return None
+    show = SHOWN.get(problem.check)
+    values = {
+        name: "" if value is None or show is None else show(problem, joints, value)
+        for name, value in (("value", problem.value), ("limit", problem.limit))
+    }
+    first, _, second = problem.subject.partition(" / ")
+    return template.format(subject=problem.subject, first=first, second=second, **values)
+
+
+def _of_joint(problem: Problem, joints: Joints, value: float) -> str:
+    joint = joints.get(problem.subject)
+    return f"{value:g}" if joint is None else text_of(joint, value)
+
+
+def _of_speed(problem: Problem, joints: Joints, value: float) -> str:
+    return f"{_of_joint(problem, joints, value)}/s"
+
+
+def _millimetres(problem: Problem, joints: Joints, value: float) -> str:
+    return f"{1000.0 * value:.1f} mm"
+
+
+def _degrees(problem: Problem, joints: Joints, value: float) -> str:
+    return f"{math.degrees(value):.1f}°"
+
+
+def _seconds(problem: Problem, joints: Joints, value: float) -> str:
+    return f"{value:.1f} s"
+
+
+# By the planner's check: how its value and its limit are shown.
+SHOWN: dict[str, Show] = {
+    "joint limit": _of_joint,
+    "start state": _of_joint,
+    "moving start": _of_speed,
+    "reach": _millimetres,
+    "collision": _millimetres,
+    "self-collision": _millimetres,
+    "clearance": _millimetres,
+    "orientation": _degrees,
+    "joint state": _seconds,
+}
