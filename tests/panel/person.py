@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 PATIENCE = 60_000.0  # [ms] a loaded machine draws a picture in seconds
 SCALE = 0.5  # of a picture's pixels to those of the page: a processor draws a quarter of them
-CONTROLS = 410  # [pixels] of the page
+CONTROLS = 450  # [pixels] of the page
 BLUE = (45, 140, 255)  # of the gizmo's arrow along z
 
 

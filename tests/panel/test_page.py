@@ -223,7 +223,9 @@ def test_a_planner_that_is_killed_is_named_and_planning_goes_on_when_it_is_back(
     arrives(arm, ARM, 20.0)
 
 
-def test_absurd_names_numbers_and_files_are_refused_in_a_sentence(person: Person, arm: gemelo.Arm) -> None:
+def test_absurd_names_numbers_and_files_are_refused_in_a_sentence(
+    person: Person, arm: gemelo.Arm, tmp_path: Path
+) -> None:
     before = arm.joints
     person.types(f"{ARM} [°]", "1e9")
     until(lambda: person.value(f"{ARM} [°]"), lambda value: value <= 169.1)
@@ -236,5 +238,10 @@ def test_absurd_names_numbers_and_files_are_refused_in_a_sentence(person: Person
         {"name": '"><script>alert(1)</script>.stl', "mimeType": "model/stl", "buffer": b"not a mesh at all"}
     )
     person.reads("The scene was not changed")
+    huge = tmp_path / "huge.stl"
+    with huge.open("wb") as file:
+        file.truncate(100_000_000)
+    person.page.locator("input[type=file]").first.set_input_files(huge)
+    person.reads("The file has 100 MB, more than 20 MB")
     assert arm.scene.objects == {}
     assert arm.joints == before

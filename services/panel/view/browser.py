@@ -3,6 +3,7 @@
 Space is Stop wherever the focus is but in a text field: a focused button would else be pressed by it, and a number
 field would swallow it. The arrow keys hold the jog buttons that name them. Once a second the browser's language, its
 wish for dark colours, its frame rate and the newest header that it has drawn come back through a hidden text field.
+The tabs stand closer, so that all of them have room in one row. A file that is too large is not sent at all.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from dataclasses import dataclass
 import msgspec
 
 CHANNEL = "gemelo-browser"  # how the hidden field's text begins
+LARGEST_UPLOAD = 20_000_000  # [bytes] chosen: the planner takes 500,000 triangles, which are 25 MB
 STOP_SIGN = "■"  # how the Stop button's text begins, in every language
 
 SCRIPT = """
 (() => {
   if (window.gemelo) return;
   window.gemelo = true;
+  document.head.insertAdjacentHTML('beforeend', '<style>.mantine-Tabs-tab { padding-inline: 6px; }</style>');
   const buttons = () => [...document.querySelectorAll('button')];
   const keys = {ArrowLeft: '◀', ArrowRight: '▶', ArrowUp: '▲', ArrowDown: '▼', PageUp: 'PgUp', PageDown: 'PgDn'};
   const isText = (t) => t.tagName === 'TEXTAREA' || t.isContentEditable || (t.tagName === 'INPUT'
@@ -47,6 +50,14 @@ SCRIPT = """
     release(e.code);
   }, true);
   window.addEventListener('blur', () => Object.keys(held).forEach(release));
+  let tooLarge = 0;
+  window.addEventListener('change', (e) => {
+    const size = e.target.files && e.target.files.length ? e.target.files[0].size : 0;
+    if (size <= LARGEST_UPLOAD) return;
+    e.stopImmediatePropagation();
+    e.target.value = '';
+    tooLarge = size;
+  }, true);
   const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;
   let frames = 0, began = performance.now(), rate = 0, told = '';
   const tell = () => {
@@ -60,7 +71,9 @@ SCRIPT = """
       if (sent !== told) {
         told = sent;
         set.call(field, 'CHANNEL ' + JSON.stringify({sent: Number(sent), language: navigator.language, rate: rate,
-          dark: matchMedia('(prefers-color-scheme: dark)').matches, width: innerWidth, height: innerHeight}));
+          dark: matchMedia('(prefers-color-scheme: dark)').matches, width: innerWidth, height: innerHeight,
+          too_large: tooLarge}));
+        tooLarge = 0;
         field.dispatchEvent(new Event('input', {bubbles: true}));
       }
     }
@@ -81,11 +94,14 @@ class Browser:
     dark: bool = False
     width: int = 0  # [pixels]
     height: int = 0
+    too_large: int = 0  # [bytes] of a file that it was asked to upload and did not
 
 
 def script_html() -> str:
     """An invisible element whose loading fails, and so runs the script: viser puts no other code on the page."""
-    script = SCRIPT.replace("STOP_SIGN", STOP_SIGN).replace("CHANNEL", CHANNEL)
+    script = SCRIPT
+    for name, value in (("STOP_SIGN", STOP_SIGN), ("CHANNEL", CHANNEL), ("LARGEST_UPLOAD", str(LARGEST_UPLOAD))):
+        script = script.replace(name, value)
     return f'<img src="data:," alt="" style="display:none" onerror="{html.escape(script, quote=True)}">'
 
 

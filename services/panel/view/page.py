@@ -20,7 +20,7 @@ from services.panel.view.tabs.device import DeviceTab
 from services.panel.view.tabs.jog import JogTab
 from services.panel.view.tabs.move import MoveTab
 from services.panel.view.tabs.programs import ProgramsTab
-from services.panel.view.tabs.scene import SceneTab
+from services.panel.view.tabs.scene import SceneTab, require_small
 from services.panel.view.tabs.state import StateTab
 from services.panel.view.tabs.teach import TeachTab
 from services.panel.view.world import World
@@ -29,7 +29,7 @@ from services.panel.words.words import NAMES, Words, language_of
 MARK = 1.0  # [s] between two marks by which a browser's lag is measured
 BRAND = (28, 126, 214)
 SLOW = 12.0  # [Hz] a browser that draws slower has no graphics card, and gets no shadows
-WIDTH = 400.0  # [pixels] of the controls
+WIDTH = 440.0  # [pixels] of the controls: room for all tabs in one row
 GOOD, BAD, NEUTRAL = "#2f9e44", "#e03131", "#868e96"
 
 
@@ -173,6 +173,8 @@ class Page:
         if browser is None:
             return
         self.browser = browser
+        if browser.too_large:
+            self._operator.guarded(lambda: require_small(browser.too_large, self._words))
         if 0.0 < browser.rate < SLOW and not self._is_plain:
             self._is_plain = True
             self.client.scene.configure_default_lights(cast_shadow=False)

@@ -12,11 +12,12 @@ import gemelo
 from schemas.frames import Transform
 from schemas.scene import BoxShape, CylinderShape, SceneObject, Shape, SphereShape
 from services.panel.model.readings import Readings
+from services.panel.view.browser import LARGEST_UPLOAD
 from services.panel.view.kit import Kit, esc, note, set_if_new
 from services.panel.view.world import World
+from services.panel.words.words import Words
 
 SIZE = (40.0, 40.0, 40.0)  # [mm] of a new object
-LARGEST_UPLOAD = 20_000_000  # [bytes] chosen: the planner takes 500,000 triangles, which are 25 MB
 SHAPES = ("box", "sphere", "cylinder")
 
 
@@ -166,10 +167,7 @@ class SceneTab:
         """An STL file from the browser."""
 
         def add() -> None:
-            if len(file.content) > LARGEST_UPLOAD:
-                raise gemelo.BadArgument(
-                    self._kit.words("too_large", size=len(file.content) // 1_000_000, most=LARGEST_UPLOAD // 1_000_000)
-                )
+            require_small(len(file.content), self._kit.words)
             name = self._free_name(Path(file.name).stem[:64] or "mesh")
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "mesh.stl"
@@ -188,6 +186,12 @@ class SceneTab:
         folder = Path("scenes")
         folder.mkdir(exist_ok=True)
         return folder / (name if name.endswith(".json") else f"{name}.json")
+
+
+def require_small(size: int, words: Words) -> None:
+    """Raises `BadArgument` for a file of so many bytes that the planner would not take its mesh."""
+    if size > LARGEST_UPLOAD:
+        raise gemelo.BadArgument(words("too_large", size=size // 1_000_000, most=LARGEST_UPLOAD // 1_000_000))
 
 
 def _size_of(shape: Shape) -> tuple[float, float, float] | None:
