@@ -102,7 +102,8 @@ JOINTS = {
         ("reach", "tool position", 0.1234, 0.0, "Ese punto queda 123.4 mm fuera del alcance"),
         ("reach", "z", 0.4, 0.2, "llega en z hasta 200.0 mm, no hasta 400.0 mm"),
         ("collision", "efector_link / post", 0.0012, 0.004, "y post quedarían a 1.2 mm; deben quedar 4.0 mm"),
-        ("self-collision", "a / b", None, 0.004, "a y b, del mismo brazo, se tocarían."),
+        ("self-collision", "a / b", -0.03, 0.004, "a y b, del mismo brazo, se tocarían."),
+        ("self-collision", "a / b", None, 0.004, "a y b, del mismo brazo, quedarían demasiado cerca."),
         ("orientation", "orientation", math.radians(12.0), 0.0, "faltan 12.0°"),
         ("allowed time", "allowed_time", None, None, "No se encontró un camino"),
         ("joint limit", "brazo_joint", None, None, "in English"),  # without its value there is no sentence
@@ -116,7 +117,7 @@ def test_refusals_are_said_in_spanish_with_their_values(check, subject, value, l
 
 def test_every_refusal_in_spanish_is_one_that_the_planner_gives():
     planner = "".join(path.read_text() for path in (PANEL.parent / "planner").rglob("*.py"))
-    checks = {key.removesuffix("_axis").removesuffix("_unknown") for key in REFUSALS}
+    checks = {key.removesuffix("_axis").removesuffix("_unknown").removesuffix("_touch") for key in REFUSALS}
     for check in checks:
         assert f'"{check.replace("_", " ")}"' in planner or f'"{check.replace("_", "-")}"' in planner, check
 

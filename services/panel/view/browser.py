@@ -21,7 +21,7 @@ SCRIPT = """
 (() => {
   if (window.gemelo) return;
   window.gemelo = true;
-  document.head.insertAdjacentHTML('beforeend', '<style>.mantine-Tabs-tab { padding-inline: 6px; }</style>');
+  document.head.insertAdjacentHTML('beforeend', '<style>[role=tab] { padding-inline: 6px !important; }</style>');
   const buttons = () => [...document.querySelectorAll('button')];
   const keys = {ArrowLeft: '◀', ArrowRight: '▶', ArrowUp: '▲', ArrowDown: '▼', PageUp: 'PgUp', PageDown: 'PgDn'};
   const isText = (t) => t.tagName === 'TEXTAREA' || t.isContentEditable || (t.tagName === 'INPUT'

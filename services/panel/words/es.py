@@ -232,7 +232,8 @@ SPANISH: dict[str, str] = {
     "text_no_plan": "Pulse antes Planificar.",
 }
 
-# The planner's refusals, by their check; "_axis" where the subject is x, y or z, "_unknown" where there is no value.
+# The planner's refusals, by their check; "_axis" where the subject is x, y or z, "_touch" where two things do,
+# "_unknown" where there is no value.
 REFUSALS: dict[str, str] = {
     "joint_limit": "{subject}: {value} está más allá de su límite de {limit}.",
     "start_state": "{subject} está en {value}, más allá de su límite de {limit}: muévala a mano hasta dentro y declare "
@@ -242,9 +243,11 @@ REFUSALS: dict[str, str] = {
     "reach_axis": "La herramienta llega en {subject} hasta {limit}, no hasta {value}.",
     "orientation": "La herramienta no puede girarse así: faltan {value}.",
     "collision": "{first} y {second} quedarían a {value}; deben quedar {limit} libres.",
-    "collision_unknown": "{first} y {second} se tocarían.",
+    "collision_touch": "{first} y {second} se tocarían.",
+    "collision_unknown": "{first} y {second} quedarían demasiado cerca.",
     "self_collision": "{first} y {second}, del mismo brazo, quedarían a {value}; deben quedar {limit} libres.",
-    "self_collision_unknown": "{first} y {second}, del mismo brazo, se tocarían.",
+    "self_collision_touch": "{first} y {second}, del mismo brazo, se tocarían.",
+    "self_collision_unknown": "{first} y {second}, del mismo brazo, quedarían demasiado cerca.",
     "joint_state": "El último estado del brazo tiene {value}, más de {limit}: no se sabe dónde está. Vea si el equipo "
     "está conectado.",
     "joint_state_unknown": "Aún no llegó ningún estado del brazo. Vea si el equipo está conectado.",

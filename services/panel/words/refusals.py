@@ -16,11 +16,9 @@ Show = Callable[[Problem, Joints, float], str]
 def sentence_of(problem: Problem, joints: Joints, templates: Mapping[str, str]) -> str | None:
     """The template of its check with its values put in; None where there is none, or a value that it needs is missing.
 
-    A check whose subject is an axis of the tool ("x") has a template of its own, "reach x"; one whose value is unknown
-    has the template "collision unknown".
+    Some checks have several templates, as `_variant` says.
     """
-    place = problem.check.replace("-", " ").replace(" ", "_")
-    variant = "axis" if problem.subject in ("x", "y", "z") else "unknown" if problem.value is None else ""
+    place, variant = problem.check.replace("-", " ").replace(" ", "_"), _variant(problem)
     template = templates.get(f"{place}_{variant}" if variant else place)
     if template is None:
         return None
@@ -31,6 +29,15 @@ def sentence_of(problem: Problem, joints: Joints, templates: Mapping[str, str]) 
     }
     first, _, second = problem.subject.partition(" / ")
     return template.format(subject=problem.subject, first=first, second=second, **values)
+
+
+def _variant(problem: Problem) -> str:
+    """Of the check's template: "axis" where the subject is one of the tool's, "touch" where two things do."""
+    if problem.subject in ("x", "y", "z"):
+        return "axis"
+    if problem.value is None:
+        return "unknown"
+    return "touch" if problem.check in PAIRS and problem.value <= 0.0 else ""
 
 
 def _of_joint(problem: Problem, joints: Joints, value: float) -> str:
@@ -54,6 +61,7 @@ def _seconds(problem: Problem, joints: Joints, value: float) -> str:
     return f"{value:.1f} s"
 
 
+PAIRS = ("collision", "self-collision")
 # By the planner's check: how its value and its limit are shown.
 SHOWN: dict[str, Show] = {
     "joint limit": _of_joint,
