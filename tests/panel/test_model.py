@@ -16,15 +16,18 @@ from msgspec.structs import replace
 import gemelo
 from gemelo.programs import AnyStep, Program, Repeat, StepPath, Wait
 from schemas.device import DeviceMode, DeviceState
+from services.arm.model.description import Arm as Description
 from services.arm.model.description import load_arm
 from services.panel.model.availability import CHECKS
 from services.panel.model.problems import Problem, problem_of
 from services.panel.model.teaching import deleted, inserted, shifted
+from services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, tool_rings
 from services.panel.view.browser import CHANNEL, Browser, read_browser, script_html
 from services.panel.view.obstacles import nearest_hit
 from services.panel.words.en import ENGLISH
 from services.panel.words.es import REFUSALS, SPANISH
 from services.panel.words.words import Words, language_of
+from tests.arm.bare_arm import ROBOT
 
 PANEL = Path(__file__).parents[2] / "services/panel"
 READY = DeviceState(mode=DeviceMode.IDLE, armed=True, referenced=(True, True), name=("a", "b"))
@@ -120,6 +123,35 @@ def test_every_refusal_in_spanish_is_one_that_the_planner_gives():
     checks = {key.removesuffix("_axis").removesuffix("_unknown").removesuffix("_touch") for key in REFUSALS}
     for check in checks:
         assert f'"{check.replace("_", " ")}"' in planner or f'"{check.replace("_", "-")}"' in planner, check
+
+
+def wrist(folder: Path, axis: str) -> Description:
+    """A SCARA whose tool a fourth joint turns about `axis`."""
+    joints = (("a", "base", "one", "revolute", "0 0 0"), ("b", "one", "two", "revolute", "0.2 0 0"),
+              ("c", "two", "three", "prismatic", "0.2 0 0"), ("d", "three", "hand", "revolute", "0 0 0"))  # fmt: skip
+    texts = [
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin xyz="{at}"/>'
+        f'<axis xyz="{axis if name == "d" else "0 0 1"}"/>'
+        '<limit lower="-2" upper="2" effort="9" velocity="1"/></joint>'
+        for name, parent, child, kind, at in joints
+    ]
+    links = "".join(f'<link name="{name}"/>' for name in ("base", "one", "two", "three", "hand"))
+    (folder / "robot.urdf").write_text(f'<robot name="bare">{links}{"".join(texts)}</robot>')
+    (folder / "robot.toml").write_text(ROBOT)
+    values = "".join(f'<joint name="{joint[0]}" value="0"/>' for joint in joints)
+    (folder / "robot.srdf").write_text(
+        f'<robot name="bare"><group name="arm"><chain base_link="base" tip_link="hand"/></group>'
+        f'<group_state name="home" group="arm">{values}</group_state></robot>'
+    )
+    return load_arm(folder)
+
+
+def test_the_gizmo_turns_only_what_the_arm_can(tmp_path: Path):
+    ours = {name: load_arm(Path(__file__).parents[2] / "urdf" / name) for name in ("rm1", "parol6")}
+    assert tool_rings(ours["rm1"]) == NO_RINGS
+    assert tool_rings(ours["parol6"]) == ALL_RINGS
+    assert tool_rings(wrist(tmp_path, "0 0 -1")) == (False, False, True)
+    assert tool_rings(wrist(tmp_path, "1 0 0")) == NO_RINGS  # two directions, of which one is left to choose
 
 
 def test_what_a_browser_tells_is_read_and_rubbish_is_not():

@@ -9,9 +9,9 @@ from math import pi
 
 import gemelo
 from services.panel.model.problems import Problem, problem_of
+from services.panel.model.tool_turns import tool_rings
 
 IDLE = 1.0  # [s] after which a solver without work looks whether it is to end
-FULL = 6  # joints with which a tool can be turned as one likes
 JUMP = {"rad": pi / 4, "m": 0.05}  # chosen: more of a joint between two points of a drag is another configuration
 
 
@@ -51,6 +51,7 @@ class GoalSolver:
         self._news = threading.Condition()
         self._wish: JointsWish | PoseWish | None = None
         self._is_open = True
+        self.rings = tool_rings(arm.description)  # that the gizmo has
         self.solved = 0  # wishes that were answered
         joints = arm.joints
         self.goal = Goal(joints, arm.fk(joints))
@@ -59,8 +60,8 @@ class GoalSolver:
 
     @property
     def can_turn(self) -> bool:
-        """True if the gizmo may turn the tool freely."""
-        return len(self._arm.description.joints) >= FULL
+        """True if the gizmo may turn the tool."""
+        return any(self.rings)
 
     def set_joints(self, joints: Mapping[str, float], source: int = -1) -> None:
         """All joints, or some; the goal shows them at once, and is checked right after."""

@@ -14,6 +14,7 @@ import gemelo
 from services.panel.model.goal import Goal
 from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
+from services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, Rings
 from services.panel.view.arms import Array, DrawnArm
 from services.panel.view.obstacles import Obstacles
 from services.runtime.deployment import project_root
@@ -42,13 +43,12 @@ class World:
         self.obstacles = Obstacles(server, (project_root(), arm.folder))
         reach = max(0.3, float(np.linalg.norm(operator.goal.goal.pose.position)))
         self._set_stage(server, reach)
-        self.gizmo = self._scene.add_transform_controls(
-            "/gizmo", scale=0.35 * reach, disable_rotations=not operator.goal.can_turn, depth_test=False
-        )
+        self._gizmos = self._make_gizmos(0.35 * reach, operator.goal.rings)
         self._frame = self._scene.add_frame("/tool", axes_length=0.12 * reach, axes_radius=0.004 * reach)
-        self._is_dragged = False
+        self._dragged: viser.TransformControlsHandle | None = None
         self._tool_pose = operator.goal.goal.pose
-        self._follow_gizmo()
+        for gizmo in self._gizmos:
+            self._follow(gizmo)
         self._goal_version = -1
         self._trail: deque[Array] = deque(maxlen=TRAIL)
         self._trail_drawn = 0.0
@@ -88,21 +88,32 @@ class World:
         server.initial_camera.position = (1.35 * reach, -1.15 * reach, 0.95 * reach)
         server.initial_camera.look_at = (0.35 * reach, 0.1 * reach, 0.1 * reach)
 
-    def _follow_gizmo(self) -> None:
-        @self.gizmo.on_drag_start
-        def _(event: viser.TransformControlsEvent) -> None:
-            self._is_dragged = True
+    def _make_gizmos(self, scale: float, rings: Rings) -> list[viser.TransformControlsHandle]:
+        """Arrows and rings; where not all rings are to be had, which viser has together with the arrows only, two."""
+        add = self._scene.add_transform_controls
+        arrows = add("/gizmo", scale=scale, disable_rotations=rings != ALL_RINGS, depth_test=False)
+        if rings in (ALL_RINGS, NO_RINGS):
+            return [arrows]
+        turning = add(
+            "/gizmo_turn", scale=scale, active_axes=rings, disable_axes=True, disable_sliders=True, depth_test=False
+        )
+        return [arrows, turning]
 
-        @self.gizmo.on_update
+    def _follow(self, gizmo: viser.TransformControlsHandle) -> None:
+        @gizmo.on_drag_start
+        def _(event: viser.TransformControlsEvent) -> None:
+            self._dragged = gizmo
+
+        @gizmo.on_update
         def _(event: viser.TransformControlsEvent) -> None:
             w, a, b, c = (float(value) for value in event.target.wxyz)
             x, y, z = (float(value) for value in event.target.position)
             pose = gemelo.Pose((x, y, z), (a, b, c, w))
             self._operator.goal.set_pose(pose, event.client_id if event.client_id is not None else -1)
 
-        @self.gizmo.on_drag_end
+        @gizmo.on_drag_end
         def _(event: viser.TransformControlsEvent) -> None:
-            self._is_dragged = False
+            self._dragged = None
             self._operator.goal.settle()
 
     def _show_goal(self, goal: Goal, readings: Readings) -> None:
@@ -115,10 +126,11 @@ class World:
             return
         self._goal_version = goal.version
         (self._bad_goal if is_bad else self._goal).show(goal.joints)
-        if not self._is_dragged:
-            self.gizmo.position = goal.pose.position
-            a, b, c, w = goal.pose.orientation
-            self.gizmo.wxyz = (w, a, b, c)
+        a, b, c, w = goal.pose.orientation
+        for gizmo in self._gizmos:
+            if gizmo is not self._dragged:
+                gizmo.position = goal.pose.position
+                gizmo.wxyz = (w, a, b, c)
 
     def _show_plan(self) -> None:
         motions, path = self._operator.motions, self._operator.bus.planned_path

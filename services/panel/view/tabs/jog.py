@@ -42,10 +42,9 @@ class JogTab:
             for axis in ("x", "y", "z"):
                 for sign in (1, -1):
                     self._tool_button(axis, sign, "")
-            if self._operator.goal.can_turn:
-                for axis in ("x", "y", "z"):
-                    for sign in (1, -1):
-                        self._tool_button(axis, sign, "r")
+            for axis, can_turn in zip(("x", "y", "z"), self._operator.goal.rings, strict=True):
+                for sign in (1, -1) if can_turn else ():
+                    self._tool_button(axis, sign, "r")
         with gui.add_folder(words("joints")):
             for joint in self._operator.arm.description.joints:
                 for sign in (-1, 1):
