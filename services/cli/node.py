@@ -61,6 +61,13 @@ def run_get(options: Options) -> ExitCode:
     return ExitCode.OK
 
 
+def run_describe(options: Options) -> ExitCode:
+    """Prints all that is known of a parameter."""
+    with connect() as session:
+        print(dump(parameter_of(session, options.node, options.parameter)), end="")
+    return ExitCode.OK
+
+
 def set_options(parser: Parser) -> None:
     """Adds node, parameter and value."""
     parameter_options(parser)
@@ -163,10 +170,23 @@ def parameter_of(session: Session, node: str, name: str) -> Parameter:
 def set_parameter(session: Session, node: str, name: str, text: str) -> str:
     """Sets a parameter and returns a line about it; the node itself refuses a value out of range."""
     parameter = parameter_of(session, node, name)
-    value = value_of(parameter, text)
+    return change_parameter(session, node, parameter, value_of(parameter, text))
+
+
+def change_parameter(session: Session, node: str, parameter: Parameter, value: ParameterValue) -> str:
+    """Sets `parameter` of `node` to `value` and returns a line about it."""
     request = Request(f"@node/{node}/parameters/set", SetParameter, Parameter, node, "")
-    after = session.node.call(request, SetParameter(name=name, value=value), timeout=TIMEOUT)
+    after = session.node.call(request, SetParameter(name=parameter.name, value=value), timeout=TIMEOUT)
     return f"{node} {after.name}: {written(parameter.value)} -> {written(after.value)}"
+
+
+def require_in_range(node: str, parameter: Parameter, value: ParameterValue) -> None:
+    """Raises `CommandError` for a number out of the parameter's range."""
+    low, high = parameter.minimum, parameter.maximum
+    if isinstance(value, bool | str):
+        return
+    if (low is not None and value < low) or (high is not None and value > high):
+        raise usage(f'{value:g} is not in {range_of(parameter)}, the range of parameter "{parameter.name}" of {node}')
 
 
 def value_of(parameter: Parameter, text: str) -> ParameterValue:

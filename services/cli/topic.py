@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from collections import deque
+import csv
+import io
 from collections.abc import Callable
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -13,6 +12,7 @@ import msgspec
 from schemas.message import Message
 from schemas.topics import TOPICS, Topic
 from services.cli.errors import CommandError, ExitCode, unknown
+from services.cli.field_path import FieldPath, leaves
 from services.cli.messages import dump, fields_of, message_of
 from services.cli.parser import Choices, Options, Parser, positive_integer, positive_number
 from services.cli.session import Session, connect
@@ -21,12 +21,15 @@ from services.cli.text_table import table
 if TYPE_CHECKING:
     from gemelo import Robot
 
-HZ_EVERY = 1.0  # [s] between two reports
+
+def list_options(parser: Parser) -> None:
+    """Adds -t."""
+    parser.add_argument("-t", "--types", action="store_true", help="a line each: the key and its message, for a script")
 
 
 def run_list(options: Options) -> ExitCode:
     """Prints the table of topics."""
-    print(listing())
+    print("\n".join(f"{topic.key} [{topic.message.__name__}]" for topic in TOPICS) if options.types else listing())
     return ExitCode.OK
 
 
@@ -42,33 +45,26 @@ def run_info(options: Options) -> ExitCode:
 
 
 def echo_options(parser: Parser) -> None:
-    """Adds topic, count and --json."""
-    topic_option(parser)
+    """Adds topic with field, count, --json and --csv."""
+    parser.add_argument(
+        "topic", metavar="TOPIC[.FIELD]", help="a key of `gemelo topic list`, and a field of its message"
+    )
     count = parser.add_mutually_exclusive_group()
     count.add_argument("--once", dest="count", action="store_const", const=1, help="the first one only")
     count.add_argument("-n", "--count", type=positive_integer, metavar="N", help="end after N messages")
-    parser.add_argument("--json", action="store_true", help="a JSON object per line")
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--json", action="store_true", help="a JSON value per line")
+    how.add_argument("--csv", action="store_true", help="a line of numbers and words per message, under a heading")
 
 
 def run_echo(options: Options) -> ExitCode:
-    """Prints the messages of a topic."""
-    topic = topic_of(options.topic)
+    """Prints the messages of a topic, or one of their fields."""
+    key, _, path = options.topic.partition(".")
+    topic = topic_of(key)
+    field = FieldPath(topic.message, path)
+    form = csv_lines() if options.csv else json_line if options.json else yaml_document
     with connect() as session:
-        return echo(session, topic, options.count, options.json)
-
-
-def hz_options(parser: Parser) -> None:
-    """Adds topic, window and count."""
-    topic_option(parser)
-    parser.add_argument("-w", "--window", type=positive_integer, default=10_000, metavar="N", help="messages averaged")
-    parser.add_argument("-n", "--count", type=positive_integer, metavar="N", help="end after N reports")
-
-
-def run_hz(options: Options) -> ExitCode:
-    """Prints the rate of a topic."""
-    topic = topic_of(options.topic)
-    with connect() as session:
-        return hz(session, topic, options.window, options.count)
+        return echo(session, topic, field, form, options.count)
 
 
 def pub_options(parser: Parser) -> None:
@@ -123,35 +119,39 @@ def information(topic: Topic[Message]) -> str:
     return dump({**head, "fields": fields_of(topic.message)})
 
 
-class RateWindow:
-    """Arrival times [s, monotonic] of the last `size` messages."""
-
-    def __init__(self, size: int = 10_000) -> None:
-        self._times: deque[float] = deque(maxlen=size)
-        self.total = 0  # messages ever seen
-
-    def add(self, time: float) -> None:
-        """Takes the arrival of a message at `time` [s, monotonic]."""
-        self._times.append(time)
-        self.total += 1
-
-    def report(self) -> str | None:
-        """Two lines in the form of `ros2 topic hz`; None after fewer than two messages."""
-        if len(self._times) < 2:
-            return None
-        times = list(self._times)
-        gaps = [after - before for before, after in pairwise(times)]
-        mean = sum(gaps) / len(gaps)
-        deviation = math.sqrt(sum((gap - mean) ** 2 for gap in gaps) / len(gaps))
-        rate = 1.0 / mean if mean > 0.0 else math.inf
-        return (
-            f"average rate: {rate:.3f}\n"
-            f"\tmin: {min(gaps):.3f}s max: {max(gaps):.3f}s std dev: {deviation:.5f}s window: {len(times)}"
-        )
+def yaml_document(value: object) -> str:
+    """The value as YAML, with the line that ends a document."""
+    return f"{dump(value)}---"
 
 
-def echo(session: Session, topic: Topic[Message], count: int | None, as_json: bool) -> ExitCode:
-    """Prints messages as they come, until Ctrl-C or `count` of them."""
+def json_line(value: object) -> str:
+    """The value as JSON on one line."""
+    return msgspec.json.encode(value).decode()
+
+
+def csv_lines() -> Callable[[object], str]:
+    """A function that gives each value as a line of CSV, the first one under a heading with the fields' paths."""
+    is_first = True
+
+    def lines(value: object) -> str:
+        nonlocal is_first
+        cells = list(leaves(value))
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        if is_first:
+            writer.writerow([path or "value" for path, _ in cells])
+            is_first = False
+        writer.writerow([cell for _, cell in cells])
+        return out.getvalue().rstrip("\n")
+
+    return lines
+
+
+def echo(
+    session: Session, topic: Topic[Message], field: FieldPath, form: Callable[[object], str], count: int | None
+) -> ExitCode:
+    """Prints messages, or their field, as they come, until Ctrl-C or `count` of them; raises `CommandError` where a
+    message has no such element."""
     printed = 0
 
     def on_message(message: Message) -> None:
@@ -159,37 +159,14 @@ def echo(session: Session, topic: Topic[Message], count: int | None, as_json: bo
         if count is not None and printed >= count:
             return
         printed += 1
-        print(msgspec.json.encode(message).decode() if as_json else f"{dump(message)}---", flush=True)
+        print(form(field.of(message)), flush=True)
         if printed == count:
             session.node.stop()
 
-    return _listen(session, topic, on_message)
+    return listen(session, topic, on_message)
 
 
-def hz(session: Session, topic: Topic[Message], window: int, count: int | None) -> ExitCode:
-    """Prints the rate of arrival once a second, until Ctrl-C or `count` reports."""
-    arrivals = RateWindow(window)
-    reports, heard, last = 0, 0, session.node.monotonic()
-
-    def on_message(message: Message) -> None:
-        arrivals.add(session.node.monotonic())
-
-    def step(now: int) -> None:
-        nonlocal reports, heard, last
-        if session.node.monotonic() - last < HZ_EVERY:
-            return
-        last = session.node.monotonic()
-        report = arrivals.report() if arrivals.total > heard else None
-        print(report or f"no new messages on {topic.key}", flush=True)
-        heard = arrivals.total
-        reports += 1
-        if reports == count:
-            session.node.stop()
-
-    return _listen(session, topic, on_message, step)
-
-
-def _listen(
+def listen(
     session: Session,
     topic: Topic[Any],
     on_message: Callable[[Message], None],

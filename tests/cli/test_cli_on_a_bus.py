@@ -18,10 +18,12 @@ from schemas.device import (
     ResumeCommand,
     StopKind,
 )
+from schemas.joints import JointState
 from schemas.planning import JointGoal, NamedGoal, PlanRequest, PoseGoal
 from schemas.topics import JOINT_STATES, JOINT_TARGETS
-from services.cli import action, device, node, state, topic
+from services.cli import action, device, node, state, topic, topic_rates
 from services.cli.errors import CommandError, ExitCode
+from services.cli.field_path import FieldPath
 from services.cli.messages import message_of
 from services.cli.move import move
 from services.cli.terminal import Interrupt
@@ -124,7 +126,7 @@ def test_nothing_heard_of_the_arm_is_no_stack(session, monkeypatch):
 
 
 def test_echo_prints_yaml_documents(session, stack, capsys):
-    assert topic.echo(session, JOINT_STATES, 3, as_json=False) is ExitCode.OK
+    assert topic.echo(session, JOINT_STATES, FieldPath(JointState, ""), topic.yaml_document, 3) is ExitCode.OK
     *documents, rest = capsys.readouterr().out.split("---\n")
     assert len(documents) == 3
     assert rest == ""
@@ -132,14 +134,14 @@ def test_echo_prints_yaml_documents(session, stack, capsys):
 
 
 def test_hz_measures_the_rate(session, stack, capsys):
-    assert topic.hz(session, JOINT_STATES, 1000, 1) is ExitCode.OK
+    assert topic_rates.hz(session, JOINT_STATES, 1000, 1) is ExitCode.OK
     words = capsys.readouterr().out.split()
     assert words[:2] == ["average", "rate:"]
     assert 25.0 < float(words[2]) < 100.0
 
 
 def test_hz_of_silence_says_so(session, capsys):
-    assert topic.hz(session, JOINT_STATES, 1000, 1) is ExitCode.OK
+    assert topic_rates.hz(session, JOINT_STATES, 1000, 1) is ExitCode.OK
     assert capsys.readouterr().out == "no new messages on joint_states\n"
 
 

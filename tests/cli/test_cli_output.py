@@ -12,7 +12,7 @@ from schemas.device import DeviceMode, DeviceState
 from schemas.joints import JointState
 from services.cli.messages import dump
 from services.cli.text_table import table
-from services.cli.topic import RateWindow
+from services.cli.topic_rates import RateWindow
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | texts

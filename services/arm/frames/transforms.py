@@ -85,6 +85,14 @@ def from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
     )
 
 
+def to_rpy(rotation: Quaternion) -> Point:
+    """Roll, pitch and yaw [rad] of a unit quaternion, as of `from_rpy`; where pitch is a right angle, one of many."""
+    x, y, z, w = rotation
+    pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
+    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
 def from_axis_angle(axis: Point, angle: float) -> Quaternion:
     """A turn by `angle` [rad] about a unit axis."""
     sine = math.sin(angle / 2.0)

@@ -1,0 +1,68 @@
+"""Fields of messages by their paths, as `position[0]` or `transforms[2].transform.translation`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+
+import msgspec
+
+from schemas.message import Message
+from services.cli.errors import CommandError, nearest, usage
+
+_PART = re.compile(r"([A-Za-z_][A-Za-z_0-9]*)((?:\[-?\d+\])*)")
+
+
+class FieldPath:
+    """The path below one kind of message; an empty one means the whole. Raises `CommandError` for one that is none."""
+
+    def __init__(self, kind: type[Message], path: str) -> None:
+        self._kind, self._path = kind, path
+        self._keys: list[str | int] = []
+        for part in path.split(".") if path else ():
+            found = _PART.fullmatch(part)
+            if found is None:
+                raise usage(f'"{path}" is no field: write it as position[0] or transforms[0].child')
+            self._keys += [found[1], *(int(index) for index in re.findall(r"-?\d+", found[2]))]
+        if self._keys and self._keys[0] not in kind.__struct_fields__:
+            self._refuse(str(self._keys[0]), kind.__struct_fields__)
+
+    def of(self, message: Message) -> object:
+        """The value there; raises `CommandError` where this message has none."""
+        value: object = message
+        for key in self._keys:
+            if isinstance(key, int):
+                if not isinstance(value, list | tuple) or not -len(value) <= key < len(value):
+                    size = f"{len(value)} elements" if isinstance(value, list | tuple) else "no elements"
+                    raise CommandError(f"{self._kind.__name__} {self._path}: [{key}] of {size}")
+                value = value[key]
+            else:
+                fields = _fields(value)
+                if key not in fields:
+                    self._refuse(key, tuple(fields))
+                value = fields[key]
+        return value
+
+    def _refuse(self, name: str, known: tuple[str, ...]) -> None:
+        guess = nearest(name, known)
+        hint = f'did you mean "{guess}"?' if guess else f"there is {', '.join(known) or 'none'}"
+        raise usage(f'{self._kind.__name__} has no field "{name}": {hint}')
+
+
+def leaves(value: object, path: str = "") -> Iterator[tuple[str, object]]:
+    """Every number, word and truth of a value with its path, in the order of the fields."""
+    fields = _fields(value)
+    if isinstance(value, list | tuple):
+        for index, item in enumerate(value):
+            yield from leaves(item, f"{path}[{index}]")
+    elif fields:
+        for name, item in fields.items():
+            yield from leaves(item, f"{path}.{name}" if path else name)
+    else:
+        yield path, value
+
+
+def _fields(value: object) -> Mapping[str, object]:
+    if isinstance(value, msgspec.Struct):
+        return {name: getattr(value, name) for name in value.__struct_fields__}
+    return value if isinstance(value, Mapping) else {}

@@ -1,0 +1,117 @@
+"""`gemelo param dump` and `load`: the parameters of running nodes as a TOML file, and back."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+from schemas.system import Parameter, ParameterValue
+from services.cli.errors import CommandError, ExitCode, usage
+from services.cli.node import (
+    change_parameter,
+    living,
+    parameter_of,
+    parameters_of,
+    require_in_range,
+    value_of,
+    written,
+)
+from services.cli.parser import Options, Parser
+from services.cli.session import Session, connect
+
+
+class Change(NamedTuple):
+    """A parameter of a node, and the value that it is to have."""
+
+    node: str
+    parameter: Parameter
+    value: ParameterValue
+
+
+def dump_options(parser: Parser) -> None:
+    """Adds the nodes."""
+    parser.add_argument("nodes", metavar="NODE", nargs="*", help="all nodes, if none is named")
+
+
+def run_dump(options: Options) -> ExitCode:
+    """Prints TOML."""
+    with connect() as session:
+        print(dumped(session, options.nodes), end="")
+    return ExitCode.OK
+
+
+def load_options(parser: Parser) -> None:
+    """Adds the file."""
+    parser.add_argument("file", metavar="FILE", help="as `param dump` writes it, or - for standard input")
+
+
+def run_load(options: Options) -> ExitCode:
+    """Sets parameters."""
+    tables = read(options.file)
+    with connect() as session:
+        for line in load(session, tables):
+            print(line)
+    return ExitCode.OK
+
+
+def dumped(session: Session, names: list[str]) -> str:
+    """A table for every node that has parameters; ranges and meanings are comments."""
+    blocks = []
+    for name in names or living(session):
+        lines = [
+            f"{json.dumps(each.name)} = {_toml(each.value)}{f'  # {each.description}' if each.description else ''}"
+            for each in parameters_of(session, name)
+        ]
+        if lines:
+            blocks.append("\n".join([f"[{json.dumps(name)}]", *lines]))
+    return "\n\n".join(blocks) + "\n"
+
+
+def read(file: str) -> dict[str, dict[str, object]]:
+    """The tables of a file, by node; raises `CommandError`."""
+    try:
+        text = sys.stdin.read() if file == "-" else Path(file).read_text(encoding="utf-8")
+        tables = tomllib.loads(text)
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise usage(f"{file}: cannot be read as parameters: {error}") from error
+    for node, table in tables.items():
+        if not isinstance(table, dict):
+            raise usage(f'{file}: "{node}" stands outside of a [node]')
+    return tables
+
+
+def load(session: Session, tables: dict[str, dict[str, object]]) -> list[str]:
+    """Sets what differs, and returns a line for each; where one is refused, what was set before it is set back."""
+    changes = [_change(session, node, name, value) for node, table in tables.items() for name, value in table.items()]
+    lines: list[str] = []
+    done: list[Change] = []
+    for change in changes:
+        if change.value == change.parameter.value:
+            continue
+        try:
+            lines.append(change_parameter(session, change.node, change.parameter, change.value))
+        except Exception:
+            for before in reversed(done):
+                change_parameter(session, before.node, before.parameter, before.parameter.value)
+            raise
+        done.append(change)
+    return lines or ["every parameter has that value already"]
+
+
+def _change(session: Session, node: str, name: str, value: object) -> Change:
+    """Checked for its type and its range, before anything is set."""
+    parameter = parameter_of(session, node, name)
+    if not isinstance(value, bool | int | float | str):
+        raise CommandError(f'{node} "{name}" is {value!r}: a parameter is one number, word or truth')
+    if isinstance(value, str) != (parameter.type == "str"):
+        raise usage(f'{value!r} is not a {parameter.type} for parameter "{name}" of {node}')
+    wanted = value_of(parameter, written(value))
+    require_in_range(node, parameter, wanted)
+    return Change(node, parameter, wanted)
+
+
+def _toml(value: ParameterValue) -> str:
+    return json.dumps(value)

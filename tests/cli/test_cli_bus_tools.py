@@ -1,0 +1,228 @@
+"""What shows the bus: fields of messages, rates, sizes and delays, frames, interfaces, parameters as files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec import Meta
+
+from schemas.frames import FrameTransform, FrameTransforms, Transform
+from schemas.joints import JointState
+from schemas.topics import FRAMES, JOINT_STATES, STATIC_FRAMES
+from services.arm.frames.transforms import from_rpy, to_rpy
+from services.cli import interface, node_parameters, tf, topic, topic_rates
+from services.cli.errors import CommandError, ExitCode
+from services.cli.field_path import FieldPath, leaves
+from services.cli.main import run
+from services.runtime.bus.memory_bus import MemoryBus
+from services.runtime.node import Node
+from tests.runtime.support import spinning
+
+STATE = JointState(stamp=5, name=("a", "b"), position=(0.5, -2.0))
+
+
+@pytest.fixture
+def stack(gateway):
+    return gateway
+
+
+def moving(now: int) -> FrameTransforms:
+    arm = Transform(translation=(0.1, 0.0, 0.2), rotation=from_rpy(0.0, 0.0, math.pi / 2))
+    return FrameTransforms(transforms=(FrameTransform(stamp=now, parent="base", child="arm", transform=arm),))
+
+
+@pytest.fixture
+def frames(deployment, network) -> Iterator[None]:
+    """A base with an arm that moves, and a hand fixed to it."""
+    with Node("state_publisher", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        publisher = node.publisher(FRAMES)
+        hand = FrameTransform(parent="arm", child="hand <1>", transform=Transform(translation=(0.0, 0.05, 0.0)))
+        node.publisher(STATIC_FRAMES).put(FrameTransforms(transforms=(hand,)))
+        with spinning(node, lambda now: publisher.put(moving(now))):
+            yield
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [("", STATE), ("stamp", 5), ("position[1]", -2.0), ("position[-1]", -2.0), ("name", ("a", "b"))],
+)
+def test_a_field_is_found_by_its_path(path: str, value: object):
+    assert FieldPath(JointState, path).of(STATE) == value
+
+
+def test_a_field_of_a_message_within_a_message_is_found():
+    path = FieldPath(FrameTransforms, "transforms[0].transform.translation[2]")
+    assert path.of(moving(1)) == 0.2
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        ("positon", 'JointState has no field "positon": did you mean "position"?'),
+        ("position[", "write it as position[0]"),
+        ("position[2]", "[2] of 2 elements"),
+        ("stamp[0]", "[0] of no elements"),
+        ("position[0].x", 'no field "x"'),
+    ],
+)
+def test_a_field_that_is_none_is_refused_by_name(path: str, said: str):
+    with pytest.raises(CommandError, match=re.escape(said)):
+        FieldPath(JointState, path).of(STATE)
+
+
+def test_echo_of_a_field_is_a_value_a_line(session, stack, capsys):
+    path = FieldPath(JointState, "position[1]")
+    assert topic.echo(session, JOINT_STATES, path, topic.json_line, 2) is ExitCode.OK
+    assert [json.loads(line) for line in capsys.readouterr().out.splitlines()] == [0.25, 0.25]
+
+
+def test_echo_as_csv_has_a_heading_and_a_row_a_message(session, stack, capsys):
+    assert topic.echo(session, JOINT_STATES, FieldPath(JointState, ""), topic.csv_lines(), 2) is ExitCode.OK
+    heading, *rows = csv.reader(io.StringIO(capsys.readouterr().out))
+    assert heading[:3] == ["stamp", "name[0]", "name[1]"]
+    assert [row[heading.index("position[2]")] for row in rows] == ["0.04", "0.04"]
+
+
+def test_leaves_have_every_number_once():
+    assert dict(leaves(moving(7)))["transforms[0].transform.translation[0]"] == 0.1
+    assert list(leaves(3.0)) == [("", 3.0)]
+
+
+def test_the_bandwidth_is_measured(session, stack, capsys):
+    assert topic_rates.bandwidth(session, JOINT_STATES, 1000, 1) is ExitCode.OK
+    zero = (0.0, 0.0, 0.0)
+    state = JointState(stamp=2**60, name=session.arm.joint_names, position=(0.5, 0.25, 0.04), velocity=zero)
+    assert f"message size mean: {len(msgspec.msgpack.encode(state))} B" in capsys.readouterr().out
+
+
+def test_the_delay_is_measured(session, stack, capsys):
+    assert topic_rates.delay(session, JOINT_STATES, 1000, 1) is ExitCode.OK
+    mean = re.match(r"average delay: ([\d.]+) ms", capsys.readouterr().out)
+    assert mean is not None
+    assert 0.0 <= float(mean[1]) < 1000.0
+
+
+def test_topics_with_their_messages_a_line_each(capsys):
+    assert run(["topic", "list", "-t"]) is ExitCode.OK
+    assert "joint_states [JointState]" in capsys.readouterr().out.splitlines()
+
+
+def test_the_pose_of_a_frame_in_another_is_said(session, frames, capsys):
+    assert tf.echo(session, "base", "hand <1>", 50.0, 1, as_json=False) is ExitCode.OK
+    said = capsys.readouterr().out
+    assert "point       50.00 0.00 200.00 mm" in said
+    assert "rpy         0.000 0.000 90.000 deg" in said
+
+
+def test_the_pose_is_said_as_json_the_other_way_round(session, frames, capsys):
+    assert tf.echo(session, "hand <1>", "base", 50.0, 1, as_json=True) is ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["parent"] == "hand <1>"
+
+
+def test_a_frame_that_is_none_is_answered_with_the_nearest(session, frames):
+    with pytest.raises(CommandError, match=r'no frame "bas".*"base"'):
+        tf.echo(session, "bas", "arm", 50.0, 1, as_json=False)
+
+
+def test_without_frames_the_one_who_sends_them_is_named(session):
+    with pytest.raises(CommandError, match="state_publisher"):
+        tf.heard(session)
+
+
+def test_the_tree_has_every_frame_below_its_parent(session, frames):
+    links = tf.heard(session).links
+    assert tf.tree_text(links) == "base\n  arm\n    hand <1> (fixed)"
+    picture = ET.fromstring(tf.tree_picture(links))
+    assert [text.text for text in picture.iter("{http://www.w3.org/2000/svg}text")] == ["base", "arm", "hand <1>"]
+    dashed = [path.get("stroke-dasharray") for path in picture.iter("{http://www.w3.org/2000/svg}path")]
+    assert dashed == [None, "4 3"]
+
+
+def test_frames_are_monitored(session, frames, capsys):
+    assert tf.monitor(session, 1) is ExitCode.OK
+    (row,) = [line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("arm")]
+    assert 25.0 < float(row[1]) < 100.0
+    assert 0.0 <= float(row[2]) <= float(row[3]) < 1000.0
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1))
+def test_roll_pitch_and_yaw_are_those_that_were_given(roll: float, pitch: float, yaw: float):
+    assert to_rpy(from_rpy(roll, pitch, yaw)) == pytest.approx((roll, pitch, yaw), abs=1e-9)
+
+
+def test_a_message_is_shown_with_its_units_and_where_it_travels(capsys):
+    assert run(["interface", "show", "FrameTransforms"]) is ExitCode.OK
+    said = capsys.readouterr().out
+    assert "translation: Vector = (0.0, 0.0, 0.0)  # [m]" in said
+    assert "# topic frames: poses of the moving links" in said
+    assert run(["interface", "show", "joint_states"]) is ExitCode.OK
+    assert "class JointState" in capsys.readouterr().out
+    assert run(["interface", "show", "JointStat"]) is not ExitCode.OK
+    assert 'did you mean "JointState"' in capsys.readouterr().err
+
+
+def test_every_message_that_travels_is_shown():
+    for kind in interface.messages().values():
+        assert f"class {kind.__name__}(" in interface.text_of(kind)
+
+
+class Knobs(msgspec.Struct, frozen=True, kw_only=True):
+    gain: Annotated[float, Meta(ge=0.0, le=2.0, description="of the thing")] = 1.0
+    name: str = 'a "b"'
+    on: bool = False
+
+
+@pytest.fixture
+def knobs(deployment, network) -> Iterator[Node]:
+    with Node("thing", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        node.parameters(Knobs)
+        with spinning(node):
+            yield node
+
+
+def test_parameters_are_dumped_and_loaded(session, knobs, tmp_path: Path):
+    text = node_parameters.dumped(session, ["thing"])
+    assert 'gain" = 1.0  # of the thing' in text
+    file = tmp_path / "knobs.toml"
+    file.write_text(text)
+    assert node_parameters.load(session, node_parameters.read(str(file))) == ["every parameter has that value already"]
+    file.write_text(text.replace("1.0", "1.5").replace("false", "true"))
+    lines = node_parameters.load(session, node_parameters.read(str(file)))
+    assert lines == ["thing gain: 1.0 -> 1.5", "thing on: false -> true"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[thing]\non = true\ngain = 3.0", "3 is not in 0..2"),
+        ("[thing]\non = true\ngan = 1.5", 'no parameter "gan": did you mean "gain"'),
+        ('[thing]\non = true\ngain = "1.5"', "not a float"),
+        ("[thing]\non = true\ngain = [1]", "one number, word or truth"),
+        ("[thin]\non = true", 'no node "thin"'),
+    ],
+)
+def test_a_file_with_a_mistake_changes_nothing(session, knobs, tmp_path: Path, text: str, said: str):
+    before = node_parameters.dumped(session, ["thing"])
+    (tmp_path / "knobs.toml").write_text(text)
+    with pytest.raises(CommandError, match=re.escape(said)):
+        node_parameters.load(session, node_parameters.read(str(tmp_path / "knobs.toml")))
+    assert node_parameters.dumped(session, ["thing"]) == before
+
+
+@pytest.mark.parametrize("text", [b"gain = 1.0", b"[thing", b"\xff"])
+def test_a_file_that_is_none_is_refused(tmp_path: Path, text: bytes):
+    (tmp_path / "knobs.toml").write_bytes(text)
+    with pytest.raises(CommandError, match=r"knobs\.toml"):
+        node_parameters.read(str(tmp_path / "knobs.toml"))
