@@ -61,6 +61,25 @@ class NodeInfo(Message, frozen=True, kw_only=True):
     actions: tuple[str, ...] = ()
 
 
+class TopicInterface(Message, frozen=True, kw_only=True):
+    """A topic as a node speaks or hears it, for those who do not have its message's class."""
+
+    key: str = ""
+    message: str = ""  # the class's name
+    fields: tuple[tuple[str, str], ...] = ()  # name and type, as written where the class is defined
+    delivery: str = ""  # of `schemas.topics.Delivery`
+    rate: float | None = None  # [Hz]; None: when there is something to say
+    recorded: bool = False
+    writer: str = ""
+    about: str = ""
+
+
+class Interfaces(Message, frozen=True, kw_only=True):
+    """Every topic that a node publishes or subscribes to."""
+
+    topics: tuple[TopicInterface, ...] = ()
+
+
 class Empty(Message, frozen=True, kw_only=True):
     """Nothing to say."""
 

@@ -67,7 +67,7 @@ COMMANDS = (
     Command(("topic", "list"), "all topics: message, rate, delivery, writer",
             "topic:run_list", "topic:list_options", "gemelo topic list -t"),
     Command(("topic", "info"), "one topic and the fields of its message",
-            "topic:run_info", "topic:topic_option", choices="topic:choices"),
+            "topic:run_info", "topic:info_options", "gemelo topic info joint_states --living", "topic:choices"),
     Command(("topic", "echo"), "print messages as YAML, until Ctrl-C",
             "topic:run_echo", "topic:echo_options", "gemelo topic echo joint_states.position[0] --csv",
             "topic:choices"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -13,6 +13,7 @@ from schemas.message import Message
 from schemas.topics import TOPICS, Topic
 from services.cli.errors import CommandError, ExitCode, unknown
 from services.cli.field_path import FieldPath, leaves
+from services.cli.living_topics import LivingTopic, all_topics, connected, ends, known_topic
 from services.cli.messages import dump, fields_of, message_of
 from services.cli.parser import Choices, Options, Parser, positive_integer, positive_number
 from services.cli.session import Session, connect
@@ -29,7 +30,8 @@ def list_options(parser: Parser) -> None:
 
 def run_list(options: Options) -> ExitCode:
     """Prints the table of topics."""
-    print("\n".join(f"{topic.key} [{topic.message.__name__}]" for topic in TOPICS) if options.types else listing())
+    topics = all_topics()
+    print("\n".join(f"{each.key} [{each.message.__name__}]" for each in topics) if options.types else listing(topics))
     return ExitCode.OK
 
 
@@ -38,9 +40,20 @@ def topic_option(parser: Parser) -> None:
     parser.add_argument("topic", metavar="TOPIC", help="a key of `gemelo topic list`")
 
 
+def info_options(parser: Parser) -> None:
+    """Adds topic and --living."""
+    topic_option(parser)
+    parser.add_argument("--living", action="store_true", help="also the nodes that write and read it now")
+
+
 def run_info(options: Options) -> ExitCode:
     """Prints one topic."""
-    print(information(topic_of(options.topic)), end="")
+    known = known_topic(options.topic)
+    if known is not None and not options.living:
+        print(information(known), end="")
+        return ExitCode.OK
+    with connected(options.topic) as (session, topic):
+        print(information(topic) + dump(ends(session, topic.key)), end="")
     return ExitCode.OK
 
 
@@ -60,11 +73,12 @@ def echo_options(parser: Parser) -> None:
 def run_echo(options: Options) -> ExitCode:
     """Prints the messages of a topic, or one of their fields."""
     key, _, path = options.topic.partition(".")
-    topic = topic_of(key)
-    field = FieldPath(topic.message, path)
     form = csv_lines() if options.csv else json_line if options.json else yaml_document
-    with connect() as session:
-        return echo(session, topic, field, form, options.count)
+    known = known_topic(key)
+    if known is not None:
+        FieldPath(known.message, path)  # a mistake is told before anything is connected
+    with connected(key) as (session, topic):
+        return echo(session, topic, FieldPath(topic.message, path), form, options.count)
 
 
 def pub_options(parser: Parser) -> None:
@@ -88,19 +102,19 @@ def choices(robot: Robot | None) -> Choices:
     return {"": [topic.key for topic in TOPICS]}
 
 
-def topic_of(name: str) -> Topic[Message]:
-    """The topic of that name, with or without a leading slash; raises `CommandError` with the nearest name."""
-    for topic in TOPICS:
-        if topic.key == name.strip("/"):
-            return topic
-    raise unknown("topic", name, [topic.key for topic in TOPICS])
+def topic_of(name: str) -> Topic[Any]:
+    """The topic of that name in our own table; raises `CommandError` with the nearest name."""
+    known = known_topic(name)
+    if known is None:
+        raise unknown("topic", name, [topic.key for topic in TOPICS])
+    return known
 
 
-def listing() -> str:
-    """The table of all topics."""
+def listing(topics: Sequence[Topic[Any]] = TOPICS) -> str:
+    """The table of topics."""
     rows = [
         (topic.key, topic.message.__name__, rate_of(topic), topic.delivery.value, topic.writer, topic.about)
-        for topic in TOPICS
+        for topic in topics
     ]
     return table(("topic", "message", "rate [Hz]", "delivery", "writer", "about"), rows)
 
@@ -116,7 +130,8 @@ def information(topic: Topic[Message]) -> str:
         "topic": topic.key, "about": topic.about, "message": topic.message.__name__, "rate_hz": topic.rate,
         "delivery": topic.delivery.value, "recorded": topic.recorded, "writer": topic.writer,
     }  # fmt: skip
-    return dump({**head, "fields": fields_of(topic.message)})
+    fields = topic.fields if isinstance(topic, LivingTopic) else fields_of(topic.message)
+    return dump({**head, "fields": fields})
 
 
 def yaml_document(value: object) -> str:

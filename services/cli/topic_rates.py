@@ -11,9 +11,10 @@ from typing import Any
 from schemas.message import Message, encode
 from schemas.topics import Topic
 from services.cli.errors import ExitCode, usage
+from services.cli.living_topics import connected
 from services.cli.parser import Options, Parser, positive_integer
-from services.cli.session import Session, connect
-from services.cli.topic import listen, topic_of, topic_option
+from services.cli.session import Session
+from services.cli.topic import listen, topic_option
 
 REPORT_EVERY = 1.0  # [s]
 Report = Callable[[], str | None]
@@ -28,24 +29,21 @@ def rate_options(parser: Parser) -> None:
 
 def run_hz(options: Options) -> ExitCode:
     """Prints the rate of a topic."""
-    topic = topic_of(options.topic)
-    with connect() as session:
+    with connected(options.topic) as (session, topic):
         return hz(session, topic, options.window, options.count)
 
 
 def run_bw(options: Options) -> ExitCode:
     """Prints the bandwidth of a topic."""
-    topic = topic_of(options.topic)
-    with connect() as session:
+    with connected(options.topic) as (session, topic):
         return bandwidth(session, topic, options.window, options.count)
 
 
 def run_delay(options: Options) -> ExitCode:
     """Prints how old the messages of a topic are when they come."""
-    topic = topic_of(options.topic)
-    if "stamp" not in topic.message.__struct_fields__:
-        raise usage(f"{topic.message.__name__} has no stamp, so that nobody knows how old it is")
-    with connect() as session:
+    with connected(options.topic) as (session, topic):
+        if "stamp" not in topic.message.__struct_fields__:
+            raise usage(f"{topic.message.__name__} has no stamp, so that nobody knows how old it is")
         return delay(session, topic, options.window, options.count)
 
 

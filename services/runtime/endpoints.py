@@ -8,7 +8,10 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from schemas.system import NodeInfo, NodeStatistics, TopicStatistics
+import msgspec
+
+from schemas.system import Interfaces, NodeInfo, NodeStatistics, TopicInterface, TopicStatistics
+from schemas.topics import Topic
 from services.runtime.actions.server import ActionServer
 from services.runtime.bus.identity import Identity
 from services.runtime.loop.loop import LoopFigures
@@ -42,6 +45,12 @@ class NodeEndpoints:
             actions=tuple(each.action.key for each in self.actions),
         )
 
+    def interfaces(self) -> Interfaces:
+        """The topics with their messages, one of each key."""
+        spoken: list[Topic[Any]] = [each.topic for each in self.publishers.values()]
+        topics = {each.key: each for each in [*(each.topic for each in self.subscriptions), *spoken]}
+        return Interfaces(topics=tuple(_interface(topics[key]) for key in sorted(topics)))
+
     def statistics(self) -> tuple[TopicStatistics, ...]:
         """The counters of received, dropped and bad messages, by key."""
         hearers: list[Subscription[Any] | RequestServer[Any, Any]] = [*self.subscriptions, *self.servers]
@@ -51,6 +60,27 @@ class NodeEndpoints:
         """Warns once per reliable topic that has lost messages."""
         for each in self.subscriptions:
             each.report_losses()
+
+
+def _interface(topic: Topic[Any]) -> TopicInterface:
+    fields = [field.name for field in msgspec.structs.fields(topic.message)]
+    types = {name: kind for base in reversed(topic.message.__mro__) for name, kind in _annotations(base).items()}
+    return TopicInterface(
+        key=topic.key,
+        message=topic.message.__name__,
+        fields=tuple((name, str(types.get(name, ""))) for name in fields),
+        delivery=topic.delivery.value,
+        rate=topic.rate,
+        recorded=topic.recorded,
+        writer=topic.writer,
+        about=topic.about,
+    )
+
+
+def _annotations(kind: type) -> dict[str, Any]:
+    """As written, where the module has postponed them; else the names of the types."""
+    own = vars(kind).get("__annotations__", {})
+    return {name: hint if isinstance(hint, str) else getattr(hint, "__name__", str(hint)) for name, hint in own.items()}
 
 
 SHORTEST = 0.5  # [s] that a report must cover

@@ -14,7 +14,7 @@ import msgspec
 
 from schemas.deployment import Deployment
 from schemas.message import Message
-from schemas.system import Empty, NodeInfo, Parameter, ParameterValue, SetParameter, TopicStatistics
+from schemas.system import Empty, Interfaces, NodeInfo, Parameter, ParameterValue, SetParameter, TopicStatistics
 from schemas.topics import LOG, STATISTICS, Action, Request, Topic
 from services.runtime.actions.client import ActionClient
 from services.runtime.actions.server import ActionServer, OnCancel, OnGoal
@@ -287,6 +287,8 @@ class Node:
     def _serve_about_itself(self) -> None:
         about = Request(f"@node/{self.name}/info", Empty, NodeInfo, self.name, "who this node is")
         self.serve(about, lambda question: self.info())
+        spoken = Request(f"@node/{self.name}/interfaces", Empty, Interfaces, self.name, "the messages of its topics")
+        self.serve(spoken, lambda question: self._endpoints.interfaces())
         self.serve(self._parameters.list_request, self._parameters.listed)
         self.serve(self._parameters.set_request, self._parameters.set)
 

@@ -14,15 +14,17 @@ from typing import Annotated
 
 import msgspec
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import Meta
 
 from schemas.frames import FrameTransform, FrameTransforms, Transform
 from schemas.joints import JointState
-from schemas.topics import FRAMES, JOINT_STATES, STATIC_FRAMES
+from schemas.message import Message
+from schemas.topics import FRAMES, JOINT_STATES, STATIC_FRAMES, Delivery, Topic
 from services.arm.frames.transforms import from_rpy, to_rpy
-from services.cli import interface, node_parameters, tf, topic, topic_rates
+from services.cli import interface, living_topics, node_parameters, tf, topic, topic_rates
 from services.cli.errors import CommandError, ExitCode
 from services.cli.field_path import FieldPath, leaves
 from services.cli.main import run
@@ -52,6 +54,70 @@ def frames(deployment, network) -> Iterator[None]:
         node.publisher(STATIC_FRAMES).put(FrameTransforms(transforms=(hand,)))
         with spinning(node, lambda now: publisher.put(moving(now))):
             yield
+
+
+class Inner(Message, frozen=True, kw_only=True):
+    depth: float = 0.0  # [m]
+
+
+class Sonar(Message, frozen=True, kw_only=True):
+    """A message that `schemas` does not have."""
+
+    stamp: int = 0
+    echo: Inner = Inner()
+    beams: tuple[float, ...] = ()
+
+
+SONAR = Topic("sonar", Sonar, Delivery.LATEST, 20.0, False, "diver", "what is below")
+
+
+@pytest.fixture
+def diver(deployment, network) -> Iterator[None]:
+    """A user's own node, with a topic of his own."""
+    with Node("diver", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        publisher = node.publisher(SONAR)
+        with spinning(
+            node, lambda now: publisher.put(Sonar(stamp=now, echo=Inner(depth=1.5), beams=(0.1, 0.2))), rate=20.0
+        ):
+            yield
+
+
+def test_the_topic_of_a_user_s_node_is_found_with_its_fields(session, diver):
+    (found,) = living_topics.other_topics(session)
+    assert (found.key, found.rate, found.delivery) == ("sonar", 20.0, Delivery.LATEST)
+    assert "Inner" in topic.information(found)
+    assert "sonar" in topic.listing([found])
+
+
+def test_the_topic_of_a_user_s_node_is_echoed(session, diver, capsys):
+    found = living_topics.topic_on(session, "sonar")
+    assert topic.echo(session, found, FieldPath(found.message, "echo.depth"), topic.json_line, 2) is ExitCode.OK
+    assert capsys.readouterr().out.splitlines() == ["1.5", "1.5"]
+
+
+def test_the_topic_of_a_user_s_node_is_echoed_whole(session, diver, capsys):
+    found = living_topics.topic_on(session, "sonar")
+    assert topic.echo(session, found, FieldPath(found.message, ""), topic.yaml_document, 1) is ExitCode.OK
+    assert yaml.safe_load(capsys.readouterr().out.removesuffix("---\n"))["echo"] == {"depth": 1.5}
+
+
+def test_the_rate_of_a_user_s_topic_is_measured(session, diver, capsys):
+    assert topic_rates.hz(session, living_topics.topic_on(session, "sonar"), 1000, 1) is ExitCode.OK
+    assert 10.0 < float(capsys.readouterr().out.split()[2]) < 40.0
+
+
+def test_a_topic_of_nobody_is_answered_with_the_nearest_of_all(session, diver):
+    with pytest.raises(CommandError, match=r'no topic "sona": did you mean "sonar"'):
+        living_topics.topic_on(session, "sona")
+
+
+def test_who_writes_and_reads_a_topic_is_named_with_what_was_lost(session, stack, deployment, network):
+    with Node("reader", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        node.subscribe(JOINT_STATES, lambda state: None)
+        with spinning(node):
+            told = living_topics.ends(session, "joint_states")
+    assert "process" in told["written_by"]["stepper_gateway"]
+    assert re.fullmatch(r"\d+ received, 0 dropped, 0 bad", told["read_by"]["reader"])
 
 
 @pytest.mark.parametrize(
