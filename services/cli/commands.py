@@ -133,6 +133,8 @@ COMMANDS = (
             "node_parameters:run_dump", "node_parameters:dump_options", "gemelo param dump > parameters.toml"),
     Command(("param", "load"), "set what a file of `param dump` says; nothing is set if one of them is refused",
             "node_parameters:run_load", "node_parameters:load_options", "gemelo param load parameters.toml"),
+    Command(("top",), "CPU, memory, loop and losses of every node, until Ctrl-C", "top:run", "top:add_options",
+            "gemelo top -n 1"),
     Command(("log",), "follow the log of every node, until Ctrl-C", "node:run_log", "node:log_options"),
     Command(("import",), "make a robot's folder of a URDF or of a CAD export",
             "import_robot:run", "import_robot:add_options"),

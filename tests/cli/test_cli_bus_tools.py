@@ -22,9 +22,10 @@ from msgspec import Meta
 from schemas.frames import FrameTransform, FrameTransforms, Transform
 from schemas.joints import JointState
 from schemas.message import Message
+from schemas.system import NodeStatistics, TopicStatistics
 from schemas.topics import FRAMES, JOINT_STATES, STATIC_FRAMES, Delivery, Topic
 from services.arm.frames.transforms import from_rpy, to_rpy
-from services.cli import interface, living_topics, node_parameters, tf, topic, topic_rates
+from services.cli import interface, living_topics, node_parameters, tf, top, topic, topic_rates
 from services.cli.errors import CommandError, ExitCode
 from services.cli.field_path import FieldPath, leaves
 from services.cli.main import run
@@ -292,3 +293,24 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, text: bytes):
     (tmp_path / "knobs.toml").write_bytes(text)
     with pytest.raises(CommandError, match=r"knobs\.toml"):
         node_parameters.read(str(tmp_path / "knobs.toml"))
+
+
+def test_top_has_every_node_with_its_figures(session, stack, capsys):
+    assert top.watch(session, 1) is ExitCode.OK
+    (row,) = [line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("stepper_gateway")]
+    cpu, memory, loop = (float(cell) for cell in row[1:4])
+    assert 0.0 <= cpu < 200.0
+    assert memory > 10.0
+    assert 25.0 < loop < 100.0
+
+
+def test_a_topic_that_comes_too_seldom_is_named_and_a_silent_one_is_not():
+    def heard(stamp: int, states: int) -> NodeStatistics:
+        topics = (TopicStatistics(key="joint_states", received=states), TopicStatistics(key="step_errors", received=9))
+        return NodeStatistics(stamp=stamp, node="planner", topics=topics)
+
+    second = 1_000_000_000
+    slow = {"planner": top.Figures(heard(0, 10), heard(second, 40))}
+    (line,) = top.slow_topics(slow)
+    assert line == "planner hears joint_states 30.0 times a second; stepper_gateway promises 50"
+    assert list(top.slow_topics({"planner": top.Figures(heard(0, 10), heard(second, 60))})) == []
