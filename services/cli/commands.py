@@ -140,6 +140,8 @@ COMMANDS = (
             "import_robot:run", "import_robot:add_options"),
     Command(("check",), "validate a robot's folder, an export's folder or a URDF: references, limits, inertias, steps",
             "robot_folder:run_check", "robot_folder:check_option"),
+    Command(("doctor",), "what keeps a twin from working here: machine, files, router, broker, device, clocks",
+            "doctor:run", JSON, "gemelo doctor"),
     Command(("version",), "the versions of gemelo, of its wire protocol and of Python", "version:run"),
     Command(("completion",), "bash completion: source <(gemelo completion)", "completion:run"),
 )  # fmt: skip

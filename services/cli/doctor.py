@@ -1,0 +1,202 @@
+"""`gemelo doctor`: what keeps a twin from working here, each with its remedy."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import socket
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from pathlib import Path
+
+import msgspec
+
+from schemas.deployment import Deployment, Wire
+from schemas.device import DeviceState, DeviceStatus
+from schemas.device_faults import fault_text
+from schemas.errors import ConfigurationError
+from schemas.joints import JointState
+from schemas.topics import DEVICE_STATE, DEVICE_STATUS, JOINT_STATES
+from services.cli.errors import CommandError, ExitCode
+from services.cli.node import living
+from services.cli.parser import Options
+from services.cli.session import Session, connect
+from services.cli.text_table import table
+from services.cli.version import version_text
+from services.runtime.deployment import load_deployment, project_root
+
+UP = "start the twin with `make up`"
+# Tuning constants: chosen.
+LEAST_DISK = 1e9  # [bytes] free: an hour of recordings
+LEAST_MEMORY = 5e8  # [bytes] free: what the stack needs itself
+MOST_CPU = 85.0  # [%] of all cores: above it, ticks of a virtual device come late
+CPU_OVER = 1.0  # [s]
+LISTENING = 1.5  # [s] for what the nodes say
+MOST_SKEW = 0.5  # [s] between this clock and that of a state's stamp
+
+
+class Verdict(StrEnum):
+    """Of one check."""
+
+    OK = "ok"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was looked at, what was found, and what would do."""
+
+    verdict: Verdict
+    subject: str
+    found: str
+    remedy: str = ""
+
+
+def run(options: Options) -> ExitCode:
+    """Prints every diagnosis; FAILED if one of them is an error."""
+    found = list(diagnoses())
+    if options.json:
+        print(msgspec.json.encode([asdict(each) for each in found]).decode())
+    else:
+        print(table(("", "what", "found"), [(each.verdict.value, each.subject, each.found) for each in found]))
+        for each in found:
+            if each.remedy:
+                print(f"{each.subject}: {each.remedy}")
+    return ExitCode.FAILED if any(each.verdict is Verdict.ERROR for each in found) else ExitCode.OK
+
+
+def diagnoses() -> Iterator[Diagnosis]:
+    """Of this machine, then of the deployment, then of the twin where it runs."""
+    yield Diagnosis(Verdict.OK, "versions", f"{version_text()}, {platform.system()} {platform.machine()}")
+    yield from _machine()
+    try:
+        deployment = load_deployment()
+    except ConfigurationError as error:
+        yield Diagnosis(Verdict.ERROR, "deployment", str(error), "correct the file that $GEMELO_CONFIG names")
+        return
+    yield from _folders(deployment)
+    yield _robot(deployment)
+    if deployment.wire is Wire.SERIAL:
+        yield serial_port(deployment.serial.device)
+    else:
+        yield _listener("broker", deployment.mqtt.host, deployment.mqtt.port)
+    router = _listener("router", deployment.router.host, deployment.router.port)
+    yield router
+    if router.verdict is Verdict.OK:
+        yield from _twin()
+
+
+def _machine() -> Iterator[Diagnosis]:
+    import psutil  # 20 ms
+
+    busy, cores = psutil.cpu_percent(CPU_OVER), os.cpu_count() or 1
+    found = f"{busy:.0f} % of {cores} cores in use"
+    if busy > MOST_CPU:
+        remedy = "end what uses it (`gemelo top` says which node): a virtual device loses time when it has to wait"
+        yield Diagnosis(Verdict.WARNING, "CPU", found, remedy)
+    else:
+        yield Diagnosis(Verdict.OK, "CPU", found)
+    memory = psutil.virtual_memory().available
+    yield _enough("memory", memory, LEAST_MEMORY, "end what uses it")
+
+
+def _enough(subject: str, free: float, least: float, remedy: str) -> Diagnosis:
+    found = f"{free / 1e9:.1f} GB free"
+    return Diagnosis(*((Verdict.WARNING, subject, found, remedy) if free < least else (Verdict.OK, subject, found)))
+
+
+def _folders(deployment: Deployment) -> Iterator[Diagnosis]:
+    for name, text in (("recordings", deployment.paths.out), ("run", deployment.paths.run)):
+        path = project_root() / text
+        there = next(each for each in (path, *path.parents) if each.exists())
+        if not os.access(there, os.W_OK | os.X_OK):
+            remedy = f"sudo chown {os.environ.get('USER', '$USER')} {there}, or set [paths] in the deployment file"
+            yield Diagnosis(Verdict.ERROR, f"folder {name}", f"{path} cannot be written", remedy)
+        elif name == "recordings":
+            yield _enough("disk", shutil.disk_usage(there).free, LEAST_DISK, f"free space where {path} is")
+
+
+def _robot(deployment: Deployment) -> Diagnosis:
+    from services.arm.checks.check import Severity, check  # half a second
+
+    errors = [each for each in check(project_root() / deployment.robot) if each.severity is Severity.ERROR]
+    if errors:
+        return Diagnosis(Verdict.ERROR, "robot", str(errors[0]), f"`gemelo check {deployment.robot}` says them all")
+    return Diagnosis(Verdict.OK, "robot", f"{deployment.robot} is well")
+
+
+def serial_port(device: str) -> Diagnosis:
+    """Whether it is there and may be opened."""
+    path = Path(device)
+    if not path.exists():
+        return Diagnosis(Verdict.ERROR, "serial port", f"{device} is not there", "plug the board in, or name its port")
+    if not os.access(path, os.R_OK | os.W_OK):
+        remedy = "sudo usermod -aG dialout $USER, then log in anew"
+        return Diagnosis(Verdict.ERROR, "serial port", f"{device} may not be opened", remedy)
+    return Diagnosis(Verdict.OK, "serial port", device)
+
+
+def _listener(name: str, host: str, port: int) -> Diagnosis:
+    try:
+        socket.create_connection((host, port), timeout=1.0).close()
+    except OSError as error:
+        found = f"nobody listens at {host}:{port} ({error.strerror or error})"
+        return Diagnosis(Verdict.ERROR, name, found, "start the twin with `make up`")
+    return Diagnosis(Verdict.OK, name, f"listens at {host}:{port}")
+
+
+def _twin() -> Iterator[Diagnosis]:
+    try:
+        with connect() as session:
+            yield from twin(session)
+    except CommandError as error:
+        yield Diagnosis(Verdict.ERROR, "twin", str(error))
+
+
+def twin(session: Session) -> Iterator[Diagnosis]:
+    """Of the nodes, the device and the clocks."""
+    node = session.node
+    statuses: list[DeviceStatus] = []
+    states: list[DeviceState] = []
+    ages: list[float] = []
+    node.subscribe(DEVICE_STATUS, statuses.append)
+    node.subscribe(DEVICE_STATE, states.append)
+
+    def on_joints(state: JointState) -> None:
+        ages.append((node.now() - state.stamp) / 1e9)
+
+    node.subscribe(JOINT_STATES, on_joints)
+    node.wait(LISTENING)
+    nodes = living(session)
+    yield Diagnosis(Verdict.OK if nodes else Verdict.ERROR, "nodes", ", ".join(nodes) or "none", "" if nodes else UP)
+    yield device(statuses[-1] if statuses else None, states[-1] if states else None)
+    yield clocks(ages)
+
+
+def device(status: DeviceStatus | None, state: DeviceState | None) -> Diagnosis:
+    """Whether it is online, and in no fault."""
+    if status is None:
+        return Diagnosis(Verdict.ERROR, "device", "stepper_gateway says nothing of it", UP)
+    if not status.online:
+        remedy = "see that it has power and reaches its broker; `gemelo device status` says more"
+        return Diagnosis(Verdict.ERROR, "device", f"offline: {status.reason or 'nothing heard of it'}", remedy)
+    if state is not None and state.fault:
+        return Diagnosis(
+            Verdict.WARNING, "device", fault_text(state.fault), "`gemelo reset`, when a person has seen why"
+        )
+    return Diagnosis(Verdict.OK, "device", f"{status.device} is online")
+
+
+def clocks(ages: list[float]) -> Diagnosis:
+    """How far this clock is from that of the stepper_gateway: `ages` [s] of states when they came."""
+    if not ages:
+        return Diagnosis(Verdict.WARNING, "clocks", "no joint state has come, so they cannot be compared")
+    least = min(ages, key=abs)
+    found = f"states are {1000.0 * least:.1f} ms old when they come"
+    if abs(least) > MOST_SKEW:
+        remedy = "let both machines take their time from one server (timedatectl set-ntp true)"
+        return Diagnosis(Verdict.WARNING, "clocks", found, remedy)
+    return Diagnosis(Verdict.OK, "clocks", found)

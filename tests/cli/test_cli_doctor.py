@@ -1,0 +1,68 @@
+"""`gemelo doctor`: each thing that keeps a twin from working is named with its remedy."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from schemas.device import DeviceState, DeviceStatus
+from services.cli import doctor
+from services.cli.errors import ExitCode
+from services.cli.main import run
+
+
+@pytest.fixture
+def stack(gateway):
+    return gateway
+
+
+def test_the_doctor_finds_a_twin_that_is_well(session, stack):
+    found = {each.subject: each for each in doctor.twin(session)}
+    assert found["nodes"].verdict is doctor.Verdict.OK
+    assert found["device"].found == "rm1 is online"
+    assert found["clocks"].verdict is doctor.Verdict.OK
+
+
+def test_the_doctor_without_a_twin_says_what_would_do(monkeypatch, capsys):
+    monkeypatch.setenv("GEMELO_ROUTER_PORT", "1")
+    monkeypatch.setenv("GEMELO_MQTT_PORT", "1")
+    assert run(["doctor", "--json"]) is ExitCode.FAILED
+    found = {each["subject"]: each for each in json.loads(capsys.readouterr().out)}
+    for name in ("router", "broker"):
+        assert (found[name]["verdict"], found[name]["remedy"]) == ("error", "start the twin with `make up`")
+    assert found["robot"]["verdict"] == "ok"
+    assert "twin" not in found
+
+
+@pytest.mark.parametrize(
+    ("diagnosis", "verdict", "words"),
+    [
+        (doctor.device(None, None), "error", "make up"),
+        (doctor.device(DeviceStatus(reason="no state for 0.5 s"), None), "error", "offline: no state for 0.5 s"),
+        (doctor.device(DeviceStatus(online=True, device="rm1"), DeviceState(fault=3)), "warning", "gemelo reset"),
+        (doctor.clocks([5.2, 5.1]), "warning", "timedatectl"),
+        (doctor.clocks([-3.0]), "warning", "-3000.0 ms"),
+        (doctor.clocks([]), "warning", "no joint state"),
+        (doctor.serial_port("/dev/nobody"), "error", "/dev/nobody is not there"),
+    ],
+)
+def test_the_doctor_names_what_is_wrong_with_its_remedy(diagnosis, verdict, words):
+    assert diagnosis.verdict == verdict
+    assert words in f"{diagnosis.found} {diagnosis.remedy}"
+
+
+def test_the_doctor_says_that_a_folder_cannot_be_written(monkeypatch, tmp_path: Path, capsys):
+    monkeypatch.setenv("GEMELO_PATHS_OUT", str(tmp_path))
+    monkeypatch.setenv("GEMELO_ROUTER_PORT", "1")
+    monkeypatch.setattr("os.access", lambda path, mode: path != tmp_path)
+    assert run(["doctor"]) is ExitCode.FAILED
+    assert "folder recordings: sudo chown" in capsys.readouterr().out
+
+
+def test_the_doctor_says_what_is_wrong_with_the_deployment(monkeypatch, tmp_path: Path, capsys):
+    (tmp_path / "site.toml").write_text("rober = 3")
+    monkeypatch.setenv("GEMELO_CONFIG", str(tmp_path / "site.toml"))
+    assert run(["doctor"]) is ExitCode.FAILED
+    assert "rober" in capsys.readouterr().out
