@@ -19,13 +19,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import Meta
 
+import gemelo
 from schemas.frames import FrameTransform, FrameTransforms, Transform
 from schemas.joints import JointState
 from schemas.message import Message
 from schemas.system import NodeStatistics, TopicStatistics
-from schemas.topics import FRAMES, JOINT_STATES, STATIC_FRAMES, Delivery, Topic
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, STATIC_FRAMES, Delivery, Topic
 from services.arm.frames.transforms import from_rpy, to_rpy
-from services.cli import interface, living_topics, node_parameters, tf, top, topic, topic_rates
+from services.cli import action_watch, interface, living_topics, node_parameters, tf, top, topic, topic_rates
 from services.cli.errors import CommandError, ExitCode
 from services.cli.field_path import FieldPath, leaves
 from services.cli.main import run
@@ -314,3 +315,24 @@ def test_a_topic_that_comes_too_seldom_is_named_and_a_silent_one_is_not():
     (line,) = top.slow_topics(slow)
     assert line == "planner hears joint_states 30.0 times a second; stepper_gateway promises 50"
     assert list(top.slow_topics({"planner": top.Figures(heard(0, 10), heard(second, 60))})) == []
+
+
+def test_a_goal_of_somebody_else_is_cancelled_and_one_that_is_none_is_named(session, connected, stack, planner):
+    with pytest.raises(CommandError, match='no goal begins with "nobody"'):
+        action_watch.cancel(session, FOLLOW_JOINT_TRAJECTORY, "nobody")
+    motion = connected.start(joints=dict(zip(session.arm.joint_names, (0.0, 0.0, 0.0), strict=True)))
+    (goal,) = action_watch.cancel(session, FOLLOW_JOINT_TRAJECTORY, motion.goal_id[:8])
+    assert goal == motion.goal_id
+    with pytest.raises(gemelo.Aborted):
+        motion.wait()
+    with pytest.raises(CommandError, match="nothing is cancelled"):
+        action_watch.cancel(session, FOLLOW_JOINT_TRAJECTORY, "")
+
+
+def test_a_goal_is_followed_to_its_result(session, connected, stack, planner, capsys):
+    motion = connected.start(joints=dict(zip(session.arm.joint_names, (0.0, 0.0, 0.0), strict=True)))
+    assert action_watch.echo(session, FOLLOW_JOINT_TRAJECTORY, 1) is ExitCode.OK
+    said = capsys.readouterr().out
+    assert f"goal {motion.goal_id} of" in said
+    assert "SUCCEEDED" in said
+    assert "executed_steps: [933, -50, 113]" in said
