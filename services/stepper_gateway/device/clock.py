@@ -2,6 +2,9 @@
 
 An exchange is wrong by half its round trip at most, and by little where both ways were quick. So a straight line goes
 through the offsets by weighted least squares: the longer a round trip beyond the shortest, the less it weighs.
+
+An exchange that contradicts the others is put aside, as anybody may have sent it. ENOUGH of them that agree with one
+another, with none between them that agrees with the others, are the clock as it is now.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ STEADY = 1000.0  # [us] that two clocks may part beyond any drift
 class Exchange(NamedTuple):
     """One SYNC and its reply."""
 
+    asked: int  # [us] of our monotonic clock, when the SYNC was sent
     at: float  # [us] of our monotonic clock, in the middle
     offset: float  # [us] device clock minus our monotonic clock
     round_trip: float  # [us] without the device's own thinking time
@@ -38,25 +42,42 @@ class ClockSync:
 
     def __init__(self) -> None:
         self._exchanges: deque[Exchange] = deque(maxlen=WINDOW)
+        self._contradicting: deque[Exchange] = deque(maxlen=WINDOW)  # since the last that agreed
         self._line = Line(0.0, 0.0, 0.0)
 
     def reset(self) -> None:
         """Forget everything: another boot is another clock."""
         self._exchanges.clear()
+        self._contradicting.clear()
 
-    def add(self, t0: int, t1: int, t2: int, t3: int) -> None:
-        """t0 sent and t3 received on our clock, t1 received and t2 sent on the device's [us]."""
+    def add(self, t0: int, t1: int, t2: int, t3: int) -> bool:
+        """True if it is believed: t0 sent, t3 received on our clock, t1 received, t2 sent on the device's [us]."""
         round_trip = (t3 - t0) - (t2 - t1)
         if round_trip < 0 or t2 < t1:
-            return
-        exchange = Exchange((t0 + t3) / 2.0, ((t1 - t0) + (t2 - t3)) / 2.0, round_trip)
+            return False
+        exchange = Exchange(t0, (t0 + t3) / 2.0, ((t1 - t0) + (t2 - t3)) / 2.0, round_trip)
         if self._exchanges and not _agree(exchange, min(self._exchanges, key=lambda one: one.round_trip)):
-            # A quartz that drifts beyond its data sheet contradicts the old exchanges only: the young ones still tell.
-            agreeing = [one for one in self._exchanges if _agree(exchange, one)]
-            self._exchanges.clear()
-            self._exchanges.extend(agreeing)
+            if not self._begin_anew(exchange):
+                return False
+        elif self.is_synchronised:
+            self._contradicting.clear()
         self._exchanges.append(exchange)
         self._line = _line(self._exchanges)
+        return True
+
+    def _begin_anew(self, exchange: Exchange) -> bool:
+        """Go on with what agrees with `exchange`, if that is enough or nothing is known yet; else put it aside."""
+        known = sorted((*self._exchanges, *self._contradicting), key=lambda one: one.at)
+        # A quartz that drifts beyond its data sheet contradicts the old exchanges only: the young ones still tell.
+        agreeing = [one for one in known if _agree(exchange, one)]
+        is_enough = len({one.asked for one in (*agreeing, exchange)}) >= ENOUGH
+        if self.is_synchronised and not is_enough:
+            self._contradicting.append(exchange)
+            return False
+        others = [] if is_enough else [one for one in known if one not in agreeing]
+        self._contradicting = deque(others, maxlen=WINDOW)
+        self._exchanges = deque(agreeing, maxlen=WINDOW)
+        return True
 
     @property
     def exchanges(self) -> int:
@@ -65,6 +86,11 @@ class ClockSync:
     @property
     def is_synchronised(self) -> bool:
         return len(self._exchanges) >= ENOUGH
+
+    @property
+    def is_contradicted(self) -> bool:
+        """True if the last exchange does not fit to those before."""
+        return self.is_synchronised and bool(self._contradicting)
 
     @property
     def round_trip(self) -> float:

@@ -66,12 +66,15 @@ class FrameHandler:
             case Kind.STATE, State():
                 self._on_state(frame, arrival, moment)
             case Kind.TRAJ_ACK, Ack():
+                self._device.session.require_known(frame)
+                self._device.session.require_present(frame, frame.t_us, arrival)
                 if frame.boot_id == self._device.session.boot_id:
                     self._controller.on_ack(frame, arrival, moment)
                     self._components.goals.on_ack()
             case Kind.SYNC_R, SyncReply():
                 self._device.session.on_sync_reply(frame, received.arrival // 1000)
             case Kind.CMD_ACK, CommandReply():
+                self._device.session.require_present(frame, frame.t_us, arrival)
                 self._device.session.on_reply(frame)
                 self._components.command_handler.on_reply(frame, moment)
             case _:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections import deque
 
+from msgspec.structs import replace
+
 from schemas.device import DeviceCommandKind, DeviceMode
 from services.stepper_gateway.device.clock import ClockSync
+from services.stepper_gateway.device.state_checks import StateChecks
 from services.stepper_gateway.links.frames import (
     NEVER_EXPIRES,
     BadFrame,
     Code,
     Command,
     CommandReply,
+    Frame,
     Heartbeat,
     State,
     StateFlag,
@@ -26,7 +30,8 @@ SYNC = 0.5  # [s]
 SYNC_AT_FIRST = 0.03  # [s] until the clock is known
 STEADY_BEATS = 0.7  # [s] of heartbeats without a pause, after which a device cannot miss them for want of any
 ASK_STATUS = 1.0  # [s] between two requests for a status that is missing
-FARTHEST_AHEAD = 1.0  # [s] that a state's time may be ahead of the device's clock as it is known
+# Chosen: true states are not taken until they are newer than one from so far ahead, which must not look like silence.
+FARTHEST_AHEAD = 0.2  # [s] that a frame's time may be ahead of the device's clock as it is known
 QUESTIONS = 32  # that may be under way
 OLD_BOOTS = 16  # remembered, so that a late frame of one does not look like a reboot
 
@@ -49,6 +54,8 @@ class DeviceSession:
         self._tells_status = True  # on request
         self._old_boots: list[int] = []
         self._reports: dict[int, StatusReport] = {}  # by boot id
+        self._doubted: StatusReport | None = None  # contradicts what the present boot has said; it is asked again
+        self._checks = StateChecks()
         self._offline_boot = 0  # whose last will has come
         self._questions: deque[int] = deque(maxlen=QUESTIONS)  # [us] SYNCs that may be answered
         self.link_up = False
@@ -91,6 +98,21 @@ class DeviceSession:
             return
         if status.boot_id == self._offline_boot:
             self._offline_boot = 0
+        if self._is_doubtful(status):
+            self._doubted, self._status_due = status, 0.0
+        else:
+            self._believe(status)
+
+    def _is_doubtful(self, status: StatusReport) -> bool:
+        """True for what the present boot has not said before, until it says so twice: anybody may have written it."""
+        known = self.status if status.boot_id == self.boot_id else None
+        if known is None or not self._tells_status or _facts(status) == _facts(known):
+            return False
+        return self._doubted is None or _facts(status) != _facts(self._doubted)
+
+    def _believe(self, status: StatusReport) -> None:
+        if status.boot_id == self.boot_id:
+            self._doubted = None
         self._reports[status.boot_id] = status
         if len(self._reports) > OLD_BOOTS:
             del self._reports[next(boot for boot in self._reports if boot != self.boot_id)]
@@ -103,11 +125,13 @@ class DeviceSession:
         if state.mode not in DeviceMode._value2member_map_:
             raise BadFrame(f"a state with the unknown mode {state.mode}")
         is_fresh = arrival - self.state_arrival <= timeout
-        ahead = state.t_us - self.clock.device_time(arrival) - FARTHEST_AHEAD * 1e6
-        if is_fresh and state.boot_id == self.boot_id and self.clock.is_synchronised and ahead > 0:
-            raise BadFrame(f"a state from {ahead * 1e-6 + FARTHEST_AHEAD:.1f} s ahead of the device's clock")
-        if state.boot_id in self._old_boots and is_fresh:
-            return False, False
+        if is_fresh and state.boot_id == self.boot_id:
+            self.require_present(state, state.t_us, arrival)
+            self._checks.require_steady(self.latest, state)
+        elif is_fresh and self.latest is not None:
+            if state.boot_id in self._old_boots:
+                return False, False
+            self._checks.require_in_a_row(self.latest, state)
         is_new_boot = self._meet(state.boot_id)
         if self.latest is not None and state.t_us <= self.latest.t_us and is_fresh:
             return False, is_new_boot
@@ -116,14 +140,32 @@ class DeviceSession:
 
     def on_sync_reply(self, reply: SyncReply, arrival_us: int) -> None:
         """Take an answer to a question of ours."""
-        if reply.boot_id == self.boot_id and reply.t0 in self._questions:
+        self.require_known(reply)
+        if reply.boot_id != self.boot_id or reply.t0 not in self._questions:
+            return
+        # What is not believed leaves the question open for the true answer.
+        if self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us):
             self._questions.remove(reply.t0)
-            self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us)
+
+    def require_known(self, frame: Frame) -> None:
+        """Raises `BadFrame` for a frame of a boot that has never been heard."""
+        if self.boot_id and frame.boot_id not in (self.boot_id, *self._old_boots):
+            raise BadFrame(f"it comes from boot {frame.boot_id}, while boot {self.boot_id} lives")
+
+    def require_present(self, frame: Frame, t_us: int, arrival: float) -> None:
+        """Raises `BadFrame` for a frame of the present boot that was said at `t_us` [us] and came before that [s]."""
+        if frame.boot_id != self.boot_id or not self.clock.is_synchronised:
+            return
+        ahead = t_us * 1e-6 - self.clock.device_time(arrival) * 1e-6
+        if ahead > FARTHEST_AHEAD + self.clock.round_trip:
+            raise BadFrame(f"it comes from {ahead:.1f} s ahead of the device's clock")
 
     def on_reply(self, reply: CommandReply) -> None:
         """A device with an older firmware cannot be asked for its status."""
         if (reply.boot_id, reply.cmd, reply.code) == (self.boot_id, DeviceCommandKind.STATUS, Code.UNKNOWN_CMD):
             self._tells_status = False
+            if self._doubted is not None:
+                self._believe(self._doubted)
 
     def renew_heartbeat(self, moment: Moment) -> bool:
         """A fresh heartbeat session, where the device misses beats that have been sent; true if so."""
@@ -147,7 +189,8 @@ class DeviceSession:
             self._beat = moment.monotonic
             frames.append(Heartbeat(boot_id=self.boot_id, session=self._session_id, counter=self._counter))
         if moment.monotonic >= self._sync_due:
-            period = SYNC if self.clock.is_synchronised else SYNC_AT_FIRST
+            is_sure = self.clock.is_synchronised and not self.clock.is_contradicted
+            period = SYNC if is_sure else SYNC_AT_FIRST
             self._sync_due = next_beat(self._sync_due, moment.monotonic, period)
             self._questions.append(moment.micros)
             frames.append(Sync(boot_id=self.boot_id, t0=moment.micros))
@@ -159,7 +202,8 @@ class DeviceSession:
         return frames
 
     def _lacks_status(self, moment: Moment) -> bool:
-        return self._tells_status and self.status is None and self.boot_id != 0 and self.is_fresh(moment, ASK_STATUS)
+        is_wanted = self.status is None or self._doubted is not None
+        return self._tells_status and is_wanted and self.boot_id != 0 and self.is_fresh(moment, ASK_STATUS)
 
     def is_fresh(self, moment: Moment, timeout: float) -> bool:
         """True if a state has arrived within `timeout` seconds."""
@@ -196,7 +240,13 @@ class DeviceSession:
         self._old_boots = [boot for boot in self._old_boots if boot != boot_id]
         self.boot_id = boot_id
         self.latest = None
+        self._doubted, self._checks = None, StateChecks()
         self.clock.reset()
         self._sync_due = 0.0
         self._status_due, self._tells_status = 0.0, True
         return is_reboot
+
+
+def _facts(status: StatusReport) -> StatusReport:
+    """What a boot never changes, but for another configuration."""
+    return replace(status, referenced=False, armed=False)

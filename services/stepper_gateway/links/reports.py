@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import msgspec
+from msgspec import Meta
 
-from services.stepper_gateway.links.frames import BadFrame, Row
+from services.stepper_gateway.links.frames import BadFrame
+
+Word = Annotated[int, Meta(ge=0, lt=2**32)]
+Micros = Annotated[int, Meta(ge=0, le=2**63 - 1)]  # [us] of the device's clock
+Steps = tuple[Annotated[int, Meta(ge=-(2**31), lt=2**31)], ...]
 
 
 class Report(msgspec.Struct, frozen=True, kw_only=True):
@@ -21,16 +26,16 @@ class StatusReport(Report, frozen=True, kw_only=True):
 
     online: bool
     device: str = ""
-    boot_id: int = 0
+    boot_id: Word = 0
     firmware: str = ""
     protocol: tuple[int, int] = (1, 1)
     reset_cause: str = ""
-    joints: int = 0
-    tick_hz: int = 0
-    queue_capacity: int = 0  # [knots]
+    joints: Word = 0
+    tick_hz: Word = 0
+    queue_capacity: Word = 0  # [knots]
     referenced: bool = False
     armed: bool = False
-    config_crc32: int = 0  # of the configuration it works with; 0: none yet
+    config_crc32: Word = 0  # of the configuration it works with; 0: none yet
     virtual: bool = False
 
 
@@ -38,15 +43,15 @@ class EventReport(Report, frozen=True, kw_only=True):
     """Something that happened once, at `t_us` of the device's clock."""
 
     event: str
-    t_us: int = 0
-    stream: int = 0
+    t_us: Micros = 0
+    stream: Word = 0
     detail: str = ""
 
 
 class ConfigAckReport(Report, frozen=True, kw_only=True):
     """The device's answer to the configuration whose text has this `crc32`."""
 
-    crc32: int
+    crc32: Word
     accepted: bool
     part: str = ""  # that is wrong; empty for the device
     reason: str = ""
@@ -55,15 +60,15 @@ class ConfigAckReport(Report, frozen=True, kw_only=True):
 class ShaftReport(Report, frozen=True, kw_only=True):
     """What the counters of a virtual device believe, and where its shafts are [steps]."""
 
-    t_us: int = 0
-    steps: Row = ()
-    shaft: Row = ()
+    t_us: Micros = 0
+    steps: Steps = ()
+    shaft: Steps = ()
 
 
 class SensorReport(Report, frozen=True, kw_only=True):
     """The readings that there are, by the sensors' names."""
 
-    t_us: int
+    t_us: Micros
     values: dict[str, float]
 
 
@@ -87,6 +92,8 @@ def decode_sensors(payload: bytes) -> SensorReport:
     try:
         values = _readings.decode(payload)
         t_us = int(values.pop("t_us", 0))
+        if not 0 <= t_us < 2**63:
+            raise ValueError(f"the device's time cannot be {t_us} us")
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, OverflowError, ValueError) as error:
         raise BadFrame(f"no sensor readings ({len(payload)} bytes): {error}") from error
     values.pop("boot_id", None)
