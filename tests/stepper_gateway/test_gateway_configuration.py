@@ -144,3 +144,15 @@ def test_a_request_for_the_configuration_of_an_absent_device_says_that_it_is_abs
     rig.run(1.0)
     assert "silent" in rig.configure().reason
     assert not told(rig).accepted
+
+
+def test_a_flood_of_people_who_want_the_configuration_given_costs_one_frame_a_second() -> None:
+    rig = VirtualArm().ready()
+    rig.lost.add("config/ack")
+    before = len([kind for _, kind, _ in rig.sent if kind == Kind.CONFIG])
+    for ticket in range(1, 501):
+        rig.ask_configuration(ticket)
+    assert len([kind for _, kind, _ in rig.sent if kind == Kind.CONFIG]) == before + 1
+    rig.lost.clear()
+    assert rig.run(2.0, lambda: len(rig.configured) == 500)
+    assert all(answer.accepted for answer in rig.configured.values())

@@ -17,6 +17,7 @@ from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Answer, Outbox
 
 AGAIN = 1.0  # [s] until a configuration that was not answered is sent once more
+REFUSED_AGAIN = 10.0  # [s] the same for one that it has refused: somebody else may have said so
 PATIENCE = 5.0  # [s] for an answer: a board writes it to its flash first
 DISARMED = (DeviceMode.UNREFERENCED, DeviceMode.FAULT, DeviceMode.ESTOP)
 
@@ -70,9 +71,11 @@ class Configuration:
             return self._answer(ticket, False, unreachable_reason)
         if not self.is_in_force and not self._may_take():
             return self._answer(ticket, False, self.mismatch_reason())
-        self._refusal = ""
+        is_under_way = bool(self._tickets) and moment.monotonic - self._sent < AGAIN
         self._tickets[ticket] = moment.monotonic + PATIENCE
-        self._send(moment)
+        if not is_under_way:  # else its answer is for this caller too
+            self._refusal = ""
+            self._send(moment)
 
     def on_ack(self, ack: ConfigAckReport) -> None:
         """The device has answered a configuration, perhaps not one of ours."""
@@ -100,7 +103,8 @@ class Configuration:
             if moment.monotonic >= deadline:
                 reason = unreachable_reason or "the device has not answered the configuration in time"
                 self._answer(ticket, False, reason)
-        if self._is_wanted(unreachable_reason) and moment.monotonic - self._sent >= AGAIN:
+        again = REFUSED_AGAIN if self._refusal_of_this_boot() else AGAIN
+        if self._is_wanted(unreachable_reason) and moment.monotonic - self._sent >= again:
             self._send(moment)
         self._tell(unreachable_reason, moment)
 
@@ -109,8 +113,7 @@ class Configuration:
             return False
         if self._is_displaced or self._tickets:
             return True
-        is_missing = not self.is_in_force and self._may_take() and not self._refusal_of_this_boot()
-        return is_missing and not unreachable_reason
+        return not self.is_in_force and self._may_take() and not unreachable_reason
 
     def _may_take(self) -> bool:
         if self._session.mode == DeviceMode.BOOT:
