@@ -195,3 +195,19 @@ def test_a_stop_that_is_asked_for_again_while_the_device_is_silent_is_sent_again
     sent = len(commands(rig))
     rig.ask(StopKind.STOP, 8)
     assert len(commands(rig)) == sent + 1
+
+
+def test_a_stop_that_is_asked_for_just_after_the_gateways_own_is_sent_at_once_too() -> None:
+    rig = moving()
+    rig.device_is_on = False
+    rig.ask(StopKind.STOP, 7)
+    sent = len(commands(rig))
+    assert rig.run(0.2, lambda: len(commands(rig)) > sent)  # it is repeated until answered
+    sent = len(commands(rig))
+    rig.ask(StopKind.STOP, 8)
+    assert len(commands(rig)) == sent + 1
+    for ticket in range(9, 200):
+        rig.ask(StopKind.STOP, ticket)
+    assert len(commands(rig)) <= sent + 4
+    rig.run(0.03)
+    assert len(commands(rig)) <= sent + 6

@@ -14,6 +14,7 @@ RETRY = 0.1  # [s]
 REPEAT = (
     0.01  # [s] after which a stop that is asked for again is sent again at once; chosen: a flood costs 100 frames/s
 )
+REPEATS_AT_ONCE = 3  # which a stop is sent again without that pause; chosen: people, not floods
 TIME_TO_LIVE = 500_000  # [us]
 SHOWN_WITHIN = 0.2  # [s] that an answer waits for the state that shows it; chosen: ten states
 INTERNAL = 0  # ticket of the gateway's own commands
@@ -53,8 +54,10 @@ class PendingCommand:
     deadline: float  # [s] monotonic
     is_own: bool = False  # the gateway itself wants it, whoever else does
     stream: int = 0  # that was played or sent when it was asked for
-    sent: float = -1.0e9  # [s] monotonic, the last time
+    sent: float = -1.0e9  # [s] monotonic, the last time; earlier where it is to be sent again before RETRY has passed
+    last_sent: float = -1.0e9  # [s] monotonic
     times_sent: int = 0
+    repeats: int = 0  # that have followed one another faster than REPEAT
     needs_clock: bool = True  # false once a device has called a stop late: then it is sent without an expiry
     needs_boot: bool = True  # false once a device was another boot: then a stop is sent to whatever boot is there
     answer: CommandReply | None = None  # that it is accepted; kept until a state shows what it did
@@ -64,6 +67,13 @@ class PendingCommand:
     def is_stop(self) -> bool:
         """True if it ends a motion: then it is sent without a status, a clock or even a known boot."""
         return self.kind in STOPPING
+
+    def repeat(self, moment: Moment) -> None:
+        """Another caller wants it too: it is due again now, or REPEAT after it was sent where that is often enough."""
+        is_early = moment.monotonic - self.last_sent < REPEAT
+        self.repeats = self.repeats + 1 if is_early else 0
+        may_wait = self.times_sent <= 1 or self.repeats > REPEATS_AT_ONCE
+        self.sent = self.last_sent + REPEAT - RETRY if is_early and may_wait else -math.inf
 
 
 class PendingCommands:
@@ -86,8 +96,7 @@ class PendingCommands:
         if under_way is not None:
             under_way.tickets += tickets
             under_way.is_own |= not tickets
-            if moment.monotonic - under_way.sent >= REPEAT:
-                under_way.sent = -math.inf
+            under_way.repeat(moment)
             return
         self._next_id = self._next_id % 0xFFFFFFFF + 1
         deadline = moment.monotonic + timeout
@@ -113,7 +122,7 @@ class PendingCommands:
         for command in self._pending:
             may_be_sent = command.answer is None and (is_reachable or command.is_stop)
             if may_be_sent and moment.monotonic - command.sent >= RETRY:
-                command.sent = moment.monotonic
+                command.sent = command.last_sent = moment.monotonic
                 command.times_sent += 1
                 command.needs_clock &= is_reachable  # one that is silent may read it whenever it wakes
                 frames.append(
