@@ -75,6 +75,7 @@ class GatewayCore:
             if moment.monotonic - self._bad_reported >= BAD_FRAME_REPORT:
                 self._bad_reported = moment.monotonic
                 self.device.event("bad_frame", f"{received.kind}: {error} ({self.bad_frames} so far)", moment)
+            return self._components.out.take()
         return self._finish(moment)
 
     def on_goal(
