@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import msgspec
 
 from schemas.actions import CancelRequest, CancelResponse, GoalRequest, GoalResponse
@@ -14,10 +16,12 @@ from schemas.topics import DEVICE_STOP, PLAN
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
 from services.runtime.actions import keys as keys
 from services.runtime.actions.server import accept
-from services.runtime.bus.interface import Bus, BusReply
+from services.runtime.bus.interface import Bus, BusReply, Query
+from services.runtime.bus.zenoh_bus import ZenohBus
+from services.runtime.bus.zenoh_declarations import QUERIES
 from services.runtime.requests.limits import MAX_WAITING_OF_A_CLIENT
 from services.runtime.requests.server import MAX_UNANSWERED, Pending
-from tests.runtime.support import Buses, hear, spinning, until
+from tests.runtime.support import Buses, RouterProcess, hear, spinning, until
 
 FLOOD = 800  # requests at once: within a client's burst, above what may wait
 
@@ -168,3 +172,32 @@ def test_a_goal_that_its_own_cancel_has_overtaken_does_not_start(buses: Buses) -
 
 def _goal(goal_id: str) -> GoalRequest:
     return GoalRequest(goal_id=goal_id, client="c", goal=msgspec.Raw(encode(FollowJointTrajectoryGoal())))
+
+
+def test_a_flood_of_stops_that_are_not_read_in_time_fills_no_link_but_its_own(router: RouterProcess) -> None:
+    server, flooder, client = (ZenohBus("127.0.0.1", router.port, "rm1") for _ in range(3))
+    is_released, is_blocked = threading.Event(), threading.Event()
+
+    def block(query: Query) -> None:
+        is_blocked.set()
+        is_released.wait(10.0)
+        query.drop()
+
+    try:
+        server.serve(DEVICE_STOP.key, block, True)
+        server.serve(PLAN.key, lambda query: query.reply(PlanResponse.__name__, encode(PlanResponse())))
+        assert flooder.wait_served(DEVICE_STOP.key, 2.0)
+        assert client.wait_served(PLAN.key, 2.0)
+        dropped: Answers = []
+        for _ in range(QUERIES + 200):  # more than wait in the server's channel
+            ask(flooder, DEVICE_STOP.key, DeviceStopRequest(), dropped)
+        assert is_blocked.wait(5.0)
+        for _ in range(5):
+            answers: Answers = []
+            ask(client, PLAN.key, PlanRequest(), answers, timeout=2.0)
+            assert until(lambda answers=answers: answers)  # type: ignore[misc]
+            assert answers[0] is not None
+    finally:
+        is_released.set()
+        for bus in (server, flooder, client):
+            bus.close()

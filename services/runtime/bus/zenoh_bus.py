@@ -1,5 +1,6 @@
 """The bus over Zenoh: a client session of the router, with the robot's name as its namespace.
 
+Urgent keys are served in a session of their own: what floods the others fills neither its link nor its thread.
 EVERY and LATCHED use Zenoh's advanced publishers and subscribers: sequence numbers, a cache at the
 writer, and recovery by the reader, so that a router that restarts costs nothing.
 """
@@ -43,15 +44,13 @@ class BusNotOpen(BusError):
 
 
 class ZenohBus:
-    """One node's session."""
+    """One node's session, and a second one where it serves urgent keys."""
 
     def __init__(self, host: str, port: int, robot: str) -> None:
         """Raises `BusNotOpen` where the router does not take the session."""
-        try:
-            self._session = zenoh.open(client_config(host, port, robot))
-        except zenoh.ZError as error:
-            raise BusNotOpen(str(error)) from error
-        self._router = (host, port)
+        self._router, self._robot = (host, port), robot
+        self._session = self._open()
+        self._urgent_session: zenoh.Session | None = None
         self._name = str(self._session.zid()).encode()
         self._disconnected_since: float | None = None  # [s] monotonic
         self._tokens: list[ZenohDeclaration] = []
@@ -62,7 +61,17 @@ class ZenohBus:
 
     @property
     def is_connected(self) -> bool:
-        return bool(self._session.info.routers_zid())
+        return all(session.info.routers_zid() for session in self._sessions)
+
+    @property
+    def _sessions(self) -> list[zenoh.Session]:
+        return [self._session] if self._urgent_session is None else [self._session, self._urgent_session]
+
+    def _open(self) -> zenoh.Session:
+        try:
+            return zenoh.open(client_config(*self._router, self._robot))
+        except zenoh.ZError as error:
+            raise BusNotOpen(str(error)) from error
 
     def require_reconnection(self) -> None:
         if self.is_connected or not router_answers(*self._router, timeout=0.1):
@@ -125,7 +134,10 @@ class ZenohBus:
         return ZenohDeclaration(misses, subscriber)
 
     def serve(self, key: str, on_query: Callable[[Query], None], urgent: bool = False) -> ZenohQueryable:
-        queryable = ZenohQueryable(self._session, key, on_query, urgent)
+        if urgent and self._urgent_session is None:
+            self._urgent_session = self._open()
+        session = self._urgent_session if urgent and self._urgent_session else self._session
+        queryable = ZenohQueryable(session, key, on_query, urgent)
         self._queryables.append(queryable)
         return queryable
 
@@ -190,9 +202,12 @@ class ZenohBus:
 
     def close(self) -> None:
         forget(self)
-        closing = threading.Thread(target=self._session.close, daemon=True, name="close")
-        closing.start()
-        closing.join(CLOSE_TIMEOUT)
+        closing = [threading.Thread(target=each.close, daemon=True, name="close") for each in self._sessions]
+        for thread in closing:
+            thread.start()
+        end = time.monotonic() + CLOSE_TIMEOUT
+        for thread in closing:
+            thread.join(max(0.0, end - time.monotonic()))
         end = time.monotonic() + CLOSE_TIMEOUT
         for queryable in self._queryables:
             queryable.join(max(0.0, end - time.monotonic()))
