@@ -31,11 +31,11 @@ SETTLE = 10.0  # [s] for a stack to accept a goal again
 class Operator:
     """A node of the test's own on the stack's bus."""
 
-    def __init__(self, stack):
+    def __init__(self, stack, name="operator"):
         self.stack = stack
         deployment = load_deployment(None, stack.environment)
         self.arm = load_arm(project_root() / deployment.robot)
-        self.node = Node("operator", deployment, robot=self.arm.name, stop=ShutdownRequest())
+        self.node = Node(name, deployment, robot=self.arm.name, stop=ShutdownRequest())
         self.seen: list[JointState] = []
         self.node.subscribe(JOINT_STATES, self._see)
         self.follow = self.node.action(FOLLOW_JOINT_TRAJECTORY)

@@ -9,25 +9,31 @@ import msgspec
 import paho.mqtt.client as paho
 import pytest
 
+from schemas.actions import GoalStatusCode
 from schemas.device import DeviceState, DeviceStatus
 from schemas.message import encode
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
+from schemas.planning import JointGoal, PlanCode, PlanRequest
 from schemas.system import Failure, NodeStatistics
 from schemas.topics import (
     ACTIONS,
     DEVICE_STATUS,
     JOINT_STATES,
     LOG,
+    PLAN,
     REQUESTS,
     STATISTICS,
     TOPICS,
+    Delivery,
 )
-from services.runtime.actions.keys import cancel_request, goal_request, result_request
+from services.runtime.actions.keys import cancel_request, feedback_topic, goal_request, result_request, status_topic
 from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.errors import GoalRefused
 from services.stepper_gateway.links.frames import Chunk, ChunkFlag, Command, Heartbeat
 from services.stepper_gateway.links.frames import encode as to_frame
 from tests.schemas.samples import sample
+from tests.schemas.strays import strays_for
+from tests.stack.person import Operator
 
 MEGABYTE = 1024 * 1024
 LONG_AGO = 1  # [us] device time at which a stale command ended
@@ -70,6 +76,71 @@ def stranger(stack, operator):
     bus = ZenohBus("127.0.0.1", int(stack.deployment["GEMELO_ROUTER_PORT"]), operator.arm.name)
     yield bus
     bus.close()
+
+
+NEARBY = 0.02  # [rad] or [m] of the first joint: a move of some tenths of a second
+KEYS = [*TOPICS, *(make(action) for action in ACTIONS for make in (feedback_topic, status_topic))]
+
+
+class Neighbour(Operator):
+    """A person who moves the arm a little after every stray, and reads how many were dropped."""
+
+    def __init__(self, stack):
+        super().__init__(stack, "neighbour")
+        self.stranger = ZenohBus("127.0.0.1", int(stack.deployment["GEMELO_ROUTER_PORT"]), self.arm.name)
+        self.bad: dict[tuple[str, str], int] = {}  # by node and key
+        self._toward = NEARBY
+        self.objection = ""  # why the last move did not succeed
+        self.node.subscribe(STATISTICS, self._count)
+
+    def close(self):
+        self.stranger.close()
+        super().close()
+
+    def _count(self, report: NodeStatistics):
+        if report.node in self.stack.processes:
+            self.bad |= {(report.node, topic.key): topic.bad for topic in report.topics}
+
+    def readers(self, key):
+        """How many messages of a key each of its readers has dropped as bad, by node."""
+        return {node: count for (node, read), count in self.bad.items() if read == key}
+
+    def has_dropped(self, key, before, count):
+        """Whether every reader of a key has dropped `count` messages since `before`."""
+        now = self.readers(key)
+        return all(now[node] - bad >= count for node, bad in before.items())
+
+    def put_strays(self, topic):
+        """How many there were."""
+        publications = {}
+        strays = list(strays_for(topic.message))
+        for schema, payload in strays:
+            if schema not in publications:
+                publications[schema] = self.stranger.publish(topic.key, schema, topic.delivery)
+            publications[schema].put(payload)
+            self.node.wait(0.002)  # LATEST keeps one message only
+        for publication in publications.values():
+            publication.close()
+        return len(strays)
+
+    def moves_a_little(self):
+        """Whether a plan and its execution succeed now; why not is kept in `objection`."""
+        self._toward = -self._toward
+        self.seen.clear()
+        assert self.wait_for(lambda: self.seen, 5.0)
+        here = self.seen[-1].position
+        target = JointGoal(name=self.arm.joint_names, position=(here[0] + self._toward, *here[1:]))
+        plan = self.node.call(PLAN, PlanRequest(goal=target), timeout=5.0)
+        if plan.code is not PlanCode.SUCCESS:
+            self.objection = plan.refusal
+            return False
+        try:
+            outcome = self.send(plan).wait(plan.duration + 5.0)
+        except GoalRefused as refused:
+            self.objection = refused.reason
+            return False
+        self.objection = outcome.result.error_string
+        return outcome.status is GoalStatusCode.SUCCEEDED
 
 
 @pytest.fixture
@@ -208,3 +279,24 @@ def test_rubbish_and_stale_commands_on_every_mqtt_topic_move_nothing(wire, opera
     wire.publish(f"{prefix}/hb", to_frame(Heartbeat(boot_id=who.boot_id ^ 1, session=1, counter=1)))
     assert operator.wait_for(lambda: operator.device.message.refused >= before.refused + len(refused) + 1, 5.0)
     assert operator.wait_for(lambda: operator.device.message.bad_frames > before.bad_frames, 5.0)
+
+
+@pytest.fixture(scope="module")
+def neighbour(stack):
+    stack.wait_ready(20.0)
+    person = Neighbour(stack)
+    yield person
+    person.close()
+
+
+@pytest.mark.parametrize("topic", KEYS, ids=lambda topic: topic.key)
+def test_extreme_strays_on_a_key_keep_nothing_from_working(topic, stack, neighbour):
+    assert neighbour.wait_for(lambda: len(neighbour.bad) > 0, 3.0)
+    before = neighbour.readers(topic.key)
+    pids = stack.pids()
+    count = neighbour.put_strays(topic)
+    stack.wait_ready(5.0)
+    assert neighbour.wait_for(neighbour.moves_a_little, 3.0), neighbour.objection
+    assert stack.pids() == pids
+    if topic.delivery is Delivery.LATCHED:
+        assert neighbour.wait_for(lambda: neighbour.has_dropped(topic.key, before, count), 3.0), (before, count)
