@@ -154,6 +154,7 @@ def test_a_frame_with_a_jumped_field_ends_no_move(kind: Kind) -> None:
     for field, values in FRAMES[kind].items():
         rig.play(kind, [changed(field, value) for value in values])
         assert not rig.finished, f"{field}: {rig.log[-1]}"
+    assert rig.core.bad_frames > 0
     rig.assert_moves_on()
 
 
@@ -162,6 +163,7 @@ def test_a_frame_from_ahead_of_the_devices_time_ends_no_move(kind: Kind, fields:
     rig = moving_rig()
     for by in AHEAD:
         rig.play(kind, [later(by, *fields)])
+    assert rig.core.bad_frames > 0
     rig.assert_moves_on()
 
 
@@ -174,6 +176,7 @@ def test_a_text_with_a_jumped_field_ends_no_move(kind: Kind) -> None:
             rig.receive(kind, json.dumps(sample | {field: value}).encode())
             rig.run(0.02)
             assert not rig.finished, f"{field} {value}: {rig.log[-1]}"
+    assert rig.core.bad_frames > 0
     rig.assert_moves_on()
 
 

@@ -139,13 +139,13 @@ class DeviceSession:
         return True, is_new_boot
 
     def on_sync_reply(self, reply: SyncReply, arrival_us: int) -> None:
-        """Take an answer to a question of ours."""
+        """Take an answer to a question of ours; raises `BadFrame` for one that is not believed."""
         self.require_known(reply)
         if reply.boot_id != self.boot_id or reply.t0 not in self._questions:
             return
-        # What is not believed leaves the question open for the true answer.
-        if self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us):
-            self._questions.remove(reply.t0)
+        if not self.clock.add(reply.t0, reply.t1, reply.t2, arrival_us):  # the question stays open for the true answer
+            raise BadFrame(f"an answer of {reply.t1} us, which is not the device's clock as it is known")
+        self._questions.remove(reply.t0)
 
     def require_known(self, frame: Frame) -> None:
         """Raises `BadFrame` for a frame of a boot that has never been heard."""
