@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Sequence
 
 import numpy as np
@@ -72,8 +73,22 @@ class SelfCollisionChecker:
         pin.computeDistances(self._model, self._data, self._geometry, self._geometry_data, q)
 
 
+_newest: tuple[weakref.ref[Arm], pin.GeometryModel] | None = None  # of the arm that was loaded last
+
+
 def load_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
-    """The collision shapes; pinocchio drops what it does not know WITHOUT an error, so they are counted."""
+    """The collision shapes, read once for as long as the arm is the newest: large meshes take seconds.
+
+    The model is the caller's own, its shapes are shared; raises `DescriptionError` where one could not be read.
+    """
+    global _newest
+    if _newest is None or _newest[0]() is not arm:
+        _newest = weakref.ref(arm), _read_collision_geometry(arm, model)
+    return _newest[1].copy()
+
+
+def _read_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
+    """Pinocchio drops what it does not know WITHOUT an error, so the shapes are counted."""
     expected = sum(len(link.collisions) for link in arm.model.links)
     geometry = pin.buildGeomFromUrdf(
         model, str(arm.urdf_path), pin.GeometryType.COLLISION, package_dirs=[str(arm.folder)]

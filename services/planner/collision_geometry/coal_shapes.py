@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from functools import lru_cache
 
 import coal
@@ -64,9 +65,17 @@ def is_inside(mesh: TriangleMesh, point: Array) -> bool:
 
 
 def mesh_of(geometry: coal.CollisionGeometry) -> TriangleMesh | None:
-    """The triangles of a geometry that has any."""
+    """The triangles of a geometry that has any; of equal ones in a row the same."""
     if not isinstance(geometry, coal.BVHModelBase):
         return None
-    vertices = np.array([geometry.vertex(index) for index in range(geometry.num_vertices)]).reshape(-1, 3)
-    triangles = map(geometry.tri_indices, range(geometry.num_tris))
-    return TriangleMesh(vertices, np.array([[triangle[k] for k in range(3)] for triangle in triangles], dtype=np.int32))
+    for known, mesh in _KNOWN:
+        if known.num_tris == geometry.num_tris and known == geometry:
+            return mesh
+    triangles = [(each[0], each[1], each[2]) for each in map(geometry.tri_indices, range(geometry.num_tris))]
+    faces = np.array(triangles, dtype=np.int32).reshape(-1, 3)
+    mesh = TriangleMesh(np.array(geometry.vertices()).reshape(-1, 3), faces)
+    _KNOWN.append((geometry, mesh))
+    return mesh
+
+
+_KNOWN: deque[tuple[coal.BVHModelBase, TriangleMesh]] = deque(maxlen=32)  # the newest

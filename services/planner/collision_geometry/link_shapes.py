@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import coal
-import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.self_collisions import load_collision_geometry
 from services.arm.model.description import Arm
+from services.planner.collision_geometry.coal_shapes import mesh_of
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from services.planner.collision_geometry.solids import Box, Capsule, Cylinder, Solid
 
-Array = NDArray[np.float64]
 Form = tuple[ShapeKind, tuple[float, ...], TriangleMesh | None]
 
 
@@ -44,10 +42,7 @@ def _form_of(geometry: coal.CollisionGeometry, link: str) -> Form:
         case coal.Sphere():
             return ShapeKind.SPHERE, (float(geometry.radius),), None
         case coal.BVHModelBase():
-            vertices = np.array([geometry.vertex(i) for i in range(geometry.num_vertices)]).reshape(-1, 3)
-            triangles = map(geometry.tri_indices, range(geometry.num_tris))
-            faces = np.array([[triangle[k] for k in range(3)] for triangle in triangles], dtype=np.int32)
-            return ShapeKind.MESH, (), TriangleMesh(vertices, faces)
+            return ShapeKind.MESH, (), mesh_of(geometry)
     raise DescriptionError(
         f'link "{link}": there are no spheres for a {type(geometry).__name__}; use box, cylinder, sphere or mesh'
     )

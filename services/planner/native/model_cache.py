@@ -68,7 +68,8 @@ def cache_folder() -> Path:
 @cache
 def _maker() -> bytes:
     """The hash of the code that makes spheres, compiled and not."""
-    files = (Path(motion.__file__), Path(__file__).with_name("sphere_cover.py"))
+    here = Path(__file__).parent
+    files = (Path(motion.__file__), here / "sphere_cover.py", here.parent / "collision_geometry" / "solids.py")
     return hashlib.sha256(b"".join(hashlib.sha256(file.read_bytes()).digest() for file in files)).digest()
 
 

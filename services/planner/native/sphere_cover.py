@@ -58,7 +58,7 @@ def _placed(shape: CollisionShape, bulge: float) -> SphereCover:
 def kept_cover(shape: CollisionShape, bulge: float) -> SphereCover:
     """The spheres [m] of a shape about its own origin, from the disk where they have been made before."""
     if shape.mesh is None:
-        return cover_of(solid_of(shape), bulge)
+        return _kept_solid(solid_of(shape), bulge)
     vertices, faces = shape.mesh.arrays
     content = b"".join(
         (np.float64(bulge).tobytes(), np.int64(len(vertices)).tobytes(), vertices.tobytes(), faces.tobytes())
@@ -67,12 +67,17 @@ def kept_cover(shape: CollisionShape, bulge: float) -> SphereCover:
     return SphereCover(rows[:-1], float(rows[-1, 0]))
 
 
+@lru_cache(maxsize=256)
+def _kept_solid(solid: Solid, bulge: float) -> SphereCover:
+    rows = cached_rows(f"{solid} {bulge}".encode(), lambda: _as_rows(cover_of(solid, bulge)))
+    return SphereCover(rows[:-1], float(rows[-1, 0]))
+
+
 def _as_rows(cover: SphereCover) -> Array:
     """(n + 1, 4) the spheres, and the bulge in the last row."""
     return np.vstack((cover.spheres, (cover.bulge, 0.0, 0.0, 0.0)))
 
 
-@lru_cache(maxsize=256)
 def cover_of(solid: Solid, bulge: float = BULGE) -> SphereCover:
     """The spheres [m] of a convex solid in its own frame, which reach at most `bulge` [m] beyond it."""
     if isinstance(solid, Capsule) and solid.half_length == 0.0:
@@ -97,7 +102,18 @@ def mesh_cover(vertices: Array, faces: NDArray[np.int32], bulge: float = BULGE) 
     promised = rows[:, 3]  # for any point of a cell; half a diagonal more for its centre
     depths = np.where(promised > 0.0, promised + radius, np.where(promised < 0.0, -radius, 0.0))
     cells = with_radii(rows[:, :3], np.full(len(rows), radius * (1.0 + 1e-9)))
-    return SphereCover(_chosen(cells, with_radii(rows[:, :3], depths + bulge), bulge - radius), bulge)
+    middle = _medial_cells(rows[:, :3], depths, pitch)
+    candidates = with_radii(rows[middle, :3], depths[middle] + bulge)
+    return SphereCover(_chosen(cells, candidates, bulge - radius), bulge)
+
+
+def _medial_cells(centres: Array, depths: Array, pitch: float) -> NDArray[np.bool_]:
+    """(m,) True for the cells (m, 3) of a lattice, `pitch` [m] apart, that are at the medial axis, as in `medial`."""
+    places = tuple(np.rint((centres - centres.min(axis=0)) / pitch).astype(int).T + 1)
+    field = np.full([int(place.max()) + 2 for place in places], depths.min() - pitch)
+    field[places] = depths
+    slopes: Array = np.linalg.norm(np.gradient(field, pitch), axis=0)
+    return np.asarray(slopes[places] < MEDIAL)
 
 
 def _chosen(cells: Array, candidates: Array, least: float) -> Array:

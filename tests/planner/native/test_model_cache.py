@@ -12,9 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from services.arm.kinematics import self_collisions
 from services.arm.model.description import Arm, load_arm
 from services.arm.stl import read_stl
+from services.planner.collision_geometry.link_shapes import link_shapes, solid_of
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
+from services.planner.core import Planner
 from services.planner.native import model_cache, sphere_cover
 from services.planner.native.model_cache import FOLDER, cache_folder, cached_rows
 from services.planner.native.native_planner import NativePlanner
@@ -122,6 +125,34 @@ def test_only_so_many_files_are_kept(monkeypatch: pytest.MonkeyPatch, folder: Pa
     assert len(list(folder.glob("*.rows"))) == 3
 
 
+def test_a_solid_is_covered_once_too_and_as_it_would_be_anew(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    box = CollisionShape("box", ShapeKind.BOX, (0.1, 0.07, 0.05))
+    fresh = sphere_cover.cover_of(solid_of(box), 0.011)
+    kept_cover(box, 0.011)
+    sphere_cover._kept_solid.cache_clear()
+    monkeypatch.setattr(sphere_cover, "cover_of", None)
+    again = kept_cover(box, 0.011)
+    assert np.array_equal(again.spheres, fresh.spheres)
+    assert again.bulge == fresh.bulge
+
+
+def test_the_shapes_of_an_arm_are_read_once_and_their_triangles_too(meshed: Arm, monkeypatch: pytest.MonkeyPatch):
+    read = self_collisions._read_collision_geometry
+    times: list[Arm] = []
+
+    def counted(arm: Arm, model: object) -> object:
+        times.append(arm)
+        return read(arm, model)
+
+    monkeypatch.setattr(self_collisions, "_read_collision_geometry", counted)
+    arm = load_arm(meshed.folder)
+    Planner(arm).prepare()
+    assert times == [arm]
+    meshes = [shape.mesh for shapes in link_shapes(arm).values() for shape in shapes if shape.mesh is not None]
+    assert len(meshes) == 2
+    assert meshes[0] is meshes[1]
+
+
 @pytest.fixture
 def meshed(rm1_folder: Path, tmp_path: Path) -> Arm:
     """rm1 with a mesh on two links."""
@@ -138,9 +169,12 @@ def test_another_process_finds_what_the_first_has_made(meshed: Arm, made: list[i
         "from services.planner.native.native_planner import NativePlanner; NativePlanner(load_arm(Path(sys.argv[1])))"
     )
     subprocess.run([sys.executable, "-c", program, str(meshed.folder)], check=True)
-    assert len(list(folder.glob("*.rows"))) == 1  # both links have the same mesh
+    there = set(folder.iterdir())
+    assert any(file.suffix == ".rows" for file in there)
+    sphere_cover._kept_solid.cache_clear()
     NativePlanner(meshed)
     assert made == []
+    assert set(folder.iterdir()) == there  # nor the boxes' and cylinders' spheres
 
 
 def test_the_log_says_how_far_it_is_and_which_model_is_too_large(

@@ -64,7 +64,7 @@ def test_a_ball_is_its_own_sphere():
 
 def test_the_same_solid_gets_the_same_spheres():
     box = Box((0.05, 0.02, 0.03))
-    assert np.array_equal(cover_of.__wrapped__(box, 0.005).spheres, cover_of.__wrapped__(box, 0.005).spheres)
+    assert np.array_equal(cover_of(box, 0.005).spheres, cover_of(box, 0.005).spheres)
 
 
 def test_a_smaller_bulge_takes_more_spheres():

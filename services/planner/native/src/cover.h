@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <numeric>
 #include <vector>
 
 #include "bad_model.h"
@@ -16,7 +18,10 @@ namespace gemelo {
 class GreedyCover {
   public:
     GreedyCover(const std::vector<Sphere>& cells, std::vector<Sphere> candidates, double least)
-        : cells_(cells), candidates_(std::move(candidates)), holders_(cells.size()) {
+        : cells_(cells), candidates_(std::move(candidates)), order_(cells.size()), holders_(cells.size()) {
+        std::iota(order_.begin(), order_.end(), 0);
+        std::stable_sort(order_.begin(), order_.end(),
+                         [&](uint32_t a, uint32_t b) { return cells_[a].x < cells_[b].x; });
         for (size_t k = 0; k < candidates_.size(); ++k) list(k);
         for (size_t i = 0; i < cells_.size(); ++i) {
             if (!holders_[i].empty()) continue;
@@ -57,15 +62,19 @@ class GreedyCover {
 
     static double square(double value) { return value * value; }
 
+    // Only the cells whose x is in the candidate's reach are looked at.
     void list(size_t candidate) {
         const Sphere& sphere = candidates_[candidate];
         Held held{{}, 0};
-        for (size_t i = 0; i < cells_.size(); ++i) {
+        const auto first = std::lower_bound(order_.begin(), order_.end(), sphere.x - sphere.radius,
+                                            [&](uint32_t i, double low) { return cells_[i].x < low; });
+        for (auto next = first; next != order_.end() && cells_[*next].x <= sphere.x + sphere.radius; ++next) {
+            const uint32_t i = *next;
             const double room = sphere.radius - cells_[i].radius;
             const double apart =
                 square(sphere.x - cells_[i].x) + square(sphere.y - cells_[i].y) + square(sphere.z - cells_[i].z);
             if (room < 0.0 || apart > room * room) continue;
-            held.cells.push_back(static_cast<uint32_t>(i));
+            held.cells.push_back(i);
             holders_[i].push_back(static_cast<uint32_t>(candidate));
         }
         held.gain = static_cast<int64_t>(held.cells.size());
@@ -74,6 +83,7 @@ class GreedyCover {
 
     const std::vector<Sphere>& cells_;
     std::vector<Sphere> candidates_;
+    std::vector<uint32_t> order_;                 // of the cells, by x
     std::vector<std::vector<uint32_t>> holders_;  // of each cell
     std::vector<Held> held_;                      // by each candidate
 };
