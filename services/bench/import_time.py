@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
@@ -49,14 +50,14 @@ def part(index: int) -> trimesh.Trimesh:
     return whole
 
 
-def export(folder: Path) -> Path:
-    """A ROS package with meshes in millimetres and package:// paths."""
+def export(folder: Path, link: Callable[[int], trimesh.Trimesh] = part) -> Path:
+    """A ROS package with meshes [mm], which `link` gives for each number, and package:// paths."""
     (folder / "meshes").mkdir(parents=True)
     (folder / "urdf").mkdir()
     (folder / "package.xml").write_text(f'<package format="2"><name>{folder.name}</name></package>\n')
     names = [f"link_{index}" for index in range(JOINTS + 1)]
     for index, name in enumerate(names):
-        part(index).export(folder / "meshes" / f"{name}.stl")
+        link(index).export(folder / "meshes" / f"{name}.stl")
     lines = ['<?xml version="1.0"?>', '<robot name="six">', *(_link(folder.name, name) for name in names)]
     for index, (parent, child) in enumerate(pairwise(names)):
         axis = "0 0 1" if index in (0, 3, 5) else "0 1 0"

@@ -44,6 +44,7 @@ FIGURES = {
     "plan_python_ms": Row("planning:plan_python_ms", "ms"),
     "plan_mesh_ms": Row("mesh_planning:plan_mesh_ms", "ms"),
     "import_s": Row("import_time:import_s", "s"),
+    "fit_excess_mm": Row("fit_quality:fit_excess_mm", "mm"),
     "first_plan_s": Row("first_plan:first_plan_s", "s"),
     "deadline_overrun_ms": Row("deadlines:deadline_overrun_ms", "ms"),
     "scene_intake_ms": Row("scene_intake:scene_intake_ms", "ms"),

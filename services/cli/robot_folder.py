@@ -19,10 +19,12 @@ if TYPE_CHECKING:
 
 FIT = "services.collision_fitting.main"  # in a process of its own: the command line loads no planner
 BULGE = 0.005  # [m] that a sphere may reach beyond its link
+WITHIN = 0.005  # [m] of the mesh, where 95 % of the surface of its shapes is to be
+MOST = 24  # shapes of a link
 FIT_EXAMPLES = """examples:
   gemelo collision fit urdf/parol6
   gemelo collision fit urdf/my_arm --meshes
-  gemelo collision fit urdf/my_arm --meshes --link forearm --most 3 --write"""
+  gemelo collision fit urdf/my_arm --meshes --within 3mm --link forearm --most 40 --write"""
 
 
 def folder_option(parser: Parser) -> None:
@@ -85,7 +87,14 @@ def fit_options(parser: Parser) -> None:
     )
     parser.add_argument("--meshes", action="store_true", help="fit boxes, cylinders, plates, capsules and balls")
     parser.add_argument(
-        "--most", type=positive_integer, default=6, metavar="N", help="shapes for a link, with --meshes"
+        "--within",
+        type=positive_length,
+        default=WITHIN,
+        metavar="DISTANCE",
+        help="of the mesh, where 95 %% of the shapes' surface is to be, with --meshes; as 5mm",
+    )
+    parser.add_argument(
+        "--most", type=positive_integer, default=MOST, metavar="N", help="shapes for a link, with --meshes"
     )
     parser.add_argument("--link", nargs="+", default=[], metavar="LINK", help="fit to these alone; the others stay")
     parser.add_argument("--write", action="store_true", help="replace the links' <collision> elements; the rest stays")
@@ -94,7 +103,7 @@ def fit_options(parser: Parser) -> None:
 def run_fit(options: Options) -> ExitCode:
     """Fits spheres or shapes."""
     if options.meshes:
-        return shapes(options.folder, options.most, options.link, options.write)
+        return shapes(options.folder, options.within, options.most, options.link, options.write)
     if options.write or options.link:
         raise usage("--write and --link go with --meshes: spheres are the core's own and stand in no file")
     return spheres(options.folder, options.bulge)
@@ -116,10 +125,12 @@ def spheres(folder: Path, bulge: float) -> ExitCode:
     return _fitted(folder, "--bulge", f"{1000.0 * bulge:g}")
 
 
-def shapes(folder: Path, most: int, links: Sequence[str], write: bool) -> ExitCode:
-    """Prints the shapes that fit the links' meshes, at most `most` for each; writes them into the URDF if `write`."""
+def shapes(folder: Path, within: float, most: int, links: Sequence[str], write: bool) -> ExitCode:
+    """Prints the shapes that fit the links' meshes to within so many [m], at most `most` for each; writes them into the
+    URDF if `write`."""
     only = [f"--link={link}" for link in links]
-    return _fitted(folder, "--meshes", f"--most={most}", *only, *(["--write"] if write else []))
+    bound = f"--within={1000.0 * within:g}"
+    return _fitted(folder, "--meshes", bound, f"--most={most}", *only, *(["--write"] if write else []))
 
 
 def _fitted(folder: Path, *options: str) -> ExitCode:
@@ -138,7 +149,7 @@ def print_matrix(folder: Path, write: bool) -> ExitCode:
         text = arm.srdf_path.read_text(encoding="utf-8")
     except (ValueError, OSError) as error:
         raise usage(str(error)) from error
-    verdicts = collision_matrix(arm)
+    verdicts = collision_matrix(arm, tell=lambda said: print(said, file=sys.stderr, flush=True))
     wanted, lines = plan_of(text, verdicts)
     print(listing(verdicts))
     changed = with_pairs(text, wanted)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm, load_arm
 from services.arm.model.urdf import Triple
 from services.arm.model.urdf_edit import with_collisions
+from services.collision_fitting.excess import depth_in
 from services.collision_fitting.fitted_shape import Fitted
-from services.collision_fitting.mesh_fit import LinkFit, depths
+from services.collision_fitting.mesh_fit import LinkFit
 from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
@@ -86,7 +85,7 @@ def _require_there(arm: Arm, fits: Sequence[LinkFit], wanted: dict[str, list[str
                 f'{arm.urdf_path}: link "{fit.link}" has {len(shapes)} collision shapes once it is loaded, not '
                 f"{len(wanted[fit.link])}"
             )
-        deepest = np.max([depths(shape, fit.mesh.vertices) for shape in shapes], axis=0)
+        deepest = depth_in(shapes, fit.mesh.vertices)
         if deepest.min() < -OUTSIDE:
             raise DescriptionError(
                 f'{arm.urdf_path}: link "{fit.link}" sticks {-1000.0 * deepest.min():.3g} mm out of its shapes'

@@ -22,14 +22,25 @@ THINNEST = 2e-4  # [m] that an edge or a radius has at least
 # How much less one shape must hold than another to be taken: what stands along the link's axes is easier to read, and
 # what is one element of a URDF.
 TURNED, OBLIQUE, SEVERAL = 1.002, 1.02, 1.05
+ROUNDEST = math.pi / 4.0  # of a box's volume, that a plate in it has at least
+TURNS = np.pi / 8.0 * np.arange(8)
+WIDTHS = np.array((np.cos(TURNS), np.sin(TURNS)))  # (2, 8): directions in which a width is measured
 UPRIGHT = np.eye(3)[[2, 0, 1]]  # the link's axes; of equal shapes the one along its z is taken
 
 
 def fitted(points: Array) -> Fitted:
     """The shape of least volume that holds all `points` (n, 3) [m]; the same points give the same shape."""
     corners, sides = corners_and_sides(points)
-    axes = np.vstack((UPRIGHT, spread(corners), sides))
-    return min((_ball(corners), *(each for axis in axes for each in _along(corners, axis))), key=_cost)
+    best = _ball(corners)
+    for axis in np.vstack((UPRIGHT, spread(corners), sides)):
+        for each in _along(corners, axis, best.volume):
+            best = min(best, each, key=_cost)
+    return best
+
+
+def axes_of(fitted: Fitted) -> Array:
+    """(3, 3) whose rows are the shape's axes in the link."""
+    return matrix_of(((0.0, 0.0, 0.0), from_rpy(*fitted.origin.rpy)))[:3, :3].T
 
 
 def _cost(shape: Fitted) -> float:
@@ -43,15 +54,26 @@ def spread(points: Array) -> Array:
     return np.asarray(np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2])
 
 
-def _along(points: Array, axis: Array) -> Iterator[Fitted]:
-    """What is smallest of what has this axis as its z."""
+def _along(points: Array, axis: Array, best: float) -> Iterator[Fitted]:
+    """What is smallest of what has this axis as its z; nothing with a round side that cannot have less than `best`
+    [m^3]."""
     turn = _frame(axis)
     for angle in (0.0, smallest_rectangle(points @ turn[:2].T)):
         cosine, sine = np.cos(angle), np.sin(angle)
         along = np.array(((cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0))) @ turn
-        yield _box(points, along)
-        yield from _plate(points, along)
-    yield from _round(points, turn)
+        box = _box(points, along)
+        yield box
+        if ROUNDEST * box.volume < OBLIQUE * best:
+            yield from _plate(points, along)
+    if _least_round(points @ turn.T) < OBLIQUE * best:
+        yield from _round(points, turn)
+
+
+def _least_round(there: Array) -> float:
+    """[m^3] that a capsule or cylinder along z has at least around points (n, 3)."""
+    radius = 0.5 * float(np.ptp(there[:, :2] @ WIDTHS, axis=0).max())
+    length = float(np.ptp(there[:, 2]))
+    return math.pi * radius**2 * max(length - 2.0 * radius / 3.0, length / 1.5)
 
 
 def _box(points: Array, turn: Array) -> Fitted:

@@ -30,26 +30,30 @@ def report(folder: Path, bulge: float = BULGE) -> str:
     return _table([*rows, ("all", "", str(total), "")])
 
 
-def fit_meshes(folder: Path, most: int, only: Sequence[str], write: bool) -> str:
-    """What is fitted to each link, and its elements for the URDF, or that they are written there."""
+def fit_meshes(folder: Path, within: float, most: int, only: Sequence[str], write: bool) -> str:
+    """What is fitted to each link, to within so many [m], and its elements for the URDF, or that they are written."""
     # Not above: trimesh takes half a second.
     from services.collision_fitting.fit_writing import elements_of, touching_states, write_fits
-    from services.collision_fitting.mesh_fit import fit_links
+    from services.collision_fitting.mesh_fit import beyond_bound, fit_links
 
     arm = load_arm(folder)
-    fits = fit_links(arm, most, only)
-    rows = [("link", "shapes", "of its hull [%]", "beyond [mm]", "")]
+    fits = fit_links(arm, within, most, only, lambda said: print(said, file=sys.stderr, flush=True))
+    rows = [("link", "shapes", "95 % within [mm]", "worst [mm]", "at [mm]", "")]
     for fit in fits:
-        figures = str(len(fit.shapes)), f"{100.0 * fit.share:.0f}", f"{1000.0 * fit.overshoot:.1f}"
-        rows.append((fit.link, *figures, _kinds(fit)))
+        figures = str(len(fit.shapes)), f"{1000.0 * fit.excess.p95:.1f}", f"{1000.0 * fit.excess.worst:.1f}"
+        place = " ".join(f"{1000.0 * value:.0f}" for value in fit.excess.place)
+        rows.append((fit.link, *figures, place, _kinds(fit)))
     lines = [_table(rows)]
+    for fit in fits:
+        if not fit.is_within:
+            print(f"warning: {beyond_bound(fit, most)}", file=sys.stderr)
     if write:
         changed = write_fits(arm, fits)
         return "\n".join(
             [
                 *lines,
                 *(
-                    f"{said}: write finer shapes by hand, or do without with --link"
+                    f"{said}: fit them closer with --within, write finer shapes by hand, or do without with --link"
                     for said in touching_states(changed)
                 ),
                 f"{arm.urdf_path} is changed, loaded again, and every corner of the meshes is in its shapes",
@@ -69,7 +73,13 @@ def _table(rows: Sequence[tuple[str, ...]]) -> str:
     """The first column and words at the end to the left, figures to the right."""
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     return "\n".join(
-        "  ".join([row[0].ljust(widths[0]), *(row[k].rjust(widths[k]) for k in (1, 2, 3)), *row[4:]]).rstrip()
+        "  ".join(
+            [
+                row[0].ljust(widths[0]),
+                *(row[k].rjust(widths[k]) for k in (1, 2, 3)),
+                *(each.ljust(width) for each, width in zip(row[4:], widths[4:], strict=True)),
+            ]
+        ).rstrip()
         for row in rows
     )
 
@@ -80,7 +90,8 @@ def _options(arguments: list[str] | None) -> Namespace:
     parser.add_argument("--bulge", type=float, default=1000.0 * BULGE)
     parser.add_argument("--meshes", action="store_true")
     parser.add_argument("--write", action="store_true")
-    parser.add_argument("--most", type=int, default=1)
+    parser.add_argument("--within", type=float, default=5.0)
+    parser.add_argument("--most", type=int, default=24)
     parser.add_argument("--link", action="append", default=[])
     return parser.parse_args(arguments)
 
@@ -90,7 +101,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = _options(arguments)
     try:
         if options.meshes:
-            print(fit_meshes(options.folder, options.most, options.link, options.write))
+            print(fit_meshes(options.folder, options.within / 1000.0, options.most, options.link, options.write))
         else:
             print(report(options.folder, options.bulge / 1000.0))
     except (ConfigurationError, ValueError, ImportError, OSError) as error:

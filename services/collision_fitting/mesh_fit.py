@@ -2,43 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-
-import coal
-import numpy as np
-import trimesh
-from numpy.typing import NDArray
 
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.description import Arm
+from services.collision_fitting.excess import SHARE, Excess, excess_of
 from services.collision_fitting.fitted_shape import Fitted
 from services.collision_fitting.link_meshes import visual_mesh
+from services.collision_fitting.mesh_surface import MeshSurface
 from services.collision_fitting.parts import shapes_around
-from services.planner.collision_geometry.coal_shapes import tree_of
-from services.planner.collision_geometry.link_shapes import solid_of
-from services.planner.collision_geometry.shapes import CollisionShape, TriangleMesh
-
-Array = NDArray[np.float64]
+from services.planner.collision_geometry.shapes import TriangleMesh
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-MOST = 6  # shapes of a link
-FACETS = 12  # along each edge of the box around a shape, where the path to the mesh is measured
+WITHIN = 0.005  # [m] of the mesh, where `SHARE` of the shapes' outer surface is to be
+MOST = 24  # shapes of a link
 
 
 @dataclass(frozen=True)
 class LinkFit:
-    """The shapes around one link's mesh; `share` of the volume of the mesh's convex hull that they add up to."""
+    """The shapes around one link's mesh, and how far they reach beyond it; `within` [m] was asked for."""
 
     link: str
     mesh: TriangleMesh
     shapes: tuple[Fitted, ...]
-    share: float
-    overshoot: float  # [m] that the farthest point of the shapes is away from the mesh
+    within: float
+    excess: Excess
+
+    @property
+    def is_within(self) -> bool:
+        """True if as much of the surface as is to be is within the bound."""
+        return self.excess.share >= SHARE
 
 
-def fit_links(arm: Arm, most: int = MOST, only: Sequence[str] = ()) -> list[LinkFit]:
-    """Of every link with a visual mesh, or of those named; raises `DescriptionError` with what is wrong and where."""
+def _tell_nobody(_: str) -> None:
+    pass
+
+
+def fit_links(
+    arm: Arm,
+    within: float = WITHIN,
+    most: int = MOST,
+    only: Sequence[str] = (),
+    tell: Callable[[str], None] = _tell_nobody,
+) -> list[LinkFit]:
+    """Of every link with a visual mesh, or of those named, to within so many [m]; `tell` hears of each link. Raises
+    `DescriptionError` with what is wrong and where."""
     for name in only:
         if name not in arm.model.link_names:
             raise DescriptionError(
@@ -50,42 +61,32 @@ def fit_links(arm: Arm, most: int = MOST, only: Sequence[str] = ()) -> list[Link
     if bare or not any(meshes.values()):
         of = f'link "{bare[0]}" has' if bare else "its links have"
         raise DescriptionError(f"{arm.urdf_path}: {of} no visual mesh to fit shapes to: write <collision> by hand")
-    return [_fit(name, mesh, most) for name, mesh in meshes.items() if mesh is not None]
+    drawn = {name: mesh for name, mesh in meshes.items() if mesh is not None}
+    fits = []
+    for number, (name, mesh) in enumerate(drawn.items(), 1):
+        began = time.monotonic()
+        fits.append(_fit(name, mesh, within, most))
+        place = f'link "{name}" ({number} of {len(drawn)}), {len(mesh.faces)} triangles'
+        p95, worst = 1000.0 * fits[-1].excess.p95, 1000.0 * fits[-1].excess.worst
+        reach = f"95 % of their surface within {p95:.1f} mm, the worst place {worst:.1f} mm beyond"
+        tell(f"{place}: {len(fits[-1].shapes)} shapes after {time.monotonic() - began:.1f} s, {reach}")
+    return fits
 
 
-def _fit(link: str, mesh: TriangleMesh, most: int) -> LinkFit:
-    shapes = tuple(shapes_around(mesh, most))
-    hull = float(trimesh.convex.convex_hull(mesh.vertices).volume)
-    return LinkFit(link, mesh, shapes, sum(shape.volume for shape in shapes) / hull, overshoot(shapes, mesh))
+def _fit(link: str, mesh: TriangleMesh, within: float, most: int) -> LinkFit:
+    surface = MeshSurface(mesh)
+    shapes = tuple(shapes_around(surface, within, most))
+    return LinkFit(link, mesh, shapes, within, excess_of(shapes, surface, within))
 
 
-def overshoot(fitted: Sequence[Fitted], mesh: TriangleMesh) -> float:
-    """[m] from the mesh to the farthest point of the shapes' surface, of those that are in no other shape."""
-    tree, point = tree_of(mesh), coal.Sphere(1e-9)
-    shapes = [shape for each in fitted for shape in each.shapes]
-    farthest = 0.0
-    for shape in shapes:
-        there = _surface(shape)
-        for other in shapes:
-            if other is not shape:
-                there = there[depths(other, there) <= 0.0]
-        for place in there:
-            pose = coal.Transform3s(np.eye(3), place)
-            request, result = coal.DistanceRequest(), coal.DistanceResult()
-            farthest = max(farthest, float(coal.distance(tree, coal.Transform3s(), point, pose, request, result)))
-    return farthest
-
-
-def _surface(shape: CollisionShape) -> Array:
-    """(k, 3) points on it, its corners and rims among them: nearest to those of a box around it."""
-    solid = solid_of(shape)
-    steps = np.linspace(-1.0, 1.0, FACETS + 1)
-    across = np.array([(x, y) for x in steps for y in steps])
-    sides = [np.insert(across, axis, side, axis=1) for axis in range(3) for side in (-1.0, 1.0)]
-    local = solid.nearest(np.vstack(sides) * (solid.half * 1.01))
-    return local @ shape.rotation.T + shape.pose[0]
-
-
-def depths(shape: CollisionShape, points: Array) -> Array:
-    """(n,) [m] that points (n, 3) are inside the shape, below 0 outside."""
-    return solid_of(shape).depth((points - shape.pose[0]) @ shape.rotation)
+def beyond_bound(fit: LinkFit, most: int) -> str:
+    """That the bound was not met with so many shapes at most, by how much, where, and what would do."""
+    excess = fit.excess
+    wider = f"--within {math.ceil(1000.0 * excess.p95)}mm"
+    remedy = f"--most {2 * most} or {wider}" if len(fit.shapes) >= most else wider
+    place = ", ".join(f"{1000.0 * value:.0f}" for value in excess.place)
+    return (
+        f'link "{fit.link}": {100.0 * excess.share:.0f} % of the surface of its {len(fit.shapes)} shapes is within '
+        f"{1000.0 * fit.within:.3g} mm of its mesh, not {100.0 * SHARE:.0f} %: that much is within "
+        f"{1000.0 * excess.p95:.1f} mm, and ({place}) mm stands {1000.0 * excess.worst:.1f} mm beyond it: give {remedy}"
+    )

@@ -111,6 +111,7 @@ OPTIONS = (
     Option("device press freeze {}", TIME, "press.value"),
     Option("device monitor --duration {}", TIME, "options.duration"),
     Option("collision fit urdf/rm1 --bulge {}", LENGTH, "options.bulge"),
+    Option("collision fit urdf/rm1 --meshes --within {}", LENGTH, "options.within"),
 )
 
 

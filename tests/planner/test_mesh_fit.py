@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +19,14 @@ from services.arm.model.description import Arm, load_arm
 from services.arm.model.srdf_edit import with_pairs
 from services.arm.model.urdf_edit import with_collisions
 from services.cli.robot_folder import plan_of
+from services.collision_fitting.excess import SHARE, depths
 from services.collision_fitting.fit_writing import touching_states, write_fits
 from services.collision_fitting.fitted_shape import Fitted, Kind
 from services.collision_fitting.fitting import fitted
 from services.collision_fitting.hull import smallest_ball
 from services.collision_fitting.link_meshes import visual_mesh
-from services.collision_fitting.mesh_fit import depths, fit_links
+from services.collision_fitting.mesh_fit import fit_links
+from services.collision_fitting.mesh_surface import MeshSurface
 from services.collision_fitting.parts import shapes_around
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision_geometry.coal_shapes import is_inside
@@ -125,22 +128,24 @@ def test_what_is_inside_a_mesh_is_inside_its_shapes_wherever_it_was_cut(seed: in
     faces = np.vstack([part.faces + start for part, start in zip(parts, starts, strict=False)])
     mesh = TriangleMesh(np.vstack([part.vertices for part in parts]), faces)
     most = int(random.integers(1, 12))
-    shapes = shapes_around(mesh, most)
+    shapes = shapes_around(MeshSurface(mesh), 0.002, most)
     assert 1 <= len(shapes) <= most
     assert depth(shapes, mesh.vertices).min() >= 0.0
     around = random.uniform(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0), (400, 3))
     inner = np.array([point for point in around if any(is_inside(part, point) for part in parts)])
     assert not len(inner) or depth(shapes, inner).min() >= 0.0
-    assert shapes_around(mesh, most) == shapes
+    assert shapes_around(MeshSurface(mesh), 0.002, most) == shapes
 
 
 def test_an_angle_of_one_piece_is_cut_into_its_legs():
-    """Large triangles are halved first: the two legs of the outline have none of their own."""
+    """By planes: the two legs of the outline have no triangles of their own."""
     outline = np.array([(0, 0), (0.2, 0), (0.2, 0.03), (0.03, 0.03), (0.03, 0.2), (0, 0.2)])
     made = trimesh.creation.extrude_polygon(trimesh.path.polygons.Polygon(outline), 0.04)
-    one, two = shapes_around(as_mesh(made), 1), shapes_around(as_mesh(made), 2)
+    surface = MeshSurface(as_mesh(made))
+    one, two = shapes_around(surface, 0.005, 1), shapes_around(surface, 0.005, 24)
     assert one[0].volume == pytest.approx(0.2 * 0.2 * 0.04, rel=0.01)
-    assert sum(each.volume for each in two) < 1.15 * made.volume
+    assert len(two) == 2
+    assert sum(each.volume for each in two) < 1.05 * made.volume
     assert {each.kind for each in two} == {Kind.BOX}
 
 
@@ -149,11 +154,11 @@ def test_a_fitted_arm_loads_and_its_neighbours_do_not_touch_once_its_matrix_is_m
     text, fits = before.urdf_path.read_text(), fit_links(before)
     for fit in fits:
         assert depth(fit.shapes, fit.mesh.vertices).min() >= 0.0
-        assert 1 <= len(fit.shapes) <= 6
-        assert (
-            0.15 < fit.share < 1.3
-        )  # of the hull: what is bent or hollow takes less, one box around a round thing more
-        assert 0.0 < fit.overshoot < 0.03
+        assert 1 <= len(fit.shapes) <= 24
+        assert fit.is_within
+        assert fit.excess.share >= SHARE
+        assert 0.0 < fit.excess.p95 <= 0.005
+        assert fit.excess.p95 < fit.excess.worst < 0.02
 
     arm = write_fits(before, fits)
     _require_only_collisions_changed(text, arm)
@@ -184,7 +189,7 @@ def test_an_arm_that_has_meshes_alone_is_told_what_makes_shapes_and_gets_them(co
     bare = load_arm(copied)
     with pytest.raises(DescriptionError, match=r"gemelo collision fit .* --meshes --write"):
         Kinematics(bare)
-    fits = fit_links(bare, 1)
+    fits = fit_links(bare, most=1)
     write_fits(bare, fits)
     elements = sum(len(shape.shapes) for fit in fits for shape in fit.shapes)
     assert Kinematics(load_arm(copied)).collisions.geometry_count == elements
@@ -290,10 +295,10 @@ def test_a_link_without_a_mesh_and_one_that_is_not_there_are_said(copied: Path):
 
 def test_a_file_that_would_not_load_again_stays_as_it_was(copied: Path):
     arm = load_arm(copied)
-    fits = fit_links(arm, 1)
+    fits = fit_links(arm, most=1)
     before = arm.urdf_path.read_bytes()
     outside = TriangleMesh(fits[0].mesh.vertices + 1.0, fits[0].mesh.faces)
-    wrong = type(fits[0])(fits[0].link, outside, fits[0].shapes, 1.0, 0.0)
+    wrong = replace(fits[0], mesh=outside)
     with pytest.raises(DescriptionError, match=r"sticks .* mm out of its shapes"):
         write_fits(arm, [wrong])
     assert arm.urdf_path.read_bytes() == before

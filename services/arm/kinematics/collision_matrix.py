@@ -6,15 +6,17 @@ As MoveIt's setup assistant does it, but what seems never to be near is also sea
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.arm.kinematics.self_collisions import LinkPair, SelfCollisionChecker
+from services.arm.kinematics.link_distances import LinkDistances
+from services.arm.kinematics.self_collisions import LinkPair
 from services.arm.model.description import Arm
 from services.arm.model.urdf import JointKind
 
@@ -26,6 +28,8 @@ SPARE = 0.001  # [m] beyond the arm's clearance, which must stay between two lin
 SEARCHES = 4  # from the nearest samples of a pair
 STEPS = 60
 SHRINK = 0.9
+LOOKS = 40  # samples of a pair that are looked at on either side, where that settles it
+SAYING = 2.0  # [s] between two words of how far it is
 
 
 class DisabledReason(StrEnum):
@@ -47,50 +51,78 @@ class LinkPairData:
     farthest: float
 
 
-def collision_matrix(arm: Arm, samples: int = SAMPLES) -> list[LinkPairData]:
-    """Every pair of links that have collision shapes; the same arm gives the same matrix."""
+def _tell_nobody(_: str) -> None:
+    pass
+
+
+def collision_matrix(
+    arm: Arm, samples: int = SAMPLES, tell: Callable[[str], None] = _tell_nobody
+) -> list[LinkPairData]:
+    """Every pair of links that have collision shapes; the same arm gives the same matrix. `tell` hears of progress."""
+    began = time.monotonic()
     kinematics = Kinematics(arm)
-    bare = replace(arm, disabled_collisions=frozenset())
-    checker = SelfCollisionChecker(bare, kinematics.model, kinematics.configuration, with_rigid=True)
     random = np.random.default_rng(SEED)
     configurations = _configurations(arm, samples, random)
-    distances = [checker.distances(configuration) for configuration in configurations]
-    return [_pair_data(arm, checker, pair, configurations, distances, random) for pair in checker.pairs]
+    links = LinkDistances(arm, kinematics.model, kinematics.configuration, configurations)
+    tell(f"{len(configurations)} configurations sampled after {time.monotonic() - began:.1f} s")
+    found, said = [], time.monotonic()
+    for number in range(len(links.pairs)):
+        found.append(_pair_data(arm, links, number, configurations, random))
+        if time.monotonic() - said > SAYING:
+            tell(f"{number + 1} of {len(links.pairs)} pairs of links after {time.monotonic() - began:.1f} s")
+            said = time.monotonic()
+    return found
 
 
 def _pair_data(
-    arm: Arm,
-    checker: SelfCollisionChecker,
-    pair: LinkPair,
-    configurations: Array,
-    distances: list[dict[LinkPair, float]],
-    random: np.random.Generator,
+    arm: Arm, links: LinkDistances, number: int, configurations: Array, random: np.random.Generator
 ) -> LinkPairData:
-    seen = np.array([row[pair] for row in distances])
-    nearest, farthest = float(seen.min()), float(seen.max())
+    pair, never_below = links.pairs[number], arm.clearance + SPARE
+    is_settled = are_adjacent(arm, *pair) or are_rigid_links(arm, *pair)
+    seen = _nearest_samples(links, number, configurations, math.inf if is_settled else never_below)
+    nearest = min(seen.values())
+    farthest = max(nearest, _farthest(links, number, configurations, -math.inf if is_settled else arm.clearance))
     if are_adjacent(arm, *pair):
         return LinkPairData(pair, DisabledReason.ADJACENT, nearest, farthest)
     if are_rigid_links(arm, *pair):
         return LinkPairData(pair, DisabledReason.RIGID, nearest, farthest)
     if farthest <= arm.clearance:
         return LinkPairData(pair, DisabledReason.ALWAYS, nearest, farthest)
-    never_below = arm.clearance + SPARE
     if nearest > never_below:
-        starts = configurations[np.argsort(seen, kind="stable")[:SEARCHES]]
-        nearest = min(nearest, *(_nearest_from(arm, checker, pair, start, random) for start in starts))
+        starts = configurations[sorted(seen, key=lambda sample: (seen[sample], sample))[:SEARCHES]]
+        nearest = min(nearest, *(_nearest_from(arm, links, pair, start, random) for start in starts))
     return LinkPairData(pair, DisabledReason.NEVER if nearest > never_below else None, nearest, farthest)
 
 
-def _nearest_from(
-    arm: Arm, checker: SelfCollisionChecker, pair: LinkPair, start: Array, random: np.random.Generator
-) -> float:
+def _nearest_samples(links: LinkDistances, number: int, configurations: Array, enough: float) -> dict[int, float]:
+    """Distances [m] by samples: the nearest, and all that may be nearer than `enough` [m] until one of them is."""
+    least, found, best = links.bounds[:, number, 0], dict[int, float](), math.inf
+    for sample in np.argsort(least, kind="stable").tolist():
+        if least[sample] > best or (len(found) >= LOOKS and (best <= enough or least[sample] > enough)):
+            break
+        found[sample] = links.distance(links.pairs[number], configurations[sample])
+        best = min(best, found[sample])
+    return found
+
+
+def _farthest(links: LinkDistances, number: int, configurations: Array, enough: float) -> float:
+    """[m] of the samples that may be the farthest: of all until one is farther than `enough` [m]."""
+    most, best = links.bounds[:, number, 1], -math.inf
+    for count, sample in enumerate(np.argsort(-most, kind="stable").tolist()):
+        if most[sample] <= best or (count >= LOOKS and best > enough):
+            break
+        best = max(best, links.distance(links.pairs[number], configurations[sample]))
+    return best
+
+
+def _nearest_from(arm: Arm, links: LinkDistances, pair: LinkPair, start: Array, random: np.random.Generator) -> float:
     """[m] by a random search in a shrinking neighbourhood."""
     lower, upper = _limits(arm)
-    best, configuration = checker.distances(start)[pair], start
+    best, configuration = links.distance(pair, start), start
     reach = 0.2 * (upper - lower)
     for _ in range(STEPS):
         tried = np.clip(configuration + reach * random.uniform(-1.0, 1.0, len(start)), lower, upper)
-        distance = checker.distances(tried)[pair]
+        distance = links.distance(pair, tried, best)
         if distance < best:
             best, configuration = distance, tried
         else:
