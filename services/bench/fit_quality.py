@@ -1,4 +1,4 @@
-"""The figure of fitted collision shapes: how far they reach beyond the meshes of generated arms, and what that costs."""
+"""The figure of fitted collision shapes: how far they reach beyond the meshes of generated arms, and what it costs."""
 
 from __future__ import annotations
 

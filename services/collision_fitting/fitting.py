@@ -31,10 +31,12 @@ UPRIGHT = np.eye(3)[[2, 0, 1]]  # the link's axes; of equal shapes the one along
 def fitted(points: Array) -> Fitted:
     """The shape of least volume that holds all `points` (n, 3) [m]; the same points give the same shape."""
     corners, sides = corners_and_sides(points)
-    best = _ball(corners)
+    best = _box(corners, np.eye(3))
     for axis in np.vstack((UPRIGHT, spread(corners), sides)):
         for each in _along(corners, axis, best.volume):
             best = min(best, each, key=_cost)
+    if _least_ball(corners) < OBLIQUE * best.volume:
+        best = min(best, _ball(corners), key=_cost)
     return best
 
 
@@ -67,6 +69,11 @@ def _along(points: Array, axis: Array, best: float) -> Iterator[Fitted]:
             yield from _plate(points, along)
     if _least_round(points @ turn.T) < OBLIQUE * best:
         yield from _round(points, turn)
+
+
+def _least_ball(points: Array) -> float:
+    """[m^3] that a ball has at least around points (n, 3)."""
+    return math.pi / 6.0 * float(np.ptp(points @ np.hstack((UPRIGHT, spread(points).T)), axis=0).max()) ** 3
 
 
 def _least_round(there: Array) -> float:

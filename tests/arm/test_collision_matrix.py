@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from services.arm.kinematics.collision_matrix import DisabledReason, are_adjacent, collision_matrix
 from services.arm.kinematics.kinematics import Kinematics
+from services.arm.kinematics.link_distances import LinkDistances
 from services.arm.kinematics.self_collisions import SelfCollisionChecker
 from services.arm.model.description import load_arm
 from services.arm.model.srdf_edit import entries, with_pairs
@@ -48,6 +52,35 @@ def test_distances_name_every_pair_with_its_nearest_shapes(rm1_folder: Path) -> 
         distances = checker.distances(configuration)
         assert tuple(distances) == checker.pairs
         assert min(distances.values()) == pytest.approx(checker.distance(configuration), abs=2e-6)
+
+
+@pytest.mark.parametrize("robot", ["rm1", "parol6"])
+def test_the_bounds_of_the_matrix_hold_and_its_distances_are_the_checkers(rm1_folder: Path, robot: str) -> None:
+    arm = load_arm(rm1_folder.parent / robot)
+    kinematics = Kinematics(arm)
+    bare = replace(arm, disabled_collisions=frozenset())
+    checker = SelfCollisionChecker(bare, kinematics.model, kinematics.configuration, with_rigid=True)
+    random = np.random.default_rng(5)
+    lower, upper = (np.array([getattr(joint, side) for joint in arm.joints]) for side in ("lower", "upper"))
+    configurations = random.uniform(lower, upper, (25, len(lower)))
+    links = LinkDistances(arm, kinematics.model, kinematics.configuration, configurations)
+    assert set(links.pairs) == set(checker.pairs)
+    for row, configuration in enumerate(configurations):
+        exact = checker.distances(configuration)
+        for number, pair in enumerate(links.pairs):
+            least, most = links.bounds[row, number]
+            assert least <= exact[pair] + 2e-6
+            assert exact[pair] <= most + 2e-6
+            assert links.distance(pair, configuration) == pytest.approx(exact[pair], abs=2e-6)
+            assert links.distance(pair, configuration, -1.0) == -1.0
+
+
+def test_progress_of_the_matrix_is_told(rm1_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("services.arm.kinematics.collision_matrix.SAYING", 0.0)
+    said: list[str] = []
+    collision_matrix(load_arm(rm1_folder), samples=20, tell=said.append)
+    assert re.fullmatch(r"\d+ configurations sampled after \d+\.\d s", said[0])
+    assert re.fullmatch(r"6 of 6 pairs of links after \d+\.\d s", said[-1])
 
 
 def test_links_without_a_shape_do_not_keep_neighbours_apart(tmp_path: Path, rm1_folder: Path) -> None:

@@ -82,6 +82,16 @@ def test_fit_to_the_meshes_is_printed_and_written_only_when_asked(
     assert counts == {**shipped, "antebrazo_link": 1}
 
 
+def test_fit_says_how_far_it_is_and_what_it_could_not_meet(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    line = ["collision", "fit", str(folder), "--meshes", "--within", "0.5mm", "--most", "2", "--link", "antebrazo_link"]
+    assert run(line) is ExitCode.OK
+    progress, warning = capfd.readouterr().err.splitlines()
+    assert progress.startswith('link "antebrazo_link" (1 of 1), 2036 triangles: 2 shapes after ')
+    assert warning.startswith('warning: link "antebrazo_link": ')
+    assert "is within 0.5 mm of its mesh, not 95 %" in warning
+    assert "give --most 4 or --within " in warning
+
+
 def test_fit_says_what_it_cannot_do(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert run(["collision", "fit", str(folder), "--write"]) is ExitCode.USAGE
     assert "--meshes" in capfd.readouterr().err
