@@ -14,10 +14,11 @@ class DeploymentRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
 
 
 class Broker(StrEnum):
-    """Which MQTT broker the `broker` process is."""
+    """Which MQTT broker gateway and device meet at."""
 
-    AMQTT = "amqtt"  # embedded, pure Python: local simulated runs
-    MOSQUITTO = "mosquitto"  # real arms and tests
+    AMQTT = "amqtt"  # the process `broker`, pure Python: local simulated runs
+    MOSQUITTO = "mosquitto"  # the process `broker` becomes it: real arms and tests
+    EXTERNAL = "external"  # one that runs already; the process `broker` stands aside
 
 
 class DeviceKind(StrEnum):
@@ -49,9 +50,27 @@ class RouterSection(DeploymentRecord, frozen=True, kw_only=True):
 
 
 class MqttSection(DeploymentRecord, frozen=True, kw_only=True):
+    """Passwords are in files of mode 600, or in $GEMELO_MQTT_PASSWORD and $GEMELO_MQTT_DEVICE_PASSWORD."""
+
     broker: Broker = Broker.AMQTT
-    host: str = "127.0.0.1"
+    host: str = "127.0.0.1"  # that gateway and virtual device connect to
     port: int = 1883
+    listen_host: str = ""  # that the process `broker` listens on; empty: host
+    listen_port: int = 0  # the same; 0: port
+    secure_folder: str = ""  # that `gemelo broker secure` has written: TLS, users and passwords of every end
+    user: str = ""  # of the gateway; empty: none
+    password_file: str = ""
+    device_user: str = ""  # of the virtual device; empty: the gateway's. A board is provisioned with its own
+    device_password_file: str = ""
+    tls: bool = False
+    ca: str = ""  # PEM file of the authority that signed the broker's certificate; empty: those of this system
+    certificate: str = ""  # PEM file of our own, where the broker asks for one
+    key: str = ""  # its private key, of mode 600; empty: in the same file
+
+    @property
+    def listening(self) -> tuple[str, int]:
+        """Host and port that our own broker listens on."""
+        return self.listen_host or self.host, self.listen_port or self.port
 
 
 class SerialSection(DeploymentRecord, frozen=True, kw_only=True):

@@ -17,6 +17,7 @@ from schemas.deployment import Deployment
 from schemas.errors import ConfigurationError
 
 DEFAULT_FILE = "deploy/local.toml"
+MQTT_FILES = ("secure_folder", "password_file", "device_password_file", "ca", "certificate", "key")
 PREFIX = "GEMELO_"
 
 
@@ -122,4 +123,6 @@ def _with_absolute_paths(deployment: Deployment, root: Path) -> Deployment:
         out=str(root / deployment.paths.out),
         programs=str(root / deployment.paths.programs),
     )
-    return msgspec.structs.replace(deployment, robot=str(root / deployment.robot), paths=paths)
+    files = {name: str(root / path) for name in MQTT_FILES if (path := getattr(deployment.mqtt, name))}
+    mqtt = msgspec.structs.replace(deployment.mqtt, **files)
+    return msgspec.structs.replace(deployment, robot=str(root / deployment.robot), mqtt=mqtt, paths=paths)

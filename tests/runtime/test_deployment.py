@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from schemas.deployment import Broker
+from schemas.deployment import Broker, MqttSection
 from services.runtime.deployment import DeploymentError, load_deployment, project_root, robot_name
 
 
@@ -45,9 +45,25 @@ def test_every_key_can_be_overridden_in_the_environment(file: Path) -> None:
     assert deployment.parameters == {"planner": {"attempts": 3}}
 
 
+def test_listening_and_connecting_addresses_are_two_settings_and_the_one_is_the_other_unless_said() -> None:
+    assert MqttSection(host="10.0.0.2", port=8883).listening == ("10.0.0.2", 8883)
+    section = MqttSection(host="127.0.0.1", port=1883, listen_host="0.0.0.0", listen_port=8883)
+    assert section.listening == ("0.0.0.0", 8883)
+    assert (section.host, section.port) == ("127.0.0.1", 1883)
+
+
+def test_the_files_of_a_broker_are_relative_to_the_project_and_those_not_said_stay_so(file: Path) -> None:
+    file.write_text('[mqtt]\nbroker = "external"\nuser = "ada"\npassword_file = "secret"\n')
+    mqtt = load_deployment(file, {"GEMELO_MQTT_TLS": "true", "GEMELO_MQTT_CA": "/etc/ca.pem"}).mqtt
+    assert mqtt.password_file == str(project_root() / "secret")
+    assert (mqtt.ca, mqtt.certificate, mqtt.secure_folder) == ("/etc/ca.pem", "", "")
+    assert mqtt.tls is True
+
+
 @pytest.mark.parametrize(
     ("text", "environ", "reason"),
     [
+        ("[mqtt]\npassword = 'x'\n", {}, r'unknown key "mqtt.password": did you mean "password_file"\?'),
         ("[router]\nprot = 1\n", {}, r'site.toml: unknown key "router.prot": did you mean "port"\?'),
         ("[ruoter]\nport = 1\n", {}, r'unknown key "ruoter": did you mean "router"\?'),
         ("[router]\nport = 'x'\n", {}, r"site.toml: .*int.*router\.port"),

@@ -1,0 +1,154 @@
+"""What it takes to join a broker, read from the deployment: address, user, password and TLS.
+
+A password is in the environment or in a file that its owner alone can read; it is never shown.
+"""
+
+from __future__ import annotations
+
+import os
+import ssl
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from schemas.deployment import Broker, MqttSection
+from schemas.errors import ConfigurationError
+
+PASSWORD, DEVICE_PASSWORD = "GEMELO_MQTT_PASSWORD", "GEMELO_MQTT_DEVICE_PASSWORD"  # in the environment
+GATEWAY = "gateway"  # its user name, where `gemelo broker secure` names it
+AUTHORITY = "ca.pem"  # of a secure folder
+
+
+class AccessError(ConfigurationError):
+    """A broker that cannot be joined for what the deployment says; the text names the key or file and the remedy."""
+
+
+@dataclass(frozen=True)
+class BrokerAccess:
+    """The address, credentials and TLS context of a broker."""
+
+    host: str
+    port: int
+    user: str = ""
+    password: str = field(default="", repr=False)
+    tls: ssl.SSLContext | None = field(default=None, repr=False)
+    authority: str = ""  # the file that `tls` trusts; empty: those of this system
+    has_certificate: bool = False  # of our own
+    speaks_5: bool = True  # MQTT 5 is tried first: it says what an ACL denies
+    is_ours: bool = False  # the process `broker`
+
+    def __str__(self) -> str:
+        return f"the MQTT broker at {self.host}:{self.port}"
+
+
+def gateway_access(section: MqttSection, environ: Mapping[str, str] | None = None) -> BrokerAccess:
+    """The gateway's access; raises `AccessError`."""
+    _require_consistent(section)
+    folder = section.secure_folder
+    user = section.user or (GATEWAY if folder else "")
+    file = section.password_file or (str(Path(folder) / f"{user}.password") if folder else "")
+    return _access(section, user, _password(user, file, PASSWORD, environ))
+
+
+def device_access(section: MqttSection, device: str, environ: Mapping[str, str] | None = None) -> BrokerAccess:
+    """The access of a virtual device that was not provisioned with any; raises `AccessError`."""
+    if not section.device_user and not section.secure_folder:
+        return gateway_access(section, environ)
+    _require_consistent(section)
+    user, folder = section.device_user or device, section.secure_folder
+    file = section.device_password_file or (str(Path(folder) / f"{user}.password") if folder else "")
+    return _access(section, user, _password(user, file, DEVICE_PASSWORD, environ))
+
+
+def read_secret(path: str) -> str:
+    """The first line of a file that its owner alone can read; raises `AccessError` with the remedy."""
+    require_private(path)
+    try:
+        with open(path, encoding="utf-8") as file:
+            secret = file.readline().rstrip("\r\n")
+    except (OSError, UnicodeDecodeError) as error:
+        raise AccessError(f"cannot read the password in {path}: {error}") from None
+    if not secret:
+        raise AccessError(f"{path} holds no password in its first line")
+    return secret
+
+
+def require_private(path: str) -> None:
+    """Returns if only its owner can read the file; else raises `AccessError` with the remedy."""
+    try:
+        mode = stat.S_IMODE(os.stat(path).st_mode)
+    except OSError as error:
+        raise AccessError(f"cannot read {path}: {error.strerror}") from None
+    if mode & 0o077:
+        raise AccessError(f"{path} has mode {mode:03o}, so others can read the secret in it: chmod 600 {path}")
+
+
+def _require_consistent(section: MqttSection) -> None:
+    is_locked = bool(section.secure_folder or section.tls or section.user)
+    if section.broker is Broker.AMQTT and is_locked:
+        raise AccessError(
+            'mqtt.broker = "amqtt" knows neither users nor TLS: set it to "mosquitto" or "external", or take '
+            "mqtt.user, mqtt.tls and mqtt.secure_folder away"
+        )
+    if section.broker is Broker.MOSQUITTO and is_locked and not section.secure_folder:
+        raise AccessError(
+            'mqtt.user and mqtt.tls are for mqtt.broker = "external": the mosquitto that gemelo starts gets its '
+            "users and TLS from mqtt.secure_folder, which `gemelo broker secure` writes"
+        )
+    if not section.tls and not section.secure_folder and (section.ca or section.certificate or section.key):
+        raise AccessError("mqtt.ca, mqtt.certificate and mqtt.key are for TLS: set mqtt.tls = true too")
+    if section.key and not section.certificate:
+        raise AccessError("mqtt.key is the key of mqtt.certificate, which is not set")
+
+
+def _password(user: str, file: str, variable: str, environ: Mapping[str, str] | None) -> str:
+    """`variable` wins over `file`, as every variable does."""
+    environ = os.environ if environ is None else environ
+    if not user:
+        return ""
+    if environ.get(variable):
+        return environ[variable]
+    return read_secret(file) if file else ""
+
+
+def _access(section: MqttSection, user: str, password: str) -> BrokerAccess:
+    folder = section.secure_folder
+    authority = section.ca or (str(Path(folder) / AUTHORITY) if folder else "")
+    is_tls = section.tls or bool(folder)
+    return BrokerAccess(
+        host=section.host,
+        port=section.port,
+        user=user,
+        password=password,
+        tls=tls_context(authority, section.certificate, section.key) if is_tls else None,
+        authority=authority,
+        has_certificate=bool(section.certificate),
+        speaks_5=section.broker is not Broker.AMQTT,
+        is_ours=section.broker is not Broker.EXTERNAL,
+    )
+
+
+def tls_context(authority: str = "", certificate: str = "", key: str = "") -> ssl.SSLContext:
+    """TLS that trusts the PEM file `authority`, else this system's; with our own certificate if there is one."""
+    try:
+        context = ssl.create_default_context(cafile=authority or None)
+    except ssl.SSLError:
+        raise AccessError(f"mqtt.ca: {authority} holds no certificate in PEM") from None
+    except OSError as error:
+        raise AccessError(f"mqtt.ca: cannot read {authority}: {error.strerror}") from None
+    if certificate:
+        _show_ourselves(context, certificate, key)
+    return context
+
+
+def _show_ourselves(context: ssl.SSLContext, certificate: str, key: str) -> None:
+    require_private(key or certificate)
+
+    def refuse() -> str:  # instead of asking on the terminal of a service
+        raise AccessError(f"mqtt.key: {key or certificate} is encrypted: take its password away and keep its mode 600")
+
+    try:
+        context.load_cert_chain(certificate, key or None, password=refuse)
+    except (ssl.SSLError, OSError) as error:
+        raise AccessError(f"mqtt.certificate: {certificate} and its key cannot be used: {error}") from None

@@ -1,0 +1,119 @@
+"""paho's client, made for one broker: password, TLS, MQTT 5 where the broker speaks it, and why it failed."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import ssl
+import threading
+from contextlib import AbstractContextManager
+
+from paho.mqtt import client as paho
+from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
+from paho.mqtt.reasoncodes import ReasonCode
+
+from services.mqtt.access import BrokerAccess
+
+CONNECT_TIMEOUT = 2.0  # [s]
+OLD_BROKER = 132  # CONNACK: Unsupported protocol version
+NO_ANSWER = 141  # DISCONNECT: Keep alive timeout
+
+
+class MqttClient(paho.Client):
+    """A client whose session ends with its connection; it keeps the error that made a connection fail."""
+
+    def __init__(
+        self, access: BrokerAccess, client_id: str, *, speaks_5: bool = True, reconnect_on_failure: bool = False
+    ) -> None:
+        is_5 = speaks_5 and access.speaks_5
+        super().__init__(
+            CallbackAPIVersion.VERSION2,
+            client_id=client_id,
+            clean_session=None if is_5 else True,
+            protocol=paho.MQTTv5 if is_5 else paho.MQTTv311,
+            reconnect_on_failure=reconnect_on_failure,
+        )
+        if access.user:
+            self.username_pw_set(access.user, access.password or None)
+        self._tls = access.tls
+        if access.tls is not None:
+            self.tls_set_context(access.tls)
+        self.connect_timeout = CONNECT_TIMEOUT
+        self.on_socket_open = _send_at_once
+        self.failure: OSError | None = None  # of the newest connection
+        self._writing = threading.RLock()  # two that write parts of frames would mix them
+        # OpenSSL does not let one thread read from a connection while another writes to it; TCP does.
+        self._tls_turn: AbstractContextManager[object] = threading.RLock() if access.tls else contextlib.nullcontext()
+
+    @property
+    def speaks_5(self) -> bool:
+        """True if the broker says by MQTT 5 what came of a message."""
+        return self.protocol == paho.MQTTv5
+
+    def speak_older(self) -> None:
+        """MQTT 3.1.1 from the next connection on."""
+        self._protocol, self._clean_session = paho.MQTTv311, True
+
+    def write_now(self) -> None:
+        """Writes what is queued, as far as the socket takes it without blocking; from any thread.
+
+        paho's thread has to be woken and to wait for its turn among the threads of the process: in a flood tens of
+        milliseconds. It still writes what the socket did not take at once, and handles every error.
+        """
+        with self._writing:
+            self._packet_write()
+
+    def loop_write(self) -> MQTTErrorCode:
+        """As paho's; its thread calls it."""
+        with self._writing:
+            return super().loop_write()
+
+    def reconnect(self) -> MQTTErrorCode:
+        """As paho's; keeps the error of a connection that cannot be made."""
+        self.failure = None
+        try:
+            return super().reconnect()
+        except OSError as error:
+            self.failure = error
+            raise
+
+    def _ssl_wrap_socket(self, tcp_sock: socket.socket) -> ssl.SSLSocket:
+        """As paho's, which leaves a connection open whose handshake has failed."""
+        assert self._tls is not None
+        wrapped = self._tls.wrap_socket(tcp_sock, server_hostname=self.host, do_handshake_on_connect=False)
+        try:
+            wrapped.settimeout(CONNECT_TIMEOUT)
+            wrapped.do_handshake()
+        except OSError:
+            wrapped.close()
+            raise
+        return wrapped
+
+    def _sock_recv(self, bufsize: int) -> bytes:
+        """As paho's; the alerts of TLS 1.3 come with the first bytes, not with the handshake."""
+        try:
+            with self._tls_turn:
+                return super()._sock_recv(bufsize)
+        except ssl.SSLError as error:
+            self.failure = error
+            raise
+
+    def _sock_send(self, buf: bytes | bytearray) -> int:
+        with self._tls_turn:
+            return super()._sock_send(buf)
+
+
+def is_failure(reason: object) -> bool:
+    """True for a reason code by which a broker says no."""
+    return isinstance(reason, ReasonCode) and reason.is_failure
+
+
+def code_of(reason: object) -> int:
+    """The number of a reason code."""
+    return int(reason.value) if isinstance(reason, ReasonCode) else 0
+
+
+def _send_at_once(_client: paho.Client, _data: object, sock: object) -> None:
+    # Without it Nagle's algorithm and delayed acknowledgements cost 20 to 40 ms a frame.
+    if isinstance(sock, socket.socket):
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
