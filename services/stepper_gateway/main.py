@@ -41,9 +41,10 @@ def open_link(deployment: Deployment, device: str, wake: Callable[[], None]) -> 
     """The other wire's library is not even imported."""
     match deployment.wire:
         case Wire.MQTT:
+            from services.mqtt.access import gateway_access
             from services.stepper_gateway.links.mqtt import MqttLink
 
-            return MqttLink(deployment.mqtt.host, deployment.mqtt.port, device, wake)
+            return MqttLink(gateway_access(deployment.mqtt), device, wake)
         case Wire.SERIAL:
             from services.stepper_gateway.links.serial import SerialLink
 

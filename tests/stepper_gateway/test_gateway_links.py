@@ -31,6 +31,7 @@ from services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind, Li
 from services.stepper_gateway.links.mqtt import MqttLink
 from services.stepper_gateway.links.serial import FRAMES, TYPES, SerialLink
 from tests.stepper_gateway.processes import BROKER, Processes
+from tests.stepper_gateway.wired import plain
 
 TEXT = b'{"some": "text"}'
 SAID = {  # something of every kind that a device says
@@ -67,7 +68,7 @@ class MqttPeer:
         self.mend()
 
     def link(self, wake: Callable[[], None]) -> Link:
-        return MqttLink("127.0.0.1", self._processes.port, "rm1", wake)
+        return MqttLink(plain(self._processes.port), "rm1", wake)
 
     def say(self, kind: Kind, payload: bytes) -> None:
         assert self._client is not None

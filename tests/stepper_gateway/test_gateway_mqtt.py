@@ -23,7 +23,7 @@ from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.links.mqtt import MqttLink
 from services.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.processes import BROKER, DEVICE, Processes, free_port
-from tests.stepper_gateway.wired import WiredGateway
+from tests.stepper_gateway.wired import WiredGateway, plain
 
 HOME = (0.0, 0.0, 0.0)
 NEAR = (0.1, -0.2, 0.01)
@@ -135,7 +135,7 @@ def test_a_restarted_device_is_met_again(processes: Processes) -> None:
 
 def test_a_link_without_a_broker_says_so_and_costs_nothing() -> None:
     port = free_port()
-    with closing(MqttLink("127.0.0.1", port, "rm1", lambda: None)) as link:
+    with closing(MqttLink(plain(port), "rm1", lambda: None)) as link:
         time.sleep(0.3)
         before = time.process_time()
         time.sleep(0.7)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from schemas.device import InjectRequest, InjectResponse
+from services.mqtt.access import BrokerAccess
 from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.links.mqtt import MqttLink
 from services.virtual_arm.gateway_driver import GatewayDriver, Kind, Moment
@@ -16,14 +17,19 @@ from services.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.harness import move
 
 
+def plain(port: int) -> BrokerAccess:
+    """A broker on the loopback that lets everybody in."""
+    return BrokerAccess("127.0.0.1", port, is_ours=True)
+
+
 class WiredGateway(GatewayDriver):
     """Core and link with a small loop of their own, without the bus."""
 
-    def __init__(self, port: int, link: Callable[[Callable[[], None]], Link] | None = None) -> None:
+    def __init__(self, port: int = 0, link: Callable[[Callable[[], None]], Link] | None = None) -> None:
         super().__init__()
         self.start_core(rm1(), int.from_bytes(os.urandom(3), "little") + 1)
         self._woken = threading.Event()
-        self.link = link(self._woken.set) if link else MqttLink("127.0.0.1", port, "rm1", self._woken.set)
+        self.link = link(self._woken.set) if link else MqttLink(plain(port), "rm1", self._woken.set)
 
     def close(self) -> None:
         self.link.close()

@@ -33,6 +33,8 @@ ASK_STATUS = 1.0  # [s] between two requests for a status that is missing
 # Chosen: true states are not taken until they are newer than one from so far ahead, which must not look like silence.
 FARTHEST_AHEAD = 0.2  # [s] that a frame's time may be ahead of the device's clock as it is known
 QUESTIONS = 32  # that may be under way
+NOT_HEARD = "is it switched on, does it use the same broker, and does the broker's ACL let it write?"
+NO_CLOCK = "try again in a second; if it stays so, the device does not hear us (the broker's ACL, or the wire)"
 OLD_BOOTS = 16  # remembered, so that a late frame of one does not look like a reboot
 
 
@@ -222,12 +224,12 @@ class DeviceSession:
             if self._offline_boot and self.boot_id in (0, self._offline_boot):
                 return f'device "{name}" is offline: switch it on, or check its network'
             if self.latest is None and not self._reports:
-                return f'device "{name}" has not been heard: is it switched on and does it use the same broker?'
+                return f'device "{name}" has not been heard: {NOT_HEARD}'
             return f'device "{name}" is silent for more than {timeout:g} s: check its power and network'
         if self.status is None:
             return f'device "{name}" has not said yet who it is: wait a second, or restart it'
         if not self.clock.is_synchronised:
-            return f'the clock of device "{name}" is not known yet: try again in a second'
+            return f'the clock of device "{name}" is not known yet: {NO_CLOCK}'
         return ""
 
     def _meet(self, boot_id: int) -> bool:

@@ -8,62 +8,44 @@ from __future__ import annotations
 
 import contextlib
 import secrets
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterable
 
 from paho.mqtt import client as paho
-from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
 
+from schemas.device_topics import topic
+from services.mqtt.access import BrokerAccess
+from services.mqtt.client import NO_ANSWER, OLD_BROKER, MqttClient, code_of, is_failure
+from services.mqtt.failures import denial, failure, needs_a_person, refusal, silence
 from services.stepper_gateway.links.connection import ReceiveQueue, keep_connected
 from services.stepper_gateway.links.link import FROM_DEVICE, Kind, Received
 
-PREFIX = "gemelo/v1"
 UNACKNOWLEDGED = (Kind.HB, Kind.SYNC, Kind.SYNC_R, Kind.TRAJ_ACK, Kind.STATE, Kind.SENSORS, Kind.SHAFT)  # QoS 0
+DISPENSABLE = (Kind.INJECT, Kind.CONFIG)  # whoever asks for these hears that the device did not answer
 MAX_PAYLOAD = 65_536  # [bytes] no frame of the device comes near
-CONNECT_TIMEOUT = 2.0  # [s]
 KEEP_ALIVE = 5  # [s]
-
-
-class DirectClient(paho.Client):
-    """A client whose caller writes to the socket itself, before paho's thread would.
-
-    paho's thread has to be woken and to wait for its turn among the threads of the process: in a flood tens of
-    milliseconds. It still writes what the socket did not take at once, and handles every error.
-    """
-
-    def __init__(self, client_id: str) -> None:
-        super().__init__(
-            CallbackAPIVersion.VERSION2,
-            client_id=client_id,
-            clean_session=True,
-            protocol=paho.MQTTv311,
-            reconnect_on_failure=False,
-        )
-        self._writing = threading.RLock()  # two that write parts of frames would mix them
-
-    def write_now(self) -> None:
-        """Writes what is queued, as far as the socket takes it without blocking; from any thread."""
-        with self._writing:
-            self._packet_write()
-
-    def loop_write(self) -> MQTTErrorCode:
-        """As paho's; its thread calls it."""
-        with self._writing:
-            return super().loop_write()
+# Between attempts after a refusal, which only a person can mend.
+REFUSED = (1.0, 2.0, 4.0, 8.0, 16.0)  # [s]
+MOST_UNANSWERED = 1024  # [messages] whose topic is remembered for the broker's answer
 
 
 class MqttLink:
     """A link to one device through one broker; connects and reconnects in a thread of its own."""
 
-    def __init__(self, host: str, port: int, device: str, wake: Callable[[], None]) -> None:
-        self._address = (host, port)
-        self._prefix = f"{PREFIX}/{device}/"
+    def __init__(self, access: BrokerAccess, device: str, wake: Callable[[], None]) -> None:
+        self._access = access
+        self._device = device
+        self._prefix = topic(device, "")
         self._wake = wake
         self._inbox = ReceiveQueue(wake)
-        self._client: DirectClient | None = None
-        self._reason = f"no connection yet to the MQTT broker at {host}:{port}"
+        self._client: MqttClient | None = None
+        self._reason = f"no connection yet to {access}"
+        self._speaks_5 = True
+        self._was_answered = False  # on this connection
+        self._refusals = 0  # in a row
+        self._sent: dict[int, Kind] = {}  # by message id, what the broker has not acknowledged
+        self._tried: set[Kind] = set()  # kinds of QoS 0 that the broker was asked about on this connection
         self._lost = threading.Event()
         self._stop = threading.Event()
         self._thread = threading.Thread(
@@ -86,7 +68,8 @@ class MqttLink:
             return False
         # The newest configuration replaces what any gateway before us has left at the broker.
         retain = kind is Kind.CONFIG
-        queued = client.publish(self._prefix + kind, payload, _qos(kind), retain)
+        queued = client.publish(self._prefix + kind, payload, self._qos_to_send(client, kind), retain)
+        self._remember(queued.mid, kind)
         client.write_now()
         return queued.rc == paho.MQTT_ERR_SUCCESS
 
@@ -96,18 +79,34 @@ class MqttLink:
     def close(self) -> None:
         self._stop.set()
         self._lost.set()
-        self._thread.join(timeout=CONNECT_TIMEOUT + 2.0)
+        self._thread.join(timeout=4.0)
+
+    def _qos_to_send(self, client: MqttClient, kind: Kind) -> int:
+        """A broker says only for QoS 1 that its ACL denies a message: the first of every kind asks for that."""
+        if not client.speaks_5 or kind in self._tried:
+            return _qos(kind)
+        self._tried.add(kind)
+        return 1
+
+    def _remember(self, message_id: int, kind: Kind) -> None:
+        if len(self._sent) >= MOST_UNANSWERED:
+            self._sent.clear()
+        self._sent[message_id] = kind
 
     def _connection(self) -> bool:
         """One connection from beginning to end; true if there was one."""
-        host, port = self._address
         self._lost.clear()
+        self._sent.clear()
+        self._tried.clear()
+        self._was_answered = False
+        refusals = self._refusals
         client = self._new_client()
         try:
-            client.connect(host, port, keepalive=KEEP_ALIVE)
+            client.connect(self._access.host, self._access.port, keepalive=KEEP_ALIVE)
         except OSError as error:
-            self._lose(f"no MQTT broker answers at {host}:{port} ({error}): is the process `broker` running?")
-            return False
+            self._refusals += needs_a_person(error)
+            self._lose(failure(error, self._access))
+            return self._after(refusals, False)
         client.loop_start()
         self._lost.wait()
         was_connected = self._client is not None
@@ -116,42 +115,75 @@ class MqttLink:
             client.disconnect()
         client.loop_stop()
         self._client = None  # a late answer of the broker may have set it once more
+        return self._after(refusals, was_connected)
+
+    def _after(self, refusals: int, was_connected: bool) -> bool:
+        """Waits ever longer after refusals in a row; anything else ends the row."""
+        if self._refusals > refusals:
+            self._stop.wait(REFUSED[min(refusals, len(REFUSED) - 1)])
+        else:
+            self._refusals = 0
         return was_connected
 
-    def _new_client(self) -> DirectClient:
-        client = DirectClient(f"gemelo-gateway-{secrets.token_hex(6)}")
-        client.connect_timeout = CONNECT_TIMEOUT
+    def _new_client(self) -> MqttClient:
+        client = MqttClient(self._access, f"gemelo-gateway-{secrets.token_hex(6)}", speaks_5=self._speaks_5)
         client.max_inflight_messages_set(0)  # no limit: a stop must not wait until a broker has acknowledged others
-        client.on_socket_open = _send_at_once
         client.on_connect = self._on_connect
         client.on_subscribe = self._on_subscribe
+        client.on_publish = self._on_publish
         client.on_disconnect = self._on_disconnect
         client.on_message = self._on_message
         return client
 
     def _on_connect(self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
-        if getattr(reason, "is_failure", False):
-            self._lose(f"the MQTT broker at {self._address[0]}:{self._address[1]} refuses us: {reason}")
-            return
-        client.subscribe([(self._prefix + kind, _qos(kind)) for kind in FROM_DEVICE])
+        self._was_answered = True
+        if not is_failure(reason):
+            client.subscribe([(self._prefix + kind, _qos(kind)) for kind in FROM_DEVICE])
+        elif self._speaks_5 and code_of(reason) == OLD_BROKER:
+            self._speaks_5 = False
+            self._lose(f"{self._access} speaks no MQTT 5: trying again with 3.1.1")
+        else:
+            self._refuse(refusal(code_of(reason), str(reason), self._access))
 
     def _on_subscribe(
         self, client: paho.Client, _data: object, _id: int, reasons: Iterable[object], _props: object
     ) -> None:
         """Only now nothing that the device answers can be missed."""
-        if any(getattr(reason, "is_failure", False) for reason in reasons):
-            self._lose(f"the MQTT broker at {self._address[0]}:{self._address[1]} lets us hear nothing: see its ACL")
+        denied = [kind for kind, reason in zip(FROM_DEVICE, reasons, strict=False) if is_failure(reason)]
+        if denied:
+            self._refuse(denial(self._prefix + denied[0], self._access, "read"))
             return
-        assert isinstance(client, DirectClient)  # ours, see `_new_client`
+        assert isinstance(client, MqttClient)  # ours, see `_new_client`
         self._client = client
         self._wake()
 
+    def _on_publish(self, _client: paho.Client, _data: object, message_id: int, reason: object, _props: object) -> None:
+        """The broker has taken a message, or its ACL denies it: then the device must not be believed reachable."""
+        kind = self._sent.pop(message_id, None)
+        if is_failure(reason) and kind is not None and kind not in DISPENSABLE:
+            self._refuse(denial(self._prefix + kind, self._access))
+
     def _on_disconnect(
-        self, _client: paho.Client, _data: object, _flags: object, reason: object, _props: object
+        self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object
     ) -> None:
-        self._lose(f"the connection to the MQTT broker at {self._address[0]}:{self._address[1]} is lost ({reason})")
+        assert isinstance(client, MqttClient)
+        if self._was_answered or code_of(reason) == NO_ANSWER:
+            self._lose(f"the connection to {self._access} is lost ({reason})")
+        elif client.failure is not None:
+            self._refuse(failure(client.failure, self._access))
+        else:
+            self._speaks_5 = not self._speaks_5  # some old brokers only hang up on a version that they do not know
+            self._refuse(silence(self._access))
+
+    def _refuse(self, reason: str) -> None:
+        if not self._lost.is_set():
+            self._refusals += 1
+        self._lose(reason)
 
     def _lose(self, reason: str) -> None:
+        """The first reason counts: what comes after it follows from it."""
+        if self._lost.is_set():
+            return
         self._reason = reason
         self._lost.set()
         self._wake()
@@ -169,9 +201,3 @@ class MqttLink:
 
 def _qos(kind: Kind) -> int:
     return 0 if kind in UNACKNOWLEDGED else 1
-
-
-def _send_at_once(_client: paho.Client, _data: object, sock: object) -> None:
-    # Without it Nagle's algorithm and delayed acknowledgements cost 20 to 40 ms a frame.
-    if isinstance(sock, socket.socket):
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
