@@ -6,17 +6,19 @@ import contextlib
 import logging
 import queue
 import socket
-import ssl
 import threading
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from paho.mqtt import client as paho
-from paho.mqtt.enums import CallbackAPIVersion
+
+from schemas.device_topics import topic
+from services.mqtt.access import BrokerAccess
+from services.mqtt.client import NO_ANSWER, OLD_BROKER, MqttClient, code_of, is_failure
+from services.mqtt.failures import denial, failure, needs_a_person, refusal, silence
 
 log = logging.getLogger("virtual_esp32")
 
-PREFIX = "gemelo/v1"
 COMMANDS = {"traj": 1, "cmd": 1, "hb": 0, "sync": 0, "config": 1, "inject": 1}  # QoS of the subscription
 REPORTS = {  # QoS of the publication
     "traj/ack": 0, "cmd/ack": 1, "sync/r": 0, "state": 0, "event": 1, "status": 1,
@@ -26,17 +28,9 @@ FRAME_TYPES = {"traj": 1, "cmd": 3, "hb": 5, "sync": 6}
 LARGEST = 16_384  # [bytes] the largest chunk has 8,228
 FULL_INBOX = 4096  # [messages]
 KEEP_ALIVE = 5  # [s]
-
-
-@dataclass(frozen=True)
-class BrokerAddress:
-    """The address, credentials and TLS context of a broker."""
-
-    host: str
-    port: int
-    user: str = ""
-    password: str = field(default="", repr=False)
-    tls: ssl.SSLContext | None = None
+RETRY = (0.2, 1.0)  # [s] shortest and longest pause between attempts
+RETRY_REFUSED = (1.0, 16.0)  # [s] the same while only a person can mend it
+MOST_UNANSWERED = 1024  # [messages] whose topic is remembered for the broker's answer
 
 
 @dataclass(frozen=True)
@@ -70,39 +64,40 @@ class Disconnected:
 
 
 @dataclass(frozen=True)
+class Denied:
+    """The broker's ACL does not let the device write a topic."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
 class ShutdownRequested:
     """The process is asked to end."""
 
 
-Item = MqttMessage | SerialBytes | Connected | Disconnected | ShutdownRequested
+Item = MqttMessage | SerialBytes | Connected | Disconnected | Denied | ShutdownRequested
 
 
 class DeviceLink:
     """One device's topics at one broker."""
 
-    def __init__(self, broker: BrokerAddress, device: str, will: bytes, inbox: queue.SimpleQueue[Item]) -> None:
-        self._topic = f"{PREFIX}/{device}/"
+    def __init__(self, broker: BrokerAccess, device: str, will: bytes, inbox: queue.SimpleQueue[Item]) -> None:
+        self._topic = topic(device, "")
         self._inbox = inbox
-        self._client = paho.Client(
-            CallbackAPIVersion.VERSION2,
-            client_id=f"gemelo-device-{device}",
-            clean_session=True,
-            protocol=paho.MQTTv311,
-        )
+        self._client = MqttClient(broker, f"gemelo-device-{device}", reconnect_on_failure=True)
         self._client.will_set(self._topic + "status", will, qos=1, retain=True)
-        if broker.user:
-            self._client.username_pw_set(broker.user, broker.password)
-        if broker.tls is not None:
-            self._client.tls_set_context(broker.tls)
-        self._is_broken_off = False
-        self._client.on_socket_open = _send_at_once
         self._client.on_connect = self._on_connect
         self._client.on_connect_fail = self._on_connect_fail
         self._client.on_disconnect = self._on_disconnect
+        self._client.on_publish = self._on_publish
         self._client.on_message = self._on_message
-        self._client.connect_timeout = 2.0
-        self._client.reconnect_delay_set(min_delay=0.2, max_delay=1.0)  # type: ignore[arg-type]
         self._broker = broker
+        self._is_broken_off = False
+        self._answer: bool | None = None  # of the broker on this connection: it has accepted or refused us
+        self._sent: dict[int, str] = {}  # by message id, what the broker has not acknowledged
+        self._tried: set[str] = set()  # kinds of QoS 0 that the broker was asked about on this connection
+        self._pauses: tuple[float, float] | None = None
+        self._retry(RETRY)
 
     def start(self) -> None:
         """Connect, and again for as long as it takes, in paho's own thread."""
@@ -111,7 +106,14 @@ class DeviceLink:
 
     def publish(self, kind: str, payload: bytes) -> None:
         """Send a report; what cannot be sent now is dropped by paho or the caller, never blocks."""
-        self._client.publish(self._topic + kind, payload, qos=REPORTS[kind], retain=kind == "status")
+        qos = REPORTS[kind]
+        if self._client.speaks_5 and kind not in self._tried:  # only for QoS 1 a broker says that its ACL denies it
+            self._tried.add(kind)
+            qos = 1
+        sent = self._client.publish(self._topic + kind, payload, qos=qos, retain=kind == "status")
+        if len(self._sent) >= MOST_UNANSWERED:
+            self._sent.clear()
+        self._sent[sent.mid] = kind
 
     def close(self, offline_status: bytes) -> None:
         """Leave a retained status behind and end; waits at most a second for the broker."""
@@ -139,19 +141,43 @@ class DeviceLink:
         if not self._is_broken_off:
             self._inbox.put(item)
 
-    def _on_connect(self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
-        if getattr(reason, "is_failure", False):
-            self._put(Disconnected(f"the broker refuses us: {reason}"))
-            return
-        client.subscribe([(self._topic + kind, qos) for kind, qos in COMMANDS.items()])
-        self._put(Connected())
+    def _retry(self, pauses: tuple[float, float]) -> None:
+        """Shortest and longest pause between attempts [s]; it doubles from one to the other."""
+        if pauses != self._pauses:
+            self._pauses = pauses
+            self._client.reconnect_delay_set(*pauses)  # type: ignore[arg-type]
 
-    def _on_connect_fail(self, _client: paho.Client, _data: object) -> None:
-        where = f"{self._broker.host}:{self._broker.port}"
-        self._put(Disconnected(f"no MQTT broker answers at {where}; is the process `broker` running?"))
+    def _on_connect(self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
+        self._answer = not is_failure(reason)
+        if self._answer:
+            self._retry(RETRY)
+            self._tried.clear()
+            client.subscribe([(self._topic + kind, qos) for kind, qos in COMMANDS.items()])
+            self._put(Connected())
+        elif self._client.speaks_5 and code_of(reason) == OLD_BROKER:
+            self._client.speak_older()
+        else:
+            self._retry(RETRY_REFUSED)
+            self._put(Disconnected(refusal(code_of(reason), str(reason), self._broker)))
+
+    def _on_connect_fail(self, client: paho.Client, _data: object) -> None:
+        error = self._client.failure or OSError("no connection")
+        self._retry(RETRY_REFUSED if needs_a_person(error) else RETRY)
+        self._put(Disconnected(failure(error, self._broker)))
 
     def _on_disconnect(self, _client: paho.Client, _data: object, _flags: object, reason: object, _p: object) -> None:
-        self._put(Disconnected(str(reason)))
+        answer, self._answer = self._answer, None
+        if answer or code_of(reason) == NO_ANSWER:
+            self._put(Disconnected(str(reason)))
+        elif answer is None:
+            self._retry(RETRY_REFUSED)
+            error = self._client.failure
+            self._put(Disconnected(failure(error, self._broker) if error else silence(self._broker)))
+
+    def _on_publish(self, _client: paho.Client, _data: object, message_id: int, reason: object, _props: object) -> None:
+        kind = self._sent.pop(message_id, None)
+        if is_failure(reason) and kind is not None:
+            self._put(Denied(denial(self._topic + kind, self._broker)))
 
     def _on_message(self, _client: paho.Client, _data: object, message: paho.MQTTMessage) -> None:
         arrival = time.monotonic()
@@ -166,9 +192,3 @@ def _fits(kind: str, payload: bytes) -> bool:
     if kind not in FRAME_TYPES:
         return len(payload) <= LARGEST
     return 3 <= len(payload) <= LARGEST and payload[2] == FRAME_TYPES[kind]
-
-
-def _send_at_once(_client: paho.Client, _data: object, sock: object) -> None:
-    # Without it Nagle's algorithm and delayed acknowledgements cost 20 to 40 ms a frame.
-    if isinstance(sock, socket.socket):
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

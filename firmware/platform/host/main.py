@@ -14,7 +14,7 @@ from firmware.bindings.device import ConfigError
 from firmware.bindings.library import LibraryMissing
 from firmware.bindings.motor import MotorError
 from firmware.platform.host.board import Board
-from firmware.platform.host.link import BrokerAddress, Item, ShutdownRequested
+from firmware.platform.host.link import Item, ShutdownRequested
 from firmware.platform.host.network import Network
 from firmware.platform.host.pty import SerialLine
 from firmware.platform.host.virtual_esp32 import VirtualEsp32
@@ -22,6 +22,7 @@ from firmware.platform.host.wires import Wires
 from schemas.deployment import Deployment, DeviceKind, Wire
 from services.arm.errors import DescriptionError
 from services.arm.model.description import load_arm
+from services.mqtt.access import AccessError, device_access
 from services.runtime.deployment import DeploymentError, load_deployment, project_root
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.readiness import Readiness
@@ -39,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     log.propagate = False
     try:
         run(load_deployment(options.config), options.serial)
-    except (DeploymentError, DescriptionError, ConfigError, MotorError, LibraryMissing) as error:
+    except (DeploymentError, AccessError, DescriptionError, ConfigError, MotorError, LibraryMissing) as error:
         log.error("%s", error)
         return 1
     return 0
@@ -55,7 +56,7 @@ def run(deployment: Deployment, has_line: bool = False) -> None:
         signal.signal(number, lambda *_: inbox.put(ShutdownRequested()))
     if deployment.device is DeviceKind.BOARD:
         return idle(inbox, Readiness(folder, NAME))
-    network = Network(BrokerAddress(deployment.mqtt.host, deployment.mqtt.port), inbox)
+    network = Network(device_access(deployment.mqtt, arm.device.name), inbox)
     line = _serial_line(folder, inbox) if has_line or deployment.wire is Wire.SERIAL else None
     VirtualEsp32(Board(arm, folder, NAME), Wires(network, line), inbox, Readiness(folder, NAME)).run()
 

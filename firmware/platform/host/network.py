@@ -12,7 +12,8 @@ from urllib.parse import urlsplit
 from firmware.bindings.device import Device
 from firmware.bindings.frames import OutFrame
 from firmware.platform.host.flash import Credentials
-from firmware.platform.host.link import REPORTS, BrokerAddress, DeviceLink, Item
+from firmware.platform.host.link import REPORTS, DeviceLink, Item
+from services.mqtt.access import BrokerAccess
 
 log = logging.getLogger("virtual_esp32")
 
@@ -27,13 +28,14 @@ class AddressError(ValueError):
 class Network:
     """One device's MQTT; `default` is the broker where none was provisioned."""
 
-    def __init__(self, default: BrokerAddress, inbox: queue.SimpleQueue[Item]) -> None:
+    def __init__(self, default: BrokerAccess, inbox: queue.SimpleQueue[Item]) -> None:
         self._default = default
         self._inbox = inbox
         self._link: DeviceLink | None = None
         self._offline_status = b""
         self._started = time.monotonic()
         self._was_refused = ""
+        self._denied: set[str] = set()  # what was said of the broker's ACL
         self.is_connected = False
 
     def join(self, device: Device, name: str, credentials: Credentials) -> None:
@@ -76,13 +78,19 @@ class Network:
             self._was_refused = reason
         self.is_connected = False
 
+    def on_denied(self, reason: str) -> None:
+        """Says once what the broker's ACL denies: the gateway then hears nothing of it."""
+        if reason not in self._denied:
+            self._denied.add(reason)
+            log.error("%s", reason)
+
 
 def offline_status(name: str, boot_id: int) -> bytes:
     """The JSON of the status of an offline device: the last will."""
     return json.dumps({"online": False, "device": name, "boot_id": boot_id}).encode()
 
 
-def broker_address(credentials: Credentials, default: BrokerAddress) -> BrokerAddress:
+def broker_address(credentials: Credentials, default: BrokerAccess) -> BrokerAccess:
     """The provisioned broker, or `default` where none was; raises AddressError."""
     if not credentials.mqtt_uri:
         return default
@@ -94,16 +102,18 @@ def broker_address(credentials: Credentials, default: BrokerAddress) -> BrokerAd
     if uri.scheme not in ("mqtt", "mqtts") or not uri.hostname:
         raise AddressError(f"the provisioned broker {credentials.mqtt_uri!r} is not mqtt://host or mqtts://host")
     is_secure = uri.scheme == "mqtts"
-    return BrokerAddress(
+    return BrokerAccess(
         uri.hostname,
         port or (MQTTS_PORT if is_secure else MQTT_PORT),
         credentials.mqtt_user,
-        credentials.mqtt_password,
+        credentials.mqtt_password if credentials.mqtt_user else "",
         _tls(credentials.mqtt_ca) if is_secure else None,
+        authority="the board's mqtt_ca" if credentials.mqtt_ca else "",
     )
 
 
 def _tls(authority: str) -> ssl.SSLContext:
+    """Of a provisioned certificate (PEM text), else of this system's authorities; raises AddressError."""
     try:
         return ssl.create_default_context(cadata=authority or None)
     except ssl.SSLError as error:

@@ -13,7 +13,15 @@ from firmware.bindings.frames import PlatformRequest
 from firmware.bindings.injection import InjectRefused, inject, read_injection, within
 from firmware.bindings.parsers import ProvisionRefused
 from firmware.platform.host.board import Board, DeviceClock, provision, provision_answer
-from firmware.platform.host.link import Connected, Disconnected, Item, MqttMessage, SerialBytes, ShutdownRequested
+from firmware.platform.host.link import (
+    Connected,
+    Denied,
+    Disconnected,
+    Item,
+    MqttMessage,
+    SerialBytes,
+    ShutdownRequested,
+)
 from firmware.platform.host.wires import Wires, say_event
 from schemas.device import InjectKind, InjectRequest
 from services.runtime.process.readiness import Readiness
@@ -112,6 +120,8 @@ class VirtualEsp32:
             case Disconnected():
                 self._wires.network.on_disconnected(item.reason)
                 self._readiness.not_ready()
+            case Denied():
+                self._wires.network.on_denied(item.reason)
             case ShutdownRequested():
                 self._running = False
 
