@@ -46,7 +46,8 @@ async def _wait(stop: asyncio.Event, seconds: float) -> None:
 
 
 def _settings(section: MqttSection) -> dict[str, object]:
+    host, port = section.listening
     return {
-        "listeners": {"default": {"type": "tcp", "bind": f"{section.host}:{section.port}"}},
+        "listeners": {"default": {"type": "tcp", "bind": f"{host}:{port}"}},
         "plugins": {"amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}},
     }

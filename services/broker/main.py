@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import argparse
 import logging
+import signal
 import sys
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 
 from schemas.deployment import Broker, Deployment
 from services.broker import mosquitto
+from services.mqtt.access import AccessError, gateway_access
 from services.runtime.deployment import DeploymentError, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.readiness import Readiness
+
+BEAT = 1.0  # [s] of the readiness file
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -22,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     log = line_logger("broker", options.log_level)
     try:
         return run(load_deployment(options.config), log)
-    except (DeploymentError, PortTaken, mosquitto.NotInstalled) as error:
+    except (DeploymentError, AccessError, PortTaken, mosquitto.NotInstalled) as error:
         log.error("%s", error)
         return 1
 
@@ -30,16 +35,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def run(deployment: Deployment, log: logging.Logger) -> int:
     """Serves; the readiness file is beaten once a second for as long as connections are accepted."""
     section = deployment.mqtt
-    require_free(section.host, section.port, "mqtt")
     folder = Path(deployment.paths.run)
     folder.mkdir(parents=True, exist_ok=True)
     readiness = Readiness(folder, "broker")
+    if section.broker is Broker.EXTERNAL:
+        log.info("the deployment has its broker at %s port %d: this one stands aside", section.host, section.port)
+        return stand_aside(readiness)
+    gateway_access(section)  # raises where its users and TLS cannot be
+    host, port = section.listening
+    require_free(host, port, "mqtt", "listen_port" if section.listen_port else "port")
 
     def beat() -> None:
         readiness.ready()
         readiness.beat()
 
-    log.info("%s listens on %s port %d", section.broker, section.host, section.port)
+    log.info("%s listens on %s port %d%s", section.broker, host, port, " with TLS" if section.secure_folder else "")
     if section.broker is Broker.MOSQUITTO:
         return mosquitto.serve(section, folder, beat, readiness.not_ready)
     # amqtt takes half a second to import, which mosquitto need not wait for.
@@ -49,6 +59,18 @@ def run(deployment: Deployment, log: logging.Logger) -> int:
         return embedded.serve(section, beat)
     finally:
         readiness.not_ready()
+
+
+def stand_aside(readiness: Readiness) -> int:
+    """Stays ready and idle until SIGTERM or SIGINT: what joins the broker says itself whether it can."""
+    stop = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    readiness.ready()
+    while not stop.wait(BEAT):
+        readiness.beat()
+    readiness.not_ready()
+    return 0
 
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:

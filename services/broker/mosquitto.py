@@ -12,12 +12,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from schemas.deployment import MqttSection
+from services.mqtt import secure_folder
 
 BEAT = 1.0  # [s]
 CONF = """\
 # Written by gemelo-broker at every start.
 listener {port} {host}
-allow_anonymous true
+{door}
 set_tcp_nodelay true
 persistence false
 # No limit: a stop must not wait until a device has acknowledged what came before it.
@@ -27,6 +28,7 @@ log_dest stderr
 log_type error
 log_type warning
 """
+OPEN = "allow_anonymous true"
 
 
 class NotInstalled(Exception):
@@ -52,7 +54,7 @@ def serve(section: MqttSection, run: Path, beat: Callable[[], None], on_end: Cal
     """
     program = find()
     conf = run / "mosquitto.conf"
-    conf.write_text(CONF.format(host=section.host, port=section.port))
+    conf.write_text(configuration(section))
     alive, held = os.pipe()
     if os.fork() == 0:
         os.close(held)
@@ -64,6 +66,13 @@ def serve(section: MqttSection, run: Path, beat: Callable[[], None], on_end: Cal
     sys.stdout.flush()
     sys.stderr.flush()
     os.execv(program, [program, "-c", str(conf)])
+
+
+def configuration(section: MqttSection) -> str:
+    """The text of mosquitto.conf: open, or with the lock that `gemelo broker secure` has made."""
+    host, port = section.listening
+    door = secure_folder.listener(Path(section.secure_folder)) if section.secure_folder else OPEN
+    return CONF.format(host=host, port=port, door=door)
 
 
 def _watch_broker(section: MqttSection, alive: int, beat: Callable[[], None], on_end: Callable[[], None]) -> None:
@@ -79,7 +88,7 @@ def _watch_broker(section: MqttSection, alive: int, beat: Callable[[], None], on
 
 def _accepts(section: MqttSection) -> bool:
     try:
-        socket.create_connection((section.host, section.port), timeout=0.5).close()
+        socket.create_connection(section.listening, timeout=0.5).close()
     except OSError:
         return False
     return True

@@ -152,10 +152,20 @@ def test_a_missing_mosquitto_is_said_with_the_remedy(monkeypatch):
         mosquitto.find()
 
 
+def test_it_stands_aside_for_a_broker_that_runs_already(tmp_path):
+    with socket.create_server(("127.0.0.1", 0)) as theirs:
+        process = Process("external", tmp_path, theirs.getsockname()[1])
+        process.wait_ready()
+        output = process.stop()
+    assert process.popen.returncode == 0
+    assert "this one stands aside" in output
+    assert not process.ready.exists()
+
+
 def test_mosquitto_is_told_to_send_at_once_and_to_keep_nothing():
-    section = MqttSection(port=1234)
-    conf = mosquitto.CONF.format(host=section.host, port=section.port)
+    conf = mosquitto.configuration(MqttSection(host="10.0.0.2", port=1, listen_host="127.0.0.1", listen_port=1234))
     assert "listener 1234 127.0.0.1" in conf
+    assert "allow_anonymous true" in conf
     assert "set_tcp_nodelay true" in conf
     assert "persistence false" in conf
 

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 from schemas.deployment import Broker, Deployment, MqttSection, PathsSection, Wire
@@ -27,31 +28,44 @@ def free_port() -> int:
 class Processes:
     """Started by module name, killed with everything they have started themselves."""
 
-    def __init__(self, broker: str, folder: Path, wire: Wire = Wire.MQTT) -> None:
+    def __init__(self, broker: str, folder: Path, wire: Wire = Wire.MQTT, secure_folder: str = "") -> None:
         self.port = free_port()
         self.deployment = Deployment(
             wire=wire,
-            mqtt=MqttSection(broker=Broker(broker), port=self.port),
+            mqtt=MqttSection(broker=Broker(broker), port=self.port, secure_folder=secure_folder),
             paths=PathsSection(run=str(folder / "run"), out=str(folder / "out")),
         )
+        self._log = folder / "processes.log"
         self._environment = os.environ | {
             "GEMELO_WIRE": wire.value,
             "GEMELO_MQTT_BROKER": broker,
             "GEMELO_MQTT_PORT": str(self.port),
+            "GEMELO_MQTT_SECURE_FOLDER": secure_folder,
             "GEMELO_PATHS_RUN": self.deployment.paths.run,
             "GEMELO_PATHS_OUT": self.deployment.paths.out,
         }
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, module: str) -> None:
-        self._running[module] = subprocess.Popen(
-            [sys.executable, "-m", module],
-            cwd=ROOT,
-            env=self._environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+    def start(self, module: str, *arguments: str, environment: Mapping[str, str] | None = None) -> None:
+        """What it prints is in `log`."""
+        with self._log.open("ab") as log:
+            self._running[module] = subprocess.Popen(
+                [sys.executable, "-m", module, *arguments],
+                cwd=ROOT,
+                env={**self._environment, **(environment or {})},
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+
+    @property
+    def log(self) -> str:
+        """What the processes have printed."""
+        return self._log.read_text()
+
+    @property
+    def pids(self) -> list[int]:
+        return [process.pid for process in self._running.values()]
 
     def start_broker(self) -> None:
         """Returns once it listens."""

@@ -1,0 +1,112 @@
+"""The folder that locks a mosquitto: a small authority, the broker's certificate, users with passwords, and an ACL.
+
+Everything in it is for its owner alone, and a .gitignore keeps all of it out of any repository.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+import secrets
+from collections.abc import Iterable
+from pathlib import Path
+
+from schemas.device_topics import FROM_DEVICE, TO_DEVICE, topic
+from services.mqtt.access import AUTHORITY, GATEWAY, AccessError, read_secret
+from services.mqtt.certificates import Authority
+
+ACL, USERS, CERTIFICATE, KEY = "acl", "users", "server.pem", "server.key"
+SALT, HASH, ITERATIONS = 12, 64, 10_000  # [bytes], [bytes]; of mosquitto's "$7$": PBKDF2 with SHA-512
+SECRET = 24  # [bytes] of a password
+LONGEST_NAME = 31  # [bytes] that a board keeps of its name
+
+
+def make(folder: Path, hosts: Iterable[str], devices: Iterable[str]) -> tuple[str, ...]:
+    """Writes or renews the folder; returns the devices that now have a user.
+
+    The authority and the passwords that are there stay, so that boards need not be told anew; the broker's certificate
+    is made anew for `hosts` (names and IP addresses). Raises `AccessError`.
+    """
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    folder.chmod(0o700)
+    write(folder / ".gitignore", "*\n")
+    Authority(folder / AUTHORITY, folder / "ca.key").sign(hosts, folder / CERTIFICATE, folder / KEY)
+    names = tuple(sorted({*map(_require_name, devices), *devices_in(folder)}))
+    passwords = {user: _password(folder, user) for user in (GATEWAY, *names)}
+    write(folder / USERS, "".join(f"{user}:{hashed(password)}\n" for user, password in passwords.items()))
+    write(folder / ACL, acl(names))
+    return names
+
+
+def devices_in(folder: Path) -> tuple[str, ...]:
+    """The devices that have a password there."""
+    return tuple(sorted(file.stem for file in folder.glob("*.password") if file.stem != GATEWAY))
+
+
+def password_of(folder: Path, user: str) -> str:
+    """The password of a user; raises `AccessError` if there is none, or others can read it."""
+    return read_secret(str(folder / f"{user}.password"))
+
+
+def listener(folder: Path) -> str:
+    """The lines of mosquitto.conf that belong to a listener; raises `AccessError` if the folder was never made."""
+    missing = [name for name in (AUTHORITY, CERTIFICATE, KEY, USERS, ACL) if not (folder / name).is_file()]
+    if missing:
+        raise AccessError(f"mqtt.secure_folder: {folder} has no {missing[0]}: `gemelo broker secure` makes it")
+    # Started by root, mosquitto would become a user who cannot read these files.
+    stays = "user root\n" if os.geteuid() == 0 else ""
+    return (
+        f"{stays}allow_anonymous false\ncertfile {folder / CERTIFICATE}\nkeyfile {folder / KEY}\n"
+        f"password_file {folder / USERS}\nacl_file {folder / ACL}"
+    )
+
+
+def acl(devices: Iterable[str]) -> str:
+    """mosquitto's ACL: what no line allows is denied."""
+    parts = [
+        "# Written by `gemelo broker secure`: a device writes only what it says itself, a gateway what devices hear."
+    ]
+    parts.append(_rights(GATEWAY, "+", TO_DEVICE, FROM_DEVICE))
+    parts += [_rights(device, device, FROM_DEVICE, TO_DEVICE) for device in devices]
+    return "\n\n".join(parts) + "\n"
+
+
+def hashed(password: str) -> str:
+    """The password as mosquitto 2 keeps it: `$7$<iterations>$<salt>$<PBKDF2-HMAC-SHA512>`."""
+    salt = secrets.token_bytes(SALT)
+    digest = hashlib.pbkdf2_hmac("sha512", password.encode(), salt, ITERATIONS, HASH)
+    return f"$7${ITERATIONS}${base64.b64encode(salt).decode()}${base64.b64encode(digest).decode()}"
+
+
+def write(path: Path, text: str) -> None:
+    """Replaces a file that only its owner can read."""
+    beside = path.with_name(f"{path.name}.new")
+    beside.unlink(missing_ok=True)
+    with os.fdopen(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as file:
+        file.write(text)
+    os.replace(beside, path)
+
+
+def _rights(user: str, device: str, writes: Iterable[str], reads: Iterable[str]) -> str:
+    lines = [f"user {user}"]
+    lines += [f"topic write {topic(device, kind)}" for kind in writes]
+    lines += [f"topic read {topic(device, kind)}" for kind in reads]
+    return "\n".join(lines)
+
+
+def _password(folder: Path, user: str) -> str:
+    path = folder / f"{user}.password"
+    if not path.exists():
+        write(path, secrets.token_urlsafe(SECRET) + "\n")
+    return password_of(folder, user)
+
+
+def _require_name(device: str) -> str:
+    plain = device.replace("_", "").replace("-", "")
+    if device == GATEWAY or not plain.isalnum() or not plain.isascii() or len(device) > LONGEST_NAME:
+        raise AccessError(
+            f'"{device}" cannot be the name of a device: 1 to {LONGEST_NAME} letters, digits, "_" or "-", and not '
+            f'"{GATEWAY}", which is the gateway\'s user'
+        )
+    return device
