@@ -1,27 +1,34 @@
-"""The checks that `make up` runs before it starts a process: the deployment file, the arm's files and free ports."""
+"""The checks that `make up` runs before it starts a process: deployment file, the arm's files, broker, free ports."""
 
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
-from schemas.deployment import Deployment, ViewerMode
+from schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
 from schemas.errors import ConfigurationError
 from services.arm.model.description import Arm, load_arm, require_motors
 from services.arm.model.virtual_drive import NO_MOTORS
+from services.mqtt.access import device_access, gateway_access
+from services.mqtt.secure_folder import listener
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.process.ports import PortTaken, require_free
 
 
 def start_problems(deployment: Deployment) -> list[str]:
     """Every reason why this deployment cannot start on this machine, one sentence each; empty if it can."""
-    found = []
+    found, device = [], ""
     try:
-        require_motors(load_arm(project_root() / deployment.robot), deployment.device)
+        arm = load_arm(project_root() / deployment.robot)
+        device = arm.device.name if deployment.device is DeviceKind.VIRTUAL else ""
+        require_motors(arm, deployment.device)
     except ConfigurationError as error:
         found.append(str(error))
+    found += broker_problems(deployment, device)
     router, mqtt, viewer, panel = deployment.router, deployment.mqtt, deployment.viewer, deployment.panel
-    ports = [(router.host, router.port, "router", "port"), (mqtt.host, mqtt.port, "mqtt", "port")]
-    ports.append((panel.host, panel.port, "panel", "port"))
+    ports = [(router.host, router.port, "router", "port"), (panel.host, panel.port, "panel", "port")]
+    if mqtt.broker is not Broker.EXTERNAL:
+        ports.append((*mqtt.listening, "mqtt", "listen_port" if mqtt.listen_port else "port"))
     if viewer.mode is not ViewerMode.NONE:
         ports += [(viewer.host, viewer.port, "viewer", "port"), (viewer.host, viewer.web_port, "viewer", "web_port")]
     for host, port, section, key in ports:
@@ -30,6 +37,25 @@ def start_problems(deployment: Deployment) -> list[str]:
         except PortTaken as error:
             found.append(str(error))
     return found
+
+
+def broker_problems(deployment: Deployment, device: str) -> list[str]:
+    """Why gateway or virtual device could not join the broker; one that runs already is asked itself.
+
+    `device` is the virtual device's name; empty where there is none.
+    """
+    section = deployment.mqtt
+    try:
+        accesses = [gateway_access(section), *([device_access(section, device)] if device else [])]
+        if section.broker is Broker.MOSQUITTO and section.secure_folder:
+            listener(Path(section.secure_folder))
+    except ConfigurationError as error:
+        return [str(error)]
+    if section.broker is not Broker.EXTERNAL or deployment.wire is Wire.SERIAL:
+        return []
+    from services.mqtt.check import problem  # paho takes 50 ms that only a strange broker is worth
+
+    return list(dict.fromkeys(filter(None, map(problem, accesses))))
 
 
 def main() -> int:

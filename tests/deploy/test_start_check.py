@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import socket
+import tempfile
+from contextlib import closing
+from pathlib import Path
 
 import msgspec
 import pytest
 
-from schemas.deployment import Deployment, DeviceKind, MqttSection, RouterSection, ViewerMode, ViewerSection
+from schemas.deployment import Broker, Deployment, DeviceKind, MqttSection, RouterSection, ViewerMode, ViewerSection
+from services.mqtt import secure_folder
 from services.stack.stack import free_ports
 from services.stack.start_check import main, start_problems
 from tests.arm.bare_arm import write_bare_arm
+from tests.optional import need
+from tests.stepper_gateway.locked import Mosquitto, external, locked
 
 
 @pytest.fixture
@@ -43,10 +49,48 @@ def test_an_arm_that_is_not_there_is_named(free):
     assert "urdf/nobody" in problem
 
 
+def test_a_broker_that_runs_already_is_asked_itself_and_needs_no_free_port(free):
+    strange = msgspec.structs.replace(free.mqtt, broker=Broker.EXTERNAL)
+    (problem,) = start_problems(msgspec.structs.replace(free, mqtt=strange))
+    assert f"no MQTT broker answers at 127.0.0.1:{strange.port}" in problem
+    need("mosquitto")
+    plain = msgspec.structs.replace(strange, broker=Broker.MOSQUITTO)
+    with tempfile.TemporaryDirectory() as folder, closing(Mosquitto(Path(folder), plain)):
+        assert start_problems(msgspec.structs.replace(free, mqtt=strange)) == []
+
+
+def test_a_password_that_others_can_read_or_that_is_wrong_is_said_before_anything_starts(free, tmp_path):
+    section = locked(tmp_path / "lock")
+    (tmp_path / "lock" / "rm1.password").chmod(0o644)
+    (problem,) = start_problems(msgspec.structs.replace(free, mqtt=section))
+    assert f"chmod 600 {tmp_path}/lock/rm1.password" in problem
+    secure_folder.write(tmp_path / "wrong", "wrong\n")
+    mine = external(section, password_file=str(tmp_path / "wrong"))
+    with closing(Mosquitto(tmp_path, section)):
+        (problem,) = start_problems(msgspec.structs.replace(free, mqtt=mine))
+    assert 'refuses user "gateway"' in problem
+
+
+def test_a_lock_that_was_never_made_is_named_with_the_command(free, tmp_path):
+    section = msgspec.structs.replace(free.mqtt, broker=Broker.MOSQUITTO, secure_folder=str(tmp_path))
+    (problem,) = start_problems(msgspec.structs.replace(free, mqtt=section))
+    assert "ca.pem" in problem or "password" in problem
+
+
+def test_the_listening_port_is_the_one_that_must_be_free(free):
+    (other,) = free_ports(1)
+    section = msgspec.structs.replace(free.mqtt, listen_port=other)
+    with socket.create_server(("127.0.0.1", free.mqtt.port)):
+        assert start_problems(msgspec.structs.replace(free, mqtt=section)) == []
+    with socket.create_server(("127.0.0.1", other)):
+        (problem,) = start_problems(msgspec.structs.replace(free, mqtt=section))
+    assert "GEMELO_MQTT_LISTEN_PORT" in problem
+
+
 def test_a_word_that_the_deployment_does_not_know_is_refused_with_those_it_does(monkeypatch, capsys):
     monkeypatch.setenv("GEMELO_MQTT_BROKER", "mosquito")
     assert main() == 1
-    assert "known are amqtt, mosquitto" in capsys.readouterr().err
+    assert "known are amqtt, mosquitto, external" in capsys.readouterr().err
 
 
 def test_an_arm_without_motors_starts_with_a_virtual_device_and_is_refused_a_board(free, tmp_path, capsys, monkeypatch):

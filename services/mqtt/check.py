@@ -1,0 +1,43 @@
+"""Whether a broker can be joined, tried once."""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import secrets
+
+from paho.mqtt import client as paho
+
+from services.mqtt.access import BrokerAccess
+from services.mqtt.client import OLD_BROKER, MqttClient, code_of, is_failure
+from services.mqtt.failures import failure, refusal, silence
+
+PATIENCE = 3.0  # [s] for an answer to CONNECT
+
+
+def problem(access: BrokerAccess) -> str:
+    """Why the broker does not let us in, as a sentence with its remedy; empty if it does."""
+    answers: queue.SimpleQueue[str] = queue.SimpleQueue()
+    client = MqttClient(access, f"gemelo-check-{secrets.token_hex(6)}")
+
+    def on_connect(_client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
+        is_no = is_failure(reason) and code_of(reason) != OLD_BROKER
+        answers.put(refusal(code_of(reason), str(reason), access) if is_no else "")
+
+    def on_disconnect(*_: object) -> None:
+        answers.put(failure(client.failure, access) if client.failure else silence(access))
+
+    client.on_connect, client.on_disconnect = on_connect, on_disconnect
+    try:
+        client.connect(access.host, access.port)
+    except OSError as error:
+        return failure(error, access)
+    client.loop_start()
+    try:
+        return answers.get(timeout=PATIENCE)
+    except queue.Empty:
+        return f"{access} takes the connection and does not answer in {PATIENCE:g} s: is it a broker?"
+    finally:
+        with contextlib.suppress(OSError, ValueError):
+            client.disconnect()
+        client.loop_stop()
