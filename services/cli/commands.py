@@ -5,6 +5,7 @@ from __future__ import annotations
 from services.cli.parser import Command
 
 GROUPS = {
+    "broker": "the MQTT broker between gateway and board",
     "device": "the controller board: how it is, what it is told, and its drivers",
     "topic": "the topics and what passes on them",
     "tf": "the frames: tree, poses, rates",
@@ -64,6 +65,8 @@ COMMANDS = (
             "program:run_program", "program:run_options", "gemelo program run tour --from 3.1", "program:choices"),
     Command(("program", "export"), "write the same as a Python script",
             "program:run_export", "program:export_options", "gemelo program export tour tour.py", "program:choices"),
+    Command(("broker", "secure"), "give mosquitto users, an ACL and TLS, and tell the board of them",
+            "broker_secure:run", "broker_secure:add_options", "gemelo broker secure --host 192.168.1.10"),
     Command(("topic", "list"), "all topics: message, rate, delivery, writer",
             "topic:run_list", "topic:list_options", "gemelo topic list -t"),
     Command(("topic", "info"), "one topic and the fields of its message",

@@ -12,6 +12,7 @@ import msgspec
 from services.cli.errors import usage
 
 WIFI_PASSWORD, MQTT_PASSWORD = "GEMELO_WIFI_PASSWORD", "GEMELO_MQTT_PASSWORD"
+MQTT_DEVICE_PASSWORD = "GEMELO_MQTT_DEVICE_PASSWORD"  # wins over the other, which is the gateway's too
 LONGEST_SSID = 32  # [bytes] IEEE 802.11
 WPA = (8, 63)  # [characters] of a passphrase
 
@@ -54,10 +55,14 @@ def require_sound(credentials: Credentials) -> Credentials:
     return credentials
 
 
-def password(what: str, variable: str, environ: Mapping[str, str]) -> str:
-    """The password from the environment, else asked for on a terminal without echo, else a line of standard input."""
-    if variable in environ:
-        return environ[variable]
+def password(what: str, variable: str, environ: Mapping[str, str], *more: str) -> str:
+    """The password from the environment, else asked for on a terminal without echo, else a line of standard input.
+
+    Of the variables `more` and `variable` the first that is set counts.
+    """
+    for name in (*more, variable):
+        if name in environ:
+            return environ[name]
     if sys.stdin.isatty():
         return getpass.getpass(f"{what} (empty: none): ")
     line = sys.stdin.readline()

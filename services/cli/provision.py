@@ -11,7 +11,15 @@ from typing import Protocol, TypeVar
 
 import msgspec
 
-from services.cli.credentials import MQTT_PASSWORD, WIFI_PASSWORD, Credentials, certificate, password, require_sound
+from services.cli.credentials import (
+    MQTT_DEVICE_PASSWORD,
+    MQTT_PASSWORD,
+    WIFI_PASSWORD,
+    Credentials,
+    certificate,
+    password,
+    require_sound,
+)
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.terminal import confirm
@@ -24,7 +32,8 @@ PATIENCE = 15.0  # [s] for a board to start and answer
 AGAIN = 2.0  # [s] between two tries
 TO_RESTART = 8.0  # [s] for the first message after it
 PASSWORDS = """Passwords are no arguments, because every user of a machine sees those: they are asked for, or taken from
-$GEMELO_WIFI_PASSWORD and $GEMELO_MQTT_PASSWORD, or read as lines of standard input, in this order."""
+$GEMELO_WIFI_PASSWORD and $GEMELO_MQTT_DEVICE_PASSWORD (else $GEMELO_MQTT_PASSWORD), or read as lines of standard
+input, in this order."""
 
 
 def add_options(parser: Parser) -> None:
@@ -57,7 +66,9 @@ def run(options: Options) -> ExitCode:
         mqtt_user=mqtt,
         mqtt_ca=certificate(options.mqtt_ca),
         wifi_password=None if wifi is None else password("Wi-Fi password", WIFI_PASSWORD, os.environ),
-        mqtt_password=None if mqtt is None else password("MQTT password", MQTT_PASSWORD, os.environ),
+        mqtt_password=None
+        if mqtt is None
+        else password("MQTT password", MQTT_PASSWORD, os.environ, MQTT_DEVICE_PASSWORD),
     )
     return provision(options.serial, options.baud, require_sound(credentials))
 
