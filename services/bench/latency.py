@@ -35,6 +35,7 @@ WARM_UP = 2.0  # [s] that is not counted
 STREAMED_SWING, STREAMED_PERIOD = 0.4, 6.0  # [rad] or [m] of the first joint, [s]
 FRAME_BYTES, KNOT_BYTES, ACK_BYTES = 36, 8, 48  # firmware/PROTOCOL.md
 ECHO_FACTOR = 1.5  # of the bare echo's p99
+TLS_FACTOR = 1.5  # of the plain connection's p99
 
 
 def chunk_ack_ms(stacks: Stacks, broker: str) -> Figure:
@@ -59,6 +60,23 @@ def chunk_ack_ms(stacks: Stacks, broker: str) -> Figure:
     )
     reference = {"bare echo median": statistics.median(echoes), "bare echo p99": quantile(echoes, 0.99)}
     return of_samples(took, Goal(p99=bound), reference, note)
+
+
+def chunk_ack_tls_ms(stacks: Stacks) -> Figure:
+    """The same over TLS with users and an ACL, after the same over a plain connection in this run."""
+    plain = stacks.with_broker("mosquitto")
+    device = plain.arm.device.name
+    swing(plain, WARM_UP)
+    without = [ack.round_trip * 1e3 for ack in collect(plain, CHUNKS / CHUNK_RATE)]
+    locked = stacks.with_broker("mosquitto", device)
+    swing(locked, WARM_UP)
+    took = [ack.round_trip * 1e3 for ack in collect(locked, CHUNKS / CHUNK_RATE)]
+    reference = {"plain median": statistics.median(without), "plain p99": quantile(without, 0.99)}
+    note = (
+        f"mosquitto with TLS, users and an ACL: {len(took)} chunks at {CHUNK_RATE:g} Hz, after {len(without)} without; "
+        f"goal: {TLS_FACTOR:g} x the plain p99"
+    )
+    return of_samples(took, Goal(p99=TLS_FACTOR * quantile(without, 0.99)), reference, note)
 
 
 def chunk_bytes(running: Running) -> int:

@@ -70,6 +70,7 @@ FIGURES = {
     "program_legs": Row("program_legs:program_legs", "ms", True),
     "stop_ms": Row("stops:stop_ms", "ms", True),
     "chunk_ack_ms": Row("latency:chunk_ack_ms", "ms", True, "mosquitto"),
+    "chunk_ack_tls_ms": Row("latency:chunk_ack_tls_ms", "ms", True),
     "chunk_ack_ms_amqtt": Row("latency:chunk_ack_ms", "ms", True, "amqtt"),
     "panel_cpu_percent": Row("panel:panel_cpu_percent", "% of one core", True),
     "panel_lag_ms": Row("panel:panel_lag_ms", "ms", True),

@@ -56,17 +56,19 @@ class Stacks:
         self._running.clear()
         self._open.close()
 
-    def with_broker(self, broker: str) -> Running:
+    def with_broker(self, broker: str, locked_for: str = "") -> Running:
         """The stack with this MQTT broker; stops any other, because two would disturb each other.
 
-        Raises NotMeasured if mosquitto is asked for and not installed.
+        With TLS, users and an ACL where `locked_for` names its device. Raises NotMeasured if mosquitto is asked for and
+        not installed.
         """
         if broker == "mosquitto" and not has_mosquitto():
             raise NotMeasured("mosquitto is not installed: apt-get install mosquitto")
-        if broker not in self._running:
+        key = f"{broker} {locked_for}"
+        if key not in self._running:
             self.stop()
-            self._running[broker] = self._start(broker)
-        return self._running[broker]
+            self._running[key] = self._start(broker, locked_for)
+        return self._running[key]
 
     def any_broker(self) -> Running:
         """The stack that runs, else a new one."""
@@ -74,8 +76,8 @@ class Stacks:
             return running
         return self.with_broker("mosquitto" if has_mosquitto() else "amqtt")
 
-    def _start(self, broker: str) -> Running:
-        stack = self._open.enter_context(Stack(broker=broker, viewer="none"))
+    def _start(self, broker: str, locked_for: str) -> Running:
+        stack = self._open.enter_context(Stack(broker=broker, locked_for=locked_for, viewer="none"))
         deployment = load_deployment(None, stack.environment)
         arm = load_arm(project_root() / deployment.robot)
         node = self._open.enter_context(Node("bench", deployment, robot=arm.name))

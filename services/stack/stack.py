@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
+from services.mqtt import secure_folder
 from services.runtime.deployment import project_root
 from services.stack.compose import Compose, ComposeError
 
@@ -41,6 +42,7 @@ class Stack:
     """Starts on entering, stops on leaving; every process can be looked at and killed by name.
 
     `viewer="none"` leaves the viewer's process out, `panel` adds the operator's page.
+    `locked_for` names the device for which mosquitto gets TLS, users and an ACL; `lock` is their folder then.
     `environment` is added to what the stack gets.
     `command` starts it in another way, for example ("make", "up").
     """
@@ -49,6 +51,7 @@ class Stack:
         self,
         *,
         broker: str = "amqtt",
+        locked_for: str = "",
         viewer: str = "none",
         panel: bool = False,
         out: Path | None = None,
@@ -82,6 +85,10 @@ class Stack:
             "GEMELO_PATHS_OUT": str(self.out),
             **(environment or {}),
         }
+        self.lock = self.folder / "lock"
+        if locked_for:
+            secure_folder.make(self.lock, ["127.0.0.1"], [locked_for])
+            self.deployment["GEMELO_MQTT_SECURE_FOLDER"] = str(self.lock)
 
     @property
     def environment(self) -> dict[str, str]:

@@ -12,6 +12,7 @@ from services.bench.figures import Figure, Goal, NotMeasured, guarded, of_sample
 from services.bench.main import FIGURES, function_of
 
 ISSUE = (
+    "chunk_ack_tls_ms",
     "chunk_ack_ms", "state_to_frame_ms", "move_accept_to_first_step_ms", "frame_lookup_us", "plan_ms",
     "stack_idle_cpu_percent", "stack_rss_mb", "cli_start_ms", "lost_of_45000_at_25hz", "ready_s",
     "tick_instructions", "slot_instructions", "core_text_bytes", "core_ram_bytes",
