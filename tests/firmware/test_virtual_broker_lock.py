@@ -1,0 +1,109 @@
+"""The virtual device against a mosquitto with TLS, users and an ACL: one sentence for each refusal, and no storm."""
+
+from __future__ import annotations
+
+import queue
+import time
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from firmware.platform.host.flash import Credentials
+from firmware.platform.host.link import Connected, Denied, DeviceLink, Disconnected, Item
+from firmware.platform.host.network import broker_address
+from services.mqtt import secure_folder
+from services.mqtt.access import BrokerAccess, device_access
+from services.mqtt.certificates import Authority
+from tests.stepper_gateway.locked import Mosquitto, locked, renew
+
+WATCHED = 2.5  # [s] attempts at 0, 1 and 3 s
+
+
+def joined(broker: BrokerAccess, seconds: float) -> list[Item]:
+    """What a device hears of its broker until it is in, or for so long."""
+    inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
+    link = DeviceLink(broker, "rm1", b"gone", inbox)
+    link.start()
+    heard: list[Item] = []
+    end = time.monotonic() + seconds
+    while time.monotonic() < end and not any(isinstance(item, Connected) for item in heard):
+        try:
+            heard.append(inbox.get(timeout=max(0.0, end - time.monotonic())))
+        except queue.Empty:
+            break
+    link.break_off()
+    return heard
+
+
+@pytest.fixture(scope="module")
+def section(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("broker")
+    section = locked(folder / "lock")
+    with closing(Mosquitto(folder, section)):
+        yield section
+
+
+def told(section, **changes):
+    """The broker as a board is told of it."""
+    folder = Path(section.secure_folder)
+    credentials = Credentials(
+        device="rm1",
+        mqtt_uri=f"mqtts://127.0.0.1:{section.port}",
+        mqtt_user="rm1",
+        mqtt_password=secure_folder.password_of(folder, "rm1"),
+        mqtt_ca=(folder / "ca.pem").read_text(),
+    )
+    return broker_address(replace(credentials, **changes), BrokerAccess("127.0.0.1", 1))
+
+
+def test_a_provisioned_board_joins(section):
+    assert isinstance(joined(told(section), 10.0)[-1], Connected)
+
+
+def test_each_refusal_is_the_same_sentence_again_and_again_at_growing_pauses(section, tmp_path):
+    Authority(tmp_path / "other.pem", tmp_path / "other.key")
+    uri = f"mqtts://localhost:{section.port}"
+    cases = [
+        (told(section, mqtt_password="wrong"), 'refuses user "rm1"'),
+        (told(section, mqtt_ca=(tmp_path / "other.pem").read_text()), "is not signed by the authority in"),
+    ]
+    for broker, sentence in cases:
+        heard = joined(broker, WATCHED)
+        assert heard
+        assert {type(item) for item in heard} == {Disconnected}
+        assert len(heard) <= 3
+        assert all(isinstance(item, Disconnected) and sentence in item.reason for item in heard)
+    plain = joined(told(section, mqtt_uri=uri.replace("mqtts", "mqtt").replace("localhost", "127.0.0.1")), 1.0)
+    assert isinstance(plain[0], Disconnected)
+    assert "does that port want TLS" in plain[0].reason
+
+
+def test_a_name_that_the_certificate_lacks_and_one_that_has_expired_are_said(tmp_path):
+    section = locked(tmp_path / "lock")
+    renew(section, "broker.lan")
+    with closing(Mosquitto(tmp_path, section)):
+        (first, *_) = joined(told(section), 1.0)
+    renew(section, "127.0.0.1", days=-1)
+    with closing(Mosquitto(tmp_path, section)):
+        (second, *_) = joined(told(section), 1.0)
+    assert isinstance(first, Disconnected)
+    assert 'is for another name than "127.0.0.1"' in first.reason
+    assert isinstance(second, Disconnected)
+    assert "has expired" in second.reason
+
+
+def test_what_the_acl_denies_is_said_with_its_topic(section):
+    inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
+    link = DeviceLink(device_access(section, "rm1"), "other", b"gone", inbox)
+    link.start()
+    try:
+        said = inbox.get(timeout=10.0)
+        if isinstance(said, Connected):
+            link.publish("state", b"x")
+            said = inbox.get(timeout=10.0)
+    finally:
+        link.break_off()
+    assert isinstance(said, (Denied, Disconnected))
+    assert 'user "rm1"' in said.reason
