@@ -14,10 +14,9 @@ class SlowPins {
 
   private:
     void let_go();
-    void hand_over(uint8_t pin);
 
     const DeviceConfig* config_ = nullptr;
-    uint64_t taken_ = 0;  // bit i: GPIO i is set up
+    uint64_t taken_ = 0;  // bit i: GPIO i is set up as an input or an output
     uint16_t outputs_ = 0;
     bool is_enabled_ = false;
 };

@@ -60,6 +60,15 @@ bool uses_button_pin(const DeviceConfig& config) {
     return false;
 }
 
+// A pin that a configuration has let go is no input: it would read low, which is pressed.
+void set_up_button() {
+    gpio_config_t button = {};
+    button.pin_bit_mask = pin(kThisChip.boot_button);
+    button.mode = GPIO_MODE_INPUT;
+    button.pull_up_en = GPIO_PULLUP_ENABLE;
+    ESP_ERROR_CHECK(gpio_config(&button));
+}
+
 void run(void*) {
     voltmeter.begin();
     echo.begin(xTaskGetCurrentTaskHandle());
@@ -79,20 +88,15 @@ void run(void*) {
 
 }  // namespace
 
-void start_sensors() {
-    gpio_config_t button = {};
-    button.pin_bit_mask = pin(kThisChip.boot_button);
-    button.mode = GPIO_MODE_INPUT;
-    button.pull_up_en = GPIO_PULLUP_ENABLE;
-    ESP_ERROR_CHECK(gpio_config(&button));
-    start_task(run, "sensors", kSensorStack, kSensorPriority, kNetworkCore);
-}
+void start_sensors() { start_task(run, "sensors", kSensorStack, kSensorPriority, kNetworkCore); }
 
 void set_sensors(const DeviceConfig& config) {
     __atomic_store_n(&jobs.count, uint8_t{0}, __ATOMIC_RELEASE);
     for (uint8_t i = 0; i < config.sensors; ++i)
         jobs.job[i] = Job{config.sensor[i].kind, config.sensor[i].pin, config.sensor[i].trigger_pin};
-    __atomic_store_n(&jobs.has_button, !uses_button_pin(config), __ATOMIC_RELEASE);
+    const bool has_button = !uses_button_pin(config);
+    if (has_button) set_up_button();
+    __atomic_store_n(&jobs.has_button, has_button, __ATOMIC_RELEASE);
     __atomic_store_n(&jobs.round_ms, config.sensor_hz == 0 ? 1000 : 1000 / config.sensor_hz, __ATOMIC_RELAXED);
     __atomic_store_n(&jobs.count, config.joints == 0 ? uint8_t{0} : config.sensors, __ATOMIC_RELEASE);
 }

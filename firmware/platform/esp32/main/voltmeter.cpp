@@ -19,7 +19,7 @@ void Voltmeter::begin() {
 
 bool Voltmeter::measure(uint8_t pin, int32_t* millivolts) {
     adc_channel_t channel;
-    if (!find(pin, &channel)) return false;
+    if (!set_up(pin, &channel)) return false;
     int32_t sum = 0;
     for (int i = 0; i < kReadings; ++i) {
         int raw = 0, voltage = 0;
@@ -31,16 +31,16 @@ bool Voltmeter::measure(uint8_t pin, int32_t* millivolts) {
     return true;
 }
 
-bool Voltmeter::find(uint8_t pin, adc_channel_t* channel) {
+// Each time anew: a configuration may have used the pin for something else since the last measurement.
+bool Voltmeter::set_up(uint8_t pin, adc_channel_t* channel) {
     adc_unit_t unit;
     if (adc_oneshot_io_to_channel(pin, &unit, channel) != ESP_OK || unit != ADC_UNIT_1) return false;
     if (*channel >= kChannels) return false;
-    if (calibration_[*channel] != nullptr) return true;
     adc_oneshot_chan_cfg_t config = {};
     config.atten = kAttenuation;
     config.bitwidth = ADC_BITWIDTH_DEFAULT;
     if (adc_oneshot_config_channel(unit_, *channel, &config) != ESP_OK) return false;
-    return calibrate(*channel, &calibration_[*channel]);
+    return calibration_[*channel] != nullptr || calibrate(*channel, &calibration_[*channel]);
 }
 
 bool Voltmeter::calibrate([[maybe_unused]] adc_channel_t channel, adc_cali_handle_t* calibration) {

@@ -15,7 +15,7 @@ class Voltmeter {
     bool measure(uint8_t pin, int32_t* millivolts);
 
   private:
-    bool find(uint8_t pin, adc_channel_t* channel);
+    bool set_up(uint8_t pin, adc_channel_t* channel);
     bool calibrate(adc_channel_t channel, adc_cali_handle_t* calibration);
 
     static constexpr uint8_t kChannels = 10;

@@ -200,19 +200,27 @@ esp_err_t gptimer_stop(gptimer_handle_t) {
     return ESP_OK;
 }
 
+static void gpio_reset_all(uint64_t pins) {
+    chip.is_output &= ~pins;
+    chip.is_input &= ~pins;
+    chip.is_analog &= ~pins;
+}
 esp_err_t gpio_config(const gpio_config_t* config) {
+    gpio_reset_all(config->pin_bit_mask);
     if (config->mode == GPIO_MODE_OUTPUT) chip.is_output |= config->pin_bit_mask;
+    if (config->mode == GPIO_MODE_INPUT) chip.is_input |= config->pin_bit_mask;
     return ESP_OK;
 }
+// As ESP-IDF's: no input, no output, a pull-up, and no longer at the ADC.
 esp_err_t gpio_reset_pin(gpio_num_t pin) {
-    chip.is_output &= ~(1ull << pin);
+    gpio_reset_all(1ull << pin);
     return ESP_OK;
 }
 esp_err_t gpio_set_level(gpio_num_t pin, uint32_t level) {
     chip.outputs = (chip.outputs & ~(1ull << pin)) | static_cast<uint64_t>(level) << pin;
     return ESP_OK;
 }
-int gpio_get_level(gpio_num_t pin) { return static_cast<int>(chip.inputs >> pin & 1); }
+int gpio_get_level(gpio_num_t pin) { return static_cast<int>((chip.inputs & chip.is_input) >> pin & 1); }
 esp_err_t gpio_set_intr_type(gpio_num_t, gpio_int_type_t) { return ESP_OK; }
 esp_err_t gpio_install_isr_service(int) { return ESP_OK; }
 esp_err_t gpio_isr_handler_add(gpio_num_t, gpio_isr_t, void*) { return ESP_OK; }
@@ -287,13 +295,30 @@ void esp_transport_ssl_crt_bundle_attach(esp_transport_handle_t, esp_err_t (*)(v
 esp_err_t esp_crt_bundle_attach(void*) { return ESP_OK; }
 
 esp_err_t adc_oneshot_new_unit(const adc_oneshot_unit_init_cfg_t*, adc_oneshot_unit_handle_t*) { return ESP_OK; }
-esp_err_t adc_oneshot_config_channel(adc_oneshot_unit_handle_t, adc_channel_t, const adc_oneshot_chan_cfg_t*) {
+// ADC1 of the ESP32: GPIO 36 to 39 are its channels 0 to 3, 32 to 35 the channels 4 to 7.
+static int adc_pin(adc_channel_t channel) { return channel < 4 ? 36 + channel : 28 + channel; }
+esp_err_t adc_oneshot_config_channel(adc_oneshot_unit_handle_t, adc_channel_t channel, const adc_oneshot_chan_cfg_t*) {
+    gpio_reset_all(1ull << adc_pin(channel));
+    chip.is_analog |= 1ull << adc_pin(channel);
     return ESP_OK;
 }
-esp_err_t adc_oneshot_read(adc_oneshot_unit_handle_t, adc_channel_t, int*) { return ESP_OK; }
-esp_err_t adc_oneshot_io_to_channel(int, adc_unit_t* const, adc_channel_t* const) { return ESP_ERR_NO_MEM; }
-esp_err_t adc_cali_raw_to_voltage(adc_cali_handle_t, int, int*) { return ESP_OK; }
-esp_err_t adc_cali_create_scheme_line_fitting(const adc_cali_line_fitting_config_t*, adc_cali_handle_t*) {
+esp_err_t adc_oneshot_read(adc_oneshot_unit_handle_t, adc_channel_t channel, int* raw) {
+    *raw = (chip.is_analog >> adc_pin(channel) & 1) != 0 ? fake::kAnalogMv : fake::kPulledUpMv;
+    return ESP_OK;
+}
+esp_err_t adc_oneshot_io_to_channel(int pin, adc_unit_t* const unit, adc_channel_t* const channel) {
+    if (pin < 32 || pin > 39) return ESP_ERR_NO_MEM;
+    *unit = ADC_UNIT_1;
+    *channel = static_cast<adc_channel_t>(pin < 36 ? pin - 28 : pin - 36);
+    return ESP_OK;
+}
+esp_err_t adc_cali_raw_to_voltage(adc_cali_handle_t, int raw, int* voltage) {
+    *voltage = raw;
+    return ESP_OK;
+}
+esp_err_t adc_cali_create_scheme_line_fitting(const adc_cali_line_fitting_config_t*, adc_cali_handle_t* handle) {
+    static int scheme;
+    *handle = reinterpret_cast<adc_cali_handle_t>(&scheme);
     return ESP_OK;
 }
 

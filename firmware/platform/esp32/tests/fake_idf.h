@@ -20,12 +20,16 @@ namespace fake {
 struct Restarted {};  // thrown by esp_restart()
 struct Ended {};      // thrown where the task would wait for ever
 
+constexpr int kAnalogMv = 1500, kPulledUpMv = 3100;  // [mV] what a pin at the ADC reads, and one that was let go
+
 struct Chip {
     uint64_t now_us = 0;
     uint64_t waking_us = 0;       // from the interrupt that wakes the task until it runs
     uint64_t inputs = 0;          // levels, bit i: GPIO i
     uint64_t outputs = 0;         // levels
     uint64_t is_output = 0;       // bit i: GPIO i is set up as an output
+    uint64_t is_input = 0;        // its level can be read; a pin that was let go reads low
+    uint64_t is_analog = 0;       // it is at the ADC and has no pull resistor
     std::map<int, uint32_t> ups;  // rising edges of each output that the tick drives
     esp_reset_reason_t reset_reason = ESP_RST_POWERON;
     std::map<std::string, std::string> nvs;
