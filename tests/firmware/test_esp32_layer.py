@@ -5,12 +5,15 @@ from __future__ import annotations
 import configparser
 import re
 import subprocess
+import sys
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 from machine_code import Function, functions, reached
 
+from firmware.platform.esp32.check_linked import INSIDE, IRAM
+from firmware.platform.esp32.check_linked import functions as functions_in
 from tests.optional import need
 
 ROOT = Path(__file__).parents[2]
@@ -39,10 +42,11 @@ def objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def interrupt_code(objects: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Function]:
+def interrupt_code(objects: Path) -> dict[str, Function]:
     """The layer's interrupt and what of the core is mapped into IRAM, for the C3, as ESP-IDF would compile it."""
     need("riscv")
-    folder = tmp_path_factory.mktemp("core")
+    folder = objects / "core"
+    folder.mkdir()
     mapped = []
     for name in _mapped(LAYER / "gemelo_core/linker.lf"):
         mapped.append(folder / f"{name}.o")
@@ -89,6 +93,37 @@ def test_objects_with_interrupt_code_are_mapped_out_of_the_flash() -> None:
     assert _mapped(LAYER / "main/linker.lf") == ["tick"]
     settings = (LAYER / "sdkconfig.defaults").read_text()
     assert "CONFIG_GPTIMER_ISR_IRAM_SAFE=y" in settings
+
+
+@pytest.mark.parametrize(("place", "message"), [(0x4038_0000, ""), (0x4200_0000, "not in the IRAM of esp32c3")])
+def test_what_was_linked_is_looked_at(
+    objects: Path, interrupt_code: dict[str, Function], tmp_path: Path, place: int, message: str
+) -> None:
+    """The layer's tick and the core's two objects, linked for the C3 into its IRAM, or into its flash."""
+    core = [objects / "core" / f"{name}.o" for name in _mapped(LAYER / "gemelo_core/linker.lf")]
+    elf = tmp_path / "firmware.elf"
+    link = ["riscv64-unknown-elf-ld", "-m", "elf32lriscv", "--unresolved-symbols=ignore-all", "--no-relax", "-e", "0"]
+    link.append(f"--section-start={interrupt_code[INTERRUPT].section}=0x40390000")
+    parts = [objects / "esp32c3/tick.o", *core]
+    subprocess.run([*link, f"-Ttext={place:#x}", "-o", elf, *parts], check=True, capture_output=True)
+    command = [sys.executable, LAYER / "check_linked.py", "esp32c3", elf]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == (1 if message else 0), done.stderr
+    assert message in done.stderr
+    inside, _ = reached(interrupt_code, INTERRUPT)
+    named = functions_in(elf.read_bytes())
+    assert all(name in named and any(part in name for part in INSIDE) for name in inside), inside
+
+
+def test_every_chip_is_built_for_the_smallest_flash_and_its_link_is_looked_at() -> None:
+    settings = configparser.ConfigParser(inline_comment_prefixes=(";",))
+    settings.read(FIRMWARE / "platformio.ini")
+    assert settings["env:esp32s3"]["board_upload.flash_size"] == "4MB"  # the board named there has 8
+    assert "CONFIG_ESPTOOLPY_FLASHSIZE_4MB=y" in (LAYER / "sdkconfig.defaults").read_text()
+    kind, _, script = settings["env"]["extra_scripts"].partition(":")
+    assert kind == "post"
+    assert FIRMWARE / script == LAYER / "check_linked.py"
+    assert set(IRAM) == set(CHIPS)
 
 
 def test_tasks_share_no_lock_and_allocate_nothing() -> None:

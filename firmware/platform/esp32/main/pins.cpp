@@ -38,7 +38,7 @@ void SlowPins::set_up(const DeviceConfig& config) {
     put(config.enable_pin, false, config.is_enable_inverted != 0);
     for (uint8_t i = 0; i < config.outputs; ++i) put(config.output[i].pin, false, config.output[i].is_inverted != 0);
     for (const PinUse& use : uses) {
-        // Letting an analog pin go would give it a pull-up: it is the ADC's, which sets it up anew for each measurement.
+        // Let go, an analog pin would get a pull-up: it is the ADC's, which sets it up for each measurement.
         if (use.use != Use::Analog) taken_ |= pin(use.pin);
         if (use.use == Use::Output) configure(use.pin, GPIO_MODE_OUTPUT, Pull::None);
         if (use.use == Use::Input) configure(use.pin, GPIO_MODE_INPUT, use.pull);

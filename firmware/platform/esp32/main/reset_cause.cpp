@@ -10,8 +10,6 @@ ResetCause reset_cause() {
             return {"power_on", false};
         case ESP_RST_BROWNOUT:
             return {"brownout", false};
-        case ESP_RST_EXT:
-            return {"reset_pin", true};
         case ESP_RST_SW:
             return {"restart", true};
         case ESP_RST_PANIC:

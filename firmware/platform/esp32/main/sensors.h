@@ -7,7 +7,8 @@ namespace gemelo {
 
 void start_sensors();
 
-// From the slot's task, after the pins are set up: measure what `config` says from now on. Kept, not copied; without joints nothing is measured.
+// From the slot's task, after the pins are set up: measure what `config` says from now on. Without joints nothing is
+// measured.
 void set_sensors(const DeviceConfig& config);
 
 }  // namespace gemelo

@@ -4,7 +4,7 @@
 #include "esp_transport.h"
 #include "provision.h"
 
-// In ESP-IDF's library and used across its components, but declared in a private header only (5.0 to 5.5).
+// In ESP-IDF's library and used across its components, but declared in a private header only up to 5.4.
 extern "C" int esp_transport_get_socket(esp_transport_handle_t t);
 
 namespace gemelo {
