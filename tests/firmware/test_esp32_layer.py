@@ -186,7 +186,8 @@ def test_every_stand_in_declares_only_what_the_layer_uses() -> None:
 def test_platformio_builds_the_three_chips_from_what_is_there() -> None:
     settings = configparser.ConfigParser()
     settings.read(FIRMWARE / "platformio.ini")
-    assert {f"env:{chip}" for chip in CHIPS} == {section for section in settings if section.startswith("env:")}
+    envs = {f"env:{chip}{kind}" for chip in CHIPS for kind in ("", "-debug")}
+    assert envs == {section for section in settings if section.startswith("env:")}
     assert re.fullmatch(r"espressif32@\d+\.\d+\.\d+", settings["env"]["platform"])
     assert settings["env"]["framework"] == "espidf"
     assert (FIRMWARE / settings["platformio"]["src_dir"] / "CMakeLists.txt").exists()
@@ -194,6 +195,21 @@ def test_platformio_builds_the_three_chips_from_what_is_there() -> None:
     project = (FIRMWARE / "CMakeLists.txt").read_text()
     for named in re.findall(r"\$\{CMAKE_CURRENT_LIST_DIR\}/(platform/esp32/\S+?)\)", project):
         assert (FIRMWARE / named).exists(), named
+
+
+@pytest.mark.parametrize("chip", CHIPS)
+def test_a_debug_build_speaks_on_a_console_that_is_not_the_serial_wire(chip: str) -> None:
+    silent = (LAYER / "sdkconfig.defaults").read_text()
+    speaks = (LAYER / "sdkconfig.debug").read_text() + (LAYER / f"sdkconfig.debug.{chip}").read_text()
+    for off in re.findall(r"^(CONFIG_\w+)=n$", speaks, re.MULTILINE):
+        assert f"{off}=y" in silent, "what is switched off there was on"
+    consoles = {"esp32": "CONFIG_ESP_CONSOLE_UART_CUSTOM_NUM_1=y"}
+    assert consoles.get(chip, "CONFIG_ESP_CONSOLE_USB_SERIAL_JTAG=y") in speaks
+    assert "CUSTOM_NUM_0" not in speaks
+    assert "UART_DEFAULT" not in speaks
+    project = (FIRMWARE / "CMakeLists.txt").read_text()
+    assert "platform/esp32/sdkconfig.debug" in project
+    assert "-DGEMELO_DEBUG=1" in (FIRMWARE / "platformio.ini").read_text()
 
 
 def test_the_partitions_do_not_overlap_and_fit_the_flash() -> None:

@@ -3,12 +3,16 @@
 #include "bootloader_random.h"
 #include "device.h"
 #include "esp_err.h"
+#include "esp_log.h"
 #include "esp_random.h"
 #include "esp_task_wdt.h"
 #include "network.h"
+#include "report.h"
+#include "reset_cause.h"
 #include "sensors.h"
 #include "store.h"
 #include "tasks.h"
+#include "this_chip.h"
 #include "wire.h"
 
 namespace gemelo {
@@ -38,11 +42,18 @@ void start_watchdog() {
     ESP_ERROR_CHECK(esp_task_wdt_reconfigure(&config));
 }
 
+// On the console of the debug builds; the others have none, and compile this to nothing.
+void say_hello() {
+    ESP_LOGI("gemelo", "firmware %s for %s, reset cause %s, device \"%s\", %s", kFirmwareVersion, kThisChip.name,
+             reset_cause().text, credentials.device, credentials.wifi_ssid[0] != 0 ? "Wi-Fi" : "cable only");
+}
+
 void run_device(void*) { device.run(); }
 
 void start() {
     open_store();
     load_credentials(&credentials);
+    say_hello();
     start_watchdog();
     const uint32_t boot_id = random_boot_id();
     device.begin(credentials, boot_id);
