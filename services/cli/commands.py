@@ -52,6 +52,8 @@ COMMANDS = (
     Command(("device", "arm"), "energise the drivers", "device:run", example="gemelo device arm"),
     Command(("device", "disarm"), "take the current from the motors; every joint is unreferenced then",
             "device:run", example="gemelo device disarm"),
+    Command(("device", "doctor"), "listen to what a board says on its serial line: the likely cause and the remedy",
+            "board_doctor:run", "board_doctor:add_options", "gemelo device doctor --serial /dev/ttyUSB0"),
     Command(("device", "press"), "press a virtual device's buttons, push its shafts, break its network",
             "device_press:run", "device_press:add_options", "gemelo device press slip brazo_joint 100",
             "device_press:choices"),

@@ -1,0 +1,99 @@
+"""What a board says as it starts, and what is then said of it; at a pseudo-terminal where a line is needed."""
+
+from __future__ import annotations
+
+import os
+import threading
+import tty
+
+import msgspec
+import pytest
+
+from services.cli import board_doctor
+from services.cli.board_doctor import Heard, diagnose
+from services.cli.errors import ExitCode
+from services.cli.main import run
+from services.runtime.serial_frames import JsonFrame, json_frame, packet
+
+ROM = b"ets Jul 29 2019 12:21:46\r\n\r\nrst:0x1 (POWERON_RESET),boot:0x13 (SPI_FAST_FLASH_BOOT)\r\n"
+SAID = {
+    "no firmware": (ROM + b"invalid header: 0xffffffff\r\n" * 9, "there is no firmware in its flash"),
+    "an empty ESP32 of old": (ROM + b"flash read err, 1000\r\nets_main.c 371\r\n", "there is no firmware in its flash"),
+    "small flash": (
+        ROM + b"E (36) spi_flash: Detected size(4096k) smaller than the size in the binary image header(8192k).\r\n",
+        "its flash is smaller than the firmware was built for",
+    ),
+    "held for flashing": (
+        b"ESP-ROM:esp32s3-20210327\r\nrst:0x1 (POWERON),boot:0x0 (DOWNLOAD(USB/UART0))\r\nwaiting for download\r\n",
+        "BOOT was held low while it started",
+    ),
+    "damaged": (ROM + b"E (71) esp_image: Checksum failed. Calculated 0x1 read 0x2\r\n", "holds damaged firmware"),
+    "weak supply": (ROM + b"Brownout detector was triggered\r\n", "its 3.3 V break down"),
+    "crash": (ROM + b"Guru Meditation Error: Core 0 panic'ed (LoadProhibited).\r\n", "stops with an error"),
+    "boot loop": (ROM * 5, "it starts again and again, 5 times in 3 s"),
+    "silent firmware": (ROM + b"load:0x3fff0030,len:4\r\n", "its boot loader runs, gemelo's firmware does not answer"),
+    "another firmware": (b"connecting to wifi ...\r\n" * 3, "another firmware speaks there"),
+    "wrong rate": (bytes(range(128, 256)), "what it says is no text at 921600, 115200 baud"),
+    "held in reset": (b"", "it says nothing"),
+    "noise of a plug": (b"\x00\xff", "it says nothing"),
+}
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_the_cause_is_told_from_what_is_heard(name):
+    data, cause = SAID[name]
+    at_wrong_rate = bytes(byte | 128 for byte in data)  # text is not read as text there
+    finding = diagnose([Heard(921_600, at_wrong_rate[:400], False), Heard(115_200, data, False)])
+    assert cause in finding.cause
+    assert finding.remedy
+    assert not finding.is_well
+
+
+def test_a_board_that_is_well_is_said_to_be():
+    assert diagnose([Heard(921_600, b"", True)]).is_well
+
+
+@pytest.fixture
+def port(request):
+    """A line whose other end says `request.param` when it is asked for the first time."""
+    master, slave = os.openpty()
+    tty.setraw(slave)
+
+    def answer():
+        os.read(master, 1)
+        os.write(master, request.param)
+
+    board = threading.Thread(target=answer)
+    board.start()
+    yield os.ttyname(slave)
+    board.join(5.0)
+    os.close(slave)
+    os.close(master)
+
+
+STATUS = packet(json_frame(JsonFrame.STATUS, msgspec.json.encode({"online": True, "device": "rm1"})))
+
+
+@pytest.mark.parametrize("port", [ROM + b"invalid header: 0xffffffff\r\n\x1b[31m"], indirect=True)
+def test_a_port_is_listened_to_and_the_lines_are_shown(port, capsys, monkeypatch):
+    monkeypatch.setattr(board_doctor, "LISTENING", 0.6)
+    assert run(["device", "doctor", "--serial", port]) is ExitCode.FAILED
+    said = capsys.readouterr()
+    assert "it says: invalid header: 0xffffffff" in said.out
+    assert "\x1b" not in said.out
+    assert "there is no firmware in its flash: flash it" in said.err
+
+
+@pytest.mark.parametrize("port", [STATUS], indirect=True)
+def test_a_board_that_answers_is_well_at_once(port, capsys):
+    assert run(["device", "doctor", "--serial", port]) is ExitCode.OK
+    said = capsys.readouterr().out
+    assert "gemelo's firmware runs and answers" in said
+    assert "115200" not in said
+
+
+def test_a_port_that_is_not_there_or_not_allowed_is_named(capsys, tmp_path):
+    assert run(["device", "doctor", "--serial", str(tmp_path / "tty")]) is ExitCode.FAILED
+    said = capsys.readouterr().err
+    assert "cannot open" in said
+    assert "group dialout" in said
