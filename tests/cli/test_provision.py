@@ -136,6 +136,8 @@ def test_a_password_comes_from_the_environment_a_terminal_or_a_pipe(monkeypatch)
             return True
 
     assert password("password", "SECRET", {"SECRET": ""}) == ""
+    assert password("password", "SECRET", {"SECRET": "of the gateway", "OWN": "own"}, "OWN") == "own"
+    assert password("password", "SECRET", {"SECRET": "of both"}, "OWN") == "of both"
     monkeypatch.setattr("sys.stdin", io.StringIO("first\nsecond\n"))
     assert [password("password", "SECRET", {}) for _ in range(2)] == ["first", "second"]
     with pytest.raises(CommandError, match=r"\$SECRET"):
