@@ -13,7 +13,7 @@ from pathlib import Path
 
 import msgspec
 
-from schemas.deployment import Deployment, Wire
+from schemas.deployment import Deployment, MqttSection, Wire
 from schemas.device import DeviceState, DeviceStatus
 from schemas.device_faults import fault_text
 from schemas.errors import ConfigurationError
@@ -25,9 +25,11 @@ from services.cli.parser import Options
 from services.cli.session import Session, connect
 from services.cli.text_table import table
 from services.cli.version import version_text
+from services.mqtt.access import AccessError, gateway_access
 from services.runtime.deployment import load_deployment, project_root
 
 UP = "start the twin with `make up`"
+BROKER_PAGE = "docs/my_broker.md has every such sentence with what to do"
 # Tuning constants: chosen.
 LEAST_DISK = 1e9  # [bytes] free: an hour of recordings
 LEAST_MEMORY = 5e8  # [bytes] free: what the stack needs itself
@@ -82,7 +84,7 @@ def diagnoses() -> Iterator[Diagnosis]:
     if deployment.wire is Wire.SERIAL:
         yield serial_port(deployment.serial.device)
     else:
-        yield _listener("broker", deployment.mqtt.host, deployment.mqtt.port)
+        yield broker(deployment.mqtt)
     router = _listener("router", deployment.router.host, deployment.router.port)
     yield router
     if router.verdict is Verdict.OK:
@@ -146,6 +148,21 @@ def _listener(name: str, host: str, port: int) -> Diagnosis:
         found = f"nobody listens at {host}:{port} ({error.strerror or error})"
         return Diagnosis(Verdict.ERROR, name, found, "start the twin with `make up`")
     return Diagnosis(Verdict.OK, name, f"listens at {host}:{port}")
+
+
+def broker(section: MqttSection) -> Diagnosis:
+    """Of the broker: whether it is there, and lets the gateway in."""
+    from services.mqtt.check import problem  # 50 ms
+
+    try:
+        access = gateway_access(section)
+    except AccessError as error:
+        return Diagnosis(Verdict.ERROR, "broker", str(error), BROKER_PAGE)
+    listening = _listener("broker", section.host, section.port)
+    if listening.verdict is Verdict.ERROR and access.is_ours:
+        return listening
+    said = problem(access)
+    return Diagnosis(Verdict.ERROR, "broker", said, BROKER_PAGE) if said else listening
 
 
 def _twin() -> Iterator[Diagnosis]:

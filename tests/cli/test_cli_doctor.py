@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from schemas.device import DeviceState, DeviceStatus
 from services.cli import doctor
 from services.cli.errors import ExitCode
 from services.cli.main import run
+from services.mqtt import secure_folder
+from tests.stepper_gateway.locked import Mosquitto, external, locked
 
 
 @pytest.fixture
@@ -51,6 +54,20 @@ def test_the_doctor_without_a_twin_says_what_would_do(monkeypatch, capsys):
 def test_the_doctor_names_what_is_wrong_with_its_remedy(diagnosis, verdict, words):
     assert diagnosis.verdict == verdict
     assert words in f"{diagnosis.found} {diagnosis.remedy}"
+
+
+def test_the_doctor_says_why_a_broker_does_not_let_the_gateway_in(tmp_path: Path):
+    section = locked(tmp_path / "lock")
+    with closing(Mosquitto(tmp_path, section)):
+        assert doctor.broker(section).verdict is doctor.Verdict.OK
+        secure_folder.write(tmp_path / "lock" / "gateway.password", "wrong\n")
+        refused = doctor.broker(section)
+        assert refused.verdict is doctor.Verdict.ERROR
+        assert 'refuses user "gateway"' in refused.found
+        (tmp_path / "lock" / "gateway.password").chmod(0o644)
+        assert "chmod 600" in doctor.broker(section).found
+    away = doctor.broker(external(locked(tmp_path / "other")))
+    assert "are its address and port right" in away.found
 
 
 def test_the_doctor_says_that_a_folder_cannot_be_written(monkeypatch, tmp_path: Path, capsys):
