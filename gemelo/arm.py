@@ -31,7 +31,7 @@ from schemas.deployment import Deployment
 from schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
 from schemas.joints import JointState
 from schemas.planning import IkRequest, JogCommand, JogStatus, PlanRequest
-from schemas.topics import JOINT_STATES, SENSORS, STEP_ERRORS
+from schemas.topics import DEVICE_STATUS, JOINT_STATES, SENSORS, STEP_ERRORS
 from services.arm.errors import suggestion
 from services.arm.model.description import Arm as Description
 from services.runtime.node import Node
@@ -154,7 +154,7 @@ class Arm:
 
     @property
     def joints(self) -> dict[str, float]:
-        """[rad] or [m] by joint: what the device has executed, at most 0.1 s old.
+        """[rad] or [m] by joint: what the device has executed, or was sent if it does not say; at most 0.1 s old.
 
         >>> arm.move(joints={"brazo_joint": 0.3}) and round(arm.joints["brazo_joint"], 2)
         0.3
@@ -208,9 +208,13 @@ class Arm:
     def step_errors(self) -> dict[str, float]:
         """[steps] by joint: what the path asks for minus what the device has emitted, at the same instant.
 
+        Empty for a board that does not say what it has executed.
+
         >>> all(abs(error) <= 0.5 for error in arm.step_errors.values())
         True
         """
+        if self._session.newest(DEVICE_STATUS).open_loop:  # nobody knows them
+            return {}
         errors = self._session.newest(STEP_ERRORS)
         return dict(zip(errors.name, errors.error, strict=True))
 

@@ -107,7 +107,8 @@ class Motion:
 
     @property
     def stopped_at(self) -> dict[str, float]:
-        """[rad] or [m] by joint, where it ended, from the steps that were read back; empty before its end.
+        """[rad] or [m] by joint, where it ended, from the steps that were read back; empty before its end,
+        and where the board does not say what it has executed.
 
         >>> abs(arm.move(joints={"brazo_joint": 0.2}).stopped_at["brazo_joint"] - 0.2) < 0.001
         True
@@ -238,6 +239,8 @@ class Motion:
         if self._outcome is None:
             return f"{about}, {self.progress:.0%}>"
         result = self._outcome.result
+        if not result.verified:
+            return f"{about} in {result.duration:.2f} s, {result.error_string}>"
         errors = ", ".join(
             f"{name} {error:+.2f}" for name, error in zip(result.joint_names, result.final_error, strict=False)
         )

@@ -49,6 +49,7 @@ class DeviceStatus(Message, frozen=True, kw_only=True):
     config_crc32: int = 0  # of the configuration that the device works with; 0: none yet
     wanted_crc32: int = 0  # of the one that robot.toml asks for
     virtual: bool = False  # inputs and failures can be injected
+    open_loop: bool = False  # it does not say what it has executed: its positions are what was sent
 
 
 class DeviceState(Message, frozen=True, kw_only=True):

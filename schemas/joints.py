@@ -13,6 +13,7 @@ class JointState(Message, frozen=True, kw_only=True):
     position: Vector = ()  # [rad] or [m]
     velocity: Vector = ()  # [rad/s] or [m/s]
     effort: Vector = ()  # [N m] or [N]; empty: steppers do not measure it
+    commanded: bool = False  # true: what was sent, of a device that does not say what it has executed
 
 
 class JointTargets(Message, frozen=True, kw_only=True):

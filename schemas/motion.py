@@ -79,7 +79,7 @@ class FollowErrorCode(IntEnum):
 
 
 class FollowJointTrajectoryResult(Message, frozen=True, kw_only=True):
-    """The result of an execution; success means that the executed steps were read back."""
+    """The result of an execution; success means that the executed steps were read back, unless it is not verified."""
 
     error_code: FollowErrorCode = FollowErrorCode.SUCCESSFUL
     error_string: str = ""
@@ -89,3 +89,4 @@ class FollowJointTrajectoryResult(Message, frozen=True, kw_only=True):
     max_following_error: Vector = ()  # [steps] largest |commanded - executed| on the way
     final_error: Vector = ()  # [steps] goal - executed at the end; commanded - executed where another goal followed
     duration: float = 0.0  # [s] from acceptance to result
+    verified: bool = True  # false: all was sent, and what was executed is not known; the executed steps are empty then

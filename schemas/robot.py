@@ -91,6 +91,14 @@ class Homing(RobotRecord, frozen=True, kw_only=True):
     timeout: Positive = 60.0  # [s] of the joint's whole homing
 
 
+class Sketch(RobotRecord, frozen=True, kw_only=True):
+    """What an AccelStepper sketch does with a joint, where it is not what the motor's own table says."""
+
+    steps_per_turn: str = ""  # exact: by which the sketch turns degrees into steps; empty: the motor's
+    speed: Positive | None = None  # [steps/s] its setMaxSpeed(); None: by max_speed_rpm
+    acceleration: Positive | None = None  # [steps/s^2] its setAcceleration(); None: by ramp_time
+
+
 class StepperJoint(RobotRecord, frozen=True, kw_only=True):
     """One joint's drive; limits tighter than the URDF's win."""
 
@@ -106,6 +114,7 @@ class StepperJoint(RobotRecord, frozen=True, kw_only=True):
     mechanical_upper: float | None = None  # [rad] or [m]
     reference_position: float = 0.0  # [rad] or [m] of the pose that `gemelo reference` declares
     homing: Homing | None = None
+    sketch: Sketch | None = None  # dialect = "ra"
     path_tolerance_steps: AtLeastHalfAStep = 4.0  # default of FollowJointTrajectory
     goal_tolerance_steps: AtLeastHalfAStep = 0.75
 
@@ -150,6 +159,14 @@ class Sensor(RobotRecord, frozen=True, kw_only=True):
     offset: float = 0.0
 
 
+class Dialect(StrEnum):
+    """What the controller board speaks."""
+
+    GEMELO = "gemelo"  # the frames of firmware/PROTOCOL.md
+    RA = "ra"  # MQTT: relative degrees on ra/juntas, for an AccelStepper sketch
+    TEXT = "text"  # serial: <SEQ,J1,...,Jn> in radians, answered by <ACK,SEQ,TIMESTAMP_US>
+
+
 class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
     """The controller board."""
 
@@ -160,6 +177,10 @@ class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
     armed_at_boot: bool = True  # as it is where no enable pin is wired
     enable_pin: Pin | None = None  # of all drivers
     enable_active: PinLevel = PinLevel.LOW
+    dialect: Dialect = Dialect.GEMELO
+    message_time: Annotated[float, Meta(ge=0.6, le=10.0)] = 2.0  # [s] that one message of dialect "ra" may take
+    telemetry_time: Annotated[float, Meta(ge=0.01, le=2.0)] = 0.1  # [s] between two words of a sketch of dialect "ra"
+    text_hz: Annotated[float, Meta(ge=1.0, le=100.0)] = 25.0  # [Hz] of lines in dialect "text"
 
 
 class RobotFile(RobotRecord, frozen=True, kw_only=True):

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 PATIENCE = 2.0  # [s] for the first messages
 POLL = 0.02  # [s]
 
+OPEN_LOOP = "SENT, NOT VERIFIED: this board does not say what it has executed; the positions are what it was sent"
+
 
 class DeviceView:
     """The newest message of every topic about the device."""

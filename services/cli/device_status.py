@@ -5,7 +5,15 @@ from __future__ import annotations
 import msgspec
 
 from schemas.device import DeviceMode, DeviceState, DeviceStatus
-from services.cli.device_snapshot import DeviceJoint, DeviceSnapshot, DeviceView, Reading, readings, snapshot_of
+from services.cli.device_snapshot import (
+    OPEN_LOOP,
+    DeviceJoint,
+    DeviceSnapshot,
+    DeviceView,
+    Reading,
+    readings,
+    snapshot_of,
+)
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options
 from services.cli.session import Session, connect
@@ -81,6 +89,8 @@ def _who(status: DeviceStatus) -> str:
     name = status.device or "unknown"
     if not status.online:
         return f"{name}: OFFLINE: {status.reason or 'no reason is known'}"
+    if status.open_loop:
+        return f"{name}: online, {status.firmware}; {OPEN_LOOP}"
     kind = "virtual, " if status.virtual else ""
     return (
         f"{name}: online, {kind}firmware {status.firmware}, boot {status.boot_id:08x} ({status.reset_cause}), "

@@ -36,6 +36,7 @@ class MoveReport(msgspec.Struct, frozen=True, kw_only=True):
     stopped_at: dict[str, float] = {}  # [rad] or [m]
     fraction: float = 1.0  # of a line, of which less will do
     stopped_by: str = ""  # why it is no more
+    verified: bool = True  # false: all was sent, and what the device executed is not known
 
     @property
     def exit_code(self) -> ExitCode:
@@ -74,10 +75,11 @@ def report_of(
         planned_s=plan.planning_time,
         duration_s=plan.duration,
         took_s=result.duration,
-        final_error_m=tool_error(arm, plan.trajectory, errors) if succeeded else None,
+        final_error_m=tool_error(arm, plan.trajectory, errors) if succeeded and result.verified else None,
         final_error_steps=errors,
         max_following_error_steps=dict(zip(result.joint_names, result.max_following_error, strict=False)),
         stopped_at=stopped_at,
+        verified=result.verified,
     )
 
 
@@ -94,6 +96,8 @@ def summary(report: MoveReport, arm: Description, plan_only: bool = False) -> st
     if not report.succeeded:
         reason = report.reason or "no reason was given"
         return f"{report.status.lower()} after {report.took_s:.2f} s: {reason}" + (f"; now at {where}" if where else "")
+    if not report.verified:
+        return f"{planned}, took {report.took_s:.2f} s; {report.reason}"
     steps = ", ".join(f"{name} {error:+z.2f}" for name, error in report.final_error_steps.items())
     millimetres = "unknown" if report.final_error_m is None else f"{1e3 * report.final_error_m:.3f} mm"
     return f"{planned}, took {report.took_s:.2f} s, final error {millimetres}, steps: {steps}"

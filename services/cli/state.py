@@ -11,6 +11,7 @@ from schemas.device import DeviceState, DeviceStatus
 from schemas.joints import JointState, StepErrors
 from schemas.topics import DEVICE_STATE, DEVICE_STATUS, FRAMES, JOINT_STATES, STATIC_FRAMES, STEP_ERRORS
 from services.arm.frames.frame_buffer import FrameBuffer, FrameError
+from services.cli.device_snapshot import OPEN_LOOP
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options, Parser
 from services.cli.session import Session, connect, other_robots
@@ -62,6 +63,7 @@ class Snapshot(msgspec.Struct, frozen=True):
     time_scale: float | None
     buffered: float | None  # [s]
     round_trip: float | None  # [s]
+    open_loop: bool = False  # the positions are what was sent: what was executed is not known
 
 
 def snapshot(
@@ -80,6 +82,10 @@ def snapshot(
     commanded = dict(zip(errors.name, errors.commanded, strict=False))
     executed = dict(zip(errors.name, errors.executed, strict=False))
     error = dict(zip(errors.name, errors.error, strict=False))
+    is_open_loop = bool(status and status.open_loop)
+    if is_open_loop and device is not None:
+        commanded = dict(zip(device.name, map(float, device.steps), strict=False))
+        executed, error = {}, {}
     lines = tuple(
         JointLine(
             joint.name, joint.unit, position.get(joint.name), velocity.get(joint.name),
@@ -99,6 +105,7 @@ def snapshot(
         time_scale=device.time_scale if device else None,
         buffered=device.buffered if device else None,
         round_trip=device.round_trip if device else None,
+        open_loop=is_open_loop,
     )
 
 
@@ -118,7 +125,8 @@ def text_of(view: Snapshot) -> str:
         device += f", time scale {view.time_scale:.2f}, {view.buffered:.2f} s of path buffered"
     if view.online and view.reason:
         device += f"; {view.reason}"
-    return f"{table(headings, rows)}\n\ntool {view.tool_frame}: {tool}\ndevice {device}\nlink   {link}"
+    sent = f"\n\n{OPEN_LOOP}" if view.open_loop else ""
+    return f"{table(headings, rows)}{sent}\n\ntool {view.tool_frame}: {tool}\ndevice {device}\nlink   {link}"
 
 
 def _row(line: JointLine) -> tuple[str, ...]:
@@ -150,7 +158,10 @@ class StateView:
     @property
     def is_complete(self) -> bool:
         """True if every message has been received."""
-        parts = (self._states.message, self._errors.message, self._device.message, self._status.message)
+        status = self._status.message
+        parts = [self._states.message, self._device.message, status]
+        if status is not None and not status.open_loop:  # else there are no step errors
+            parts.append(self._errors.message)
         return None not in parts and self.tool() is not None
 
     @property

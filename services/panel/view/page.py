@@ -191,11 +191,11 @@ class Page:
             reason = readings.status.reason if readings.status is not None and not readings.status.online else ""
             return mark + box(f"<b>{esc(words('not_live', age=age))}</b> {esc(reason)}", BAD)
         worst = max((abs(error) for error in readings.step_errors.values()), default=0.0)
+        error = words("step_error", steps=f"{worst:.2f}")
+        if readings.status is not None and readings.status.open_loop:
+            error = words("sent_not_verified")
         lag = f", {1000 * self.lag:.0f} ms" if isfinite(self.lag) else ""
-        text = (
-            f"<b>{esc(words(f'mode_{state.mode.name.lower()}'))}</b> · {esc(words('step_error', steps=f'{worst:.2f}'))}"
-            f" · {esc(words('live_data'))}{lag}"
-        )
+        text = f"<b>{esc(words(f'mode_{state.mode.name.lower()}'))}</b> · {esc(error)} · {esc(words('live_data'))}{lag}"
         if readings.fault:
             return mark + box(f"{text}<br>{esc(readings.fault)}", BAD)
         return mark + box(text, GOOD if state.armed and all(state.referenced) else NEUTRAL)

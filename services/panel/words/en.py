@@ -10,6 +10,7 @@ ENGLISH: dict[str, str] = {
     "understood": "Understood",
     "not_live": "No fresh state of the arm ({age} old).",
     "live_data": "live",
+    "sent_not_verified": "sent, not verified: the board does not say what it has executed",
     "step_error": "step error {steps}",
     "mode_boot": "Starting",
     "mode_unreferenced": "Not referenced",

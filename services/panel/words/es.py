@@ -10,6 +10,7 @@ SPANISH: dict[str, str] = {
     "understood": "Entendido",
     "not_live": "Sin estado reciente del brazo (hace {age}).",
     "live_data": "en vivo",
+    "sent_not_verified": "enviado, sin verificar: la placa no dice lo que ha ejecutado",
     "step_error": "error {steps} pasos",
     "mode_boot": "Arrancando",
     "mode_unreferenced": "Sin referencia",

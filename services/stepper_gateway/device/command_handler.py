@@ -21,6 +21,7 @@ REMEDIES: dict[int, str] = {
     Code.NOT_ARMED: "its drivers are off, or only just on: run `gemelo device arm`, and wait a second",
     Code.ESTOP_PRESSED: "its emergency stop is pressed: release it first",
     Code.NO_HOMING: "a joint has no home switch: give it a [joint.homing] in robot.toml, or run `gemelo reference`",
+    Code.UNKNOWN_CMD: "its firmware, or the dialect that it speaks, has no such command",
     Code.BAD_ARGUMENT: "it has no such output, joint or value: see `gemelo device config`",
 }
 NOT_NOW = {

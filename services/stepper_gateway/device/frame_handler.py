@@ -138,9 +138,11 @@ class FrameHandler:
     def _publish(self, state: State, point: PathPoint, moment: Moment) -> None:
         reporter = self._device.reporter
         stamp = self._publish_device(state, moment)
-        self._device.out.publish(JOINT_STATES, reporter.joint_state(state, stamp))
+        is_open_loop = self._device.session.is_open_loop
+        self._device.out.publish(JOINT_STATES, reporter.joint_state(state, stamp, is_open_loop))
         self._device.out.publish(JOINT_COMMANDS, reporter.joint_command(point, state, stamp))
-        self._device.out.publish(STEP_ERRORS, reporter.step_errors(point, state, stamp))
+        if not is_open_loop:  # else nobody knows them
+            self._device.out.publish(STEP_ERRORS, reporter.step_errors(point, state, stamp))
 
     def _publish_device(self, state: State, moment: Moment) -> int:
         """The state's stamp [ns]."""

@@ -17,6 +17,8 @@ from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Outbox
 from services.stepper_gateway.parameters import GatewayParameters
 
+SETTLING = 2.5  # messages: the one under way, the last one, and the word after it
+
 
 class GatewayDevice:
     """One device; nothing here moves it."""
@@ -36,6 +38,11 @@ class GatewayDevice:
     def state(self) -> State | None:
         """The latest state of the arm's joints; None before the first."""
         return self.session.state
+
+    @property
+    def settling_time(self) -> float:
+        """[s] that a board may need after the path's end, where it is sent its steps in messages of that length."""
+        return SETTLING * self.arm.device.message_time if self.session.is_open_loop else 0.0
 
     def unreachable_reason(self, moment: Moment) -> str:
         """Why the device cannot be reached, empty if it can."""
@@ -77,4 +84,5 @@ def status_of(device: GatewayDevice, moment: Moment) -> DeviceStatus:
         config_crc32=device.configuration.device_crc32,
         wanted_crc32=device.configuration.crc32,
         virtual=report.virtual,
+        open_loop=report.open_loop,
     )

@@ -38,11 +38,14 @@ class Reporter:
     def _rates(self, rates: tuple[float, ...], scale: float = 1.0) -> Vector:
         return tuple(rate * scale / joint.steps.per_unit for joint, rate in zip(self._joints, rates, strict=True))
 
-    def joint_state(self, state: State, stamp: int) -> JointState:
-        """The measured joints."""
-        rates = state.velocity
+    def joint_state(self, state: State, stamp: int, is_open_loop: bool = False) -> JointState:
+        """The measured joints; in open loop what was sent, and marked as that."""
         return JointState(
-            stamp=stamp, name=self._names, position=self.positions(state.steps), velocity=self._rates(rates)
+            stamp=stamp,
+            name=self._names,
+            position=self.positions(state.steps),
+            velocity=self._rates(state.velocity),
+            commanded=is_open_loop,
         )
 
     def joint_command(self, point: PathPoint, state: State, stamp: int) -> JointState:

@@ -73,6 +73,11 @@ class DeviceSession:
         return self._reports.get(self.boot_id)
 
     @property
+    def is_open_loop(self) -> bool:
+        """True if the device does not say what it has executed: its steps are those that were sent."""
+        return self.status is not None and self.status.open_loop
+
+    @property
     def state(self) -> State | None:
         """The latest state, if it is one of this arm."""
         return self.latest if self.latest is not None and self.fits(self.latest) else None

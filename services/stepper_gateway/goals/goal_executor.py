@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
 from schemas.actions import GoalStatusCode
-from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
+from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
 from schemas.system import LogLevel
 from services.stepper_gateway.device.gateway_device import GatewayDevice
 from services.stepper_gateway.goals.active_goal import ActiveGoal, GoalEnding
@@ -27,6 +29,7 @@ HELD = {  # by the detail of the device's event
     "shutdown": "the device holds because it is being shut down",
 }
 HELD_SILENTLY = "the device holds by itself and has not said why: see its own log"
+NOT_VERIFIED = "sent, not verified: the board does not say what it has executed"
 FAILED = GoalStatusCode.ABORTED, FollowErrorCode.DEVICE_FAILED
 
 
@@ -36,6 +39,11 @@ class GoalVerdict(NamedTuple):
     accepted: bool
     code: FollowErrorCode = FollowErrorCode.SUCCESSFUL
     reason: str = ""
+
+
+def as_not_verified(result: FollowJointTrajectoryResult) -> FollowJointTrajectoryResult:
+    """The result of a device that does not say what it has executed: nothing is claimed of it."""
+    return replace(result, executed_steps=(), max_following_error=(), final_error=(), verified=False)
 
 
 class GoalExecutor:
@@ -67,6 +75,7 @@ class GoalExecutor:
                 raise invalid("the arm is still decelerating after the last goal; send this one again when it rests")
             self.scenes.require_newest(PlannedIn.of(goal))
             checked = self._validator.check(goal, moment.unix, self._device.parameters)
+            checked = checked.with_more_time(self._device.settling_time)
             if goal.after and (present := self._next.require_place(checked, self._current, goal.after)) is not None:
                 return self._accept_next(goal_id, checked, present, moment)
             motion_start = controller.motion_start(moment)
@@ -304,7 +313,12 @@ class GoalExecutor:
             self._finish(dropped, GoalEnding(GoalStatusCode.ABORTED, ending.code, reason), moment)
 
     def _finish(self, execution: ActiveGoal, ending: GoalEnding, moment: Moment) -> None:
+        is_open_loop = self._device.session.is_open_loop
+        if is_open_loop:
+            reason = f"{ending.reason}; {NOT_VERIFIED}" if ending.reason else NOT_VERIFIED
+            ending = ending._replace(reason=reason)
         result = execution.result(ending, self._device.state, moment.monotonic)
+        result = as_not_verified(result) if is_open_loop else result
         self._device.out.put(GoalFinished(execution.goal_id, ending.status, result))
         self._next.ended(execution.goal_id, ending.status)
         level = LogLevel.INFO if ending.status == GoalStatusCode.SUCCEEDED else LogLevel.WARNING

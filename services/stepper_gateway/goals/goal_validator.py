@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from schemas.message import Vector
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
@@ -36,6 +36,11 @@ class ValidatedGoal:
     def target(self) -> Vector:
         """[rad] or [m] where the arm is to end."""
         return self.trajectory.points[-1].positions
+
+    def with_more_time(self, seconds: float) -> ValidatedGoal:
+        """The same, which may end so much later [s]."""
+        late = self.time_tolerance
+        return self if late is None or not seconds else replace(self, time_tolerance=late + seconds)
 
 
 @dataclass(frozen=True)

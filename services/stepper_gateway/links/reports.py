@@ -37,6 +37,7 @@ class StatusReport(Report, frozen=True, kw_only=True):
     armed: bool = False
     config_crc32: Word = 0  # of the configuration it works with; 0: none yet
     virtual: bool = False
+    open_loop: bool = False  # it does not say what it has executed
 
 
 class EventReport(Report, frozen=True, kw_only=True):

@@ -29,7 +29,14 @@ class PanelInputs:
 
 def panel(inputs: PanelInputs, now: int) -> str:
     """Markdown; `now` in ns UNIX."""
-    parts = (_heading(inputs, now), _lost(inputs), _device(inputs, now), _table(inputs), _numbers(inputs))
+    parts = (
+        _heading(inputs, now),
+        _open_loop(inputs),
+        _lost(inputs),
+        _device(inputs, now),
+        _table(inputs),
+        _numbers(inputs),
+    )
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
@@ -66,6 +73,13 @@ def _fault(robot: str, state: DeviceState) -> str:
         return f"# {robot} · {state.mode.name}"
     where = f" AT {state.fault_joint.upper()}" if state.fault_joint else ""
     return f"# {robot} · {about.name}{where}\n\n**{about.meaning}**\n\n{about.remedy}"
+
+
+def _open_loop(inputs: PanelInputs) -> str:
+    """That the arm drawn is what was sent; empty where it is measured."""
+    if inputs.status is None or not inputs.status.open_loop:
+        return ""
+    return "**SENT, NOT VERIFIED: this board does not say what it has executed**"
 
 
 def _lost(inputs: PanelInputs) -> str:

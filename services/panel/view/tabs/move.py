@@ -171,6 +171,8 @@ class MoveTab:
             if joint.name in motion.stopped_at
         ]
         try:
+            if not motion.result.verified:
+                return note(f"{esc(words(key))}: {esc(words('sent_not_verified'))}")
             worst = max((abs(error) for error in motion.result.final_error), default=0.0)
         except gemelo.Error:
             return note(esc(words(key)))
