@@ -4,18 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
 
 from schemas.deployment import DeviceKind
-from schemas.robot import CLEARANCE, DeviceRecord, Driver, Input, Output, RobotFile, Sensor, StepperJoint, Transmission
+from schemas.robot import (
+    CLEARANCE,
+    DeviceRecord,
+    Dialect,
+    Driver,
+    Input,
+    Output,
+    RobotFile,
+    Sensor,
+    StepperJoint,
+    Transmission,
+)
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.robot_file import read_robot_data, read_text, typed_robot, where_of
 from services.arm.model.srdf import SrdfModel, read_srdf
 from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel, read_urdf
 from services.arm.model.virtual_drive import NO_MOTORS, TO_DRIVE, lacks_motors, with_virtual_drive
+from services.arm.motors.relative_moves import ramp_of
 from services.arm.motors.speed import speed_limits
 from services.arm.motors.steps import StepScale, step_scale
 
@@ -126,7 +138,7 @@ def load_arm(folder: Path) -> Arm:
     drivers = {driver.name: driver for driver in robot.driver}
     joints = tuple(_joint(drive, drivers, model, robot_path) for drive in robot.joint)
     _require_joints(joints, model, robot_path)
-    return Arm(
+    arm = Arm(
         name=robot.name,
         folder=robot_path.parent,
         urdf_path=urdf_path,
@@ -147,6 +159,24 @@ def load_arm(folder: Path) -> Arm:
         model=model,
         clearance=robot.clearance,
     )
+    return heard_by_the_board(arm)
+
+
+def heard_by_the_board(arm: Arm) -> Arm:
+    """Without what the board's dialect has no words for: switches, homing, motor current; as slow as it can follow."""
+    if arm.device.dialect is Dialect.GEMELO:
+        return arm
+    device = msgspec.structs.replace(arm.device, enable_pin=None, armed_at_boot=True)
+    joints = tuple(_heard_joint(joint, device) for joint in arm.joints)
+    return replace(arm, device=device, joints=joints, inputs=())
+
+
+def _heard_joint(joint: Joint, device: DeviceRecord) -> Joint:
+    joint = replace(joint, drive=msgspec.structs.replace(joint.drive, homing=None))
+    if device.dialect is not Dialect.RA:
+        return joint
+    speed = ramp_of(joint.drive).path_speed(device.message_time, device.telemetry_time) / joint.steps.per_unit
+    return replace(joint, velocity=min(joint.velocity, speed))
 
 
 def require_motors(arm: Arm, device: DeviceKind) -> None:
