@@ -18,8 +18,10 @@ from firmware.platform.host.link import Item, ShutdownRequested
 from firmware.platform.host.network import Network
 from firmware.platform.host.pty import SerialLine
 from firmware.platform.host.virtual_esp32 import VirtualEsp32
+from firmware.platform.host.virtual_sketch import VirtualSketch
 from firmware.platform.host.wires import Wires
 from schemas.deployment import Deployment, DeviceKind, Wire
+from schemas.robot import Dialect
 from services.arm.errors import DescriptionError
 from services.arm.model.description import load_arm
 from services.mqtt.access import AccessError, device_access
@@ -56,8 +58,12 @@ def run(deployment: Deployment, has_line: bool = False) -> None:
         signal.signal(number, lambda *_: inbox.put(ShutdownRequested()))
     if deployment.device is DeviceKind.BOARD:
         return idle(inbox, Readiness(folder, NAME))
-    network = Network(device_access(deployment.mqtt, arm.device.name), inbox)
-    line = _serial_line(folder, inbox) if has_line or deployment.wire is Wire.SERIAL else None
+    access = device_access(deployment.mqtt, arm.device.name)
+    if arm.device.dialect is Dialect.RA:
+        return VirtualSketch(arm, access, inbox, Readiness(folder, NAME)).run()
+    network = Network(access, inbox)
+    is_wired = deployment.wire is Wire.SERIAL or arm.device.dialect is Dialect.TEXT
+    line = _serial_line(folder, inbox) if has_line or is_wired else None
     VirtualEsp32(Board(arm, folder, NAME), Wires(network, line), inbox, Readiness(folder, NAME)).run()
 
 
