@@ -9,7 +9,9 @@ from contextlib import closing
 from pathlib import Path
 
 from schemas.deployment import Deployment, DeviceKind, Wire
-from services.arm.model.description import load_arm, require_motors
+from schemas.robot import Dialect
+from services.arm.errors import DescriptionError
+from services.arm.model.description import Arm, load_arm, require_motors
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
@@ -32,9 +34,23 @@ def run(node: Node, deployment: Deployment) -> None:
     parameters = node.parameters(GatewayParameters)
     core = GatewayCore(arm, secrets.randbelow(2**31 - 1) + 1, parameters.value)
     shell = Shell(node, core, parameters)
-    with closing(open_link(deployment, arm.device.name, shell.wake)) as link:
+    with closing(open_device(deployment, arm, shell.wake)) as link:
         shell.use(link)
         node.spin(shell.step, rate=RATE)
+
+
+def open_device(deployment: Deployment, arm: Arm, wake: Callable[[], None]) -> Link:
+    """The link to the arm's device, in the dialect that it speaks."""
+    match arm.device.dialect:
+        case Dialect.GEMELO:
+            return open_link(deployment, arm.device.name, wake)
+        case Dialect.RA:
+            from services.mqtt.access import gateway_access
+            from services.stepper_gateway.links.foreign.ra_link import RaLink
+
+            return RaLink(gateway_access(deployment.mqtt), arm, wake)
+        case dialect:
+            raise DescriptionError(f'{arm.robot_path}: [device] dialect = "{dialect}" has no link yet')
 
 
 def open_link(deployment: Deployment, device: str, wake: Callable[[], None]) -> Link:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from schemas.message import Vector
 from schemas.motion import JointTrajectory, TrajectoryPoint
+from services.arm.model.description import Arm
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits
 from services.stepper_gateway.motion.paths import profile
@@ -16,9 +17,11 @@ from services.virtual_arm.virtual_arm import VirtualArm, rm1
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def move(start: Vector, end: Vector, period: float = 0.05, slower: float = 1.0) -> JointTrajectory:
+def move(
+    start: Vector, end: Vector, period: float = 0.05, slower: float = 1.0, arm: Arm | None = None
+) -> JointTrajectory:
     """A jerk-limited move from rest to rest in points of `period` seconds, as the planner makes them."""
-    arm = rm1()
+    arm = arm or rm1()
     path = profile(Knot.at_rest(start), Knot.at_rest(end), Limits.of(arm.joints))
     assert path is not None
     count = max(1, round(path.duration / period))

@@ -28,15 +28,19 @@ def free_port() -> int:
 class Processes:
     """Started by module name, killed with everything they have started themselves."""
 
-    def __init__(self, broker: str, folder: Path, wire: Wire = Wire.MQTT, secure_folder: str = "") -> None:
+    def __init__(
+        self, broker: str, folder: Path, wire: Wire = Wire.MQTT, secure_folder: str = "", robot: Path | None = None
+    ) -> None:
         self.port = free_port()
         self.deployment = Deployment(
+            robot=str(robot or ROOT / "urdf/rm1"),
             wire=wire,
             mqtt=MqttSection(broker=Broker(broker), port=self.port, secure_folder=secure_folder),
             paths=PathsSection(run=str(folder / "run"), out=str(folder / "out")),
         )
         self._log = folder / "processes.log"
         self._environment = os.environ | {
+            "GEMELO_ROBOT": self.deployment.robot,
             "GEMELO_WIRE": wire.value,
             "GEMELO_MQTT_BROKER": broker,
             "GEMELO_MQTT_PORT": str(self.port),

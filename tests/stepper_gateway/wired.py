@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from schemas.device import InjectRequest, InjectResponse
+from services.arm.model.description import Arm
 from services.mqtt.access import BrokerAccess
 from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.links.mqtt import MqttLink
@@ -25,9 +26,12 @@ def plain(port: int) -> BrokerAccess:
 class WiredGateway(GatewayDriver):
     """Core and link with a small loop of their own, without the bus."""
 
-    def __init__(self, port: int = 0, link: Callable[[Callable[[], None]], Link] | None = None) -> None:
+    def __init__(
+        self, port: int = 0, link: Callable[[Callable[[], None]], Link] | None = None, arm: Arm | None = None
+    ) -> None:
         super().__init__()
-        self.start_core(rm1(), int.from_bytes(os.urandom(3), "little") + 1)
+        self.arm = arm or rm1()
+        self.start_core(self.arm, int.from_bytes(os.urandom(3), "little") + 1)
         self._woken = threading.Event()
         self.link = link(self._woken.set) if link else MqttLink(plain(port), "rm1", self._woken.set)
 
@@ -63,7 +67,7 @@ class WiredGateway(GatewayDriver):
 
     def move_to(self, end: tuple[float, ...], goal_id: str = "g") -> Any:
         """Asks for a jerk-limited move from where the arm is."""
-        return self.goal(move(self.published["joint_states"][-1].position, end), goal_id)
+        return self.goal(move(self.published["joint_states"][-1].position, end, arm=self.arm), goal_id)
 
     def answer_to_press(self, request: InjectRequest) -> InjectResponse:
         """The answer of the virtual device."""

@@ -1,0 +1,81 @@
+"""The messages of dialect "ra": `ra/juntas` to the sketch, `ra/estados` and `ra/sensores` from it. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import msgspec
+
+from services.arm.motors.relative_moves import Ramp
+
+JOINTS, STATES, SENSORS = "ra/juntas", "ra/estados", "ra/sensores"
+OUTPUT = "avanzar"
+LARGEST = 256  # [bytes] PubSubClient's buffer, and nothing that the sketch says is longer
+DECIMALS = 9  # of a degree: far below the margin
+LEAST_MARGIN = 2.0**-10  # [steps]
+# A sketch on an ESP32 computes with floats of 24 bits: three roundings of one part in 2^24 stay below one in 2^20.
+FLOAT_MARGIN = 2.0**-20
+
+_decoder = msgspec.json.Decoder(dict[str, int | float | bool | None])
+
+
+class BadMessage(ValueError):
+    """What no sketch says; the text says what is wrong."""
+
+
+class Telemetry(NamedTuple):
+    """The numbers in a message of the sketch, by name; `estado` in any spelling is "estado"."""
+
+    values: dict[str, float]
+
+
+def degrees(steps: int, ramp: Ramp) -> float:
+    """[deg] of the output shaft that the sketch turns into exactly `steps`, whether it truncates or rounds."""
+    if steps == 0:
+        return 0.0
+    beyond = math.copysign(LEAST_MARGIN + abs(steps) * FLOAT_MARGIN, steps)
+    return round((steps + beyond) * 360.0 / float(ramp.steps_per_turn), DECIMALS)
+
+
+def joints_message(steps: Sequence[int], ramps: Sequence[Ramp], output: bool) -> bytes:
+    """A relative move of all joints; the sketch moves only where it finds every one of them."""
+    moves: dict[str, float | int] = {r.name: degrees(count, r) for count, r in zip(steps, ramps, strict=True)}
+    return msgspec.json.encode({**moves, OUTPUT: int(output)})
+
+
+def output_message(output: bool) -> bytes:
+    """The output alone: a move of nought would end the one under way."""
+    return msgspec.json.encode({OUTPUT: int(output)})
+
+
+def read_states(payload: bytes) -> Telemetry:
+    """`{"estado": int}`; raises `BadMessage`."""
+    values = _numbers(payload)
+    if "estado" not in values:
+        raise BadMessage(f'{STATES} without "estado": {_shown(payload)}')
+    return Telemetry({"estado": values["estado"]})
+
+
+def read_sensors(payload: bytes) -> Telemetry:
+    """`{"ultra": int}`, `{"bateria": float}`, or `{"Estado": int, "ultra": int}`; raises `BadMessage`."""
+    values = {name: value for name, value in _numbers(payload).items() if name in ("ultra", "bateria", "estado")}
+    if not values:
+        raise BadMessage(f'{SENSORS} without "ultra", "bateria" or "Estado": {_shown(payload)}')
+    return Telemetry(values)
+
+
+def _numbers(payload: bytes) -> dict[str, float]:
+    if len(payload) > LARGEST:
+        raise BadMessage(f"{len(payload)} bytes, more than the {LARGEST} of a sketch")
+    try:
+        found = _decoder.decode(payload)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise BadMessage(f"no JSON object of numbers: {_shown(payload)}: {error}") from error
+    named = ((name[:1].lower() + name[1:], value) for name, value in found.items() if value is not None)
+    return {name: float(value) for name, value in named if math.isfinite(value)}
+
+
+def _shown(payload: bytes) -> str:
+    return repr(payload[:40].decode("utf-8", "replace"))

@@ -1,0 +1,106 @@
+"""A gateway that drives a sketch over dialect "ra", in one virtual time."""
+
+from __future__ import annotations
+
+import itertools
+import random
+from collections.abc import Callable
+from dataclasses import replace
+
+import msgspec
+
+from firmware.platform.host.sketch import Sketch
+from schemas.device import DeviceCommandKind
+from schemas.robot import Dialect
+from services.arm.model.description import Arm, heard_by_the_board
+from services.arm.motors.relative_moves import ramp_of
+from services.stepper_gateway.links.foreign.ra_device import RaDevice
+from services.stepper_gateway.links.link import Kind
+from services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Moment
+from services.virtual_arm.virtual_arm import GATEWAY_ZERO, UNIX, rm1
+
+PERIOD = 0.02  # [s] of the gateway's loop
+STEP = 0.005  # [s] of virtual time
+
+
+def ra_arm(message_time: float = 2.0) -> Arm:
+    """rm1 behind a sketch."""
+    arm = rm1()
+    device = msgspec.structs.replace(arm.device, dialect=Dialect.RA, message_time=message_time)
+    return heard_by_the_board(replace(arm, device=device))
+
+
+class SketchArm(GatewayDriver):
+    """Messages take `delay` to `delay` + `jitter` [s], in order, as over TCP."""
+
+    def __init__(
+        self,
+        arm: Arm | None = None,
+        *,
+        delay: float = 0.005,
+        jitter: float = 0.0,
+        truncates: bool = True,
+        seed: int = 1,
+    ) -> None:
+        super().__init__()
+        self.arm = arm or ra_arm()
+        self.now = 0.0
+        self._delay, self._jitter, self._rng = delay, jitter, random.Random(seed)
+        self._beat = 0.0
+        boots = itertools.count(1001)
+        self.device = RaDevice(self.arm, lambda: next(boots), GATEWAY_ZERO)
+        self.sketch = Sketch([ramp_of(joint.drive) for joint in self.arm.joints], truncates)
+        self.messages_sent: list[bytes] = []
+        self.is_cut = False  # between the sketch and the broker
+        self._down: list[tuple[float, bytes]] = []
+        self._up: list[tuple[float, str, bytes]] = []
+        self.start_core(self.arm, seed, GatewayParameters())
+        self.carry_out(self.core.on_link(True, "", self.moment))
+
+    @property
+    def moment(self) -> Moment:
+        return Moment(UNIX + round(self.now * 1e9), GATEWAY_ZERO + self.now)
+
+    def send(self, kind: Kind, payload: bytes) -> None:
+        self.device.receive(kind, payload, self.moment.monotonic)
+
+    def run(self, seconds: float, until: Callable[[], bool] | None = None) -> bool:
+        end = self.now + seconds
+        while self.now < end:
+            if until is not None and until():
+                return True
+            self.now += STEP
+            self._exchange()
+            if self.now >= self._beat:
+                self._beat += PERIOD
+                self.carry_out(self.core.step(self.moment))
+        return until is None or until()
+
+    def _exchange(self) -> None:
+        monotonic = self.moment.monotonic
+        while self._down and self._down[0][0] <= self.now:
+            self.sketch.receive(self._down.pop(0)[1])
+        for topic, payload in self.sketch.advance(self.now):
+            if not self.is_cut:
+                self._up.append((self._arrival(self._up[-1][0] if self._up else 0.0), topic, payload))
+        while self._up and self._up[0][0] <= self.now:
+            _, topic, payload = self._up.pop(0)
+            self.device.hear(topic, payload, False, monotonic)
+        for message in self.device.advance(monotonic):
+            self.messages_sent.append(message)
+            if not self.is_cut:
+                self._down.append((self._arrival(self._down[-1][0] if self._down else 0.0), message))
+        for kind, report in self.device.take():
+            self.receive(kind, report)
+
+    def _arrival(self, after: float) -> float:
+        return max(after, self.now + self._delay + self._rng.random() * self._jitter)
+
+    def referenced(self) -> SketchArm:
+        """A person has said where the joints are: it accepts goals."""
+        assert self.run(
+            4.0, lambda: bool(self.published["device/status"]) and self.published["device/status"][-1].online
+        )
+        self.command(DeviceCommandKind.REFERENCE, 99)
+        assert self.run(3.0, lambda: 99 in self.answers and not self.reason_not_ready), self.reason_not_ready
+        return self

@@ -1,0 +1,70 @@
+"""What a person sees of a board that does not say what it has executed: in every view that it is sent, not verified."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from schemas.actions import GoalStatusCode
+from schemas.motion import FollowJointTrajectoryResult
+from services.cli import device_status
+from services.cli.move_report import MoveReport, summary
+from services.cli.state import snapshot, text_of
+from services.panel.words.words import Words
+from services.virtual_arm.sketch_arm import SketchArm
+from services.visualizer.content.panel import PanelInputs, panel
+from tests.stepper_gateway.harness import move
+from tests.stepper_gateway.test_ra_sketch import HOME
+
+
+@pytest.fixture(scope="module")
+def moved() -> SketchArm:
+    """After a short move on dialect "ra"."""
+    arm = SketchArm().referenced()
+    assert arm.goal(move(HOME, (0.1, 0.0, 0.0), arm=arm.arm)).accepted
+    assert arm.finish()[0] is GoalStatusCode.SUCCEEDED
+    return arm
+
+
+def newest(arm: SketchArm, key: str) -> Any:
+    return arm.published[key][-1]
+
+
+def test_gemelo_state_shows_what_was_sent_and_no_executed_step(moved: SketchArm) -> None:
+    seen = snapshot(
+        moved.arm, newest(moved, "joint_states"), None, newest(moved, "device/state"),
+        newest(moved, "device/status"), None,
+    )  # fmt: skip
+    text = text_of(seen)
+    assert "SENT, NOT VERIFIED" in text
+    assert seen.open_loop
+    assert [line.executed_steps for line in seen.joints] == [None] * 3
+    assert seen.joints[0].commanded_steps == moved.sketch.shafts[0]
+
+
+def test_gemelo_device_status_says_it_beside_the_device(moved: SketchArm) -> None:
+    who = device_status._who(newest(moved, "device/status"))
+    assert "SENT, NOT VERIFIED" in who
+    assert "sketch" in who
+
+
+def test_the_viewers_panel_says_it(moved: SketchArm) -> None:
+    state = newest(moved, "device/state")
+    shown = panel(PanelInputs(robot="rm1", status=newest(moved, "device/status"), state=state), state.stamp)
+    assert "SENT, NOT VERIFIED" in shown
+
+
+def test_a_moves_report_claims_no_final_error(moved: SketchArm) -> None:
+    result: FollowJointTrajectoryResult = moved.finished["g"][1]
+    report = MoveReport(
+        robot="rm1", status="SUCCEEDED", planned_s=0.0, duration_s=1.0, reason=result.error_string, verified=False
+    )
+    said = summary(report, moved.arm)
+    assert "sent, not verified" in said
+    assert "final error" not in said
+
+
+def test_the_page_says_it_in_both_languages() -> None:
+    assert "not verified" in Words("en")("sent_not_verified")
+    assert "sin verificar" in Words("es")("sent_not_verified")
