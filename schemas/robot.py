@@ -181,6 +181,7 @@ class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
     message_time: Annotated[float, Meta(ge=0.6, le=10.0)] = 2.0  # [s] that one message of dialect "ra" may take
     telemetry_time: Annotated[float, Meta(ge=0.01, le=2.0)] = 0.1  # [s] between two words of a sketch of dialect "ra"
     text_hz: Annotated[float, Meta(ge=1.0, le=100.0)] = 25.0  # [Hz] of lines in dialect "text"
+    text_decimals: Annotated[int, Meta(ge=2, le=9)] = 6  # of a radian or metre in them; 4 are coarser than many a step
 
 
 class RobotFile(RobotRecord, frozen=True, kw_only=True):

@@ -159,7 +159,7 @@ class StateView:
     def is_complete(self) -> bool:
         """True if every message has been received."""
         status = self._status.message
-        parts = [self._states.message, self._device.message, status]
+        parts: list[object] = [self._states.message, self._device.message, status]
         if status is not None and not status.open_loop:  # else there are no step errors
             parts.append(self._errors.message)
         return None not in parts and self.tool() is not None

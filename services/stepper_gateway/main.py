@@ -10,7 +10,6 @@ from pathlib import Path
 
 from schemas.deployment import Deployment, DeviceKind, Wire
 from schemas.robot import Dialect
-from services.arm.errors import DescriptionError
 from services.arm.model.description import Arm, load_arm, require_motors
 from services.runtime.application import service
 from services.runtime.deployment import project_root
@@ -49,8 +48,10 @@ def open_device(deployment: Deployment, arm: Arm, wake: Callable[[], None]) -> L
             from services.stepper_gateway.links.foreign.ra_link import RaLink
 
             return RaLink(gateway_access(deployment.mqtt), arm, wake)
-        case dialect:
-            raise DescriptionError(f'{arm.robot_path}: [device] dialect = "{dialect}" has no link yet')
+        case Dialect.TEXT:
+            from services.stepper_gateway.links.foreign.text_link import TextLink
+
+            return TextLink(serial_device(deployment), deployment.serial.baud, arm, wake)
 
 
 def open_link(deployment: Deployment, device: str, wake: Callable[[], None]) -> Link:

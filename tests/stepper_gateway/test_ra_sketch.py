@@ -130,6 +130,7 @@ def test_a_reconnection_in_a_move_ends_it_and_the_position_is_not_known_any_more
     sent = len(arm.messages_sent)
     assert arm.run(4.0, lambda: arm.published["device/status"][-1].online)
     arm.run(1.0)
+    assert "position_lost" in arm.events()
     assert [m for m in arm.messages_sent[sent:] if b"q1" in m] == [], "nothing resumes by itself"
     assert "gemelo reference" in arm.goal(ra_move(HOME, (0.1, 0.0, 0.0)), "next").reason
 

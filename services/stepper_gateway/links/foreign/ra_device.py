@@ -30,7 +30,7 @@ class RaDevice:
         self._stand_in = StandIn(arm, NAME, steps, new_boot, now)
         self._sender = RaSender(self._ramps, steps, self._telemetry_time)
         self._heard = -1.0e9  # [s] the sketch's latest word
-        self._is_online = False
+        self._is_online = self._is_lost = False
         self._output = False
         self._said_output: bool | None = None  # None: not known at the sketch
         self._estado: float | None = None
@@ -74,6 +74,10 @@ class RaDevice:
         if not self._is_online:
             self._is_online, self._said_output = True, None
             self._stand_in.report_status()
+            if self._is_lost:
+                self._is_lost = False
+                detail = "the sketch was silent in a motion: where the arm is is not known"
+                self._say(Kind.EVENT, {"event": "position_lost", "t_us": 0, "detail": detail})
         return self._messages(now)
 
     def take(self) -> list[Report]:
@@ -107,6 +111,7 @@ class RaDevice:
         self._is_online = False
         if self._stand_in.is_moving or not self._is_settled:
             is_known = self._sender.is_done
+            self._is_lost = not is_known
             self._stand_in.start(self.sent, is_known, now)
             self._sender = RaSender(self._ramps, self.sent, self._telemetry_time)
 

@@ -7,6 +7,7 @@ import secrets
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 
 from paho.mqtt import client as paho
 
@@ -105,4 +106,4 @@ class RaLink:
 
     def _on_message(self, _client: paho.Client, _data: object, message: paho.MQTTMessage) -> None:
         topic, payload, retained = message.topic, bytes(message.payload), message.retain
-        self._adapter.put(Heard(lambda now: self._device.hear(topic, payload, retained, now)))
+        self._adapter.put(Heard(partial(self._device.hear, topic, payload, retained)))

@@ -15,7 +15,17 @@ from schemas.device import DeviceCommandKind, DeviceMode
 from schemas.device_config import config_text
 from services.arm.device.device_config import device_config
 from services.arm.model.description import Arm
-from services.stepper_gateway.links.frames import BadFrame, Code, Command, CommandReply, State, decode, encode
+from services.stepper_gateway.links.frames import (
+    BadFrame,
+    Code,
+    Command,
+    CommandReply,
+    State,
+    Sync,
+    SyncReply,
+    decode,
+    encode,
+)
 from services.stepper_gateway.links.link import Kind
 
 STALL = 0.1  # [s] a caller that is later was stopped by the operating system: nothing is caught up
@@ -46,6 +56,11 @@ class StandIn:
     def steps(self) -> tuple[int, ...]:
         """What the paths have commanded so far, absolute."""
         return self._device.steps
+
+    @property
+    def is_referenced(self) -> bool:
+        """A person has said where the joints stand."""
+        return self._device.referenced
 
     @property
     def is_moving(self) -> bool:
@@ -80,6 +95,13 @@ class StandIn:
             self._device.stand_still(max(0, until - LAST_SLOTS))
         self._device.advance(until)
         self._advanced = max(self._advanced, now)
+
+    def answer_sync(self, sync: Sync, now: float) -> None:
+        """Answer a question for the clock now, later than it came: with what the board's own wire took."""
+        t_us = self.device_us(now)
+        self._reports.append(
+            (Kind.SYNC_R, encode(SyncReply(boot_id=self._device.boot_id, t0=sync.t0, t1=t_us, t2=t_us)))
+        )
 
     def take(self, is_settled: bool) -> list[Report]:
         """What it has said; until the board is settled, what stands here is still under way there."""
