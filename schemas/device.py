@@ -248,6 +248,18 @@ class InjectResponse(Message, frozen=True, kw_only=True):
     reason: str = ""
 
 
+class EchoRequest(Message, frozen=True, kw_only=True):
+    """Have the device answer once over its wire; nothing moves."""
+
+
+class EchoResponse(Message, frozen=True, kw_only=True):
+    """What the wire took, without the bus."""
+
+    answered: bool = False
+    round_trip: float = 0.0  # [s] gateway to device and back, without the device's own thinking time
+    reason: str = ""  # why there is no answer
+
+
 class CommandChunk(Message, frozen=True, kw_only=True):
     """One chunk of knots as it was sent: rows are knots, columns joints."""
 

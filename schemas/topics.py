@@ -22,6 +22,8 @@ from schemas.device import (
     DeviceState,
     DeviceStatus,
     DeviceStopRequest,
+    EchoRequest,
+    EchoResponse,
     InjectRequest,
     InjectResponse,
     SensorReadings,
@@ -188,6 +190,10 @@ DEVICE_INJECT = Request(
     "device/inject", InjectRequest, InjectResponse, GATEWAY, "inject inputs and failures into a virtual device"
 )
 
+DEVICE_ECHO = Request(
+    "device/echo", EchoRequest, EchoResponse, GATEWAY, "what the wire to the device takes, there and back"
+)
+
 REQUESTS: tuple[Request[Message, Message], ...] = (
     PLAN,
     PLAN_CANCEL,
@@ -199,6 +205,7 @@ REQUESTS: tuple[Request[Message, Message], ...] = (
     DEVICE_STOP,
     DEVICE_CONFIGURE,
     DEVICE_INJECT,
+    DEVICE_ECHO,
 )
 
 FOLLOW_JOINT_TRAJECTORY = Action(

@@ -7,6 +7,7 @@ from services.cli.parser import Command
 GROUPS = {
     "broker": "the MQTT broker between gateway and board",
     "device": "the controller board: how it is, what it is told, and its drivers",
+    "link": "the wire to the controller board",
     "topic": "the topics and what passes on them",
     "tf": "the frames: tree, poses, rates",
     "interface": "the messages",
@@ -60,6 +61,8 @@ COMMANDS = (
     Command(("device", "provision"), "tell a board its networks over its serial line",
             "provision:run", "provision:add_options",
             "gemelo device provision --serial /dev/ttyUSB0 --device rm1 --wifi-ssid lab --mqtt-uri mqtt://10.0.0.2:1883"),
+    Command(("link", "bench"), "round trips over the wire to the device: median, p99, jitter, lost; nothing moves",
+            "link_bench:run", "link_bench:add_options", "gemelo link bench --rate 25 --count 1000"),
     Command(("program", "list"), "the programs of the folder, and what is wrong with them", "program:run_list", JSON),
     Command(("program", "check"), "plan a whole program, leg by leg; nothing moves",
             "program:run_check", "program:check_options", "gemelo program check tour", "program:choices"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from services.arm.model.description import Arm
 from services.stepper_gateway.device.command_handler import CommandHandler
+from services.stepper_gateway.device.echoes import Echoes
 from services.stepper_gateway.device.gateway_device import GatewayDevice
 from services.stepper_gateway.device.injection_handler import InjectionHandler
 from services.stepper_gateway.device.sensors import SensorRelay
@@ -27,6 +28,7 @@ class Components:
         self.command_handler = CommandHandler(self.device, self.controller)
         self.sensors = SensorRelay(self.device)
         self.injections = InjectionHandler(self.device)
+        self.echoes = Echoes(self.device)
 
     def abort_all(self, reason: str, moment: Moment) -> None:
         """Nothing of what was under way is continued."""

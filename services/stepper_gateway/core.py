@@ -135,6 +135,11 @@ class GatewayCore:
         self._components.injections.ask(request, ticket, moment)
         return self._finish(moment)
 
+    def on_echo(self, ticket: int, moment: Moment) -> list[Output]:
+        """Somebody measures the wire; the answer comes as an `Answer` with this ticket."""
+        self._components.echoes.ask(ticket, moment)
+        return self._finish(moment)
+
     def step(self, moment: Moment) -> list[Output]:
         """One turn of the control loop, 50 times a second; sends the heartbeat."""
         device = self.device
@@ -151,6 +156,7 @@ class GatewayCore:
         self._components.command_handler.step(moment)
         device.configuration.step(unreachable_reason, moment)
         self._components.injections.step(moment)
+        self._components.echoes.step(moment)
         self._components.sensors.step(unreachable_reason, moment)
         self.controller.pump(moment)
         return self._finish(moment)

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from schemas.actions import GoalStatusCode
-from schemas.device import ConfigureResponse, DeviceCommandResponse, InjectResponse
+from schemas.device import ConfigureResponse, DeviceCommandResponse, EchoResponse, InjectResponse
 from schemas.message import Message
 from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryResult
 from schemas.system import LogLevel
 from schemas.topics import Topic
 from services.stepper_gateway.links.link import Kind
 
-Response = DeviceCommandResponse | ConfigureResponse | InjectResponse
+Response = DeviceCommandResponse | ConfigureResponse | InjectResponse | EchoResponse
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,8 @@ from schemas.device import (
     DeviceCommandRequest,
     DeviceCommandResponse,
     DeviceStopRequest,
+    EchoRequest,
+    EchoResponse,
     InjectRequest,
     InjectResponse,
 )
@@ -24,6 +26,7 @@ from schemas.motion import (
 from schemas.topics import (
     DEVICE_COMMAND,
     DEVICE_CONFIGURE,
+    DEVICE_ECHO,
     DEVICE_INJECT,
     DEVICE_STOP,
     FOLLOW_JOINT_TRAJECTORY,
@@ -70,6 +73,7 @@ class Shell:
         node.serve_later(DEVICE_STOP, self._on_stop)
         node.serve_later(DEVICE_CONFIGURE, self._on_configure)
         node.serve_later(DEVICE_INJECT, self._on_inject)
+        node.serve_later(DEVICE_ECHO, self._on_echo)
 
     def use(self, link: Link) -> None:
         self._link = link
@@ -131,6 +135,9 @@ class Shell:
 
     def _on_inject(self, request: InjectRequest, pending: Pending[InjectResponse]) -> None:
         self._carry_out(self._core.on_inject(request, self._ticket(pending), self._moment()))
+
+    def _on_echo(self, _request: EchoRequest, pending: Pending[EchoResponse]) -> None:
+        self._carry_out(self._core.on_echo(self._ticket(pending), self._moment()))
 
     def _ticket(self, pending: Pending[Any]) -> int:
         ticket = next(self._tickets)

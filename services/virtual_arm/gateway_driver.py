@@ -19,6 +19,7 @@ from schemas.device import (
     DeviceCommandResponse,
     DeviceState,
     DeviceStopRequest,
+    EchoResponse,
     InjectRequest,
     InjectResponse,
     StopKind,
@@ -69,6 +70,7 @@ class GatewayDriver(ABC):
         self.answers: dict[int, DeviceCommandResponse] = {}  # by ticket, like the next two
         self.configured: dict[int, ConfigureResponse] = {}
         self.pressed: dict[int, InjectResponse] = {}
+        self.echoed: dict[int, EchoResponse] = {}
         self.log: list[str] = []
         self._on_message = on_message
 
@@ -194,6 +196,8 @@ class GatewayDriver(ABC):
                     self.configured[ticket] = response
                 case Answer(ticket, InjectResponse() as response):
                     self.pressed[ticket] = response
+                case Answer(ticket, EchoResponse() as response):
+                    self.echoed[ticket] = response
                 case LogLine(_, text):
                     self.log.append(text)
 

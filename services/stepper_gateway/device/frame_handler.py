@@ -73,6 +73,7 @@ class FrameHandler:
                     self._components.goals.on_ack()
             case Kind.SYNC_R, SyncReply():
                 self._device.session.on_sync_reply(frame, received.arrival // 1000)
+                self._components.echoes.on_reply(frame, received.arrival // 1000)
             case Kind.CMD_ACK, CommandReply():
                 self._device.session.require_present(frame, frame.t_us, arrival)
                 self._device.session.on_reply(frame)

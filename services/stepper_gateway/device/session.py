@@ -145,6 +145,11 @@ class DeviceSession:
         self.latest, self.state_arrival = state, arrival
         return True, is_new_boot
 
+    def question(self, moment: Moment) -> Sync:
+        """One more question for the clock, now."""
+        self._questions.append(moment.micros)
+        return Sync(boot_id=self.boot_id, t0=moment.micros)
+
     def on_sync_reply(self, reply: SyncReply, arrival_us: int) -> None:
         """Take an answer to a question of ours; raises `BadFrame` for one that is not believed."""
         self.require_known(reply)
@@ -199,8 +204,7 @@ class DeviceSession:
             is_sure = self.clock.is_synchronised and not self.clock.is_contradicted
             period = SYNC if is_sure else SYNC_AT_FIRST
             self._sync_due = next_beat(self._sync_due, moment.monotonic, period)
-            self._questions.append(moment.micros)
-            frames.append(Sync(boot_id=self.boot_id, t0=moment.micros))
+            frames.append(self.question(moment))
         if self._lacks_status(moment) and moment.monotonic >= self._status_due:
             self._status_due = moment.monotonic + ASK_STATUS
             self._status_id = (self._status_id + 1) & 0xFFFFFFFF

@@ -1,0 +1,68 @@
+"""Measurements of the wire that somebody has asked for: a question for the clock each, which moves nothing."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from schemas.device import EchoResponse
+from schemas.robot import Dialect
+from services.stepper_gateway.device.gateway_device import GatewayDevice
+from services.stepper_gateway.links.frames import SyncReply, encode
+from services.stepper_gateway.links.link import Kind
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.outputs import Answer
+
+TIMEOUT = 1.0  # [s] after which an answer counts as lost
+MOST = 32  # that may wait; it is one more than any bench has under way
+NO_ANSWERS = "a sketch on ra/juntas answers nothing, so nothing can be measured: see how often ra/estados comes"
+NOT_YET = "the first line to this board would move it: say where its joints stand first, with `gemelo reference`"
+
+
+class Waiting(NamedTuple):
+    """Who waits for the answer to which question."""
+
+    ticket: int
+    asked: float  # [s] monotonic
+
+
+class Echoes:
+    """Every question has a time of its own, so answers are told apart by it."""
+
+    def __init__(self, device: GatewayDevice) -> None:
+        self._device = device
+        self._waiting: dict[int, Waiting] = {}  # by t0 [us]
+
+    def ask(self, ticket: int, moment: Moment) -> None:
+        """Send a question now, or answer why not."""
+        if reason := self._objection(moment):
+            return self._answer(ticket, EchoResponse(reason=reason))
+        question = self._device.session.question(moment)
+        self._waiting[question.t0] = Waiting(ticket, moment.monotonic)
+        self._device.out.send(Kind.SYNC, encode(question))
+
+    def on_reply(self, reply: SyncReply, arrival_us: int) -> None:
+        """The device has answered a question at `arrival_us` [us] monotonic."""
+        waiting = self._waiting.pop(reply.t0, None)
+        if waiting is not None:
+            took = (arrival_us - reply.t0 - (reply.t2 - reply.t1)) * 1e-6
+            self._answer(waiting.ticket, EchoResponse(answered=True, round_trip=max(0.0, took)))
+
+    def step(self, moment: Moment) -> None:
+        """Give up what was not answered in time."""
+        for t0, waiting in list(self._waiting.items()):
+            if moment.monotonic - waiting.asked > TIMEOUT:
+                del self._waiting[t0]
+                self._answer(waiting.ticket, EchoResponse(reason=f"no answer in {TIMEOUT:g} s"))
+
+    def _objection(self, moment: Moment) -> str:
+        dialect, state = self._device.arm.device.dialect, self._device.state
+        if not self._device.session.link_up:
+            return f"no link to the device: {self._device.session.link_reason}"
+        if dialect is Dialect.RA:
+            return NO_ANSWERS
+        if dialect is Dialect.TEXT and (state is None or not state.referenced):
+            return NOT_YET
+        return "too many measurements at a time: one bench is enough" if len(self._waiting) >= MOST else ""
+
+    def _answer(self, ticket: int, response: EchoResponse) -> None:
+        self._device.out.put(Answer(ticket, response))
