@@ -63,6 +63,8 @@ COMMANDS = (
             "gemelo device provision --serial /dev/ttyUSB0 --device rm1 --wifi-ssid lab --mqtt-uri mqtt://10.0.0.2:1883"),
     Command(("link", "bench"), "round trips over the wire to the device: median, p99, jitter, lost; nothing moves",
             "link_bench:run", "link_bench:add_options", "gemelo link bench --rate 25 --count 1000"),
+    Command(("link", "ra"), "be the sketch: a publisher's ra/juntas moves this arm, within its limits, until Ctrl-C",
+            "ra_listen:run", example="gemelo link ra"),
     Command(("program", "list"), "the programs of the folder, and what is wrong with them", "program:run_list", JSON),
     Command(("program", "check"), "plan a whole program, leg by leg; nothing moves",
             "program:run_check", "program:check_options", "gemelo program check tour", "program:choices"),

@@ -1,0 +1,121 @@
+"""What `ra/juntas` asks of an arm of ours: relative degrees in, absolute positions within the limits out. Pure."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from services.arm.model.description import Arm, Joint
+
+OUTPUT = "avanzar"
+LARGEST = 256  # [bytes] of a message
+FARTHEST = 1.0e6  # [deg] of one message
+
+
+class Refused(ValueError):
+    """A message that is not followed; the text says why."""
+
+
+class Wanted(NamedTuple):
+    """What one message asks for; None where it says nothing of it."""
+
+    moves: tuple[Fraction, ...] | None  # [steps] by joint, relative
+    output: bool | None
+
+
+class RaIntake:
+    """Where the arm is to be, in exact fractions of a step: no remainder of any message is lost."""
+
+    def __init__(self, arm: Arm) -> None:
+        self._joints = arm.joints
+        self._names = tuple(joint.wire_name for joint in arm.joints)
+        self._target: tuple[Fraction, ...] | None = None
+
+    @property
+    def target(self) -> tuple[float, ...] | None:
+        """[rad] or [m] by joint; None if nothing is asked for."""
+        if self._target is None:
+            return None
+        return tuple(_position(joint, steps) for joint, steps in zip(self._joints, self._target, strict=True))
+
+    def take(self, payload: bytes, stands: Sequence[int]) -> Wanted:
+        """A message, while the arm stands at `stands` [steps]; raises `Refused`, and what was asked before stays."""
+        wanted = self._read(payload)
+        if wanted.moves is None:
+            return wanted
+        base = self._target if self._target is not None else tuple(map(Fraction, stands))
+        target = tuple(at + move for at, move in zip(base, wanted.moves, strict=True))
+        for joint, steps in zip(self._joints, target, strict=True):
+            _require_within(joint, steps)
+        self._target = target
+        return wanted
+
+    def forget(self) -> None:
+        """Somebody has stopped the arm: nothing of what was asked is continued."""
+        self._target = None
+
+    def is_reached(self, stands: Sequence[int]) -> bool:
+        """True if the arm stands on the nearest steps; the fractions are kept for the next message."""
+        return self._target is None or all(
+            abs(steps - count) <= Fraction(1, 2) + Fraction(1, 128)
+            for steps, count in zip(self._target, stands, strict=True)
+        )
+
+    def forget_if_elsewhere(self, stands: Sequence[int]) -> None:
+        """The arm at rest was moved by somebody else meanwhile: the next message counts from there."""
+        if not self.is_reached(stands):
+            self.forget()
+
+    def _read(self, payload: bytes) -> Wanted:
+        found = _object(payload)
+        output = found.get(OUTPUT)
+        if output is not None and (isinstance(output, str) or output not in (0, 1)):
+            raise Refused(f'"{OUTPUT}" is {output!r}: write 0 or 1')
+        missing = [name for name in self._names if name not in found]
+        if len(missing) == len(self._names) and output is not None:
+            return Wanted(None, bool(output))
+        if missing:
+            raise Refused(f"{', '.join(missing)} missing: the sketch moves only by {', '.join(self._names)} together")
+        moves = zip(self._joints, self._names, strict=True)
+        steps = tuple(_degrees(found[name], name) * joint.steps.steps_per_turn / 360 for joint, name in moves)
+        return Wanted(steps, None if output is None else bool(output))
+
+
+def _object(payload: bytes) -> dict[str, object]:
+    if len(payload) > LARGEST:
+        raise Refused(f"{len(payload)} bytes, more than the {LARGEST} of a sketch's buffer")
+    try:
+        found = json.loads(payload)
+    except (ValueError, RecursionError) as error:
+        raise Refused(f"no JSON: {payload[:40]!r}: {error}") from error
+    if not isinstance(found, dict):
+        raise Refused(f"no JSON object: {payload[:40]!r}")
+    return found
+
+
+def _degrees(value: object, name: str) -> Fraction:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise Refused(f'"{name}" is {value!r}: write a number of degrees')
+    if not (math.isfinite(value) and abs(value) <= FARTHEST) if isinstance(value, float) else abs(value) > FARTHEST:
+        raise Refused(f'"{name}" is {value!s:.20}: no joint turns that far in one message')
+    return Fraction(value)
+
+
+def _position(joint: Joint, steps: Fraction) -> float:
+    return joint.clamp(joint.steps.to_position(float(steps)))
+
+
+def _require_within(joint: Joint, steps: Fraction) -> None:
+    position, half = joint.steps.to_position(float(steps)), 0.5 / joint.steps.per_unit
+    if joint.lower - half <= position <= joint.upper + half:
+        return
+    limit = joint.lower if position < joint.lower else joint.upper
+    too_far = abs(position - limit) / joint.steps.travel_per_turn * 360.0
+    raise Refused(
+        f'joint "{joint.name}" ({joint.wire_name}) would be at {position:.4f} {joint.unit}, beyond its limit of '
+        f"{limit:.4f} {joint.unit}: {too_far:.3f} degrees too far"
+    )
