@@ -52,6 +52,8 @@ FIGURES = {
     "jog_tick_us": Row("tool_motion:jog_tick_us", "us"),
     "lost_of_45000_at_25hz": Row("virtual_time:lost_of_45000_at_25hz", "chunks"),
     "seed_move_percent": Row("seed_move:seed_move_percent", "%"),
+    "ra_remainder_steps": Row("old_dialects:ra_remainder_steps", "steps"),
+    "text_link_ms": Row("old_dialects:text_link_ms", "ms"),
     "clock_sync_error_us": Row("virtual_time:clock_sync_error_us", "us"),
     "hold_reaction_ms": Row("virtual_time:hold_reaction_ms", "ms"),
     "max_step_rate_hz": Row("pulses:max_step_rate_hz", "steps/s"),
