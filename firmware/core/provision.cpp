@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "baud.h"
 #include "phrase.h"
 #include "record_reader.h"
 
@@ -22,6 +23,7 @@ constexpr Field kFields[] = {
     text("mqtt_user", offsetof(Credentials, mqtt_user), sizeof Credentials::mqtt_user),
     text("mqtt_password", offsetof(Credentials, mqtt_password), sizeof Credentials::mqtt_password),
     text("mqtt_ca", offsetof(Credentials, mqtt_ca), sizeof Credentials::mqtt_ca),
+    text("serial_baud", offsetof(Credentials, serial_baud), sizeof Credentials::serial_baud),
     Field{"factory_reset", Kind::Truth, false, offsetof(Credentials, is_factory_reset)},
 };
 constexpr Record kProvision{kFields, sizeof kFields / sizeof kFields[0], true};
@@ -40,6 +42,8 @@ const char* find_fault(const Credentials& credentials) {
         return "\"device\" is not 1 to 31 letters, digits, '_' or '-'";
     if (credentials.mqtt_uri[0] != 0 && !is_uri(credentials.mqtt_uri))
         return "\"mqtt_uri\" does not begin with mqtt:// or mqtts://";
+    if (credentials.serial_baud[0] != 0 && read_baud(credentials.serial_baud) == 0)
+        return "\"serial_baud\" is not a number of 9600 to 3000000";
     const bool has_password = credentials.wifi_password[0] != 0;
     if (has_password && memchr(credentials.wifi_password, 0, kLeastWifiPassword) != nullptr)
         return "\"wifi_password\" is shorter than the 8 bytes of WPA2";

@@ -17,6 +17,7 @@ struct Credentials {
     char mqtt_user[64] = "";
     char mqtt_password[64] = "";
     char mqtt_ca[2049] = "";        // PEM
+    char serial_baud[8] = "";       // of the serial line; empty: 921600
     bool is_factory_reset = false;  // asked for; nothing to be kept
 };
 

@@ -95,6 +95,7 @@ void SerialPort::take_line(uint64_t received_us, uint64_t now_us) {
 void SerialPort::greet(uint64_t received_us) {
     const bool is_stranger = !was_heard_ || received_us > heard_us_ + kStrangerUs;
     was_heard_ = true;
+    ++understood_;
     heard_us_ = received_us;
     if (!is_stranger) return;
     is_greeting_ = true;

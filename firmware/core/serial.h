@@ -34,6 +34,8 @@ class SerialPort {
     // The same for the JSON of a platform's own: PROVISION_ACK, SHAFT.
     size_t wrap_json(FrameType type, const uint8_t* text, size_t size, uint8_t* out, size_t capacity) const;
 
+    // Frames and lines that were understood since begin().
+    uint32_t understood() const { return understood_; }
     const TextMode& text_mode() const { return text_mode_; }
 
   private:
@@ -54,6 +56,7 @@ class SerialPort {
     bool is_answering_ = false;  // what is said now answers what came over this line
     bool is_greeting_ = false;
     bool was_heard_ = false;
+    uint32_t understood_ = 0;
     uint64_t heard_us_ = 0;  // the last frame or line
     uint64_t byte_us_ = 0;   // the last bytes
 };

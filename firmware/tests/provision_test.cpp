@@ -63,6 +63,11 @@ TEST(Provision, WhatCannotWorkIsRefused) {
     EXPECT_EQ(reason_of(member("device", "a/b")), "\"device\" is not 1 to 31 letters, digits, '_' or '-'");
     EXPECT_EQ(reason_of(member("mqtt_uri", "http://x")), "\"mqtt_uri\" does not begin with mqtt:// or mqtts://");
     EXPECT_EQ(reason_of(member("wifi_password", "seven77")), "\"wifi_password\" is shorter than the 8 bytes of WPA2");
+    for (const char* rate : {"9599", "3000001", "fast", "1e5"})
+        EXPECT_EQ(reason_of(member("serial_baud", rate)), "\"serial_baud\" is not a number of 9600 to 3000000");
+    Credentials credentials;
+    EXPECT_TRUE(parse(member("serial_baud", "115200"), &credentials));
+    EXPECT_STREQ(credentials.serial_baud, "115200");
     EXPECT_EQ(reason_of(R"({"wifi_ssid":"a","wifi_ssid":"b"})"), "\"wifi_ssid\" is there twice");
     EXPECT_EQ(reason_of("hello"), "an object is expected (byte 0)");
 }

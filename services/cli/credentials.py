@@ -14,6 +14,7 @@ from services.cli.errors import usage
 WIFI_PASSWORD, MQTT_PASSWORD = "GEMELO_WIFI_PASSWORD", "GEMELO_MQTT_PASSWORD"
 MQTT_DEVICE_PASSWORD = "GEMELO_MQTT_DEVICE_PASSWORD"  # wins over the other, which is the gateway's too
 LONGEST_SSID = 32  # [bytes] IEEE 802.11
+BAUD = (9_600, 3_000_000)  # the firmware's bounds
 WPA = (8, 63)  # [characters] of a passphrase
 
 
@@ -27,6 +28,7 @@ class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     mqtt_user: str | None = None
     mqtt_password: str | None = None
     mqtt_ca: str | None = None  # PEM
+    serial_baud: str | None = None  # of its serial line, a decimal number
     factory_reset: bool = False
 
     def text(self) -> bytes:
@@ -35,7 +37,7 @@ class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
     def summary(self) -> str:
         """The given fields as a line, without a password."""
-        said = [f"{name} {value}" for name in ("device", "wifi_ssid", "mqtt_uri", "mqtt_user")
+        said = [f"{name} {value}" for name in ("device", "wifi_ssid", "mqtt_uri", "mqtt_user", "serial_baud")
                 if (value := getattr(self, name)) is not None]  # fmt: skip
         hidden = [name for name in ("wifi_password", "mqtt_password", "mqtt_ca") if getattr(self, name) is not None]
         return ", ".join([*said, *(f"{name} given" for name in hidden)])
@@ -50,6 +52,8 @@ def require_sound(credentials: Credentials) -> Credentials:
         raise usage(f"the Wi-Fi password has {len(credentials.wifi_password)} characters, not {WPA[0]} to {WPA[1]}")
     if uri is not None and not uri.startswith(("mqtt://", "mqtts://")):
         raise usage(f'--mqtt-uri "{uri}" is written as mqtt://host:1883, or mqtts://host:8883 with TLS')
+    if credentials.serial_baud is not None and not BAUD[0] <= int(credentials.serial_baud) <= BAUD[1]:
+        raise usage(f"--serial-baud {credentials.serial_baud} is not within {BAUD[0]} to {BAUD[1]}")
     if credentials == Credentials():
         raise usage("nothing to tell the device: give --device, --wifi-ssid, --mqtt-uri, ... or --factory-reset")
     return credentials

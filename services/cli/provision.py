@@ -45,6 +45,12 @@ def add_options(parser: Parser) -> None:
     parser.add_argument("--mqtt-uri", metavar="URI", help="as mqtt://host:1883, or mqtts://host:8883")
     parser.add_argument("--mqtt-user", metavar="NAME", help="at the broker; its password is asked for")
     parser.add_argument("--mqtt-ca", type=Path, metavar="FILE", help="the certificate that mqtts trusts, PEM")
+    parser.add_argument(
+        "--serial-baud",
+        type=positive_integer,
+        metavar="BAUD",
+        help="of its serial line from now on, as 115200 for a driver of <SEQ,...>; then also [serial] baud",
+    )
     parser.add_argument("--factory-reset", action="store_true", help="forget everything, configuration included")
     parser.add_argument("-y", "--yes", action="store_true", help="do not ask before a factory reset")
     parser.epilog = f"{PASSWORDS}\n\n{parser.epilog}"
@@ -52,7 +58,10 @@ def add_options(parser: Parser) -> None:
 
 def run(options: Options) -> ExitCode:
     """Provisions the board, or resets it to its factory state after asking."""
-    given = (options.device, options.wifi_ssid, options.mqtt_uri, options.mqtt_user, options.mqtt_ca)
+    given = (
+        options.device, options.wifi_ssid, options.mqtt_uri, options.mqtt_user, options.mqtt_ca, options.serial_baud,
+    )  # fmt: skip
+
     if options.factory_reset:
         if any(each is not None for each in given):
             raise usage("--factory-reset forgets everything: tell the device anew afterwards, in a command of its own")
@@ -65,6 +74,7 @@ def run(options: Options) -> ExitCode:
         mqtt_uri=options.mqtt_uri,
         mqtt_user=mqtt,
         mqtt_ca=certificate(options.mqtt_ca),
+        serial_baud=None if options.serial_baud is None else str(options.serial_baud),
         wifi_password=None if wifi is None else password("Wi-Fi password", WIFI_PASSWORD, os.environ),
         mqtt_password=None
         if mqtt is None

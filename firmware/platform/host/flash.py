@@ -21,6 +21,7 @@ class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     mqtt_user: str = ""
     mqtt_password: str = ""
     mqtt_ca: str = ""  # PEM
+    serial_baud: str = ""  # empty: 921600; a pseudo-terminal has none
 
     def __repr__(self) -> str:
         return f"Credentials(device={self.device!r}, mqtt_uri={self.mqtt_uri!r}, ...)"

@@ -1,4 +1,4 @@
-// What the tasks share: rings between them, and nothing else. Each ring has one writer and one reader.
+// What the tasks share: rings between them, and a counter. Each ring has one writer and one reader.
 #pragma once
 
 #include <stdint.h>
@@ -26,6 +26,7 @@ struct Board {
     Ring<1024> from_sensors;
     Ring<8192> to_mqtt;
     Ring<8192> to_wire;
+    uint32_t understood = 0;  // frames and lines of the wire; written in the slot's task, atomically
 };
 
 extern Board board;

@@ -113,7 +113,8 @@ void Device::dispatch(const Record& record) {
         case Inbound::Connected:
             return machine_.report_status();
         case Inbound::Bytes:
-            return serial_.receive(record.bytes, record.size, record.time_us, now_us);
+            serial_.receive(record.bytes, record.size, record.time_us, now_us);
+            return __atomic_store_n(&board.understood, serial_.understood(), __ATOMIC_RELAXED);
         case Inbound::Sensor: {
             int32_t raw = 0;
             memcpy(&raw, record.bytes, sizeof raw);

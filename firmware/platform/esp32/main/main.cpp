@@ -1,4 +1,5 @@
 // The start: what the flash knows, then the tasks.
+#include "baud.h"
 #include "board.h"
 #include "bootloader_random.h"
 #include "device.h"
@@ -57,7 +58,7 @@ void start() {
     start_watchdog();
     const uint32_t boot_id = random_boot_id();
     device.begin(credentials, boot_id);
-    start_wire();
+    start_wire(read_baud(credentials.serial_baud));
     device.set_network(start_network(credentials, boot_id));
     start_sensors();
     start_task(run_device, "slot", kSlotStack, kSlotPriority, kSlotCore);

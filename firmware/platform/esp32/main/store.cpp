@@ -27,8 +27,9 @@ struct Entries {
                 {"mqtt_uri", c.mqtt_uri, sizeof c.mqtt_uri},
                 {"mqtt_user", c.mqtt_user, sizeof c.mqtt_user},
                 {"mqtt_password", c.mqtt_password, sizeof c.mqtt_password},
-                {"mqtt_ca", c.mqtt_ca, sizeof c.mqtt_ca}} {}
-    Entry entry[7];
+                {"mqtt_ca", c.mqtt_ca, sizeof c.mqtt_ca},
+                {"serial_baud", c.serial_baud, sizeof c.serial_baud}} {}
+    Entry entry[8];
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "wire.h"
 
+#include "baud.h"
 #include "board.h"
 #include "driver/uart.h"
 #include "esp_err.h"
@@ -11,14 +12,15 @@ namespace gemelo {
 namespace {
 
 constexpr uart_port_t kPort = UART_NUM_0;
-constexpr int kBaudRate = 921600;
 constexpr int kBuffer = 4096;
 constexpr size_t kAtOnce = 256;
 constexpr TickType_t kPatience = 1;
 
+BaudSearch search;
+
 void set_up() {
     uart_config_t config = {};
-    config.baud_rate = kBaudRate;
+    config.baud_rate = static_cast<int>(search.rate());
     config.data_bits = UART_DATA_8_BITS;
     config.parity = UART_PARITY_DISABLE;
     config.stop_bits = UART_STOP_BITS_1;
@@ -35,6 +37,8 @@ void listen() {
     if (size <= 0) return;
     const uint64_t now_us = static_cast<uint64_t>(esp_timer_get_time());
     board.from_wire.push(static_cast<uint8_t>(Inbound::Bytes), 0, now_us, bytes, static_cast<size_t>(size));
+    const uint32_t understood = __atomic_load_n(&board.understood, __ATOMIC_RELAXED);
+    if (search.hear(static_cast<size_t>(size), understood, now_us)) uart_set_baudrate(kPort, search.rate());
 }
 
 void speak() {
@@ -55,6 +59,9 @@ void run(void*) {
 
 }  // namespace
 
-void start_wire() { start_task(run, "wire", kWireStack, kWirePriority, kNetworkCore); }
+void start_wire(uint32_t rate) {
+    search = BaudSearch(rate);
+    start_task(run, "wire", kWireStack, kWirePriority, kNetworkCore);
+}
 
 }  // namespace gemelo

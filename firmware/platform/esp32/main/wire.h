@@ -1,8 +1,12 @@
-// The serial wire's task: bytes from UART0 into the board's ring, and what the device says out of it.
+// The serial wire's task: bytes from UART0 into the board's ring, and what the device says out of it, at the baud rate
+// that was provisioned, or at that of whoever speaks.
 #pragma once
+
+#include <stdint.h>
 
 namespace gemelo {
 
-void start_wire();
+// `rate` as it was provisioned; 0: none was.
+void start_wire(uint32_t rate);
 
 }  // namespace gemelo
