@@ -75,7 +75,7 @@ class MqttSection(DeploymentRecord, frozen=True, kw_only=True):
 
 class SerialSection(DeploymentRecord, frozen=True, kw_only=True):
     device: str = "/dev/ttyUSB0"
-    baud: int = 921_600
+    baud: int = 0  # 0: [device] serial_baud of robot.toml
 
 
 class ViewerSection(DeploymentRecord, frozen=True, kw_only=True):

@@ -178,6 +178,7 @@ class DeviceRecord(RobotRecord, frozen=True, kw_only=True):
     enable_pin: Pin | None = None  # of all drivers
     enable_active: PinLevel = PinLevel.LOW
     dialect: Dialect = Dialect.GEMELO
+    serial_baud: Annotated[int, Meta(ge=9_600, le=3_000_000)] = 921_600  # of its serial line, as it was provisioned
     message_time: Annotated[float, Meta(ge=0.6, le=10.0)] = 2.0  # [s] that one message of dialect "ra" may take
     telemetry_time: Annotated[float, Meta(ge=0.01, le=2.0)] = 0.1  # [s] between two words of a sketch of dialect "ra"
     text_hz: Annotated[float, Meta(ge=1.0, le=100.0)] = 25.0  # [Hz] of lines in dialect "text"

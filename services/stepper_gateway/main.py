@@ -22,6 +22,7 @@ from services.stepper_gateway.shell import Shell
 RATE = 50.0  # [Hz]
 # Between the threads of bus, wire and loop: at Python's own 5 ms a stop waits for several of them in a flood.
 SWITCH_INTERVAL = 0.0005  # [s] chosen
+USUAL_BAUD = 921_600
 VIRTUAL_LINE = "virtual_esp32.tty"
 
 
@@ -42,7 +43,7 @@ def open_device(deployment: Deployment, arm: Arm, wake: Callable[[], None]) -> L
     """The link to the arm's device, in the dialect that it speaks."""
     match arm.device.dialect:
         case Dialect.GEMELO:
-            return open_link(deployment, arm.device.name, wake)
+            return open_link(deployment, arm.device.name, wake, baud_of(deployment, arm))
         case Dialect.RA:
             from services.mqtt.access import gateway_access
             from services.stepper_gateway.links.foreign.ra_link import RaLink
@@ -51,10 +52,10 @@ def open_device(deployment: Deployment, arm: Arm, wake: Callable[[], None]) -> L
         case Dialect.TEXT:
             from services.stepper_gateway.links.foreign.text_link import TextLink
 
-            return TextLink(serial_device(deployment), deployment.serial.baud, arm, wake)
+            return TextLink(serial_device(deployment), baud_of(deployment, arm), arm, wake)
 
 
-def open_link(deployment: Deployment, device: str, wake: Callable[[], None]) -> Link:
+def open_link(deployment: Deployment, device: str, wake: Callable[[], None], baud: int = USUAL_BAUD) -> Link:
     """The other wire's library is not even imported."""
     match deployment.wire:
         case Wire.MQTT:
@@ -65,7 +66,12 @@ def open_link(deployment: Deployment, device: str, wake: Callable[[], None]) -> 
         case Wire.SERIAL:
             from services.stepper_gateway.links.serial import SerialLink
 
-            return SerialLink(serial_device(deployment), deployment.serial.baud, wake)
+            return SerialLink(serial_device(deployment), deployment.serial.baud or baud, wake)
+
+
+def baud_of(deployment: Deployment, arm: Arm) -> int:
+    """Of the serial line: the deployment's, else robot.toml's."""
+    return deployment.serial.baud or arm.device.serial_baud
 
 
 def serial_device(deployment: Deployment) -> str:

@@ -15,13 +15,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.actions import GoalStatusCode
+from schemas.deployment import Deployment, SerialSection
 from schemas.device import DeviceCommandKind
 from schemas.robot import Dialect
 from services.arm.model.description import Arm, heard_by_the_board, load_arm
 from services.stepper_gateway.links.foreign.text_exchange import RETRIES, TextExchange
 from services.stepper_gateway.links.foreign.text_link import TextLink
 from services.stepper_gateway.links.foreign.text_messages import Answer, AnswerReader, line_of, read_answer
-from services.stepper_gateway.main import open_device
+from services.stepper_gateway.main import baud_of, open_device
 from services.virtual_arm.virtual_arm import rm1
 from tests.stepper_gateway.dialects import robot_with
 from tests.stepper_gateway.processes import DEVICE, Processes
@@ -130,6 +131,13 @@ def test_our_own_board_is_driven_by_its_text_mode_too(tmp_path: Path) -> None:
             assert gateway.move_to(END).accepted
             assert gateway.finish()[0] is GoalStatusCode.SUCCEEDED
             assert gateway.state.round_trip > 0.0
+
+
+def test_the_baud_rate_is_the_deployments_or_else_that_of_robot_toml(tmp_path: Path) -> None:
+    arm = load_arm(robot_with(tmp_path, "serial_baud = 115_200"))
+    assert baud_of(Deployment(), arm) == 115_200
+    assert baud_of(Deployment(serial=SerialSection(baud=57_600)), arm) == 57_600
+    assert baud_of(Deployment(), rm1()) == 921_600
 
 
 def test_a_port_that_is_not_there_is_named() -> None:
