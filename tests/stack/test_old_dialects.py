@@ -1,0 +1,77 @@
+"""An old publisher on a running stack: its `ra/juntas` moves the arm, and the wire is measured beside it."""
+
+from __future__ import annotations
+
+import json
+import queue
+import signal
+import subprocess
+import time
+
+import pytest
+from paho.mqtt import client as paho
+from paho.mqtt.enums import CallbackAPIVersion
+
+from services.stack.stack import Stack
+from tests.stack.gemelo import COMMAND, gemelo
+
+PROCESSES = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher")
+LONGEST = 20.0  # [s]
+
+
+@pytest.fixture
+def stack(tmp_path):
+    with Stack(broker="mosquitto", out=tmp_path, processes=PROCESSES) as running:
+        yield running
+
+
+def joints(stack) -> list[dict[str, float]]:
+    return json.loads(gemelo(stack, "state", "--json"))["joints"]
+
+
+def until(is_so) -> None:
+    end = time.monotonic() + LONGEST
+    while not is_so():
+        assert time.monotonic() < end
+
+
+def test_an_old_publisher_moves_our_arm_and_the_wire_is_measured(stack):
+    said: queue.Queue[str] = queue.Queue()
+    publisher = paho.Client(CallbackAPIVersion.VERSION2)
+    publisher.on_message = lambda _client, _data, message: said.put(message.topic)
+    publisher.connect("127.0.0.1", int(stack.environment["GEMELO_MQTT_PORT"]))
+    publisher.subscribe("ra/#")
+    publisher.loop_start()
+    with listening(stack) as listener:
+        drive_and_measure(stack, publisher, listener, said)
+    publisher.disconnect()
+    publisher.loop_stop()
+
+
+def listening(stack) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [*COMMAND, "link", "ra"], cwd=stack.root, env=stack.environment, text=True, bufsize=1,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    )  # fmt: skip
+
+
+def drive_and_measure(stack, publisher, listener, said) -> None:
+    assert "ra/juntas moves rm1 now" in listener.stdout.readline()
+    heard = set()
+    until(lambda: heard.add(said.get(timeout=LONGEST)) or heard >= {"ra/estados", "ra/sensores"})
+
+    for _ in range(50):  # as fast as the broker takes them: the sketch would keep the last one only
+        publisher.publish("ra/juntas", '{"q1": 0.9, "q2": -0.9, "q3": 0, "avanzar": 0}', qos=1)
+    until(lambda: [joint["executed_steps"] for joint in joints(stack)] == [2333, -50, 0])
+    publisher.publish("ra/juntas", '{"q1": 1, "q2": 1}', qos=1)
+    assert "q3 missing" in listener.stdout.readline()
+    publisher.publish("ra/juntas", '{"q1": 200, "q2": 0, "q3": 0}', qos=1)
+    assert 'joint "brazo_joint" (q1) would be at' in listener.stdout.readline()
+
+    bench = json.loads(gemelo(stack, "link", "bench", "--rate", "50", "--count", "25", "--json"))
+    assert (bench["count"], bench["lost"]) == (25, 0)
+    assert 0.0 < bench["median"] < 250.0
+    assert [joint["executed_steps"] for joint in joints(stack)] == [2333, -50, 0]
+
+    listener.send_signal(signal.SIGINT)
+    assert listener.wait(LONGEST) == 0
