@@ -85,6 +85,13 @@ def test_a_board_is_told_what_is_given_and_nothing_else(line, monkeypatch, capsy
     assert "correct horse" not in text
 
 
+def test_a_board_is_told_the_baud_rate_of_its_line(line, capsys):
+    board, port = line
+    assert run(["device", "provision", "--serial", port, "--serial-baud", "115200"]) is ExitCode.OK
+    assert board.told == [{"serial_baud": "115200"}]
+    assert "taken: serial_baud 115200" in capsys.readouterr().out
+
+
 def test_a_board_that_starts_while_it_is_told_is_told_again(line, quick):
     board, port = line
     board.deaf = 2
@@ -154,6 +161,7 @@ def test_a_password_comes_from_the_environment_a_terminal_or_a_pipe(monkeypatch)
         (Credentials(wifi_ssid="ñ" * 17), "34 bytes"),
         (Credentials(wifi_ssid="lab", wifi_password="short"), "5 characters, not 8 to 63"),
         (Credentials(mqtt_uri="10.0.0.2"), "mqtt://host:1883"),
+        (Credentials(serial_baud="300"), "300 is not within 9600 to 3000000"),
     ],
 )
 def test_what_no_board_could_use_is_not_sent(credentials, reason):
