@@ -104,6 +104,17 @@ class SensorConfig(ConfigRecord, frozen=True, kw_only=True):
     offset_milli: int = 0
 
 
+class ServoConfig(ConfigRecord, frozen=True, kw_only=True):
+    """A hobby servo: pulse lengths [us], 500 to 2500, and how fast the pulse changes, so that the horn can follow."""
+
+    name: str
+    pin: int
+    lower_us: int
+    upper_us: int
+    speed_us_s: int
+    off_at_estop: bool = False
+
+
 class DeviceConfig(ConfigRecord, frozen=True, kw_only=True):
     """The whole configuration."""
 
@@ -121,6 +132,7 @@ class DeviceConfig(ConfigRecord, frozen=True, kw_only=True):
     inputs: tuple[InputConfig, ...] = ()
     outputs: tuple[OutputConfig, ...] = ()
     sensors: tuple[SensorConfig, ...] = ()
+    servo: ServoConfig | msgspec.UnsetType = msgspec.UNSET  # absent where there is none
 
 
 def config_text(config: DeviceConfig) -> bytes:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable
 
 from schemas.device_config import InputRole, SensorKind
-from schemas.robot import Input, RobotFile, Sensor
+from schemas.robot import Input, RobotFile, Sensor, ServoGripper
 from services.arm.checks.findings import Finding, error
 from services.arm.errors import suggestion
 from services.arm.model.description import ROBOT_FILE
@@ -51,6 +51,8 @@ def _signals(robot: RobotFile) -> Iterable[tuple[int, str]]:
     signals += [(output.pin, f'"{output.name}"') for output in robot.output]
     signals += [(sensor.pin, f'"{sensor.name}"') for sensor in robot.sensor]
     signals += [(sensor.trigger_pin, f'"{sensor.name}"\'s trigger_pin') for sensor in robot.sensor]
+    if isinstance(robot.gripper, ServoGripper):
+        signals.append((robot.gripper.pin, "the gripper's pin"))
     return ((pin, user) for pin, user in signals if pin is not None)
 
 

@@ -5,17 +5,21 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-from schemas.device_config import DeviceConfig, HomingConfig, JointConfig
-from schemas.robot import Homing, HomingDirection, PinLevel
+from msgspec import UNSET, UnsetType
+
+from schemas.device_config import DeviceConfig, HomingConfig, JointConfig, ServoConfig
+from schemas.robot import Homing, HomingDirection, PinLevel, ServoGripper
 from services.arm.device.device_parts import input_config, output_config, sensor_config
 from services.arm.device.device_values import device_name, int32, nearest, pin_or_unused
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.description import Arm, Joint
+from services.arm.model.gripper import pulse_speed
 from services.arm.motors.steps import Q8, StepScale
 
 # Knots are rounded to 1/256 step and sampled from profiles that touch their limits.
 HEADROOM = 1.02
 UNLIMITED_Q8 = 1 << 30  # of a joint without limits: 4 million steps each way
+SERVO_NAME = "gripper"  # in what the device says of its configuration
 MAX_COUNTS = {"joint": 8, "input": 16, "output": 8, "sensor": 8}  # of one device, the firmware's
 DEFAULT_TRAVEL_FACTOR = 1.1  # how far a joint looks for its switch, where robot.toml does not say
 
@@ -37,6 +41,7 @@ def device_config(arm: Arm) -> DeviceConfig:
         inputs=tuple(input_config(switch, arm) for switch in arm.inputs),
         outputs=tuple(output_config(output) for output in arm.outputs),
         sensors=tuple(sensor_config(sensor) for sensor in arm.sensors),
+        servo=_servo(arm),
     )
 
 
@@ -62,6 +67,20 @@ def _joint(joint: Joint, arm: Arm) -> JointConfig:
         dir_pin=pin_or_unused(motor.dir_pin),
         text_scale_q32=_text_scale(joint.steps),
         homing=_homing(joint.drive.homing, joint, arm) if joint.drive.homing is not None else None,
+    )
+
+
+def _servo(arm: Arm) -> ServoConfig | UnsetType:
+    gripper = arm.gripper
+    if not isinstance(gripper, ServoGripper):
+        return UNSET
+    return ServoConfig(
+        name=SERVO_NAME,
+        pin=gripper.pin,
+        lower_us=min(gripper.open_us, gripper.closed_us),
+        upper_us=max(gripper.open_us, gripper.closed_us),
+        speed_us_s=round(pulse_speed(gripper)),
+        off_at_estop=gripper.off_at_estop,
     )
 
 

@@ -15,6 +15,7 @@ from schemas.robot import (
     DeviceRecord,
     Dialect,
     Driver,
+    Gripper,
     Input,
     Output,
     RobotFile,
@@ -23,6 +24,7 @@ from schemas.robot import (
     Transmission,
 )
 from services.arm.errors import DescriptionError, suggestion
+from services.arm.model.gripper import require_gripper
 from services.arm.model.robot_file import read_robot_data, read_text, typed_robot, where_of
 from services.arm.model.srdf import SrdfModel, read_srdf
 from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel, read_urdf
@@ -84,6 +86,7 @@ class Arm:
     disabled_collisions: frozenset[frozenset[str]]  # pairs of links
     model: UrdfModel
     clearance: float = CLEARANCE  # [m] that plans keep between things that may not touch
+    gripper: Gripper | None = None
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -135,6 +138,7 @@ def load_arm(folder: Path) -> Arm:
     srdf_path = robot_path.with_name(robot.srdf)
     srdf = read_srdf(srdf_path)
     _require_frames(robot, model, robot_path)
+    require_gripper(robot, robot_path, text)
     drivers = {driver.name: driver for driver in robot.driver}
     joints = tuple(_joint(drive, drivers, model, robot_path) for drive in robot.joint)
     _require_joints(joints, model, robot_path)
@@ -158,6 +162,7 @@ def load_arm(folder: Path) -> Arm:
         disabled_collisions=frozenset(frozenset(pair) for pair in srdf.disabled),
         model=model,
         clearance=robot.clearance,
+        gripper=robot.gripper,
     )
     return heard_by_the_board(arm)
 

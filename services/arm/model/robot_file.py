@@ -7,6 +7,7 @@ import re
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from types import UnionType
 from typing import get_args, get_origin, get_type_hints
 
 import msgspec
@@ -16,6 +17,7 @@ from services.arm.errors import DescriptionError, suggestion
 from services.arm.motors.tick import chosen_tick
 
 Keys = tuple[str | int, ...]
+TAG_FIELD = "kind"  # of tables of which there are several kinds
 
 
 @dataclass(frozen=True)
@@ -125,13 +127,30 @@ def _header(name: str, is_array: bool, counts: dict[str, int]) -> list[str | int
     return path
 
 
+def _chosen(kind: object, data: object) -> object:
+    """Of several tables that may stand there, the one that its own `kind` names; else `kind` itself."""
+    if not (isinstance(kind, UnionType) and isinstance(data, dict)):
+        return kind
+    for option in get_args(kind):
+        if _tag_of(option) and _tag_of(option).get(TAG_FIELD) == data.get(TAG_FIELD):
+            return option
+    return kind
+
+
+def _tag_of(kind: object) -> dict[str, object]:
+    """The key that names the table's kind, where it has one, and its word."""
+    config = getattr(kind, "__struct_config__", None)
+    return {config.tag_field: config.tag} if config is not None and config.tag is not None else {}
+
+
 def _walk(data: object, kind: object, path: Keys) -> list[tuple[Keys, str]]:
     if get_origin(kind) is tuple and isinstance(data, list):
         item = get_args(kind)[0]
         return [found for index, entry in enumerate(data) for found in _walk(entry, item, (*path, index))]
+    kind = _chosen(kind, data)
     if not (isinstance(kind, type) and issubclass(kind, msgspec.Struct) and isinstance(data, dict)):
         return []
-    types = get_type_hints(kind)
+    types = get_type_hints(kind) | _tag_of(kind)
     found: list[tuple[Keys, str]] = []
     for key, value in data.items():
         if key in types:

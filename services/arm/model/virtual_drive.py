@@ -32,6 +32,7 @@ def lacks_motors(data: Table, path: Path) -> bool:
     joints = list(_tables(data.get("joint")))
     there = [f"[{key}]" if key == "device" else f"[[{key}]]" for key in ("device", "driver") if data.get(key)]
     there += [f"[[{key}]]" for key in ("input", "output", "sensor") if data.get(key)]
+    there += ["[gripper]"] if data.get("gripper") else []
     there += [
         f'joint "{joint.get("name")}"\'s {key}' for joint in joints for key in ("motor", "homing") if key in joint
     ]
