@@ -103,6 +103,7 @@ class DeviceCommandKind(IntEnum):
     OUTPUT = 9
     SPEED = 10
     STATUS = 11  # the gateway asks for a status
+    SERVO = 12  # the gateway moves the gripper
 
 
 class ResumeCommand(Message, frozen=True, kw_only=True, tag="resume"):
@@ -231,6 +232,7 @@ class InjectKind(StrEnum):
     OFFLINE = "offline"  # value [s] without network
     FREEZE = "freeze"  # value [s] in which the slot task hangs
     DRIFT = "drift"  # value [ppm] by which its clock is fast
+    OBJECT = "object"  # value [m] of what stands between the jaws of a servo gripper; 0 takes it away
 
 
 class InjectRequest(Message, frozen=True, kw_only=True):

@@ -29,6 +29,9 @@ struct GemeloSnapshot {
     uint32_t level_low;
     uint32_t level_high;
     uint32_t scale_q30;
+    uint32_t servo_us;  // 0: no pulses
+    uint32_t servo_target_us;
+    double horn_us;  // where the horn truly is
 };
 
 // The device of a configuration, or nullptr and why not; `part` has room for 32 bytes, `reason` for 128. An empty text
@@ -145,6 +148,9 @@ void gemelo_snapshot(VirtualDevice* device, GemeloSnapshot* snapshot) {
     snapshot->level_high = device->world().levels().high;
     snapshot->max_slot_error_q8 = machine.max_slot_error_q8();
     snapshot->scale_q30 = point.scale_q30;
+    snapshot->servo_us = machine.servo().pulse_us();
+    snapshot->servo_target_us = machine.servo().target_us();
+    snapshot->horn_us = device->world().horn().place_us();
     for (uint8_t j = 0; j < gemelo::kMaxJoints; ++j) {
         snapshot->steps[j] = machine.stepper().executed(j);
         snapshot->shaft[j] = device->world().shaft(j);

@@ -95,6 +95,17 @@ std::string say(const SensorConfig& sensor) {
         .object();
 }
 
+std::string say(const ServoConfig& servo) {
+    return Members()
+        .text("name", servo.name)
+        .number("pin", servo.pin)
+        .number("lower_us", servo.lower_us)
+        .number("upper_us", servo.upper_us)
+        .number("speed_us_s", servo.speed_us_s)
+        .truth("off_at_estop", servo.is_off_at_estop)
+        .object();
+}
+
 template <typename Part>
 std::string say(const Part* parts, uint8_t count) {
     std::string text = "[";
@@ -103,8 +114,8 @@ std::string say(const Part* parts, uint8_t count) {
 }
 
 std::string say(const DeviceConfig& config) {
-    return Members()
-        .text("name", config.name)
+    Members members;
+    members.text("name", config.name)
         .raw("joints", say(config.joint, config.joints))
         .number("tick_hz", config.tick_hz)
         .number("queue_capacity", config.queue_capacity)
@@ -117,8 +128,9 @@ std::string say(const DeviceConfig& config) {
         .truth("enable_inverted", config.is_enable_inverted)
         .raw("inputs", say(config.input, config.inputs))
         .raw("outputs", say(config.output, config.outputs))
-        .raw("sensors", say(config.sensor, config.sensors))
-        .object();
+        .raw("sensors", say(config.sensor, config.sensors));
+    if (config.servo.pin != kNone) members.raw("servo", say(config.servo));
+    return members.object();
 }
 
 }  // namespace

@@ -9,11 +9,13 @@ from collections.abc import Sequence
 import msgspec
 
 from firmware.bindings.frames import OUTPUTS, InputLevels, OutFrame, PinChange, PlatformRequest
+from firmware.bindings.horn import horn_record
 from firmware.bindings.library import MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
 from firmware.bindings.motor import MotorError, motor_record
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, config_text
-from schemas.robot import Motor
+from schemas.robot import Gripper, Motor, ServoGripper
+from services.arm.model.gripper import opening_of, pulse_of
 from services.runtime.serial_frames import LARGEST, JsonFrame
 
 LARGEST_OUTPUT = 1024
@@ -28,7 +30,8 @@ class Device:
     """One device; nothing happens in it but by `receive` and `advance`.
 
     `config` may be the JSON text itself, and None for a device that has none yet. `motors` are ideal where there are
-    none; the shafts stand at `steps` unless `shaft` says where they truly are.
+    none; the shafts stand at `steps` unless `shaft` says where they truly are. A servo `gripper` has a virtual servo at
+    its jaws, which are open at first; the sensor that reads them does so in `gripper_unit`.
     """
 
     def __init__(
@@ -41,6 +44,8 @@ class Device:
         reset_cause: str = "power_on",
         motors: Sequence[Motor] = (),
         shaft: Sequence[int] | None = None,
+        gripper: Gripper | None = None,
+        gripper_unit: str = "mm",
     ) -> None:
         self._library = load_library()
         self._handle = None
@@ -60,6 +65,10 @@ class Device:
             except MotorError as error:
                 raise MotorError(f"the motor of joint {index + 1}: {error}") from error
             self._library.gemelo_set_motor(self._handle, index, c.byref(record))
+        self._gripper = gripper if isinstance(gripper, ServoGripper) else None
+        if self._gripper is not None:
+            horn = horn_record(self._gripper, self._config.sensors, gripper_unit)
+            self._library.gemelo_set_horn(self._handle, c.byref(horn))
         true = _positions(start if shaft is None else shaft)
         self._library.gemelo_start(self._handle, _positions(start), true, referenced)
         self._config_crc = self._snapshot().config_crc32
@@ -260,6 +269,33 @@ class Device:
     def set_sensor(self, index: int, value: float) -> None:
         """Sets a sensor's reading, in the unit [unit] of robot.toml."""
         self._library.gemelo_set_sensor(self._handle, index, value)
+
+    @property
+    def servo_us(self) -> int:
+        """The servo's pulse [us]; 0 for none."""
+        return int(self._snapshot().servo_us)
+
+    @property
+    def opening(self) -> float | None:
+        """[m] that the jaws of a servo gripper truly stand apart; None without one."""
+        return None if self._gripper is None else opening_of(self._gripper, self._snapshot().horn_us)
+
+    def put_object(self, width: float) -> bool:
+        """Put something `width` [m] wide between the jaws, 0 for nothing; False where they are closer than that."""
+        if self._gripper is None:
+            return False
+        if width <= 0.0:
+            self._library.gemelo_take_object(self._handle)
+            return True
+        if (self.opening or 0.0) < width - 1e-6:
+            return False
+        self._library.gemelo_put_object(self._handle, pulse_of(self._gripper, width))
+        return True
+
+    @property
+    def has_jaws(self) -> bool:
+        """It has a servo gripper, between whose jaws something can be put."""
+        return self._gripper is not None
 
     def freeze(self, seconds: float) -> None:
         """Blocks the slot task for `seconds` [s]; only the interrupt runs."""

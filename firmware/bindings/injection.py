@@ -12,6 +12,7 @@ from schemas.device import InjectKind, InjectRequest
 from schemas.device_config import InputRole
 
 LONGEST_FREEZE = 60.0  # [s]
+WIDEST_OBJECT = 1.0  # [m]
 FURTHEST_SLIP = 1_000_000  # [steps]
 
 
@@ -44,6 +45,8 @@ def inject(device: Device, request: InjectRequest) -> None:
         case InjectKind.SENSOR:
             names = (sensor.name for sensor in device.config.sensors)
             device.set_sensor(_index("sensor", request.target, names), request.value)
+        case InjectKind.OBJECT:
+            _put_object(device, within(request, WIDEST_OBJECT))
         case InjectKind.FREEZE:
             device.freeze(within(request, LONGEST_FREEZE))
         case _:
@@ -57,6 +60,14 @@ def _press_estop(device: Device, pressed: bool | None) -> None:
     for button in buttons:
         # Released is what the contact does by itself.
         device.press_input(button, True if pressed else None)
+
+
+def _put_object(device: Device, width: float) -> None:
+    if not device.has_jaws:
+        raise InjectRefused('object: this device has no servo gripper; robot.toml wants a [gripper] of kind = "servo"')
+    if not device.put_object(width):
+        apart = (device.opening or 0.0) * 1000.0
+        raise InjectRefused(f"object: {width * 1000:g} mm do not fit between the jaws, {apart:.1f} mm apart: open them")
 
 
 def _joint(device: Device, request: InjectRequest) -> int:

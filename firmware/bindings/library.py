@@ -37,6 +37,9 @@ class SnapshotRecord(c.Structure):
         ("level_low", c.c_uint32),
         ("level_high", c.c_uint32),
         ("scale_q30", c.c_uint32),
+        ("servo_us", c.c_uint32),
+        ("servo_target_us", c.c_uint32),
+        ("horn_us", c.c_double),
     )
 
 
@@ -51,6 +54,19 @@ class MotorRecord(c.Structure):
         ("torque", c.c_double * MAX_CURVE),
         ("inertia", c.c_double),
         ("friction", c.c_double),
+    )
+
+
+class HornRecord(c.Structure):
+    """`HornConfig` of platform/host/horn.h."""
+
+    _fields_ = (
+        ("speed_us_s", c.c_double),
+        ("open_us", c.c_double),
+        ("closed_us", c.c_double),
+        ("open_value", c.c_double),
+        ("closed_value", c.c_double),
+        ("sensor", c.c_uint8),
     )
 
 
@@ -90,6 +106,9 @@ def load_library(path: Path = LIBRARY) -> c.CDLL:
         "trace": (None, [device, c.c_int]),
         "take_trace": (size, [device, u64s, u32s, u32s, size]),
         "set_motor": (None, [device, c.c_uint8, motor_config]),
+        "set_horn": (None, [device, c.POINTER(HornRecord)]),
+        "put_object": (None, [device, c.c_double]),
+        "take_object": (None, [device]),
         "inherit": (None, [device, device]),
         "press": (None, [device, c.c_uint8, c.c_uint8]),
         "block": (None, [device, c.c_uint8, c.c_int]),

@@ -1,6 +1,7 @@
 // What surrounds a virtual device, and a motor alone, as plain C functions for ctypes.
 #include "../platform/host/virtual_device.h"
 
+using gemelo::HornConfig;
 using gemelo::Motor;
 using gemelo::MotorConfig;
 using gemelo::VirtualDevice;
@@ -11,6 +12,12 @@ extern "C" {
 void gemelo_set_motor(VirtualDevice* device, uint8_t joint, const MotorConfig* motor) {
     device->world().set_motor(joint, *motor);
 }
+
+void gemelo_set_horn(VirtualDevice* device, const HornConfig* horn) { device->world().set_horn(*horn); }
+
+void gemelo_put_object(VirtualDevice* device, double stop_us) { device->world().horn().put_object(stop_us); }
+
+void gemelo_take_object(VirtualDevice* device) { device->world().horn().take_object(); }
 
 void gemelo_inherit(VirtualDevice* device, const VirtualDevice* before) { device->world().inherit(before->world()); }
 

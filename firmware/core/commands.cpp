@@ -68,6 +68,8 @@ Code Machine::carry_out(const Frame& frame) {
             return switch_output(frame.bytes[21], argument);
         case Command::Speed:
             return change_speed(argument);
+        case Command::Servo:
+            return turn_servo(frame.bytes[21], argument);
         case Command::Status:
             report_status();
             return Code::Ok;
@@ -77,6 +79,7 @@ Code Machine::carry_out(const Frame& frame) {
 }
 
 Code Machine::carry_out_hold() {
+    servo_.hold();
     if (mode_ == Mode::Run) hold("command");
     if (mode_ == Mode::Homing) stop_homing("command");
     return Code::Ok;
@@ -92,6 +95,7 @@ Code Machine::resume() {
 
 // Slows down as a hold does; finish_slot() ends the stream once the arm stands.
 Code Machine::stop() {
+    servo_.hold();
     if (mode_ == Mode::Homing) stop_homing("command");
     if (mode_ != Mode::Run && mode_ != Mode::Hold) return Code::Ok;
     if (mode_ == Mode::Run) hold("command");
@@ -114,6 +118,21 @@ Code Machine::change_speed(uint16_t permil) {
     if (permil > 1000) return Code::BadArgument;
     speed_permil_ = permil;
     if (is_following_) bound_ramps();
+    return Code::Ok;
+}
+
+// Index 0 sends it to a pulse, index 1 lets it stay where it is.
+Code Machine::turn_servo(uint8_t index, uint16_t pulse_us) {
+    if (mode_ == Mode::Boot) return Code::NotReady;
+    if (!servo_.is_there() || index > 1 || (index == 1 && pulse_us != 0)) return Code::BadArgument;
+    if (index == 1) {
+        servo_.hold();
+        return Code::Ok;
+    }
+    if (pulse_us < config_->servo.lower_us || pulse_us > config_->servo.upper_us) return Code::PositionLimit;
+    if (mode_ == Mode::EStop) return Code::EstopPressed;
+    servo_.go_to(pulse_us);
+    servo_us_ = now_us_;
     return Code::Ok;
 }
 

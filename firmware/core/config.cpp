@@ -117,6 +117,14 @@ const char* find_sensor_fault(const DeviceConfig& config, uint8_t i, PinBoard* p
     return sensor.trigger_pin == kNone ? nullptr : "an analog sensor has no trigger_pin";
 }
 
+const char* find_servo_fault(const ServoConfig& servo, PinBoard* pins) {
+    if (!is_name(servo.name)) return "its name is not 1 to 31 letters, digits, '_' or '-'";
+    if (servo.lower_us < kLeastServoUs || servo.upper_us > kMostServoUs) return "its pulses are not 500 to 2500 us";
+    if (servo.lower_us >= servo.upper_us) return "its lower_us is not below its upper_us";
+    if (servo.speed_us_s < 10 || servo.speed_us_s > 1000000) return "its speed_us_s is not 10 to 1000000";
+    return pins->claim(servo.pin);
+}
+
 bool divides_1000(uint32_t hz) { return hz >= 1 && hz <= kSlotHz && kSlotHz % hz == 0; }
 
 const char* find_device_fault(const DeviceConfig& config, PinBoard* pins) {
@@ -168,6 +176,8 @@ ConfigFault find_fault(const DeviceConfig& config) {
         fault = find_sensor_fault(config, i, &pins);
         if (fault != nullptr) return {fault, config.sensor[i].name};
     }
+    fault = config.servo.pin == kNone ? nullptr : find_servo_fault(config.servo, &pins);
+    if (fault != nullptr) return {fault, config.servo.name};
     return {};
 }
 

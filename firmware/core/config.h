@@ -82,6 +82,19 @@ struct SensorConfig {
     int32_t offset_milli;
 };
 
+constexpr uint32_t kLeastServoUs = 500;
+constexpr uint32_t kMostServoUs = 2500;
+
+// Pulse lengths in us; the pulse changes by speed_us_s, so that the horn can follow.
+struct ServoConfig {
+    char name[kNameSize];
+    uint8_t pin = kNone;  // kNone: there is no servo
+    uint32_t lower_us;
+    uint32_t upper_us;
+    uint32_t speed_us_s;
+    uint8_t is_off_at_estop;  // an e-stop ends its pulses: the horn is free then
+};
+
 struct DeviceConfig {
     char name[kNameSize];
     uint32_t crc32;           // of the text that this was read from; 0: not from a text
@@ -102,12 +115,13 @@ struct DeviceConfig {
     InputConfig input[kMaxInputs];
     OutputConfig output[kMaxOutputs];
     SensorConfig sensor[kMaxSensors];
+    ServoConfig servo;
 };
 
 // What is wrong with a configuration: a sentence, and the part it is about.
 struct ConfigFault {
     const char* sentence = nullptr;  // nullptr: nothing is wrong
-    const char* part = "";           // name of the joint, input, output or sensor; empty for the device
+    const char* part = "";           // name of the joint, input, output, sensor or servo; empty for the device
 };
 
 ConfigFault find_fault(const DeviceConfig& config);

@@ -89,6 +89,16 @@ constexpr Field kSensorFields[] = {
 };
 constexpr Record kSensor = record_of(kSensorFields);
 
+constexpr Field kServoFields[] = {
+    name(offsetof(ServoConfig, name)),
+    number("pin", Kind::Index, kRequired, offsetof(ServoConfig, pin)),
+    number("lower_us", Kind::U32, kRequired, offsetof(ServoConfig, lower_us)),
+    number("upper_us", Kind::U32, kRequired, offsetof(ServoConfig, upper_us)),
+    number("speed_us_s", Kind::U32, kRequired, offsetof(ServoConfig, speed_us_s)),
+    number("off_at_estop", Kind::Truth, kOptional, offsetof(ServoConfig, is_off_at_estop)),
+};
+constexpr Record kServo = record_of(kServoFields);
+
 constexpr Field list(const char* key, bool is_required, size_t offset, uint8_t capacity, const Record* record,
                      size_t stride, size_t count_offset) {
     return Field{key,
@@ -121,6 +131,7 @@ constexpr Field kDeviceFields[] = {
          offsetof(DeviceConfig, outputs)),
     list("sensors", kOptional, offsetof(DeviceConfig, sensor), kMaxSensors, &kSensor, sizeof(SensorConfig),
          offsetof(DeviceConfig, sensors)),
+    Field{"servo", Kind::Record, kOptional, offsetof(DeviceConfig, servo), 0, nullptr, &kServo},
 };
 constexpr Record kDevice = record_of(kDeviceFields);
 

@@ -34,6 +34,7 @@ void Machine::begin(DeviceConfig& config, const Identity& identity, const Sink& 
     }
     begin_inputs();
     begin_outputs();
+    servo_.begin(config.servo);
     path_.begin(config);
     homing_.begin(config, stepper_, ramp_);
     prepared_number_ = 1;  // the stepper starts with one empty offer
@@ -117,6 +118,7 @@ void Machine::slot(uint64_t slot_start_us) {
     watch_ticks(slot_start_us);
     finish_slot();
     watch_heartbeat();
+    watch_servo();
     plan_slot();
     guard_switches();
     report_due();
@@ -236,6 +238,7 @@ void Machine::hold(const char* cause) {
 void Machine::halt() {
     if (mode_ == Mode::Run) hold("shutdown");
     if (mode_ == Mode::Homing) stop_homing("shutdown");
+    servo_.hold();
 }
 
 uint32_t Machine::speed_q30() const {

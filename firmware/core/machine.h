@@ -14,6 +14,7 @@
 #include "path.h"
 #include "ramp.h"
 #include "report.h"
+#include "servo.h"
 #include "stepper.h"
 #include "stream_log.h"
 
@@ -71,6 +72,7 @@ class Machine {
     // Logical: the platform applies `is_inverted` and drives its pins after each slot.
     bool is_enabled() const { return is_armed_; }
     uint16_t outputs() const { return outputs_; }
+    const Servo& servo() const { return servo_; }
     // Nothing moves and no pulse is due: a platform may write its flash.
     bool keeps_still() const { return !is_moving(); }
 
@@ -101,6 +103,8 @@ class Machine {
     Code resume();
     Code switch_output(uint8_t index, uint16_t level);
     Code change_speed(uint16_t permil);
+    Code turn_servo(uint8_t index, uint16_t pulse_us);
+    void watch_servo();
     Code arm();
     Code disarm();
     Code reset();
@@ -168,6 +172,7 @@ class Machine {
     Stepper stepper_;
     StreamLog streams_;
     CommandLog commands_;
+    Servo servo_;
 
     Point points_[kPoints];
     uint32_t prepared_number_ = 0;
@@ -194,6 +199,7 @@ class Machine {
     uint64_t armed_us_ = 0;
     uint64_t alive_us_ = 0;  // of the last heartbeat, or of the start or resumption if that was later
     uint64_t beat_us_ = 0;   // of the last heartbeat that counted
+    uint64_t servo_us_ = 0;  // of the last command to the servo
     uint64_t status_due_us_ = 0;
     uint32_t session_ = 0;
     uint32_t counter_ = 0;

@@ -67,7 +67,20 @@ enum class FaultCode : uint8_t {
     EmergencyStop,
 };
 
-enum class Command : uint8_t { Hold = 1, Resume, Stop, Reset, Reference, Arm, Disarm, Home, Output, Speed, Status };
+enum class Command : uint8_t {
+    Hold = 1,
+    Resume,
+    Stop,
+    Reset,
+    Reference,
+    Arm,
+    Disarm,
+    Home,
+    Output,
+    Speed,
+    Status,
+    Servo,
+};
 
 constexpr uint16_t kFlagFirst = 1;
 constexpr uint16_t kFlagLast = 2;

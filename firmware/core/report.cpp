@@ -8,6 +8,7 @@ namespace gemelo {
 namespace {
 
 constexpr size_t kStateHeadSize = 60;
+constexpr size_t kStateServoSize = 4;
 
 }  // namespace
 
@@ -54,7 +55,7 @@ void Reporter::answer_sync(uint64_t t0, uint64_t t1, uint64_t t2) const {
 }
 
 void Reporter::state(const StateReport& report) const {
-    uint8_t bytes[kStateHeadSize + 8 * kMaxJoints + kCrcSize];
+    uint8_t bytes[kStateHeadSize + 8 * kMaxJoints + kStateServoSize + kCrcSize];
     write_header(bytes, FrameType::State, joints_, boot_id_);
     store_u64(bytes + 8, report.t_us);
     bytes[16] = static_cast<uint8_t>(report.mode);
@@ -77,7 +78,13 @@ void Reporter::state(const StateReport& report) const {
         store_i32(bytes + kStateHeadSize + 4 * j, report.steps[j]);
         store_i32(bytes + kStateHeadSize + 4 * (joints_ + j), report.velocity_q8[j]);
     }
-    send(Output::State, bytes, kStateHeadSize + 8 * static_cast<size_t>(joints_));
+    size_t size = kStateHeadSize + 8 * static_cast<size_t>(joints_);
+    if (report.has_servo) {
+        store_u16(bytes + size, report.servo_us);
+        store_u16(bytes + size + 2, report.servo_target_us);
+        size += kStateServoSize;
+    }
+    send(Output::State, bytes, size);
 }
 
 void Reporter::event(const char* name, uint64_t t_us, uint32_t stream, const char* detail) const {

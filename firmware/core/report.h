@@ -50,6 +50,8 @@ struct StateReport {
     uint16_t speed_permil;  // the time scale that was asked for
     int32_t steps[kMaxJoints];
     int32_t velocity_q8[kMaxJoints];
+    bool has_servo;
+    uint16_t servo_us, servo_target_us;  // 0: no pulses
 };
 
 struct StatusReport {

@@ -42,6 +42,9 @@ void Machine::report_state(const Point& point) {
         const int64_t from_q20 = point.is_start ? as_q20(start_q8_[j]) : before.position_q20[j];
         report.velocity_q8[j] = as_q8((point.position_q20[j] - from_q20) * kSlotHz);
     }
+    report.has_servo = servo_.is_there();
+    report.servo_us = servo_.pulse_us();
+    report.servo_target_us = servo_.target_us();
     reporter_.state(report);
 }
 

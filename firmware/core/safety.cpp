@@ -36,6 +36,8 @@ void Machine::enter_estop() {
     mode_ = Mode::EStop;
     for (uint8_t i = 0; i < config_->outputs; ++i)
         if (config_->output[i].is_off_at_estop != 0) outputs_ = static_cast<uint16_t>(outputs_ & ~(1u << i));
+    if (config_->servo.is_off_at_estop != 0) servo_.release();
+    servo_.hold();
 }
 
 void Machine::fail(FaultCode fault, const char* detail, uint8_t joint, bool was_moving) {
@@ -87,6 +89,13 @@ void Machine::watch_heartbeat() {
     if (now_us_ <= alive_us_ + timeout_us) return;
     if (mode_ == Mode::Run && !is_following_) hold("heartbeat");
     if (mode_ == Mode::Homing) stop_homing("heartbeat");
+}
+
+// A gripper on its way stops where it is when nobody watches it any more; one that holds keeps its hold.
+void Machine::watch_servo() {
+    const uint64_t heard_us = beat_us_ > servo_us_ ? beat_us_ : servo_us_;
+    if (now_us_ > heard_us + static_cast<uint64_t>(config_->hold_timeout_ms) * 1000) servo_.hold();
+    servo_.advance();
 }
 
 void Machine::set_armed(bool armed, const char* cause) {

@@ -23,7 +23,8 @@ const std::string kConfig =
     R"({"name":"seta","pin":21,"role":"estop"}],)"
     R"("outputs":[{"name":"lamp","pin":13,"inverted":true,"at_boot":true,"off_at_estop":true}],)"
     R"("sensors":[{"name":"ultra","kind":"ultrasonic","pin":35,"trigger_pin":4,"scale_q16":1124,"offset_milli":-500},)"
-    R"({"name":"battery","kind":"analog","pin":34}]})";
+    R"({"name":"battery","kind":"analog","pin":34}],)"
+    R"("servo":{"name":"jaws","pin":14,"lower_us":1000,"upper_us":2000,"speed_us_s":1500,"off_at_estop":true}})";
 
 struct Parsed {
     bool is_taken;
@@ -80,6 +81,12 @@ TEST(Config, EveryFieldArrives) {
     ASSERT_EQ(config.sensors, 2);
     EXPECT_EQ(config.sensor[0].offset_milli, -500);
     EXPECT_EQ(config.sensor[1].scale_q16, 65536000);
+    EXPECT_STREQ(config.servo.name, "jaws");
+    EXPECT_EQ(config.servo.pin, 14);
+    EXPECT_EQ(config.servo.lower_us, 1000u);
+    EXPECT_EQ(config.servo.upper_us, 2000u);
+    EXPECT_EQ(config.servo.speed_us_s, 1500u);
+    EXPECT_EQ(config.servo.is_off_at_estop, 1);
 }
 
 TEST(Config, WhatIsMissingHasTheDefaultOfTheSchema) {
@@ -91,6 +98,7 @@ TEST(Config, WhatIsMissingHasTheDefaultOfTheSchema) {
     EXPECT_EQ(parsed.config.enable_pin, kNone);
     EXPECT_EQ(parsed.config.joint[0].step_pin, kNone);
     EXPECT_EQ(parsed.config.joint[0].homing.input, kNone);
+    EXPECT_EQ(parsed.config.servo.pin, kNone);
 }
 
 TEST(Config, AnUnknownADoubleAndAMissingKeyAreNamed) {
@@ -179,6 +187,12 @@ TEST(Config, FaultsNameThePartAndTheReason) {
         {{"\"enable_pin\":12", "\"enable_pin\":99"}, ": enable_pin is not 0 to 63"},
         {{"\"enable_pin\":12", "\"enable_pin\":21"}, "seta: its pin is used by something else too"},
         {{"[" + kJoint + "]", "[]"}, ": there are not 1 to 8 joints"},
+        {{"\"lower_us\":1000", "\"lower_us\":499"}, "jaws: its pulses are not 500 to 2500 us"},
+        {{"\"upper_us\":2000", "\"upper_us\":2501"}, "jaws: its pulses are not 500 to 2500 us"},
+        {{"\"lower_us\":1000", "\"lower_us\":2000"}, "jaws: its lower_us is not below its upper_us"},
+        {{"\"speed_us_s\":1500", "\"speed_us_s\":9"}, "jaws: its speed_us_s is not 10 to 1000000"},
+        {{"\"pin\":14", "\"pin\":13"}, "jaws: its pin is used by something else too"},
+        {{"\"jaws\"", "\"j ws\""}, "j ws: its name is not 1 to 31 letters, digits, '_' or '-'"},
     };
     for (const auto& [change, said] : faults) EXPECT_EQ(said_of(change.first, change.second), said) << change.second;
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -16,6 +17,7 @@ from schemas.device_config import (
     Pull,
     SensorConfig,
     SensorKind,
+    ServoConfig,
 )
 
 I32 = st.integers(-(2**31), 2**31 - 1)
@@ -86,6 +88,21 @@ def sensors(draw: st.DrawFn, name: str, pin: int, trigger_pin: int) -> SensorCon
     return SensorConfig(name=name, kind=kind, pin=pin, trigger_pin=trigger, scale_q16=draw(I32), offset_milli=draw(I32))
 
 
+@st.composite
+def servos(draw: st.DrawFn, pin: int) -> ServoConfig | msgspec.UnsetType:
+    if pin == UNUSED or draw(FLAG):
+        return msgspec.UNSET
+    lower = draw(st.integers(500, 2499))
+    return ServoConfig(
+        name=draw(st.sampled_from(NAMES)),
+        pin=pin,
+        lower_us=lower,
+        upper_us=draw(st.integers(lower + 1, 2500)),
+        speed_us_s=draw(st.integers(10, 1_000_000)),
+        off_at_estop=draw(FLAG),
+    )
+
+
 def may_home(switch: InputConfig, joint: int, direction: int) -> bool:
     """`switch` is one that this joint can look for in this direction."""
     other_end = InputRole.LIMIT_LOWER if direction > 0 else InputRole.LIMIT_UPPER
@@ -127,4 +144,5 @@ def good_configs(draw: st.DrawFn) -> DeviceConfig:
             for name in draw(names(output_count))
         ),
         sensors=tuple(draw(sensors(name, next(pins), next(pins))) for name in draw(names(sensor_count))),
+        servo=draw(servos(next(pins, UNUSED))),
     )

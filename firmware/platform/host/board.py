@@ -16,6 +16,7 @@ from firmware.platform.host.memory import BootState, PositionStore, StoredPositi
 from schemas.device_config import config_text
 from services.arm.device.device_config import device_config, reference_steps
 from services.arm.model.description import Arm
+from services.arm.model.gripper import gripper_unit
 
 
 class DeviceClock:
@@ -52,6 +53,8 @@ class Board:
     def __init__(self, arm: Arm, folder: Path, name: str) -> None:
         self._factory = config_text(device_config(arm))
         self._reference = reference_steps(arm)
+        self._gripper = arm.gripper
+        self._gripper_unit = gripper_unit(arm)
         self._motors = tuple(joint.drive.motor for joint in arm.joints)
         self.name = arm.device.name
         self._flash = Flash(folder / f"{name}_flash.json", self.name)
@@ -123,6 +126,8 @@ class Board:
             reset_cause=_cause(boot_state, reset_cause),
             motors=self._motors,
             shaft=self._shaft,
+            gripper=self._gripper,
+            gripper_unit=self._gripper_unit,
         )
         self._crc32 = device.config_crc32
         return device

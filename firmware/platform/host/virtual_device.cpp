@@ -103,6 +103,7 @@ void VirtualDevice::advance(uint64_t until_us) {
         slot_start_us_ += kSlotUs;
         now_us_ = slot_start_us_;
         tick_in_slot_ = 0;
+        world_.turn_horn(machine_.servo().pulse_us());
     }
     if (until_us > now_us_) now_us_ = until_us;
 }

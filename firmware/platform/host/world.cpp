@@ -20,6 +20,7 @@ void World::wire(const DeviceConfig& config, const Pins& pins) {
     }
     for (uint8_t i = 0; i < config.sensors; ++i)
         raw_[i] = config.sensor[i].kind == SensorKind::Ultrasonic ? kEchoUs : kBatteryMv;
+    read_horn();
     for (uint8_t i = 0; i < config.inputs; ++i) switch_[i] = switch_of(config, i);
     levels_ = Levels{};
     read_switches();
@@ -72,7 +73,18 @@ void World::enable(bool is_enabled) {
     }
 }
 
+void World::turn_horn(uint32_t pulse_us) {
+    const double before_us = horn_.place_us();
+    horn_.advance(pulse_us, 1.0 / kSlotHz);
+    if (horn_.place_us() != before_us) read_horn();
+}
+
+void World::read_horn() {
+    if (horn_.is_there() && horn_.sensor() < config_.sensors) set_sensor(horn_.sensor(), horn_.value());
+}
+
 void World::inherit(const World& before) {
+    horn_ = before.horn_;
     for (uint8_t i = 0; i < kMaxInputs; ++i) press_[i] = before.press_[i];
     for (uint8_t i = 0; i < config_.sensors && i < before.config_.sensors; ++i) raw_[i] = before.raw_[i];
     for (uint8_t j = 0; j < kMaxJoints; ++j) block(j, before.is_blocked_[j]);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "config.h"
+#include "horn.h"
 #include "motor.h"
 #include "stepper.h"
 
@@ -18,12 +19,20 @@ class World {
     // Ideal until said; counts from the next wire() on.
     void set_motor(uint8_t joint, const MotorConfig& motor) { motor_config_[joint] = motor; }
     void set_shaft(uint8_t joint, int32_t pulses) { shaft_[joint] = pulses; }
+    void set_horn(const HornConfig& horn) {
+        horn_.begin(horn);
+        read_horn();
+    }
     // The pins are connected as `config` says; shafts stay where they are. `pins` are the present levels.
     void wire(const DeviceConfig& config, const Pins& pins);
 
     // After every tick of the stepper.
     void tick(const Pins& pins);
     void enable(bool is_enabled);
+    // A slot under this pulse of the servo; 0 us: none.
+    void turn_horn(uint32_t pulse_us);
+    Horn& horn() { return horn_; }
+    const Horn& horn() const { return horn_; }
     // What the next tick reads.
     const Levels& levels() const { return levels_; }
     // No shaft moves by itself, and the switches have been read as they are.
@@ -53,6 +62,7 @@ class World {
     bool are_motors_settled() const;
     void follow(uint8_t joint);
     void read_switches();
+    void read_horn();
 
     static constexpr uint8_t kReadings = 8;  // ticks after a change until nothing new can come of it
 
@@ -62,6 +72,7 @@ class World {
     bool is_blocked_[kMaxJoints] = {};
     Switch switch_[kMaxInputs] = {};
     Press press_[kMaxInputs];
+    Horn horn_;
     int32_t raw_[kMaxSensors] = {};
     DeviceConfig config_{};
     Pins pins_;

@@ -18,6 +18,7 @@ PinUses::PinUses(const DeviceConfig& config) {
         add(sensor.pin, is_analog ? Use::Analog : Use::Input, Pull::None, sensor.name);
         if (!is_analog) add(sensor.trigger_pin, Use::Output, Pull::None, sensor.name);
     }
+    add(config.servo.pin, Use::Output, Pull::None, config.servo.name);
 }
 
 void PinUses::add(uint8_t pin, Use use, Pull pull, const char* part) {

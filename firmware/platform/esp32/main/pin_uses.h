@@ -25,7 +25,7 @@ class PinUses {
   private:
     void add(uint8_t pin, Use use, Pull pull, const char* part);
 
-    static constexpr uint8_t kMost = 2 * kMaxJoints + kMaxInputs + kMaxOutputs + 2 * kMaxSensors + 1;
+    static constexpr uint8_t kMost = 2 * kMaxJoints + kMaxInputs + kMaxOutputs + 2 * kMaxSensors + 2;
     PinUse use_[kMost];
     uint8_t size_ = 0;
 };

@@ -28,6 +28,7 @@ void configure(uint8_t pin_number, gpio_mode_t mode, Pull pull) {
 
 // The level stands before the pin becomes an output, so it never says anything else.
 void SlowPins::set_up(const DeviceConfig& config) {
+    servo_.set_up(config.servo.pin);
     let_go();
     config_ = &config;
     outputs_ = 0;
@@ -57,6 +58,7 @@ void SlowPins::drive(const Machine& machine) {
         is_enabled_ = !is_enabled_;
         put(config_->enable_pin, is_enabled_, config_->is_enable_inverted != 0);
     }
+    servo_.drive(machine.servo().pulse_us());
     const uint16_t changed = machine.outputs() ^ outputs_;
     outputs_ = machine.outputs();
     for (uint8_t i = 0; changed != 0 && i < config_->outputs; ++i)

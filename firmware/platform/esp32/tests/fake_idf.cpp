@@ -11,6 +11,7 @@
 #include "bootloader_random.h"
 #include "driver/gpio.h"
 #include "driver/gptimer.h"
+#include "driver/ledc.h"
 #include "driver/uart.h"
 #include "esp_adc/adc_cali_scheme.h"
 #include "esp_crt_bundle.h"
@@ -225,6 +226,28 @@ esp_err_t gpio_set_intr_type(gpio_num_t, gpio_int_type_t) { return ESP_OK; }
 esp_err_t gpio_install_isr_service(int) { return ESP_OK; }
 esp_err_t gpio_isr_handler_add(gpio_num_t, gpio_isr_t, void*) { return ESP_OK; }
 esp_err_t gpio_isr_handler_remove(gpio_num_t) { return ESP_OK; }
+
+esp_err_t ledc_timer_config(const ledc_timer_config_t* timer) {
+    chip.servo_hz = timer->duty_resolution == LEDC_TIMER_14_BIT ? timer->freq_hz : 0;
+    return ESP_OK;
+}
+esp_err_t ledc_channel_config(const ledc_channel_config_t* channel) {
+    chip.servo_pin = channel->gpio_num;
+    chip.servo_duty = chip.servo_next_duty = channel->duty;
+    return ESP_OK;
+}
+esp_err_t ledc_set_duty(ledc_mode_t, ledc_channel_t, uint32_t duty) {
+    chip.servo_next_duty = duty;
+    return ESP_OK;
+}
+esp_err_t ledc_update_duty(ledc_mode_t, ledc_channel_t) {
+    chip.servo_duty = chip.servo_next_duty;
+    return ESP_OK;
+}
+esp_err_t ledc_stop(ledc_mode_t, ledc_channel_t, uint32_t) {
+    chip.servo_duty = 0;
+    return ESP_OK;
+}
 
 int64_t esp_timer_get_time(void) { return static_cast<int64_t>(chip.now_us); }
 void esp_rom_delay_us(uint32_t us) { chip.now_us += us; }

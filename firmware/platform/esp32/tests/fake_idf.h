@@ -31,6 +31,10 @@ struct Chip {
     uint64_t is_input = 0;        // its level can be read; a pin that was let go reads low
     uint64_t is_analog = 0;       // it is at the ADC and has no pull resistor
     std::map<int, uint32_t> ups;  // rising edges of each output that the tick drives
+    int servo_pin = -1;           // that LEDC drives
+    uint32_t servo_hz = 0;
+    uint32_t servo_duty = 0;       // of 2^14; 0: no pulses
+    uint32_t servo_next_duty = 0;  // until it is asked for
     esp_reset_reason_t reset_reason = ESP_RST_POWERON;
     std::map<std::string, std::string> nvs;
     uint32_t flash_writes = 0;

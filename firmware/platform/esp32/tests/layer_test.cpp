@@ -208,6 +208,29 @@ TEST(Esp32Layer, TheEstopSilencesThePinsAndTakesTheDriversPower) {
     EXPECT_TRUE(has(running->said(Output::Event), "estop"));
 }
 
+TEST(Esp32Layer, AServoGetsItsPulsesFromTheFirstCommandOnAndNoneAfterAnotherConfiguration) {
+    const std::string servo = R"(,"servo":{"name":"jaws","pin":14,"lower_us":1000,"upper_us":2000,"speed_us_s":2000}})";
+    chip.nvs = {{"config", kConfig.substr(0, kConfig.size() - 1) + servo}};
+    Running running(ESP_RST_POWERON);
+    EXPECT_EQ(chip.servo_duty, 0u);
+    EXPECT_NE(chip.is_output & 1ull << 14, 0u);
+    const auto turn = [&running](uint32_t id, uint16_t pulse_us) {
+        running.tell_over_mqtt(rig::build_command(Command::Servo, id, {}, rig::kNever, rig::kBoot, 0, pulse_us));
+    };
+    turn(900, 2000);
+    EXPECT_EQ(chip.servo_pin, 14);
+    EXPECT_EQ(chip.servo_hz, 50u);
+    EXPECT_EQ(chip.servo_duty, 2000 * 16384 / 20000);
+    turn(901, 1000);
+    running.pass_ms(250);
+    EXPECT_NEAR(chip.servo_duty, 1500 * 16384 / 20000, 8);
+    running.pass_ms(300);
+    EXPECT_NEAR(chip.servo_duty, 1000 * 16384 / 20000, 1);
+    running.command(Command::Disarm);
+    running.tell_over_wire(FrameType::Config, kConfig);
+    EXPECT_EQ(chip.servo_duty, 0u) << running.said_on_wire();
+}
+
 TEST(Esp32Layer, AWarmResetAtRestKeepsThePlace) {
     {
         ready()->pass_ms(10);
