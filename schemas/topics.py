@@ -30,6 +30,7 @@ from schemas.device import (
     ShaftPositions,
 )
 from schemas.frames import FrameTransforms, RobotDescription
+from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
 from schemas.joints import JointState, JointTargets, StepErrors
 from schemas.message import Message
 from schemas.motion import (
@@ -148,6 +149,9 @@ SENSORS = Topic("sensors", SensorReadings, LATEST, 10.0, True, GATEWAY, "reading
 DEVICE_SHAFT = Topic(
     "device/shaft", ShaftPositions, LATEST, 10.0, True, GATEWAY, "a virtual device's true shafts beside its counters"
 )
+GRIPPER_STATE = Topic(
+    "gripper_state", GripperState, LATEST, 10.0, True, GATEWAY, "the gripper's opening, and whether it presses"
+)
 COMMANDS = Topic("commands", CommandChunk, EVERY, None, True, GATEWAY, "every chunk of knots sent to the device")
 COMMAND_ACKS = Topic("command_acks", CommandAck, EVERY, None, True, GATEWAY, "the device's answer to every chunk")
 LOG = Topic("log", LogRecord, EVERY, None, True, ANY, "the log of every node")
@@ -159,7 +163,7 @@ TOPICS: tuple[Topic[Message], ...] = (
     DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, JOINT_TARGETS, FRAMES, STATIC_FRAMES, PLANNED_PATH,
     PLAN_PROGRESS,
     SCENE, CONTACTS, JOG, JOG_STATUS, DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, DEVICE_CONFIGURATION,
-    SENSORS, DEVICE_SHAFT,
+    SENSORS, DEVICE_SHAFT, GRIPPER_STATE,
     COMMANDS, COMMAND_ACKS, LOG, STATISTICS,
 )  # fmt: skip
 
@@ -213,4 +217,9 @@ FOLLOW_JOINT_TRAJECTORY = Action(
     GATEWAY, "execute a trajectory to the step",
 )  # fmt: skip
 
-ACTIONS: tuple[Action[Message, Message, Message], ...] = (FOLLOW_JOINT_TRAJECTORY,)
+GRIPPER_COMMAND = Action(
+    "gripper_command", GripperCommandGoal, GripperCommandFeedback, GripperCommandResult, GATEWAY,
+    "open or close the gripper",
+)  # fmt: skip
+
+ACTIONS: tuple[Action[Message, Message, Message], ...] = (FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND)

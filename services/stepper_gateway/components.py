@@ -9,6 +9,7 @@ from services.stepper_gateway.device.gateway_device import GatewayDevice
 from services.stepper_gateway.device.injection_handler import InjectionHandler
 from services.stepper_gateway.device.sensors import SensorRelay
 from services.stepper_gateway.goals.goal_executor import GoalExecutor
+from services.stepper_gateway.gripper.gripper_executor import GripperExecutor
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.motion_controller import MotionController
 from services.stepper_gateway.motion.target_follower import TargetFollower
@@ -26,6 +27,7 @@ class Components:
         self.goals = GoalExecutor(self.device, self.controller)
         self.streaming = TargetFollower(self.device, self.controller)
         self.command_handler = CommandHandler(self.device, self.controller)
+        self.gripper = GripperExecutor(self.device, self.command_handler)
         self.sensors = SensorRelay(self.device)
         self.injections = InjectionHandler(self.device)
         self.echoes = Echoes(self.device)
@@ -41,6 +43,7 @@ class Components:
         """The device cannot be reached: whatever it does now it does by itself."""
         is_moving = self.controller.is_followable
         self.abort_all(reason, moment)
+        self.gripper.abort(reason, moment)
         self.command_handler.drop_all(reason)
         self.controller.lost()
         if is_moving:
@@ -56,5 +59,6 @@ class Components:
     def start_over(self, reason: str, moment: Moment) -> None:
         """Another boot, or another configuration: what the gateway knew of the arm's steps means nothing."""
         self.abort_all(reason, moment)
+        self.gripper.abort(reason, moment)
         self.command_handler.drop_all(reason)
         self.controller.start_over()

@@ -8,6 +8,7 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceStatus, DeviceStopRequest, InjectRequest
+from schemas.gripper import GripperCommandGoal
 from schemas.joints import JointTargets
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.scene import PlanningScene
@@ -93,6 +94,16 @@ class GatewayCore:
         self._components.command_handler.send_due(moment)
         return reason, self._finish(moment)
 
+    def on_grip(self, goal_id: str, goal: GripperCommandGoal, moment: Moment) -> tuple[GoalVerdict, list[Output]]:
+        """A goal of the gripper, to be accepted or refused at once."""
+        verdict = self._components.gripper.accept(goal_id, goal, moment)
+        return verdict, self._finish(moment)
+
+    def on_grip_cancel(self, goal_id: str, moment: Moment) -> tuple[str, list[Output]]:
+        """Empty if the gripper's goal is cancelled, else why not."""
+        reason = self._components.gripper.cancel(goal_id, moment)
+        return reason, self._finish(moment)
+
     def on_scene(self, scene: PlanningScene) -> None:
         """The planner's newest scene: goals planned in another are refused. One that cannot be is said once."""
         scenes = self._components.goals.scenes
@@ -122,6 +133,7 @@ class GatewayCore:
         kind = STOPS[request.kind]
         if self._components.command_handler.stop(kind, ticket, self._components.goals.is_active, moment):
             self._make_way_for(kind, moment)
+            self._components.gripper.abort(f"stopped by a device command ({kind.name})", moment)
         self._components.command_handler.send_due(moment)
         return self._finish(moment)
 
@@ -158,6 +170,7 @@ class GatewayCore:
         self._components.injections.step(moment)
         self._components.echoes.step(moment)
         self._components.sensors.step(unreachable_reason, moment)
+        self._components.gripper.step(moment)
         self.controller.pump(moment)
         return self._finish(moment)
 
@@ -175,6 +188,7 @@ class GatewayCore:
 
     def _finish(self, moment: Moment) -> list[Output]:
         """Tell of the device's status where it has changed, and hand the outputs out."""
+        self._components.command_handler.tell_listeners(moment)
         status = status_of(self.device, moment)
         if self._told is None or replace(status, stamp=0) != self._told:
             self._told = replace(status, stamp=0)

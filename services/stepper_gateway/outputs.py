@@ -7,6 +7,7 @@ from typing import Any
 
 from schemas.actions import GoalStatusCode
 from schemas.device import ConfigureResponse, DeviceCommandResponse, EchoResponse, InjectResponse
+from schemas.gripper import GripperCommandFeedback, GripperCommandResult
 from schemas.message import Message
 from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryResult
 from schemas.system import LogLevel
@@ -58,6 +59,30 @@ class GoalFinished:
 
 
 @dataclass(frozen=True, slots=True)
+class GripperExecuting:
+    """The device has taken a goal of the gripper."""
+
+    goal_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class GripperProgress:
+    """Feedback on a goal of the gripper."""
+
+    goal_id: str
+    feedback: GripperCommandFeedback
+
+
+@dataclass(frozen=True, slots=True)
+class GripperFinished:
+    """The end of a goal of the gripper."""
+
+    goal_id: str
+    status: GoalStatusCode
+    result: GripperCommandResult
+
+
+@dataclass(frozen=True, slots=True)
 class Answer:
     """The answer to whoever has asked under `ticket`."""
 
@@ -73,7 +98,18 @@ class LogLine:
     text: str
 
 
-Output = SendFrame | Publish | GoalExecuting | GoalProgress | GoalFinished | Answer | LogLine
+Output = (
+    SendFrame
+    | Publish
+    | GoalExecuting
+    | GoalProgress
+    | GoalFinished
+    | GripperExecuting
+    | GripperProgress
+    | GripperFinished
+    | Answer
+    | LogLine
+)
 
 
 class Outbox:

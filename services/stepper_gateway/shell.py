@@ -17,6 +17,7 @@ from schemas.device import (
     InjectRequest,
     InjectResponse,
 )
+from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
 from schemas.joints import JointTargets
 from schemas.motion import (
     FollowJointTrajectoryFeedback,
@@ -30,6 +31,7 @@ from schemas.topics import (
     DEVICE_INJECT,
     DEVICE_STOP,
     FOLLOW_JOINT_TRAJECTORY,
+    GRIPPER_COMMAND,
     JOINT_TARGETS,
     SCENE,
 )
@@ -45,6 +47,9 @@ from services.stepper_gateway.outputs import (
     GoalExecuting,
     GoalFinished,
     GoalProgress,
+    GripperExecuting,
+    GripperFinished,
+    GripperProgress,
     LogLine,
     Output,
     Publish,
@@ -55,6 +60,8 @@ from services.stepper_gateway.parameters import GatewayParameters
 AT_ONCE = 16  # payloads handled before the loop looks at its deadline and for stops; chosen: about 1 ms
 
 Server = ActionServer[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
+
+Gripper = ActionServer[GripperCommandGoal, GripperCommandFeedback, GripperCommandResult]
 
 
 class Shell:
@@ -67,6 +74,7 @@ class Shell:
         self._callers: dict[int, Pending[Any]] = {}  # by ticket: who waits for the device's answer
         self._tickets = itertools.count(1)
         self._server: Server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self._on_goal, self._on_cancel)
+        self._gripper: Gripper = node.serve_action(GRIPPER_COMMAND, self._on_grip, self._on_grip_cancel)
         node.subscribe(JOINT_TARGETS, self._on_targets)
         node.subscribe(SCENE, core.on_scene)
         self._commands = node.serve_later(DEVICE_COMMAND, self._on_command)
@@ -117,6 +125,16 @@ class Shell:
         self._carry_out(outputs)
         return reason
 
+    def _on_grip(self, goal_id: str, goal: GripperCommandGoal) -> GoalDecision:
+        verdict, outputs = self._core.on_grip(goal_id, goal, self._moment())
+        self._carry_out(outputs)
+        return accept() if verdict.accepted else refuse(verdict.code, verdict.reason)
+
+    def _on_grip_cancel(self, goal_id: str) -> str:
+        reason, outputs = self._core.on_grip_cancel(goal_id, self._moment())
+        self._carry_out(outputs)
+        return reason
+
     def _on_targets(self, targets: JointTargets) -> None:
         self._carry_out(self._core.on_targets(targets, self._moment()))
 
@@ -127,6 +145,7 @@ class Shell:
         """What waits behind a stop was asked for before it, and must not move the arm after it."""
         reason = f"{request.kind} was asked for after it: ask again"
         self._server.refuse_waiting(reason)
+        self._gripper.refuse_waiting(reason)
         self._commands.refuse_waiting(reason)
         self._carry_out(self._core.on_stop(request, self._ticket(pending), self._moment()))
 
@@ -158,6 +177,12 @@ class Shell:
                     self._server.feedback(goal_id, feedback)
                 case GoalFinished(goal_id, status, result):
                     self._server.finish(goal_id, status, result)
+                case GripperExecuting(goal_id):
+                    self._gripper.executing(goal_id)
+                case GripperProgress(goal_id, told):
+                    self._gripper.feedback(goal_id, told)
+                case GripperFinished(goal_id, status, gripped):
+                    self._gripper.finish(goal_id, status, gripped)
                 case Answer(ticket, response):
                     self._callers.pop(ticket).reply(response)
                 case LogLine(level, text):

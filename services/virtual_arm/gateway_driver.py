@@ -24,6 +24,7 @@ from schemas.device import (
     InjectResponse,
     StopKind,
 )
+from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
 from schemas.joints import JointTargets
 from schemas.message import Message
 from schemas.motion import (
@@ -44,6 +45,8 @@ from services.stepper_gateway.outputs import (
     GoalExecuting,
     GoalFinished,
     GoalProgress,
+    GripperFinished,
+    GripperProgress,
     LogLine,
     Output,
     Publish,
@@ -65,6 +68,8 @@ class GatewayDriver(ABC):
         """`on_message` receives the published messages; without it they are kept in `published`."""
         self.published: dict[str, list[Any]] = defaultdict(list)  # by key
         self.finished: dict[str, Ended] = {}  # by goal id
+        self.gripped: dict[str, tuple[GoalStatusCode, GripperCommandResult]] = {}  # by goal id
+        self.gripping: list[GripperCommandFeedback] = []
         self.executing: list[str] = []  # goal ids
         self.feedback: list[FollowJointTrajectoryFeedback] = []
         self.answers: dict[int, DeviceCommandResponse] = {}  # by ticket, like the next two
@@ -122,6 +127,24 @@ class GatewayDriver(ABC):
         """Lets time pass until the goal has ended, at most `seconds` [s]; returns status and result."""
         assert self.run(seconds, lambda: goal_id in self.finished), f"{goal_id} has not ended"
         return self.finished[goal_id]
+
+    def grip(self, position: float, max_effort: float = 0.0, goal_id: str = "grip") -> GoalVerdict:
+        """Asks the gripper to open or close to `position` [m]; returns its acceptance or refusal."""
+        goal = GripperCommandGoal(position=position, max_effort=max_effort)
+        verdict, outputs = self.core.on_grip(goal_id, goal, self.moment)
+        self.carry_out(outputs)
+        return verdict
+
+    def finish_grip(self, goal_id: str = "grip", seconds: float = 10.0) -> tuple[GoalStatusCode, GripperCommandResult]:
+        """Lets time pass until the gripper's goal has ended; returns status and result, which are forgotten here."""
+        assert self.run(seconds, lambda: goal_id in self.gripped), f"{goal_id} has not ended"
+        return self.gripped.pop(goal_id)
+
+    def cancel_grip(self, goal_id: str = "grip") -> str:
+        """Cancels the gripper's goal; returns the reason if that is refused, else an empty text."""
+        reason, outputs = self.core.on_grip_cancel(goal_id, self.moment)
+        self.carry_out(outputs)
+        return reason
 
     def cancel(self, goal_id: str = "g") -> str:
         """Cancels the goal; returns the reason if that is refused, else an empty text."""
@@ -190,6 +213,11 @@ class GatewayDriver(ABC):
                 case GoalFinished(goal_id, status, result):
                     assert goal_id not in self.finished, f"{goal_id} ends twice"
                     self.finished[goal_id] = (status, result)
+                case GripperProgress(_, told):
+                    self.gripping.append(told)
+                case GripperFinished(goal_id, status, outcome):
+                    assert goal_id not in self.gripped, f"{goal_id} ends twice"
+                    self.gripped[goal_id] = (status, outcome)
                 case Answer(ticket, DeviceCommandResponse() as response):
                     self.answers[ticket] = response
                 case Answer(ticket, ConfigureResponse() as response):

@@ -18,6 +18,7 @@ from schemas.message import Message, Vector
 from schemas.robot import Motor
 from services.arm.device.device_config import device_config, reference_steps
 from services.arm.model.description import Arm, load_arm
+from services.arm.model.gripper import gripper_unit
 from services.runtime.deployment import project_root
 from services.virtual_arm.gateway_driver import GatewayDriver, GatewayParameters, Kind, Moment
 
@@ -88,7 +89,10 @@ class VirtualArm(GatewayDriver):
         if start is not None:
             steps = tuple(round(j.steps.to_steps(p)) for j, p in zip(self.arm.joints, start, strict=True))
         self.config = config or device_config(self.arm)  # with which the device starts
-        self.device = Device(self.config, BOOT_ID, BOOTED, _fitting(steps, self.config), referenced, motors=motors)
+        self.device = Device(
+            self.config, BOOT_ID, BOOTED, _fitting(steps, self.config), referenced, motors=motors,
+            gripper=self.arm.gripper, gripper_unit=gripper_unit(self.arm),
+        )  # fmt: skip
         self.device_is_on = self.gateway_is_on = True
         self.device_is_frozen = False  # what arrives waits
         self.loop_is_on = True  # of the gateway: no heartbeat without it; what arrives is still handled
@@ -151,7 +155,10 @@ class VirtualArm(GatewayDriver):
     def reboot(self, boot_id: int, referenced: bool = True) -> None:
         """The device loses power and starts again where it stands, with its clock at 0."""
         self._device_zero = self.now_us
-        self.device = Device(self.config, boot_id, 0, self.device.steps, referenced)
+        self.device = Device(
+            self.config, boot_id, 0, self.device.steps, referenced,
+            gripper=self.arm.gripper, gripper_unit=gripper_unit(self.arm),
+        )  # fmt: skip
 
     def unconfigure(self) -> None:
         """Another device takes its place, at its very first start."""

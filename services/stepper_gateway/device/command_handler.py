@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Callable
 
 from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceCommandResponse, DeviceMode
 from services.stepper_gateway.device.command_arguments import arguments_of, kind_of
 from services.stepper_gateway.device.gateway_device import GatewayDevice
-from services.stepper_gateway.device.pending_commands import STOPPING, PendingCommand
+from services.stepper_gateway.device.pending_commands import STOPPING, Arguments, PendingCommand
 from services.stepper_gateway.goals.rejections import GoalRejected, invalid
 from services.stepper_gateway.links.frames import Code, CommandReply, code_name, encode
 from services.stepper_gateway.links.link import Kind
@@ -38,6 +40,7 @@ TRUSTING = (  # commands that would move or mean something else with another con
     DeviceCommandKind.HOME,
     DeviceCommandKind.OUTPUT,
 )
+OnAnswer = Callable[[DeviceCommandResponse, Moment], None]
 AT_REST = (DeviceCommandKind.REFERENCE, DeviceCommandKind.DISARM, DeviceCommandKind.HOME)  # steps count anew after them
 
 
@@ -46,6 +49,9 @@ class CommandHandler:
 
     def __init__(self, device: GatewayDevice, controller: MotionController) -> None:
         self._device, self._controller = device, controller
+        self._own_tickets = itertools.count(-1, -1)  # of the gateway's own commands that it wants to hear of
+        self._listeners: dict[int, OnAnswer] = {}  # by such a ticket
+        self._heard: list[tuple[OnAnswer, DeviceCommandResponse]] = []
 
     def ask(self, request: DeviceCommandRequest, ticket: int, goal_is_active: bool, moment: Moment) -> bool:
         """Have it sent, or answer at once why not; true if it will be sent."""
@@ -61,6 +67,16 @@ class CommandHandler:
             return False
         self._device.commands.ask(kind, moment, self._device.parameters.command_timeout, ticket, arguments)
         return True
+
+    def have_sent(
+        self, kind: DeviceCommandKind, arguments: Arguments, on_answer: OnAnswer | None, moment: Moment
+    ) -> None:
+        """Have a command of the gateway's own sent; `on_answer` hears what became of it."""
+        ticket = next(self._own_tickets)
+        if on_answer is not None:
+            self._listeners[ticket] = on_answer
+        self._device.commands.ask(kind, moment, self._device.parameters.command_timeout, ticket, arguments)
+        self.send_due(moment)
 
     def stop(self, kind: DeviceCommandKind, ticket: int, goal_is_active: bool, moment: Moment) -> bool:
         """Have a stop sent, whatever is known of the device; true unless it is refused because the arm moves."""
@@ -101,6 +117,12 @@ class CommandHandler:
         for command, reply in self._device.commands.shown(self._device.session.latest, moment):
             for ticket in command.tickets:
                 self._answer(ticket, True, self._device.unreachable_reason(moment), reply.mode, sent=True)
+
+    def tell_listeners(self, moment: Moment) -> None:
+        """Hand the answers to the gateway's own commands to those who wait for them."""
+        heard, self._heard = self._heard, []
+        for listener, response in heard:
+            listener(response, moment)
 
     def send_due(self, moment: Moment) -> None:
         """Send what is new or was not answered."""
@@ -174,4 +196,8 @@ class CommandHandler:
         said = mode is not None and mode in DeviceMode._value2member_map_
         known = DeviceMode(mode or 0) if said else self._device.session.mode
         response = DeviceCommandResponse(accepted=accepted, sent=sent, reason=reason, mode=known)
+        if ticket < 0:
+            if (listener := self._listeners.pop(ticket, None)) is not None:
+                self._heard.append((listener, response))
+            return
         self._device.out.put(Answer(ticket, response))

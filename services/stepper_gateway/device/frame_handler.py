@@ -54,7 +54,9 @@ class FrameHandler:
             case Kind.CONFIG_ACK:
                 self._device.configuration.on_ack(decode_report(ConfigAckReport, payload))
             case Kind.SENSORS:
-                self._components.sensors.on_readings(decode_sensors(payload), arrival, moment)
+                readings = decode_sensors(payload)
+                self._components.sensors.on_readings(readings, arrival, moment)
+                self._components.gripper.on_readings(readings, arrival)
             case Kind.SHAFT:
                 self._on_shaft(decode_report(ShaftReport, payload), arrival, moment)
             case _:
@@ -126,6 +128,7 @@ class FrameHandler:
         controller.on_state(state, arrival)
         point = controller.commanded(state)
         self._publish(state, point, moment)
+        self._components.gripper.on_state(state, moment)
         if state.mode == DeviceMode.HOLD and controller.is_followed(state) and not controller.is_held:
             self._components.streaming.interrupt()
             self._components.goals.on_hold(moment)

@@ -33,6 +33,7 @@ _HB = struct.Struct("<II")
 _SYNC = struct.Struct("<Q")
 _SYNC_R = struct.Struct("<QQQ")
 _STATE = struct.Struct("<QBBHHHIIQIIIBBHHH")
+_SERVO = struct.Struct("<HH")
 
 
 class BadFrame(ValueError):
@@ -195,6 +196,9 @@ class State(Frame, frozen=True, kw_only=True, gc=False):
     speed: float = 1.0  # the time scale that was asked for
     steps: Row = ()
     velocity: Vector = ()  # [steps/s]
+    has_servo: bool = False
+    servo_us: int = 0  # 0: no pulses
+    servo_target_us: int = 0
 
 
 AnyFrame = Chunk | Ack | Command | CommandReply | Heartbeat | Sync | SyncReply | State
@@ -237,6 +241,7 @@ def encode(frame: AnyFrame) -> bytes:
                 frame.flags, frame.fault_joint, frame.outputs, frame.referenced, round(frame.speed * 1000.0),
             )  # fmt: skip
             body += _rows((*frame.steps, *(round(rate * Q8) for rate in frame.velocity)))
+            body += _SERVO.pack(frame.servo_us, frame.servo_target_us) if frame.has_servo else b""
     return build_frame(kind, body, frame.boot_id, joints)
 
 
@@ -316,12 +321,15 @@ def _read_sync_reply(boot_id: int, _joints: int, body: bytes) -> SyncReply:
 
 def _read_state(boot_id: int, joints: int, body: bytes) -> State:
     t_us, mode, fault, inputs, scale, buffered, stream, next_seq, play_us, *counts = _STATE.unpack_from(body)
-    steps, velocity = _read_rows(body, _STATE.size, joints, 2)
+    end = _STATE.size + 8 * joints
+    steps, velocity = _read_rows(body[:end], _STATE.size, joints, 2)
+    servo_us, servo_target_us = _SERVO.unpack(body[end:]) if len(body) > end else (0, 0)
     return State(
         boot_id=boot_id, t_us=t_us, mode=mode, fault=fault, inputs=inputs, time_scale=scale / UNITY,
         buffered_ms=buffered, stream=stream, next_seq=next_seq, play_us=play_us, underruns=counts[0], refused=counts[1],
         bad_frames=counts[2], flags=counts[3], fault_joint=counts[4], outputs=counts[5], referenced=counts[6],
         speed=counts[7] / 1000.0, steps=steps, velocity=tuple(rate / Q8 for rate in velocity),
+        has_servo=len(body) > end, servo_us=servo_us, servo_target_us=servo_target_us,
     )  # fmt: skip
 
 

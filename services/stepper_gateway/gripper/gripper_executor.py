@@ -1,0 +1,233 @@
+"""Carries out `gripper_command`: one goal at a time, until the jaws are there or something keeps them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from schemas.actions import GoalStatusCode
+from schemas.device import DeviceCommandResponse, DeviceMode
+from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
+from schemas.motion import FollowErrorCode
+from schemas.system import LogLevel
+from schemas.topics import GRIPPER_STATE
+from services.arm.model.gripper import METRES, gripper_unit
+from services.stepper_gateway.device.command_handler import CommandHandler, OnAnswer
+from services.stepper_gateway.device.gateway_device import GatewayDevice
+from services.stepper_gateway.goals.goal_executor import GoalVerdict
+from services.stepper_gateway.goals.rejections import GoalRejected, invalid
+from services.stepper_gateway.gripper.jaws import Jaws, jaws_of
+from services.stepper_gateway.links.frames import State
+from services.stepper_gateway.links.reports import SensorReport
+from services.stepper_gateway.moment import Moment, next_beat
+from services.stepper_gateway.outputs import GripperExecuting, GripperFinished, GripperProgress
+
+PERIOD = 0.1  # [s] between two states, and between two feedbacks
+FRESH = 1.0  # [s] that a reading of the jaws counts; chosen: ten of them
+STALL_TIME = 0.35  # [s] without movement that count as stalled; chosen: three readings
+STILL = 0.0003  # [m] that a reading may waver at rest; chosen: a hundredth of a servo's stroke is noise
+PATIENCE = 3.0  # [s] beyond the travel time until a goal is given up
+
+
+@dataclass
+class Grip:
+    """A goal under way; times in [s] monotonic."""
+
+    goal_id: str
+    position: float  # [m]
+    began: float
+    arrival: float  # when it may be there at the earliest
+    deadline: float
+    answered: float | None = None  # when the device has taken the command
+    still_at: float = 0.0  # [m] the last place that it has left
+    still_since: float = 0.0
+    feedback_due: float = 0.0
+
+
+class GripperExecutor:
+    """The gripper of one device."""
+
+    def __init__(self, device: GatewayDevice, commands: CommandHandler) -> None:
+        self._device, self._commands = device, commands
+        self._gripper = device.arm.gripper
+        self._jaws: Jaws | None = jaws_of(device.arm)
+        self._metres = METRES[gripper_unit(device.arm)]  # [m] of the sensor's unit
+        self._sensor = getattr(self._gripper, "sensor", "")
+        self._reading, self._read = 0.0, -1e9  # [m], [s] monotonic
+        self._grip: Grip | None = None
+        self._stalled = False
+        self._due = 0.0  # [s] monotonic, of the next state
+
+    @property
+    def is_active(self) -> bool:
+        return self._grip is not None
+
+    def accept(self, goal_id: str, goal: GripperCommandGoal, moment: Moment) -> GoalVerdict:
+        """Accept and start a goal, or say why not."""
+        try:
+            jaws = self._require(goal, moment)
+        except GoalRejected as rejected:
+            return GoalVerdict(False, rejected.code, rejected.reason)
+        self._end(GoalStatusCode.PREEMPTED, "a newer goal took over", moment)
+        now = moment.monotonic
+        arrival = now + jaws.travel_time(goal.position)
+        self._stalled = False
+        self._grip = Grip(goal_id, goal.position, now, arrival, arrival + PATIENCE)
+        self._commands.have_sent(*jaws.sending(goal.position), self._answer_to(goal_id), moment)
+        return GoalVerdict(True)
+
+    def cancel(self, goal_id: str, moment: Moment) -> str:
+        """Let the jaws stay where they are; empty, or why there is nothing to cancel."""
+        if self._grip is None or self._grip.goal_id != goal_id:
+            return f"goal {goal_id} is not being carried out"
+        sending = self._jaws.stopping() if self._jaws is not None else None
+        if sending is not None:
+            self._commands.have_sent(*sending, None, moment)
+        self._end(GoalStatusCode.CANCELED, "cancelled", moment)
+        return ""
+
+    def abort(self, reason: str, moment: Moment) -> None:
+        """What was under way is not watched any more."""
+        self._end(GoalStatusCode.ABORTED, reason, moment)
+
+    def on_state(self, state: State, moment: Moment) -> None:
+        """The device has said how its outputs and its servo are."""
+        if self._jaws is None:
+            return
+        self._jaws.on_state(state, moment.monotonic)
+        grip = self._grip
+        if grip is None:
+            return
+        if state.mode == DeviceMode.ESTOP:
+            return self._end(GoalStatusCode.ABORTED, "the emergency stop is pressed", moment)
+        if grip.answered is not None and self._jaws.is_overruled(grip.position):
+            self._end(GoalStatusCode.ABORTED, "the gripper was stopped, or switched by somebody else", moment)
+
+    def on_readings(self, report: SensorReport, arrival: float) -> None:
+        """What the board has measured; `arrival` [s] monotonic."""
+        if self._sensor in report.values:
+            self._reading, self._read = report.values[self._sensor] * self._metres, arrival
+
+    def step(self, moment: Moment) -> None:
+        """See whether the goal is over, and tell of the jaws."""
+        if self._jaws is None:
+            return
+        if self._grip is not None:
+            self._follow(self._grip, self._jaws, moment)
+        if moment.monotonic >= self._due and not self._device.unreachable_reason(moment):
+            self._due = next_beat(self._due, moment.monotonic, PERIOD)
+            self._device.out.publish(GRIPPER_STATE, self._state(self._jaws, moment))
+
+    def _require(self, goal: GripperCommandGoal, moment: Moment) -> Jaws:
+        if self._jaws is None or self._gripper is None:
+            raise invalid(f"{self._device.arm.name} has no gripper: write a [gripper] into its robot.toml")
+        if reason := self._device.unreachable_reason(moment) or self._device.configuration.mismatch_reason():
+            raise GoalRejected(FollowErrorCode.DEVICE_FAILED, reason)
+        state = self._device.state
+        if state is None:
+            raise GoalRejected(FollowErrorCode.DEVICE_FAILED, self._device.not_ready_reason())
+        if state.mode == DeviceMode.ESTOP:
+            raise GoalRejected(
+                FollowErrorCode.DEVICE_FAILED,
+                "gripper: the emergency stop is pressed: release it and run `gemelo reset` first",
+            )
+        self._jaws.require(goal.position)
+        if goal.max_effort < 0.0:
+            raise invalid(f"gripper: max_effort is {goal.max_effort:g} N: write 0 for no bound, or more")
+        if 0.0 < goal.max_effort < self._gripper.effort:
+            raise invalid(
+                f"gripper: it presses with {self._gripper.effort:g} N and cannot be told to press with at most "
+                f"{goal.max_effort:g} N: leave max_effort out, or open it only as far as the object needs"
+            )
+        return self._jaws
+
+    def _answer_to(self, goal_id: str) -> OnAnswer:
+        def on_answer(answer: DeviceCommandResponse, moment: Moment) -> None:
+            grip = self._grip
+            if grip is None or grip.goal_id != goal_id:
+                return
+            if not answer.accepted:
+                return self._end(GoalStatusCode.ABORTED, answer.reason, moment)
+            grip.arrival += moment.monotonic - grip.began
+            grip.answered = grip.still_since = moment.monotonic
+            grip.still_at = self._position(moment)
+            self._device.out.put(GripperExecuting(goal_id))
+
+        return on_answer
+
+    def _follow(self, grip: Grip, jaws: Jaws, moment: Moment) -> None:
+        now, position = moment.monotonic, self._position(moment)
+        if grip.answered is not None:
+            if abs(position - grip.still_at) > STILL:
+                grip.still_at, grip.still_since = position, now
+            if self._is_there(grip, jaws, moment):
+                return self._end(GoalStatusCode.SUCCEEDED, "", moment, reached=True)
+            if self._is_measured(moment) and now - grip.still_since >= STALL_TIME:
+                self._stalled = True
+                return self._end(GoalStatusCode.SUCCEEDED, "", moment)
+        if now >= grip.deadline:
+            there = f"it stands at {position * 1000:.1f} mm after {now - grip.began:.1f} s"
+            return self._end(GoalStatusCode.ABORTED, f"the gripper has not arrived: {there}", moment)
+        if grip.answered is not None and now >= grip.feedback_due:
+            grip.feedback_due = next_beat(grip.feedback_due, now, PERIOD)
+            feedback = GripperCommandFeedback(stamp=moment.unix, position=position, effort=self._effort(moment))
+            self._device.out.put(GripperProgress(grip.goal_id, feedback))
+
+    def _is_there(self, grip: Grip, jaws: Jaws, moment: Moment) -> bool:
+        is_commanded = jaws.commanded is not None and jaws.commanded == jaws.target
+        if not is_commanded or moment.monotonic < grip.arrival or self._gripper is None:
+            return False
+        return not self._is_measured(moment) or abs(self._reading - grip.position) <= self._gripper.tolerance
+
+    def _is_measured(self, moment: Moment) -> bool:
+        return bool(self._sensor) and moment.monotonic - self._read <= FRESH
+
+    def _position(self, moment: Moment) -> float:
+        """[m] as measured, else as commanded, else the goal's."""
+        if self._is_measured(moment):
+            return self._reading
+        if self._jaws is not None and self._jaws.commanded is not None:
+            return self._jaws.commanded
+        return self._grip.position if self._grip is not None else 0.0
+
+    def _effort(self, moment: Moment) -> float:
+        """[N] by the data sheet, while it presses; one that is not measured presses when it is closed."""
+        jaws, gripper = self._jaws, self._gripper
+        if jaws is None or gripper is None:
+            return 0.0
+        is_shut = not self._is_measured(moment) and jaws.commanded == gripper.closed
+        return gripper.effort if self._stalled or is_shut else 0.0
+
+    def _state(self, jaws: Jaws, moment: Moment) -> GripperState:
+        position = self._position(moment)
+        target = jaws.target if jaws.target is not None else position
+        return GripperState(
+            stamp=moment.unix,
+            known=self._is_measured(moment) or jaws.commanded is not None,
+            measured=self._is_measured(moment),
+            position=position,
+            target=target,
+            moving=self._grip is not None or (jaws.commanded is not None and jaws.commanded != target),
+            stalled=self._stalled,
+            effort=self._effort(moment),
+        )
+
+    def _end(self, status: GoalStatusCode, reason: str, moment: Moment, reached: bool = False) -> None:
+        grip = self._grip
+        if grip is None:
+            return
+        position = self._position(moment)
+        result = GripperCommandResult(
+            position=position,
+            effort=self._effort(moment),
+            stalled=self._stalled,
+            reached_goal=reached,
+            measured=self._is_measured(moment),
+            error_string=reason,
+        )
+        self._grip = None
+        self._device.out.put(GripperFinished(grip.goal_id, status, result))
+        level = LogLevel.INFO if status is GoalStatusCode.SUCCEEDED else LogLevel.WARNING
+        became = reason or ("stalled" if self._stalled else "is there")
+        wanted = f"gripper to {grip.position * 1000:g} mm"
+        self._device.out.log(level, f"{wanted}: {became}, at {position * 1000:.1f} mm")
+        self._due = 0.0  # the state is told at once

@@ -1,0 +1,151 @@
+"""The jaws as the device drives them: a servo by its pulse, a valve by an output. Openings in [m]."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from schemas.device import DeviceCommandKind
+from schemas.robot import OutputGripper, ServoGripper
+from services.arm.model.description import Arm
+from services.arm.model.gripper import opening_of, pulse_of
+from services.stepper_gateway.device.pending_commands import Arguments
+from services.stepper_gateway.goals.rejections import invalid
+from services.stepper_gateway.links.frames import State
+
+SLACK = 1e-6  # [m] by which an end may be missed
+AT_END = 1e-9  # [m]
+
+Sending = tuple[DeviceCommandKind, Arguments]
+
+
+class Jaws(ABC):
+    """What a kind of gripper can do, and what the device's states say of it."""
+
+    commanded: float | None = None  # [m] of the device's output now; None: nothing was commanded since its start
+    target: float | None = None  # [m] that the device goes to
+
+    @abstractmethod
+    def require(self, position: float) -> None:
+        """Raises `GoalRejected` for an opening that it cannot have."""
+
+    @abstractmethod
+    def sending(self, position: float) -> Sending:
+        """The command that opens or closes it to there."""
+
+    @abstractmethod
+    def stopping(self) -> Sending | None:
+        """The command that lets it stay where it is; None where it cannot."""
+
+    @abstractmethod
+    def travel_time(self, position: float) -> float:
+        """[s] to there from where it is, or from anywhere where that is not known."""
+
+    @abstractmethod
+    def on_state(self, state: State, now: float) -> None:
+        """Take what the device says; `now` [s] monotonic."""
+
+    @abstractmethod
+    def is_overruled(self, position: float) -> bool:
+        """True if the device does not go to `position` any more."""
+
+
+class ServoJaws(Jaws):
+    """The pulse goes to its target at the configured speed."""
+
+    def __init__(self, gripper: ServoGripper) -> None:
+        self._gripper = gripper
+
+    def require(self, position: float) -> None:
+        _require_within(position, self._gripper.closed, self._gripper.open)
+
+    def sending(self, position: float) -> Sending:
+        return DeviceCommandKind.SERVO, Arguments(argument=self._pulse(position))
+
+    def stopping(self) -> Sending | None:
+        return DeviceCommandKind.SERVO, Arguments(index=1)
+
+    def travel_time(self, position: float) -> float:
+        gripper = self._gripper
+        way = gripper.open - gripper.closed if self.commanded is None else abs(position - self.commanded)
+        return way / gripper.speed
+
+    def on_state(self, state: State, now: float) -> None:
+        self.commanded = opening_of(self._gripper, state.servo_us) if state.servo_us else None
+        self.target = opening_of(self._gripper, state.servo_target_us) if state.servo_target_us else None
+
+    def is_overruled(self, position: float) -> bool:
+        return self.target is None or abs(pulse_of(self._gripper, self.target) - self._pulse(position)) > 0.5
+
+    def _pulse(self, position: float) -> int:
+        return round(pulse_of(self._gripper, position))
+
+
+class OutputJaws(Jaws):
+    """Open or closed; how far it is on its way is known by its travel time alone."""
+
+    def __init__(self, gripper: OutputGripper, arm: Arm) -> None:
+        self._gripper = gripper
+        self._index = [output.name for output in arm.outputs].index(gripper.output)
+        self._from = 0.0  # [m]
+        self._switched = -1e9  # [s] monotonic
+
+    def require(self, position: float) -> None:
+        gripper = self._gripper
+        _require_within(position, gripper.closed, gripper.open)
+        if not self._is_closed(position) and abs(position - gripper.open) > SLACK:
+            raise invalid(
+                f"gripper: {position * 1000:g} mm: output {gripper.output!r} knows only closed, "
+                f"{gripper.closed * 1000:g} mm, and open, {gripper.open * 1000:g} mm: choose one of them"
+            )
+
+    def sending(self, position: float) -> Sending:
+        is_on = self._is_closed(position) == self._gripper.closes
+        return DeviceCommandKind.OUTPUT, Arguments(index=self._index, argument=int(is_on))
+
+    def stopping(self) -> Sending | None:
+        return None
+
+    def travel_time(self, position: float) -> float:
+        share = 1.0 if self.commanded is None else abs(position - self.commanded) / self._travel
+        return self._gripper.travel_time * share
+
+    def on_state(self, state: State, now: float) -> None:
+        is_closed = bool(state.outputs >> self._index & 1) == self._gripper.closes
+        target = self._gripper.closed if is_closed else self._gripper.open
+        if self.target is None or self.commanded is None:
+            self._from = target
+        elif target != self.target:
+            self._from, self._switched = self.commanded, now
+        self.target = target
+        most = (now - self._switched) / self._gripper.travel_time * self._travel
+        way = target - self._from
+        self.commanded = target if abs(way) <= most else self._from + (most if way > 0.0 else -most)
+
+    def is_overruled(self, position: float) -> bool:
+        return self.target is None or abs(self.target - position) > SLACK
+
+    @property
+    def _travel(self) -> float:
+        return self._gripper.open - self._gripper.closed
+
+    def _is_closed(self, position: float) -> bool:
+        return abs(position - self._gripper.closed) <= SLACK
+
+
+def jaws_of(arm: Arm) -> Jaws | None:
+    """The jaws of robot.toml's gripper; None without one."""
+    match arm.gripper:
+        case ServoGripper() as gripper:
+            return ServoJaws(gripper)
+        case OutputGripper() as gripper:
+            return OutputJaws(gripper, arm)
+        case _:
+            return None
+
+
+def _require_within(position: float, closed: float, opened: float) -> None:
+    if not closed - SLACK <= position <= opened + SLACK:
+        raise invalid(
+            f"gripper: {position * 1000:g} mm is not between its {closed * 1000:g} mm closed and {opened * 1000:g} mm "
+            "open: choose an opening between them, or correct [gripper] in robot.toml"
+        )
