@@ -9,6 +9,7 @@ from gemelo.units import Pose
 
 Joints = Mapping[str, float] | Sequence[float]
 Vector = Sequence[float]
+Grip = str | float  # "open", "close", or [m] between the jaws
 Waypoint = str | Mapping[str, float] | Pose | Vector
 
 

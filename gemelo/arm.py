@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 from typing import Self, Unpack
 
-from gemelo.arguments import Joints, Target, ToolGoal, Vector, Waypoint
+from gemelo.arguments import Grip, Joints, Target, ToolGoal, Vector, Waypoint
 from gemelo.device import Device, reference_command
 from gemelo.errors import BadArgument
 from gemelo.frames import Frames
+from gemelo.gripping import Gripped, Gripping, OnGripping
 from gemelo.homing import OnHoming, home
 from gemelo.homing_report import HomingReport
 from gemelo.jog import Jogging, Streaming, jog_command
@@ -29,9 +30,10 @@ from gemelo.targets import as_target, ik_request, joint_state, request_of
 from gemelo.units import Pose
 from schemas.deployment import Deployment
 from schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
+from schemas.gripper import GripperState
 from schemas.joints import JointState
 from schemas.planning import IkRequest, JogCommand, JogStatus, PlanRequest
-from schemas.topics import DEVICE_STATUS, JOINT_STATES, SENSORS, STEP_ERRORS
+from schemas.topics import DEVICE_STATUS, GRIPPER_STATE, JOINT_STATES, SENSORS, STEP_ERRORS
 from services.arm.errors import suggestion
 from services.arm.model.description import Arm as Description
 from services.runtime.node import Node
@@ -51,6 +53,7 @@ class Arm:
         self._frames, self._motions = Frames(session), Motions(session)
         self._jogging, self._streaming = Jogging(session), Streaming(session)
         self._scene, self._device = Scene(session), Device(session)
+        self._gripping = Gripping(session, self._scene)
 
     def __enter__(self) -> Self:
         return self
@@ -534,6 +537,31 @@ class Arm:
         ...     arm.stream({"brazo_joint": arm.joints["brazo_joint"] + 0.002})
         """
         self._streaming.say(joints)
+
+    def grip(self, to: Grip, *, max_effort: float = 0.0, on_progress: OnGripping | None = None) -> Gripped:
+        """Opens or closes the gripper: to "open", "close", or an opening [m]; returns when it is there, or holds.
+
+        What the scene has between the jaws is attached to the tool when they close on it, and left where it is when
+        they open. `max_effort` [N]: refused where the gripper presses with more. At Ctrl-C it stays where it is, and
+        `Interrupted` is raised. Raises `Refused`, `Aborted`, `Lost` or `BadArgument`.
+
+        >>> arm.grip("open").reached
+        True
+        >>> abs(arm.grip(0.025).position - 0.025) < 0.002
+        True
+        >>> print(arm.grip("close"))
+        0... mm, there
+        """
+        return self._gripping.go(to, max_effort, on_progress)
+
+    @property
+    def gripper(self) -> GripperState:
+        """The gripper: its opening [m], whether that is measured, and whether it presses.
+
+        >>> arm.grip("open").reached, arm.gripper.measured, arm.gripper.stalled
+        (True, True, False)
+        """
+        return self._session.newest(GRIPPER_STATE)
 
     # What is switched
 

@@ -50,6 +50,7 @@ class SceneObject(Message, frozen=True, kw_only=True):
     attached: bool = False  # it moves with the link `frame`
     touch_links: tuple[str, ...] = ()  # links that an attached object may touch, besides the one it is attached to
     padding: float = 0.0  # [m] kept around it, besides the planner's clearance
+    gripped: bool = False  # attached because the gripper has closed on it: it is detached when that opens
 
 
 class AllowedPair(Message, frozen=True, kw_only=True):
@@ -110,6 +111,16 @@ class SceneDetach(Message, frozen=True, kw_only=True, tag="detach"):
     name: str = ""
 
 
+class SceneGrip(Message, frozen=True, kw_only=True, tag="grip"):
+    """Attach what stands between the gripper's jaws to the tool, if anything does; the answer names it."""
+
+    look: bool = False  # only say what it is
+
+
+class SceneRelease(Message, frozen=True, kw_only=True, tag="release"):
+    """Detach what `SceneGrip` has attached; it stays where it is now."""
+
+
 class SceneAllow(Message, frozen=True, kw_only=True, tag="allow"):
     """Let a pair touch."""
 
@@ -139,6 +150,8 @@ SceneEdit = (
     | SceneResize
     | SceneAttach
     | SceneDetach
+    | SceneGrip
+    | SceneRelease
     | SceneAllow
     | SceneDisallow
     | SceneReplace
@@ -158,6 +171,8 @@ class SceneResponse(Message, frozen=True, kw_only=True):
     accepted: bool = False
     reason: str = ""
     version: int = 0
+    name: str = ""  # of SceneGrip and SceneRelease: the object; empty if there is none
+    width: float = 0.0  # [m] of that object between the jaws
 
 
 class Contact(Message, frozen=True, kw_only=True):

@@ -35,6 +35,8 @@ COMMANDS = (
             "home:run", "home:add_options", "gemelo home brazo_joint", "home:choices"),
     Command(("output",), "switch an output of the device",
             "device:run_output", "device:output_options", "gemelo output avanzar on", "device:output_choices"),
+    Command(("grip",), "open or close the gripper, or say how it is; Ctrl-C lets it stay where it is",
+            "grip:run", "grip:add_options", "gemelo grip 25mm", "grip:choices"),
     Command(("sensors",), "what the device's sensors read", "device_status:run_sensors", JSON, "gemelo sensors --json"),
     Command(("speed",), "how fast the device plays every path from now on; 0 lets it stand on it",
             "device:run_speed", "device:speed_options", "gemelo speed 50%"),

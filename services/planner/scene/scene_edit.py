@@ -17,8 +17,10 @@ from schemas.scene import (
     SceneDetach,
     SceneDisallow,
     SceneEdit,
+    SceneGrip,
     SceneMove,
     SceneObject,
+    SceneRelease,
     SceneRemove,
     SceneReplace,
     SceneResize,
@@ -27,6 +29,7 @@ from services.arm.errors import suggestion
 from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message, inverse, to_message
 from services.arm.model.description import Arm
 from services.planner.collision.scene_shapes import SceneError, pose_of
+from services.planner.scene.grasp import Grasp
 from services.planner.scene.scene_check import require_link
 
 LinkPoses = Callable[
@@ -36,8 +39,13 @@ LinkPoses = Callable[
 replace = msgspec.structs.replace
 
 
-def edited(arm: Arm, scene: PlanningScene, edit: SceneEdit, links: LinkPoses) -> PlanningScene:
-    """The scene after the change, with the same version; `scene_check` says if it is valid. Raises `SceneError`."""
+def edited(
+    arm: Arm, scene: PlanningScene, edit: SceneEdit, links: LinkPoses, grasp: Grasp | None = None
+) -> PlanningScene:
+    """The scene after the change, with the same version; `scene_check` says if it is valid. Raises `SceneError`.
+
+    `grasp`: what stands between the jaws, for `SceneGrip`.
+    """
     editor = SceneEditor(arm, scene, links)
     match edit:
         case SceneAdd(object=item):
@@ -52,6 +60,10 @@ def edited(arm: Arm, scene: PlanningScene, edit: SceneEdit, links: LinkPoses) ->
             return editor.attach(edit)
         case SceneDetach(name=name):
             return editor.detach(name)
+        case SceneGrip():
+            return scene if edit.look or grasp is None else editor.grip(grasp.item)
+        case SceneRelease():
+            return editor.release()
         case SceneAllow(pair=pair):
             return editor.allow(pair)
         case SceneDisallow(pair=pair):
@@ -115,7 +127,21 @@ class SceneEditor:
         if not item.attached:
             raise SceneError(f'object "{name}" is not attached to any link; there is nothing to detach')
         pose = to_message(self._in_base(item))
-        return self.put(replace(item, pose=pose, frame="", attached=False, touch_links=()))
+        return self.put(replace(item, pose=pose, frame="", attached=False, touch_links=(), gripped=False))
+
+    def grip(self, item: SceneObject) -> PlanningScene:
+        """The object attached to the tool, which it and what holds the tool may touch."""
+        holder = tuple(joint.parent for joint in self._arm.model.joints if joint.child == self._arm.tool_frame)
+        held = SceneEditor(self._arm, self.attach(SceneAttach(name=item.name, link=self._arm.tool_frame)), self._links)
+        return held.put(replace(held.named(item.name), touch_links=holder, gripped=True))
+
+    def release(self) -> PlanningScene:
+        """What was gripped stands where it is now."""
+        scene = self._scene
+        for item in self._scene.objects:
+            if item.gripped:
+                scene = SceneEditor(self._arm, scene, self._links).detach(item.name)
+        return scene
 
     def allow(self, pair: AllowedPair) -> PlanningScene:
         """The scene with the pair allowed to touch."""

@@ -9,9 +9,10 @@ import secrets
 
 import msgspec
 
-from schemas.scene import PlanningScene, SceneRequest, SceneResponse
+from schemas.scene import PlanningScene, SceneGrip, SceneRelease, SceneRequest, SceneResponse
 from services.arm.model.description import Arm
 from services.planner.collision.scene_shapes import Folders, SceneError
+from services.planner.scene.grasp import find_grasp
 from services.planner.scene.scene_check import require_scene
 from services.planner.scene.scene_edit import LinkPoses, edited
 
@@ -27,15 +28,22 @@ class SceneStore:
 
     def edit(self, request: SceneRequest, links: LinkPoses, stamp: int) -> SceneResponse:
         """True if the scene is changed, or why not; `links` says where the links are now, `stamp` is [ns] UNIX."""
+        name, width = "", 0.0
         try:
-            changed = edited(self._arm, self.scene, request.edit, links)
+            grasp = None
+            if isinstance(request.edit, SceneGrip):
+                grasp = find_grasp(self._arm, self.scene, links(), self._folders)
+                name, width = ("", 0.0) if grasp is None else (grasp.item.name, grasp.width)
+            elif isinstance(request.edit, SceneRelease):
+                name = next((item.name for item in self.scene.objects if item.gripped), "")
+            changed = edited(self._arm, self.scene, request.edit, links, grasp)
             if changed != self.scene:
                 require_scene(self._arm, changed, self._folders)
                 epoch, version = self.scene.epoch or drawn_epoch(), self.scene.version + 1
                 self.scene = msgspec.structs.replace(changed, stamp=stamp, version=version, epoch=epoch)
         except SceneError as error:
             return SceneResponse(reason=str(error), version=self.scene.version)
-        return SceneResponse(accepted=True, version=self.scene.version)
+        return SceneResponse(accepted=True, version=self.scene.version, name=name, width=width)
 
 
 def drawn_epoch() -> int:

@@ -1,0 +1,146 @@
+"""The gripper: opening, closing, and what it then carries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from gemelo.arguments import Grip
+from gemelo.errors import Aborted, BadArgument, Interrupted, Lost, Refused
+from gemelo.scene import Scene
+from gemelo.session import Session
+from gemelo.targets import number
+from schemas.actions import GoalStatusCode
+from schemas.device import InjectKind, InjectRequest
+from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
+from schemas.robot import Gripper, ServoGripper
+from schemas.scene import SceneGrip, SceneRelease
+from schemas.topics import DEVICE_INJECT, DEVICE_STATUS, GRIPPER_COMMAND, GRIPPER_STATE
+from services.runtime import errors as runtime
+from services.runtime.actions import ActionClient, GoalHandle
+
+OPEN, CLOSE = "open", "close"
+TO_ANSWER = 3.0  # [s] for an injection into a virtual device
+TO_STAY = 3.0  # [s] that a gripper which was cancelled may take to say so
+
+OnGripping = Callable[[GripperCommandFeedback], object]
+Handle = GoalHandle[GripperCommandFeedback, GripperCommandResult]
+
+
+class Gripped(NamedTuple):
+    """How the gripper has ended."""
+
+    position: float  # [m] between the jaws
+    effort: float  # [N] that it presses with by its data sheet; 0 where nothing is between the jaws
+    reached: bool  # it is where it was told to go
+    stalled: bool  # something keeps the jaws apart
+    measured: bool  # a sensor has read the opening; False: it is what was commanded
+    held: str  # name of the scene's object that it carries from now on; empty for none
+    released: str  # name of the one that it carries no more
+
+    def __str__(self) -> str:
+        """One line for a person."""
+        how = "stopped by what is between the jaws" if self.stalled else "there"
+        words = [f"{self.position * 1000.0:.1f} mm, {how}" + ("" if self.measured else " (commanded, not measured)")]
+        words += [f"holds {self.held}"] if self.held else []
+        words += [f"has let go of {self.released}"] if self.released else []
+        return ", ".join(words)
+
+
+class Gripping:
+    """The gripper of one connection."""
+
+    def __init__(self, session: Session, scene: Scene) -> None:
+        self._session, self._scene = session, scene
+        self._client: ActionClient[GripperCommandGoal, GripperCommandFeedback, GripperCommandResult] | None = None
+
+    def go(self, to: Grip, max_effort: float, on_progress: OnGripping | None) -> Gripped:
+        """Sends the goal and waits; attaches and detaches in the scene. Raises `Refused`, `Aborted`, `Lost`."""
+        gripper = self._gripper()
+        position = opening_of(gripper, to)
+        is_virtual_servo = self._is_virtual() and isinstance(gripper, ServoGripper)
+        if is_virtual_servo:
+            self._put_between(position)
+        closes = position < self._session.newest(GRIPPER_STATE).position
+        result = self._carried_out(GripperCommandGoal(position=position, max_effort=max_effort), on_progress)
+        held, released = "", ""
+        if result.stalled or (closes and not result.measured):
+            held = self._scene.edit(SceneGrip()).name
+        elif not closes:
+            released = self._scene.edit(SceneRelease()).name
+        return Gripped(
+            result.position, result.effort, result.reached_goal, result.stalled, result.measured, held, released
+        )
+
+    def _gripper(self) -> Gripper:
+        gripper = self._session.description.gripper
+        if gripper is None:
+            raise Refused(
+                f"{self._session.description.name} has no gripper: write a [gripper] into its robot.toml",
+                check="gripper",
+            )
+        return gripper
+
+    def _is_virtual(self) -> bool:
+        return self._session.newest(DEVICE_STATUS).virtual
+
+    def _put_between(self, position: float) -> None:
+        """A virtual servo meets what the scene has between its jaws, where that is wider than the goal."""
+        width = self._scene.edit(SceneGrip(look=True)).width
+        request = InjectRequest(kind=InjectKind.OBJECT, value=width if width > position else 0.0)
+        answer = self._session.call(DEVICE_INJECT, request, TO_ANSWER)
+        if not answer.accepted and width <= position:
+            raise Refused(f"refused: {answer.reason}", check="device", reason=answer.reason)
+
+    def _carried_out(self, goal: GripperCommandGoal, on_progress: OnGripping | None) -> GripperCommandResult:
+        handle = self._sent(goal)
+        try:
+            self._await(handle, on_progress)
+        except KeyboardInterrupt:
+            handle.cancel()
+            self._session.wait_for(lambda: handle.is_over, TO_STAY)
+            raise Interrupted("stopped by Ctrl-C: the gripper stays where it is") from None
+        self._session.changed()
+        if handle.outcome is None:
+            raise Lost(str(handle.lost), has_begun=True)
+        status, result = handle.outcome.status, handle.outcome.result
+        if status is not GoalStatusCode.SUCCEEDED:
+            reason = result.error_string or "no reason was given"
+            raise Aborted(f"gripper {status.name.lower()} at {result.position * 1000.0:.1f} mm: {reason}", status)
+        return result
+
+    def _sent(self, goal: GripperCommandGoal) -> Handle:
+        client = self._client = self._client or self._session.node.action(GRIPPER_COMMAND)
+        try:
+            handle = client.send(goal, lambda feedback: self._session.notify(), attached=True)
+        except runtime.GoalRefused as error:
+            raise Refused(f"refused: {error}", check="gripper", code=error.code, reason=str(error)) from error
+        except runtime.Refused as error:
+            raise Refused(str(error)) from error
+        except (runtime.NoAnswer, runtime.BusError) as error:
+            raise Lost(str(error)) from error
+        handle.on_end = self._session.notify
+        return handle
+
+    def _await(self, handle: Handle, on_progress: OnGripping | None) -> None:
+        told: list[GripperCommandFeedback | None] = [None]
+
+        def tell() -> None:
+            if on_progress is not None and handle.feedback is not None and handle.feedback is not told[0]:
+                told[0] = handle.feedback
+                on_progress(handle.feedback)
+
+        self._session.wait_for(lambda: handle.is_over, None, tell)
+
+
+def opening_of(gripper: Gripper, to: Grip) -> float:
+    """[m] that "open", "close" or a length means; raises `BadArgument`."""
+    if isinstance(to, str):
+        if to not in (OPEN, CLOSE):
+            raise BadArgument(f'grip("{to}") is neither "open" nor "close": write one of them, or an opening in m')
+        return gripper.open if to == OPEN else gripper.closed
+    position = number("grip", to)
+    if not gripper.closed <= position <= gripper.open:
+        hint = f": {to:g} mm is {to / 1000.0:g}" if gripper.open < position <= 1000.0 * gripper.open else ""
+        raise BadArgument(f"grip({to:g}) is not {gripper.closed:g} to {gripper.open:g} m between the jaws{hint}")
+    return position
