@@ -1,4 +1,4 @@
-"""Carries a part around a post, on whichever arm is running, and leaves the planning scene as it was found."""
+"""Grips a part and carries it around a post, on whichever arm is running; the scene is left as it was found."""
 
 import gemelo
 
@@ -21,14 +21,14 @@ with gemelo.connect() as arm, arm.scene.restored():
     for name, pose in (("pick_stand", pick), ("place_stand", place)):
         arm.scene.add_box(name, STAND, at=pose.offset(z=-LIFT - GAP - PART[2] - STAND[2] / 2).position)
         arm.scene.allow("part", name)
-    [holder] = [joint.parent for joint in arm.description.model.joints if joint.child == arm.tool_frame]
 
+    print(f"open: {arm.grip('open')}", flush=True)
     say("above the part", arm.move(pose=pick))
     say("down", arm.line(pose=pick.offset(z=-LIFT), speed=0.05))
-    arm.scene.attach("part", to=arm.tool_frame, touch=[holder])
+    print(f"close: {arm.grip('close')}", flush=True)
     say("up", arm.line(pose=pick, speed=0.05))
     say("around the post", arm.move(pose=place))
     say("down", arm.line(pose=place.offset(z=-LIFT), speed=0.05))
-    arm.scene.detach("part")
+    print(f"open: {arm.grip('open')}", flush=True)
     say("up", arm.line(pose=place, speed=0.05))
     say("home", arm.move(named="home"))

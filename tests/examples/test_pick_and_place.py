@@ -75,6 +75,10 @@ def test_the_part_stands_where_it_was_to_go_and_no_step_is_lost(operator: Operat
     assert [line.split(":")[0] for line in moves] == MOVES
     assert all(line.endswith(" 0 steps lost") for line in moves)
     assert not moves[3].startswith("around the post: straight")
+    grips = [line for line in output.splitlines() if " mm, " in line]
+    assert [line.split(":")[0] for line in grips] == ["open", "close", "open"]
+    assert grips[1].endswith("holds part")
+    assert grips[2].endswith("has let go of part")
 
     assert operator.wait_for(lambda: len(shafts) > 0 and shafts[-1].steps == shafts[-1].shaft, 3.0)
     assert max(errors) <= 0.5 + 1e-9
@@ -83,6 +87,7 @@ def test_the_part_stands_where_it_was_to_go_and_no_step_is_lost(operator: Operat
     assert operator.wait_for(lambda: is_as_found(scenes[-1]), 3.0)
     first, carried, last = (parts(scenes)[index] for index in (0, -2, -1))
     assert (first.attached, carried.attached, last.attached) == (False, True, False)
+    assert (first.gripped, carried.gripped, last.gripped) == (False, True, False)
     assert carried.frame == operator.arm.tool_frame
     assert last.frame == ""
     moved = np.subtract(last.pose.translation, first.pose.translation)
