@@ -538,12 +538,20 @@ class Arm:
         """
         self._streaming.say(joints)
 
-    def grip(self, to: Grip, *, max_effort: float = 0.0, on_progress: OnGripping | None = None) -> Gripped:
+    def grip(
+        self,
+        to: Grip,
+        *,
+        max_effort: float = 0.0,
+        on_progress: OnGripping | None = None,
+        is_cancelled: Callable[[], bool] | None = None,
+    ) -> Gripped:
         """Opens or closes the gripper: to "open", "close", or an opening [m]; returns when it is there, or holds.
 
         What the scene has between the jaws is attached to the tool when they close on it, and left where it is when
         they open. `max_effort` [N]: refused where the gripper presses with more. At Ctrl-C it stays where it is, and
-        `Interrupted` is raised. Raises `Refused`, `Aborted`, `Lost` or `BadArgument`.
+        `Interrupted` is raised; it stays too once `is_cancelled()`, which raises `Canceled`. Raises `Refused`,
+        `Aborted`, `Lost` or `BadArgument`.
 
         >>> arm.grip("open").reached
         True
@@ -552,7 +560,7 @@ class Arm:
         >>> print(arm.grip("close"))
         0... mm, there
         """
-        return self._gripping.go(to, max_effort, on_progress)
+        return self._gripping.go(to, max_effort, on_progress, is_cancelled)
 
     @property
     def gripper(self) -> GripperState:

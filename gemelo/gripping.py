@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from gemelo.arguments import Grip
-from gemelo.errors import Aborted, BadArgument, Interrupted, Lost, Refused
+from gemelo.errors import Aborted, BadArgument, Canceled, Interrupted, Lost, Refused
 from gemelo.scene import Scene
 from gemelo.session import Session
 from gemelo.targets import number
@@ -23,6 +23,7 @@ OPEN, CLOSE = "open", "close"
 TO_ANSWER = 3.0  # [s] for an injection into a virtual device
 TO_STAY = 3.0  # [s] that a gripper which was cancelled may take to say so
 
+IsCancelled = Callable[[], bool]
 OnGripping = Callable[[GripperCommandFeedback], object]
 Handle = GoalHandle[GripperCommandFeedback, GripperCommandResult]
 
@@ -54,7 +55,9 @@ class Gripping:
         self._session, self._scene = session, scene
         self._client: ActionClient[GripperCommandGoal, GripperCommandFeedback, GripperCommandResult] | None = None
 
-    def go(self, to: Grip, max_effort: float, on_progress: OnGripping | None) -> Gripped:
+    def go(
+        self, to: Grip, max_effort: float, on_progress: OnGripping | None, is_cancelled: IsCancelled | None = None
+    ) -> Gripped:
         """Sends the goal and waits; attaches and detaches in the scene. Raises `Refused`, `Aborted`, `Lost`."""
         gripper = self._gripper()
         position = opening_of(gripper, to)
@@ -62,7 +65,9 @@ class Gripping:
         if is_virtual_servo:
             self._put_between(position)
         closes = position < self._session.newest(GRIPPER_STATE).position
-        result = self._carried_out(GripperCommandGoal(position=position, max_effort=max_effort), on_progress)
+        result = self._carried_out(
+            GripperCommandGoal(position=position, max_effort=max_effort), on_progress, is_cancelled
+        )
         held, released = "", ""
         if result.stalled or (closes and not result.measured):
             held = self._scene.edit(SceneGrip()).name
@@ -92,10 +97,12 @@ class Gripping:
         if not answer.accepted and width <= position:
             raise Refused(f"refused: {answer.reason}", check="device", reason=answer.reason)
 
-    def _carried_out(self, goal: GripperCommandGoal, on_progress: OnGripping | None) -> GripperCommandResult:
+    def _carried_out(
+        self, goal: GripperCommandGoal, on_progress: OnGripping | None, is_cancelled: IsCancelled | None
+    ) -> GripperCommandResult:
         handle = self._sent(goal)
         try:
-            self._await(handle, on_progress)
+            self._await(handle, on_progress, is_cancelled)
         except KeyboardInterrupt:
             handle.cancel()
             self._session.wait_for(lambda: handle.is_over, TO_STAY)
@@ -106,7 +113,8 @@ class Gripping:
         status, result = handle.outcome.status, handle.outcome.result
         if status is not GoalStatusCode.SUCCEEDED:
             reason = result.error_string or "no reason was given"
-            raise Aborted(f"gripper {status.name.lower()} at {result.position * 1000.0:.1f} mm: {reason}", status)
+            kind = Canceled if status is GoalStatusCode.CANCELED else Aborted
+            raise kind(f"gripper {status.name.lower()} at {result.position * 1000.0:.1f} mm: {reason}", status)
         return result
 
     def _sent(self, goal: GripperCommandGoal) -> Handle:
@@ -122,7 +130,7 @@ class Gripping:
         handle.on_end = self._session.notify
         return handle
 
-    def _await(self, handle: Handle, on_progress: OnGripping | None) -> None:
+    def _await(self, handle: Handle, on_progress: OnGripping | None, is_cancelled: IsCancelled | None) -> None:
         told: list[GripperCommandFeedback | None] = [None]
 
         def tell() -> None:
@@ -130,7 +138,13 @@ class Gripping:
                 told[0] = handle.feedback
                 on_progress(handle.feedback)
 
-        self._session.wait_for(lambda: handle.is_over, None, tell)
+        def wants_end() -> bool:
+            return handle.is_over or (is_cancelled is not None and is_cancelled())
+
+        self._session.wait_for(wants_end, None, tell)
+        if not handle.is_over:
+            handle.cancel()
+            self._session.wait_for(lambda: handle.is_over, TO_STAY)
 
 
 def opening_of(gripper: Gripper, to: Grip) -> float:

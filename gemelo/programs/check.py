@@ -13,7 +13,7 @@ from gemelo.programs.planning import plan_leg
 from gemelo.programs.points import Point
 from gemelo.programs.program import Program
 from gemelo.programs.sequence import Leg, legs_of, lost_blend
-from gemelo.programs.steps import Attach, Detach, MotionStep, StepPath, Wait, WaitFor, path_text, words_of
+from gemelo.programs.steps import Attach, Detach, Grip, MotionStep, StepPath, Wait, WaitFor, path_text, words_of
 
 SAME = 1e-6  # [rad] or [m] between two states that are one
 MOST_LEGS = 5_000  # that one check plans
@@ -152,7 +152,7 @@ class _Check:
         step, text = leg.steps[-1], "; ".join(words_of(step) for step in leg.steps)
         made = CheckedLeg(leg.paths, leg.rounds, text, note=self._note(leg, following))
         if not leg.is_motion:
-            if isinstance(step, Attach | Detach):
+            if isinstance(step, Attach | Detach | Grip):
                 self._scene_note = f'planned in the scene as it is now, without step {path_text(leg.path)} ("{text}")'
             return replace(made, duration=step.time if isinstance(step, Wait) else 0.0), self._joints
         try:

@@ -15,7 +15,7 @@ from gemelo.planning import Plan
 from gemelo.programs.planning import plan_leg
 from gemelo.programs.points import Point
 from gemelo.programs.sequence import Leg
-from gemelo.programs.steps import Attach, Detach, Output, Wait, WaitFor
+from gemelo.programs.steps import Attach, Detach, Grip, Output, Wait, WaitFor
 from schemas.motion import FollowErrorCode
 
 LOOK_AHEAD = 50  # legs that are looked through for the next motion
@@ -109,6 +109,8 @@ class Execution:
         match step:
             case Output():
                 self._arm.output(step.name, step.on)
+            case Grip():
+                self._arm.grip(step.to, is_cancelled=self._controls.stop.is_set)
             case Wait():
                 self._arm.wait_for(self._controls.stop.is_set, step.time)
             case WaitFor():
@@ -203,7 +205,7 @@ class Execution:
     def _upcoming(self) -> Leg | None:
         for index in range(LOOK_AHEAD):
             leg = self._peek(index)
-            if leg is None or isinstance(leg.steps[0], Attach | Detach):
+            if leg is None or isinstance(leg.steps[0], Attach | Detach | Grip):
                 return None
             if leg.is_motion:
                 return leg

@@ -16,6 +16,7 @@ from gemelo.programs.steps import (
     Attach,
     Call,
     Detach,
+    Grip,
     Line,
     MotionStep,
     Output,
@@ -112,6 +113,8 @@ class _Script:
         match step:
             case Output():
                 return f"arm.output({_py(step.name)}, {step.on})"
+            case Grip():
+                return f"arm.grip({_py(step.to)})"
             case Wait():
                 return f"time.sleep({step.time!r})"
             case WaitFor():

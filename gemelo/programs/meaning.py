@@ -6,12 +6,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from gemelo.errors import BadArgument, Error
+from gemelo.gripping import opening_of
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import program_name, read_text
 from gemelo.programs.points import Point
 from gemelo.programs.program import Program
 from gemelo.programs.reading import parse_program, value_mistakes
-from gemelo.programs.steps import AnyStep, Attach, Call, MotionStep, Output, WaitFor
+from gemelo.programs.steps import AnyStep, Attach, Call, Grip, MotionStep, Output, WaitFor
 from gemelo.programs.values import DEEPEST, Wrong, in_words_of_a_file
 from gemelo.targets import joint_state
 from services.arm.errors import suggestion
@@ -80,6 +81,8 @@ class _Search:
                 yield from self._motion(step)
             case Output():
                 yield from _unknown("name", "output", step.name, [each.name for each in robot.outputs], robot)
+            case Grip():
+                yield from self._grip(step)
             case WaitFor():
                 yield from _unknown("sensor", "sensor", step.sensor, [each.name for each in robot.sensors], robot)
             case Attach():
@@ -87,6 +90,16 @@ class _Search:
                     yield from _unknown(key, "link", link or robot.tool_frame, robot.model.link_names, robot)
             case _:
                 return
+
+    def _grip(self, step: Grip) -> Iterator[Wrong]:
+        gripper = self._robot.gripper
+        if gripper is None:
+            yield "to", f"{self._robot.name} has no gripper: write a [gripper] into its robot.toml"
+            return
+        try:
+            opening_of(gripper, step.to)
+        except BadArgument as error:
+            yield "to", in_words_of_a_file(str(error))
 
     def _motion(self, step: MotionStep) -> Iterator[Wrong]:
         if step.point and step.point not in self._points:

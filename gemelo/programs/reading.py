@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from gemelo.gripping import CLOSE, OPEN
 from gemelo.programs.mistakes import Mistake, ProgramError
 from gemelo.programs.names import read_text
 from gemelo.programs.program import VERSION, Program, step_place
@@ -24,7 +25,7 @@ UNITS = {"m": ("m", 1.0), "cm": ("m", 0.01), "mm": ("m", 0.001), "rad": ("rad", 
          "s": ("s", 1.0), "ms": ("s", 0.001), "min": ("s", 60.0), "m/s": ("m/s", 1.0), "mm/s": ("m/s", 0.001),
          "%": ("%", 0.01)}  # fmt: skip
 MEASURED = {"position": "m", "offset": "m", "through": "m", "center": "m", "blend": "m", "rpy": "rad",
-            "tool_speed": "m/s", "time": "s", "timeout": "s", "share": "%", "joints": "rad or m"}  # fmt: skip
+            "tool_speed": "m/s", "to": "m", "time": "s", "timeout": "s", "share": "%", "joints": "rad or m"}  # fmt: skip
 EXPECTED = {
     str: 'a text in quotes, as "ready"',
     bool: "true or false",
@@ -34,6 +35,7 @@ EXPECTED = {
     dict[str, float]: "numbers by joint, as {elbow = 0.5}",
     tuple[float, float, float] | None: "three numbers, as [0.25, 0.15, 0.1]",
     tuple[float, float, float, float] | None: "four numbers, as [0, 0, 0, 1]",
+    str | float: '"open", "close" or a length',
     tuple[str, ...]: 'texts, as ["link_1", "link_2"]',
 }
 BY_KIND = {str(kind.__struct_config__.tag): kind for kind in KINDS}
@@ -171,7 +173,7 @@ class _BadUnit(Exception):
 def _in_si(name: str, value: object) -> object:
     """The value with every text that is a number with a unit turned into a number, SI."""
     unit = MEASURED.get(name, "")
-    if not unit:
+    if not unit or (name == "to" and value in (OPEN, CLOSE)):
         return value
     if isinstance(value, list):
         return [_number(each, unit) for each in value]

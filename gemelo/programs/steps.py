@@ -55,6 +55,12 @@ class Output(Step, frozen=True, kw_only=True, tag="output"):
     on: bool
 
 
+class Grip(Step, frozen=True, kw_only=True, tag="grip"):
+    """Opens or closes the gripper; what the scene has between its jaws is attached and detached."""
+
+    to: str | float  # "open", "close", or [m] between the jaws
+
+
 class Wait(Step, frozen=True, kw_only=True, tag="wait"):
     """Stands for a time."""
 
@@ -103,8 +109,8 @@ class Call(Step, frozen=True, kw_only=True, tag="call"):
     program: str
 
 
-AnyStep = Go | Line | Arc | Output | Wait | WaitFor | Speed | Attach | Detach | Repeat | Call
-KINDS: tuple[type[Step], ...] = (Go, Line, Arc, Output, Wait, WaitFor, Speed, Attach, Detach, Repeat, Call)
+AnyStep = Go | Line | Arc | Output | Grip | Wait | WaitFor | Speed | Attach | Detach | Repeat | Call
+KINDS: tuple[type[Step], ...] = (Go, Line, Arc, Output, Grip, Wait, WaitFor, Speed, Attach, Detach, Repeat, Call)
 GOALS = ("point", "state", "joints", "position", "offset")  # of a motion: exactly one of them
 
 

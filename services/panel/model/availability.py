@@ -15,7 +15,7 @@ FAULTY = (DeviceMode.FAULT, DeviceMode.ESTOP)
 
 
 def reasons(arm: gemelo.Arm, readings: Readings) -> dict[str, Reason]:
-    """By action: move, jog, arm, disarm, home, reference, reset, hold, resume, output, inject."""
+    """By action: move, jog, arm, disarm, home, reference, reset, hold, resume, output, grip, inject."""
     state = readings.state
     if state is None:
         gone: Reason = ("device_silent", "")
@@ -73,6 +73,10 @@ def _output(state: DeviceState) -> Reason:
     return None
 
 
+def _grip(state: DeviceState) -> Reason:
+    return ("in_fault", state.mode.name) if state.mode is DeviceMode.ESTOP else None
+
+
 def _home(arm: gemelo.Arm, state: DeviceState) -> Reason:
     if all(joint.drive.homing is None for joint in arm.description.joints):
         return "no_switches", ""
@@ -83,5 +87,5 @@ def _home(arm: gemelo.Arm, state: DeviceState) -> Reason:
 
 CHECKS: dict[str, Callable[[DeviceState], Reason]] = {
     "move": _move, "jog": _move, "arm": _arm, "disarm": _disarm, "reference": _reference, "reset": _reset,
-    "hold": _hold, "resume": _resume, "output": _output,
+    "hold": _hold, "resume": _resume, "output": _output, "grip": _grip,
 }  # fmt: skip

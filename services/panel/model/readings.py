@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import gemelo
 from gemelo.device import fault_of
 from schemas.device import DeviceState, DeviceStatus
+from schemas.gripper import GripperState
 from schemas.planning import JogStatus, PlannedPath
 from schemas.scene import Contacts, PlanningScene
 from schemas.system import LogRecord
@@ -29,6 +30,7 @@ class Readings:
     status: DeviceStatus | None
     sensors: Mapping[str, float]
     fault: str
+    gripper: GripperState | None
 
     @property
     def is_live(self) -> bool:
@@ -50,6 +52,7 @@ class Bus:
         self._state, self._status = node.latest(topics.DEVICE_STATE), node.latest(topics.DEVICE_STATUS)
         self._scene, self._contacts = node.latest(topics.SCENE), node.latest(topics.CONTACTS)
         self._path, self._jog = node.latest(topics.PLANNED_PATH), node.latest(topics.JOG_STATUS)
+        self._gripper = node.latest(topics.GRIPPER_STATE)
         self._log: deque[LogRecord] = deque(maxlen=LOG_LINES)
         node.subscribe(topics.LOG, self._log.append)
 
@@ -69,6 +72,7 @@ class Bus:
             if sensors is not None and not self._sensors.is_stale
             else {},
             fault=fault_of(self._arm.description, state) if state is not None else "",
+            gripper=self._gripper.message if not self._gripper.is_stale else None,
         )
 
     @property

@@ -8,6 +8,7 @@ import viser
 
 from services.panel.model.readings import Readings
 from services.panel.model.units import text_of
+from services.panel.view.gripper_box import GripperBox
 from services.panel.view.kit import Kit, Mirror, box, esc, set_if_new, table
 
 
@@ -29,6 +30,8 @@ class DeviceTab:
             reset=words("reset"),
         )  # fmt: skip
         self._outputs = {output.name: Mirror(self._output(output.name)) for output in arm.description.outputs}
+        gripper = arm.description.gripper
+        self._gripper = GripperBox(kit, gripper) if gripper is not None else None
         with kit.gui.add_folder(words("virtual"), expand_by_default=False):
             for key, value in (("estop_press", 1.0), ("estop_release", 0.0)):
                 kit.button(words(key), partial(arm.device.inject, "estop", value=value), needs="inject")
@@ -50,6 +53,8 @@ class DeviceTab:
             for name, handle in self._outputs.items():
                 handle.show(name in state.outputs)
         set_if_new(self._facts, "content", table(rows) if rows else "")
+        if self._gripper is not None:
+            self._gripper.refresh(readings)
         phases = ", ".join(f"{joint}: {phase}" for joint, phase in self._operator.homing.items())
         set_if_new(self._homing, "content", box(esc(words("homing", phases=phases)), "#1c7ed6") if phases else "")
 

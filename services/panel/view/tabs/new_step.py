@@ -15,6 +15,7 @@ from gemelo.programs import (
     Call,
     Detach,
     Go,
+    Grip,
     Line,
     Output,
     Repeat,
@@ -25,14 +26,14 @@ from gemelo.programs import (
 from services.panel.model.teaching import target_names
 from services.panel.view.kit import Kit, set_if_new
 
-KINDS = ("go", "line", "arc", "output", "wait", "wait_for", "speed", "attach", "detach", "repeat", "call")
+KINDS = ("go", "line", "arc", "output", "grip", "wait", "wait_for", "speed", "attach", "detach", "repeat", "call")
 SHOWN = {  # which fields each kind shows
     "go": ("target", "blend"), "line": ("target", "blend", "number"), "arc": ("target", "through", "number"),
-    "output": ("name", "on"), "wait": ("number",), "wait_for": ("name", "on", "number"), "speed": ("number",),
+    "output": ("name", "on"), "grip": ("number",), "wait": ("number",), "wait_for": ("name", "on", "number"), "speed": ("number",),
     "attach": ("name",), "detach": ("name",), "repeat": ("number",), "call": ("name",),
 }  # fmt: skip
 LABELS = {  # of the fields "number" and "name", by kind
-    "line": "number_tool_speed", "arc": "number_tool_speed", "wait": "number_seconds", "wait_for": "number_sensor",
+    "line": "number_tool_speed", "arc": "number_tool_speed", "grip": "number_opening", "wait": "number_seconds", "wait_for": "number_sensor",
     "speed": "number_percent", "repeat": "number_times", "output": "name_output", "attach": "name_object",
     "detach": "name_object", "call": "name_program",
 }  # fmt: skip
@@ -92,6 +93,7 @@ class NewStep:
             "line": lambda: self._with_goal(Line(tool_speed=max(0.0, number / 1000.0))),
             "arc": lambda: self._with_goal(Arc(through=self._through_point(), tool_speed=max(0.0, number / 1000.0))),
             "output": lambda: Output(name=self._known(name), on=self._on.value),
+            "grip": lambda: Grip(to=number / 1000.0),
             "wait": lambda: Wait(time=number),
             "wait_for": lambda: WaitFor(sensor=self._known(name), **{"above" if self._on.value else "below": number}),
             "speed": lambda: Speed(share=number / 100.0),
