@@ -25,7 +25,8 @@ UNITS = {"m": ("m", 1.0), "cm": ("m", 0.01), "mm": ("m", 0.001), "rad": ("rad", 
          "s": ("s", 1.0), "ms": ("s", 0.001), "min": ("s", 60.0), "m/s": ("m/s", 1.0), "mm/s": ("m/s", 0.001),
          "%": ("%", 0.01)}  # fmt: skip
 MEASURED = {"position": "m", "offset": "m", "through": "m", "center": "m", "blend": "m", "rpy": "rad",
-            "tool_speed": "m/s", "to": "m", "time": "s", "timeout": "s", "share": "%", "joints": "rad or m"}  # fmt: skip
+            "tool_speed": "m/s", "to": "m",
+            "time": "s", "timeout": "s", "share": "%", "joints": "rad or m"}  # fmt: skip
 EXPECTED = {
     str: 'a text in quotes, as "ready"',
     bool: "true or false",

@@ -14,6 +14,7 @@ from schemas.topics import (
     DEVICE_SHAFT,
     DEVICE_STATE,
     DEVICE_STATUS,
+    GRIPPER_STATE,
     JOINT_COMMANDS,
     JOINT_STATES,
     LOG,
@@ -22,6 +23,8 @@ from schemas.topics import (
     SENSORS,
     STEP_ERRORS,
 )
+from services.arm.model.description import load_arm
+from services.arm.model.gripper import jaw_objects, jaws_apart
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
@@ -82,6 +85,8 @@ def _visualizer(node: Node, message: RobotDescription, folders: tuple[Path, ...]
     node.subscribe(DEVICE_SHAFT, core.on_shaft, batch=1 / BATCH_RATE)
     node.subscribe(PLANNED_PATH, core.on_planned_path)
     node.subscribe(SCENE, core.scene.on_scene)
+    arm = load_arm(folders[-1])
+    node.subscribe(GRIPPER_STATE, lambda state: core.scene.on_jaws(jaw_objects(arm, jaws_apart(arm, state))))
     node.subscribe(CONTACTS, core.scene.on_contacts)
     node.subscribe(LOG, core.event_log.on_log, own=True)
     return core

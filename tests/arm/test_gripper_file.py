@@ -6,7 +6,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tests.arm.editing import edit
 from msgspec import UNSET
 
 from schemas.device_config import ServoConfig
@@ -15,6 +14,7 @@ from services.arm.checks.check import check
 from services.arm.device.device_config import device_config
 from services.arm.errors import DescriptionError
 from services.arm.model.description import load_arm
+from tests.arm.editing import edit
 
 URDF = Path(__file__).resolve().parents[2] / "urdf"
 
@@ -45,7 +45,12 @@ def test_rm1_has_a_servo_and_parol6_a_valve():
         ("closed = 0.0", "closed = 0.05", "open = ", "[gripper] open 0.05 m is not wider than closed, 0.05 m"),
         ("open_us = 2000", "open_us = 1050", "open_us", "[gripper] open_us 1050 us and closed_us 1000 us are nearer"),
         ("open_us = 2000", "open_us = 2600", "open_us", "Expected `int` <= 2500"),
-        ("speed = 0.1\n", "speed = 900.0\n", "speed = 900", "900 m/s is 18000000 us/s of pulse: write 0.0005 to 50 m/s"),
+        (
+            "speed = 0.1\n",
+            "speed = 900.0\n",
+            "speed = 900",
+            "900 m/s is 18000000 us/s of pulse: write 0.0005 to 50 m/s",
+        ),
         ("speed = 0.1\n", "speed = nan\n", "speed = nan", "`gripper.speed` is nan: it must be finite"),
         ('sensor = "pinza"', 'sensor = "pinzas"', "sensor =", '"pinzas" is no [[sensor]]; did you mean "pinza"?'),
         ('sensor = "pinza"', 'sensor = "ultra"', "sensor =", '"ultra" is of kind ultrasonic'),

@@ -6,7 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from schemas.device_config import SensorKind
+from schemas.frames import Transform
+from schemas.gripper import GripperState
 from schemas.robot import Gripper, OutputGripper, RobotFile, Sensor, ServoGripper
+from schemas.scene import BoxShape, SceneObject
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.robot_file import line_of
 
@@ -15,6 +18,8 @@ if TYPE_CHECKING:
 
 METRES = {"mm": 0.001, "m": 1.0}  # [m] of a sensor's unit
 JAW = (0.01, 0.005, 0.02)  # [m] the edges of a jaw that robot.toml does not give
+JAWS = ("gripper_jaw_1", "gripper_jaw_2")  # the names that collisions with them have
+APART = 0.0005  # [m] by which openings are told apart
 LEAST_PULSES = 100  # [us] between open and closed: a servo cannot tell less apart from noise
 LEAST_PULSE_SPEED, MOST_PULSE_SPEED = 10, 1_000_000  # [us/s] the firmware's bounds
 
@@ -87,6 +92,39 @@ def opening_of(gripper: ServoGripper, pulse_us: float) -> float:
 def jaw_edges(gripper: Gripper) -> tuple[float, float, float]:
     """(3,) [m] of one jaw: along x, y and z of the tool frame, which it begins at."""
     return gripper.jaw or JAW
+
+
+def jaw_objects(arm: Arm, opening: float) -> tuple[SceneObject, ...]:
+    """The two jaws as boxes that the tool carries, [m] apart as far as `opening`; none where robot.toml gives no jaw.
+
+    They touch what is fixed to the tool.
+    """
+    if arm.gripper is None or arm.gripper.jaw is None:
+        return ()
+    size = arm.gripper.jaw
+    holders = tuple(joint.parent for joint in arm.model.joints if joint.child == arm.tool_frame)
+    away = (opening + size[1]) / 2.0
+    return tuple(
+        SceneObject(
+            name=name,
+            shape=BoxShape(size=size),
+            pose=Transform(translation=(0.0, y, size[2] / 2.0), rotation=(0.0, 0.0, 0.0, 1.0)),
+            frame=arm.tool_frame,
+            attached=True,
+            touch_links=holders,
+        )
+        for name, y in zip(JAWS, (away, -away), strict=True)
+    )
+
+
+def jaws_apart(arm: Arm, state: GripperState | None) -> float:
+    """[m] that the jaws take up: as far as they are apart and will be; open where that is not known."""
+    if arm.gripper is None:
+        return 0.0
+    if state is None or not state.known:
+        return arm.gripper.open
+    widest = max(state.position, state.target) if state.moving else state.position
+    return min(max(round(widest / APART) * APART, arm.gripper.closed), arm.gripper.open)
 
 
 def gripper_unit(arm: Arm) -> str:

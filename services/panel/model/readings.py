@@ -11,8 +11,9 @@ from gemelo.device import fault_of
 from schemas.device import DeviceState, DeviceStatus
 from schemas.gripper import GripperState
 from schemas.planning import JogStatus, PlannedPath
-from schemas.scene import Contacts, PlanningScene
+from schemas.scene import Contacts, PlanningScene, SceneObject
 from schemas.system import LogRecord
+from services.arm.model.gripper import jaw_objects, jaws_apart
 
 LOG_LINES = 12  # chosen: what a person reads at one look
 LATE = 0.5  # [s] a joint state older than that is not where the arm is
@@ -79,6 +80,12 @@ class Bus:
     def scene(self) -> PlanningScene:
         """The newest planning scene."""
         return self._scene.message or PlanningScene()
+
+    @property
+    def jaws(self) -> tuple[SceneObject, ...]:
+        """The gripper's jaws, as far apart as they are; none before the first word of them."""
+        state = self._gripper.message
+        return () if state is None else jaw_objects(self._arm.description, jaws_apart(self._arm.description, state))
 
     @property
     def contacts(self) -> Contacts:

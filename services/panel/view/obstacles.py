@@ -11,7 +11,7 @@ import viser
 from numpy.typing import NDArray
 
 from schemas.frames import Transform
-from schemas.scene import BoxShape, Contact, CylinderShape, MeshShape, PlanningScene, SceneObject, SphereShape
+from schemas.scene import BoxShape, Contact, CylinderShape, MeshShape, SceneObject, SphereShape
 from services.arm.stl import BadStl, read_stl
 
 Array = NDArray[np.float64]
@@ -33,10 +33,10 @@ class Obstacles:
         self._contacts: tuple[Contact, ...] = ()
         self._dots: list[viser.SceneNodeHandle] = []
 
-    def show(self, scene: PlanningScene, contacts: Sequence[Contact], link_pose: LinkPose) -> None:
-        """The scene's objects, those in `contacts` red; carried ones where their link is."""
+    def show(self, items: Sequence[SceneObject], contacts: Sequence[Contact], link_pose: LinkPose) -> None:
+        """The scene's objects and the jaws, those in `contacts` red; carried ones where their link is."""
         red = frozenset(name for contact in contacts for name in (contact.first, contact.second))
-        present = {item.name: item for item in scene.objects}
+        present = {item.name: item for item in items}
         for name in [name for name, (item, _) in self._drawn.items() if self._is_stale(item, present.get(name), red)]:
             self._drawn.pop(name)[1].remove()
         for name, item in present.items():

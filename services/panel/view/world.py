@@ -64,7 +64,8 @@ class World:
         self._show_goal(goal, readings)
         self._show_plan()
         contacts = goal.problem.contacts if goal.problem is not None else ()
-        self.obstacles.show(self._operator.bus.scene, contacts, self.measured.pose)
+        bus = self._operator.bus
+        self.obstacles.show((*bus.scene.objects, *bus.jaws), contacts, self.measured.pose)
 
     @property
     def tool_pose(self) -> gemelo.Pose:

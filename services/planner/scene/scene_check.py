@@ -9,6 +9,7 @@ import msgspec
 from schemas.scene import AllowedPair, PlaneShape, PlanningScene, SceneObject
 from services.arm.errors import suggestion
 from services.arm.model.description import Arm
+from services.arm.model.gripper import JAWS
 from services.planner.collision.scene_shapes import ANY, Folders, SceneError, shape_of
 
 # Tuning constants: chosen, where a line does not say measured or standard.
@@ -57,7 +58,7 @@ def require_pair(arm: Arm, pair: AllowedPair, objects: Iterable[str]) -> None:
     if pair.first == pair.second:
         what = "everything to touch everything" if pair.first == ANY else f'"{pair.first}" to touch itself'
         raise SceneError(f'the pair "{pair.first}" and "{pair.second}" allows {what}; name two different things')
-    known = [*arm.model.link_names, *objects]
+    known = [*arm.model.link_names, *objects, *(JAWS if arm.gripper is not None else ())]
     for name in (pair.first, pair.second):
         if name != ANY and name not in known:
             raise SceneError(f'there is no link or object "{name}"{suggestion(name, known)}')
@@ -71,6 +72,8 @@ def _require_name(arm: Arm, name: str) -> None:
         )
     if name == ANY:
         raise SceneError('"*" stands for any name and cannot be an object\'s; give it another one')
+    if name in JAWS:
+        raise SceneError(f'"{name}" is a jaw of the gripper; give the object another name')
     if name in arm.model.link_names:
         raise SceneError(f'"{name}" is a link of {arm.name}; give the object another name')
 

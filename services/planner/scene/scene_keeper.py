@@ -8,13 +8,15 @@ from pathlib import Path
 import msgspec
 
 from schemas.frames import Transform
+from schemas.gripper import GripperState
 from schemas.joints import JointState
 from schemas.message import Vector
 from schemas.planning import PlanCode, PlanResponse
 from schemas.scene import Contacts, PlanningScene, SceneRequest, SceneResponse
-from schemas.topics import CONTACTS, SCENE, SCENE_EDIT
+from schemas.topics import CONTACTS, GRIPPER_STATE, SCENE, SCENE_EDIT
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
+from services.arm.model.gripper import jaw_objects, jaws_apart
 from services.planner.collision.clearance import ROUNDING
 from services.planner.collision.scene_shapes import SceneError
 from services.planner.collision.world import World
@@ -43,9 +45,12 @@ class SceneKeeper:
         self._scene, self._contacts = node.publisher(SCENE), node.publisher(CONTACTS)
         self._store = SceneStore(arm, self._folders, self._restored())
         self._is_touching = False
+        self._apart: float | None = None  # [m] of the jaws; None before the first word of them
         self.world = self._built(self._store.scene)
         self._show()
         node.serve(SCENE_EDIT, self._edit)
+        if jaw_objects(arm, 0.0):
+            node.subscribe(GRIPPER_STATE, self._on_gripper)
 
     def show_refusal(self, response: PlanResponse) -> None:
         """Shows what touches where a plan was refused, until one succeeds."""
@@ -62,6 +67,20 @@ class SceneKeeper:
             self._contacts.put(Contacts(stamp=self._node.now()))
             self._is_touching = False
 
+    def _on_gripper(self, state: GripperState) -> None:
+        """The jaws have another opening: everything is checked with them there from now on.
+
+        A plan that was made with narrower jaws is of another scene, whose version counts on.
+        """
+        apart = jaws_apart(self._arm, state)
+        if apart == self._apart:
+            return
+        has_opened, self._apart = self._apart is not None and apart > self._apart, apart
+        if has_opened:
+            self._store.touch(self._node.now())
+        self.world = self._built(self._store.scene)
+        self._show()
+
     def _edit(self, request: SceneRequest) -> SceneResponse:
         before = self._store.scene
         response = self._store.edit(request, self._links, self._node.now())
@@ -75,7 +94,7 @@ class SceneKeeper:
         self.world = world
         self._show()
         self._tell_what_touches_here()
-        return msgspec.structs.replace(response, reason=self._save(world.scene))
+        return msgspec.structs.replace(response, reason=self._save(self._store.scene))
 
     def _tell_what_touches_here(self) -> None:
         """After an edit: what touches where the arm stands; what a refused plan has shown was of another scene."""
@@ -90,12 +109,14 @@ class SceneKeeper:
         self._is_touching = bool(touching)
 
     def _built(self, scene: PlanningScene) -> World:
-        return World(self._arm, self._kinematics, scene, self._folders)
+        jaws = () if self._apart is None else jaw_objects(self._arm, self._apart)
+        with_jaws = msgspec.structs.replace(scene, objects=(*scene.objects, *jaws))
+        return World(self._arm, self._kinematics, with_jaws, self._folders)
 
     def _show(self) -> None:
         """Tells the planner and the bus; a world is no thing for two threads, so the planner has one of its own."""
-        self._on_world(self._built(self.world.scene))
-        self._scene.put(self.world.scene)
+        self._on_world(self._built(self._store.scene))
+        self._scene.put(self._store.scene)
 
     def _links(self) -> Mapping[str, Transform] | None:
         """Where the links are, or None where that is not known."""

@@ -26,6 +26,11 @@ class SceneStore:
         self.scene = scene or PlanningScene()
         require_scene(arm, self.scene, folders)
 
+    def touch(self, stamp: int) -> None:
+        """The same scene counts as another: what was planned in it must not be followed any more."""
+        if self.scene.epoch:
+            self.scene = msgspec.structs.replace(self.scene, stamp=stamp, version=self.scene.version + 1)
+
     def edit(self, request: SceneRequest, links: LinkPoses, stamp: int) -> SceneResponse:
         """True if the scene is changed, or why not; `links` says where the links are now, `stamp` is [ns] UNIX."""
         name, width = "", 0.0

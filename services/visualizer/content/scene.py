@@ -48,6 +48,7 @@ class SceneView:
     def __init__(self, model: VisualModel, load: MeshLoader) -> None:
         self._model, self._load = model, load
         self._scene, self._contacts = PlanningScene(), Contacts()
+        self._jaws: tuple[SceneObject, ...] = ()
         self._drawn: dict[str, DrawnObject] = {}
         self._meshes: dict[MeshShape, TriangleMesh | None] = {}
         self._is_new = False
@@ -55,6 +56,11 @@ class SceneView:
     def on_scene(self, message: PlanningScene) -> None:
         """The planning scene: objects and attached objects."""
         self._scene, self._is_new = message, True
+
+    def on_jaws(self, jaws: tuple[SceneObject, ...]) -> None:
+        """The gripper's jaws, as far apart as they are."""
+        self._is_new = self._is_new or jaws != self._jaws
+        self._jaws = jaws
 
     def on_contacts(self, message: Contacts) -> None:
         """The contacts of the configuration that was refused last."""
@@ -75,7 +81,7 @@ class SceneView:
             return []
         self._is_new = False
         now = clamp_stamp(now)
-        wanted = {item.name: self._wanted(item) for item in self._scene.objects if self._has_place(item)}
+        wanted = {item.name: self._wanted(item) for item in self._items if self._has_place(item)}
         updates: list[Update] = []
         for name, old in self._drawn.items():
             if name not in wanted or wanted[name].entity != old.entity:
@@ -85,6 +91,10 @@ class SceneView:
                 updates += self._solid_mesh(new.item, new.entity, new.color, now)
         self._drawn = wanted
         return [*updates, *self._refused(now)]
+
+    @property
+    def _items(self) -> tuple[SceneObject, ...]:
+        return (*self._scene.objects, *self._jaws)
 
     def _has_place(self, item: SceneObject) -> bool:
         return not item.attached or item.frame in self._model.paths
@@ -124,7 +134,7 @@ class SceneView:
         red."""
         red = self._in_contact() if root == entities.REFUSED else frozenset()
         updates: list[Update] = []
-        for item in self._scene.objects:
+        for item in self._items:
             if item.attached and self._has_place(item):
                 hand = entities.attached(root, self._model.paths[item.frame])
                 shown = palette.IN_CONTACT if item.name in red else color

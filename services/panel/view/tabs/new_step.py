@@ -29,11 +29,13 @@ from services.panel.view.kit import Kit, set_if_new
 KINDS = ("go", "line", "arc", "output", "grip", "wait", "wait_for", "speed", "attach", "detach", "repeat", "call")
 SHOWN = {  # which fields each kind shows
     "go": ("target", "blend"), "line": ("target", "blend", "number"), "arc": ("target", "through", "number"),
-    "output": ("name", "on"), "grip": ("number",), "wait": ("number",), "wait_for": ("name", "on", "number"), "speed": ("number",),
+    "output": ("name", "on"), "grip": ("number",), "wait": ("number",),
+    "wait_for": ("name", "on", "number"), "speed": ("number",),
     "attach": ("name",), "detach": ("name",), "repeat": ("number",), "call": ("name",),
 }  # fmt: skip
 LABELS = {  # of the fields "number" and "name", by kind
-    "line": "number_tool_speed", "arc": "number_tool_speed", "grip": "number_opening", "wait": "number_seconds", "wait_for": "number_sensor",
+    "line": "number_tool_speed", "arc": "number_tool_speed", "grip": "number_opening",
+    "wait": "number_seconds", "wait_for": "number_sensor",
     "speed": "number_percent", "repeat": "number_times", "output": "name_output", "attach": "name_object",
     "detach": "name_object", "call": "name_program",
 }  # fmt: skip
