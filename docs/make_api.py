@@ -16,7 +16,7 @@ SECTIONS = (  # title, names
     ("Connecting", ("connect", "robots", "load_robot", "Robot")),
     ("The arm", ("Arm",)),
     ("Where to and how", ("Target", "ToolGoal")),
-    ("Plans and motions", ("Plan", "Motion", "Configurations", "HomingProgress", "HomingReport")),
+    ("Plans and motions", ("Plan", "Motion", "Configurations", "HomingProgress", "HomingReport", "Gripped")),
     ("The scene", ("Scene", "load_mesh")),
     ("The device", ("Device",)),
     ("Errors", ("Error", "BadArgument", "Refused", "Aborted", "Canceled", "Lost", "Interrupted")),

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gemelo.connection import connect, robots
     from gemelo.device import Device
     from gemelo.errors import Aborted, BadArgument, Canceled, Error, Interrupted, Lost, Refused
+    from gemelo.gripping import Gripped
     from gemelo.homing_report import HomingProgress, HomingReport
     from gemelo.motion import Motion
     from gemelo.planning import Configurations, Plan
@@ -46,6 +47,7 @@ __all__ = [
     "DeviceMode",
     "Error",
     "GoalStatusCode",
+    "Gripped",
     "HomingProgress",
     "HomingReport",
     "Interrupted",
@@ -76,6 +78,7 @@ MODULES = {
     "gemelo.connection": ("connect", "robots"),
     "gemelo.device": ("Device",),
     "gemelo.errors": ("Aborted", "BadArgument", "Canceled", "Error", "Interrupted", "Lost", "Refused"),
+    "gemelo.gripping": ("Gripped",),
     "gemelo.homing_report": ("HomingProgress", "HomingReport"),
     "gemelo.motion": ("Motion",),
     "gemelo.planning": ("Configurations", "Plan"),

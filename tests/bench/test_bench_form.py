@@ -17,7 +17,7 @@ ISSUE = (
     "stack_idle_cpu_percent", "stack_rss_mb", "cli_start_ms", "lost_of_45000_at_25hz", "ready_s",
     "tick_instructions", "slot_instructions", "core_text_bytes", "core_ram_bytes",
     "max_step_rate_hz", "step_time_error_us", "parse_mb_per_s", "clock_sync_error_us", "hold_reaction_ms",
-    "estop_reaction_ticks", "seed_move_percent",
+    "gripper_reaction_ms", "estop_reaction_ticks", "seed_move_percent",
     "ik_ms", "ik_success", "plan_success", "plan_python_ms", "path_length_ratio", "duration_ratio",
     "collision_checks_per_s", "state_check_us", "lin_ms", "jog_tick_us",
 )  # fmt: skip

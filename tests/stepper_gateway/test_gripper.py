@@ -45,7 +45,7 @@ def opened() -> VirtualArm:
     """rm1, its jaws commanded open."""
     arm = VirtualArm().ready()
     assert arm.grip(OPEN).accepted
-    assert arm.finish_grip()[0] is SUCCEEDED
+    assert arm.finish_grip()[1].reached_goal
     return arm
 
 
@@ -66,6 +66,24 @@ def test_a_servo_closes_and_opens_at_its_speed_and_says_where_it_is():
     assert arm.device.opening == pytest.approx(0.0, abs=1e-4)
     assert arm.grip(0.025).accepted
     assert arm.finish_grip()[1].position == pytest.approx(0.025, abs=servo().tolerance)
+
+
+def test_a_gripper_that_is_there_already_is_there_and_not_stalled():
+    arm = VirtualArm().ready()
+    for _ in range(2):
+        assert arm.grip(OPEN).accepted
+        status, result = arm.finish_grip()
+        assert (status, result.reached_goal, result.stalled) == (SUCCEEDED, True, False)
+
+
+def test_a_slow_gripper_is_not_taken_for_a_stalled_one():
+    slow = replace(rm1(), gripper=msgspec.structs.replace(servo(), speed=0.0006))
+    arm = VirtualArm(arm=slow).ready()
+    arm.grip(OPEN)
+    arm.finish_grip()
+    assert arm.grip(OPEN - 0.006).accepted
+    status, result = arm.finish_grip(seconds=30.0)
+    assert (status, result.reached_goal, result.stalled) == (SUCCEEDED, True, False)
 
 
 def test_feedback_tells_ten_times_a_second_how_far_it_is():

@@ -161,7 +161,7 @@ class GripperExecutor:
                 grip.still_at, grip.still_since = position, now
             if self._is_there(grip, jaws, moment):
                 return self._end(GoalStatusCode.SUCCEEDED, "", moment, reached=True)
-            if self._is_measured(moment) and now - grip.still_since >= STALL_TIME:
+            if self._is_stalled(grip, jaws, moment):
                 self._stalled = True
                 return self._end(GoalStatusCode.SUCCEEDED, "", moment)
         if now >= grip.deadline:
@@ -173,10 +173,16 @@ class GripperExecutor:
             self._device.out.put(GripperProgress(grip.goal_id, feedback))
 
     def _is_there(self, grip: Grip, jaws: Jaws, moment: Moment) -> bool:
-        is_commanded = jaws.commanded is not None and jaws.commanded == jaws.target
-        if not is_commanded or moment.monotonic < grip.arrival or self._gripper is None:
+        if not jaws.has_arrived or self._gripper is None:
             return False
-        return not self._is_measured(moment) or abs(self._reading - grip.position) <= self._gripper.tolerance
+        if not self._is_measured(moment):
+            return moment.monotonic >= grip.arrival
+        return abs(self._reading - grip.position) <= self._gripper.tolerance
+
+    def _is_stalled(self, grip: Grip, jaws: Jaws, moment: Moment) -> bool:
+        """The pulse is there, the jaws are not, and do not come nearer."""
+        is_still = moment.monotonic - grip.still_since >= STALL_TIME
+        return jaws.has_arrived and is_still and self._is_measured(moment)
 
     def _is_measured(self, moment: Moment) -> bool:
         return bool(self._sensor) and moment.monotonic - self._read <= FRESH

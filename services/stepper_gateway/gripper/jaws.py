@@ -13,7 +13,6 @@ from services.stepper_gateway.goals.rejections import invalid
 from services.stepper_gateway.links.frames import State
 
 SLACK = 1e-6  # [m] by which an end may be missed
-AT_END = 1e-9  # [m]
 
 Sending = tuple[DeviceCommandKind, Arguments]
 
@@ -23,6 +22,11 @@ class Jaws(ABC):
 
     commanded: float | None = None  # [m] of the device's output now; None: nothing was commanded since its start
     target: float | None = None  # [m] that the device goes to
+
+    @property
+    def has_arrived(self) -> bool:
+        """The device's output is where it goes to; what hangs on it may still be on its way."""
+        return self.commanded is not None and self.commanded == self.target
 
     @abstractmethod
     def require(self, position: float) -> None:
