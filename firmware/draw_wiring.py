@@ -28,6 +28,7 @@ class Pins:
     part: dict[str, int]  # switches, outputs and sensors by name
     trigger: int
     enable: int
+    servo: int  # of the gripper
 
 
 def read_pins(robot: Path = ROBOT) -> Pins:
@@ -41,6 +42,7 @@ def read_pins(robot: Path = ROBOT) -> Pins:
         part={part["name"]: part["pin"] for part in parts},
         trigger=next(sensor["trigger_pin"] for sensor in table["sensor"] if "trigger_pin" in sensor),
         enable=table["device"]["enable_pin"],
+        servo=table["gripper"]["pin"],
     )
 
 
@@ -52,6 +54,7 @@ def draw(pins: Pins) -> Drawing:
     drawing.box(BOARD_LEFT, 110, BOARD_RIGHT - BOARD_LEFT, 620, "ESP32 DevKitC")
     _switches(drawing, pins)
     _sensors(drawing, pins)
+    _gripper(drawing, pins)
     _output_and_supply(drawing, pins)
     _arm_driver(drawing, pins)
     _small_driver(drawing, pins, "q2", 400)
@@ -112,6 +115,16 @@ def _sensors(drawing: Drawing, pins: Pins) -> None:
     drawing.wire((250, 520), (330, 520))
     drawing.wire((250, 548), (280, 548), color=GROUND)
     drawing.flag(280, 548, "GND", GROUND)
+
+
+def _gripper(drawing: Drawing, pins: Pins) -> None:
+    for y, pin, what in (
+        (576, f"{pins.part['pinza']} pinza", "potentiometer of the servo, 10 k"),
+        (598, f"{pins.servo} gripper", "signal of the servo"),
+    ):
+        _left_pin(drawing, y, pin)
+        drawing.wire((BOARD_LEFT, y), (330, y))
+        drawing.text(320, y + 4.5, what, "end")
 
 
 def _output_and_supply(drawing: Drawing, pins: Pins) -> None:

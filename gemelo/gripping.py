@@ -29,7 +29,14 @@ Handle = GoalHandle[GripperCommandFeedback, GripperCommandResult]
 
 
 class Gripped(NamedTuple):
-    """How the gripper has ended."""
+    """How the gripper has ended; as a text, one line for a person.
+
+    >>> opened = arm.grip("open")
+    >>> opened.reached, opened.stalled, opened.held
+    (True, False, '')
+    >>> print(opened)
+    50.0 mm, there
+    """
 
     position: float  # [m] between the jaws
     effort: float  # [N] that it presses with by its data sheet; 0 where nothing is between the jaws

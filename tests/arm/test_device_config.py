@@ -69,7 +69,7 @@ def folder(rm1_folder: Path, tmp_path: Path) -> Path:
     plain = "\n\n".join(
         block
         for block in text.split("\n\n")
-        if not any(f"[{table}" in block for table in ("[input", "[output", "[sensor", "joint.homing"))
+        if not any(f"[{table}" in block for table in ("[input", "[output", "[sensor", "gripper]", "joint.homing"))
     )
     head, _, tail = plain.partition('wire_name = "q2"')
     start = head.rindex("[[joint]]")

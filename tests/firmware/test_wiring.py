@@ -28,6 +28,8 @@ def test_the_readme_names_the_pins_of_robot_toml() -> None:
     expected["`bateria`, two cells"] = [pins.part["bateria"]]
     expected["`ultra`: trigger, echo"] = [pins.trigger, pins.part["ultra"]]
     expected["`avanzar`"] = [pins.part["avanzar"]]
+    expected["gripper: signal of the servo"] = [pins.servo]
+    expected["`pinza`: the servo's potentiometer"] = [pins.part["pinza"]]
     assert _documented() == expected
 
 

@@ -24,8 +24,8 @@ def test_readings_come_ten_times_a_second_with_names_values_and_units() -> None:
     rig.run(3.0)
     assert 29 <= len(rig.messages(SENSORS)) - before <= 31
     last = rig.messages(SENSORS)[-1]
-    assert (last.name, last.unit) == (("ultra", "bateria"), ("cm", "V"))
-    assert last.value == pytest.approx((12.5, 7.412), abs=0.02)
+    assert (last.name, last.unit) == (("ultra", "bateria", "pinza"), ("cm", "V", "mm"))
+    assert last.value == pytest.approx((12.5, 7.412, 50.0), abs=0.03)
     assert 0 <= rig.moment.unix - last.stamp < 300_000_000
     stamps = [message.stamp for message in rig.messages(SENSORS)[before:]]
     assert all(0 < b - a <= 200_000_000 for a, b in pairwise(stamps))
