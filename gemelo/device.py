@@ -173,7 +173,7 @@ class Device:
 
         "estop" (`value` 0 releases it), "switch" (`target`: an input; 1 held, 0 open, -1 left to the arm), "block" (a
         joint; 0 lets go), "slip" (a joint; steps), "sensor" (a sensor; its reading), "reboot", "offline" ([s]),
-        "freeze" ([s]), "drift" ([ppm]).
+        "freeze" ([s]), "drift" ([ppm]), "object" ([m] between the jaws of a servo gripper; 0 takes it away).
 
         >>> arm.device.inject("sensor", "ultra", 0.25)
         """

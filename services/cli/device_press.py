@@ -12,7 +12,7 @@ from schemas.device import InjectKind, InjectRequest
 from services.cli.errors import CommandError, ExitCode, joint_of, require_name, unknown, usage
 from services.cli.parser import Choices, Options, Parser
 from services.cli.session import connect_arm, load_robot
-from services.cli.units import TIME, parse_quantity
+from services.cli.units import LENGTH, TIME, parse_quantity
 
 if TYPE_CHECKING:
     from gemelo import Arm, Robot
@@ -123,6 +123,10 @@ def _sensor(arm: Description, rest: Sequence[str]) -> InjectRequest:
     return InjectRequest(kind=InjectKind.SENSOR, target=name, value=number(rest[1], f"sensor {name}"))
 
 
+def _object(arm: Description, rest: Sequence[str]) -> InjectRequest:
+    return InjectRequest(kind=InjectKind.OBJECT, value=parse_quantity(rest[0], LENGTH))
+
+
 def _timed(kind: InjectKind) -> Callable[[Description, Sequence[str]], InjectRequest]:
     return lambda arm, rest: InjectRequest(kind=kind, value=seconds(rest[0]))
 
@@ -135,6 +139,7 @@ PRESSES = {
     "slip": Press(("JOINT", "STEPS"), "push the shaft on by steps that the counter does not see", _slip),
     "switch": Press(("INPUT", "on|off|auto"), "hold a switch pressed, or open, or leave it to the arm", _switch),
     "sensor": Press(("SENSOR", "VALUE"), "give a sensor its reading", _sensor),
+    "object": Press(("WIDTH",), "put something so wide between the gripper's jaws, or 0: take it away", _object),
     "reboot": Press((), "restart the device", lambda arm, rest: InjectRequest(kind=InjectKind.REBOOT)),
     "offline": Press(("TIME",), "take its network away for so long", _timed(InjectKind.OFFLINE)),
     "freeze": Press(("TIME",), "let its path task hang for so long", _timed(InjectKind.FREEZE)),

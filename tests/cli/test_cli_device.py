@@ -260,6 +260,8 @@ def test_a_moving_arm_is_not_configured(connected, rm1_device):
         ("slip brazo_joint -40", InjectRequest(kind=InjectKind.SLIP, target="brazo_joint", value=-40.0)),
         ("switch limit_q2 auto", InjectRequest(kind=InjectKind.SWITCH, target="limit_q2", value=-1.0)),
         ("sensor bateria 7.1", InjectRequest(kind=InjectKind.SENSOR, target="bateria", value=7.1)),
+        ("object 20mm", InjectRequest(kind=InjectKind.OBJECT, value=0.02)),
+        ("object 0", InjectRequest(kind=InjectKind.OBJECT, value=0.0)),
         ("reboot", InjectRequest(kind=InjectKind.REBOOT)),
         ("offline 2", InjectRequest(kind=InjectKind.OFFLINE, value=2.0)),
         ("freeze 0.5", InjectRequest(kind=InjectKind.FREEZE, value=0.5)),

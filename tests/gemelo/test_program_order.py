@@ -14,6 +14,7 @@ from gemelo.programs import (
     Call,
     Detach,
     Go,
+    Grip,
     Line,
     Output,
     Point,
@@ -96,6 +97,8 @@ ALL = Program(
         Go(state="it's"),
         Line(offset=(0.0, 0.0, 0.1), frame="tool", tool_speed=0.05),
         Output(name="gripper", on=True),
+        Grip(to="close"),
+        Grip(to=0.025),
         Repeat(count=3, steps=(Wait(time=0.5), Go(joints={"b": 0.5}))),
         WaitFor(sensor="u", below=3.0, timeout=2.0),
         Attach(object="cup", touch=("l",)),
@@ -113,6 +116,8 @@ def test_a_script_is_type_complete_and_names_stay_texts(tmp_path: Path, root: Pa
     assert (checked.returncode, checked.stdout) == (0, "")
     assert 'via=[POINTS["it\'s \\"p\\" {x}\\\\"], gemelo.Pose((0.1, 0.2, 0.3), ' in script
     assert 'raise SystemExit("this is for r\\"m, and the arm is " + arm.name)' in script
+    assert 'arm.grip("close")' in script
+    assert "arm.grip(0.025)" in script
     assert script.index("def run_inner(") < script.index("def run_all(")
 
 
