@@ -159,7 +159,7 @@ def test_the_status_as_json_has_the_messages_and_the_words(session, rm1_device, 
 def test_sensors_are_a_table_with_units(session, rm1_device, capsys):
     assert device_status.sensors(session, as_json=False) is ExitCode.OK
     rows = [line.split() for line in capsys.readouterr().out.splitlines()[2:]]
-    assert rows == [["ultra", "12.5", "cm"], ["bateria", "7.4", "V"]]
+    assert rows == [["ultra", "12.5", "cm"], ["bateria", "7.4", "V"], ["pinza", "-", "mm"]]
 
 
 def test_silent_sensors_are_an_error(session, rm1_device, monkeypatch):

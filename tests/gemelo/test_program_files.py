@@ -135,7 +135,7 @@ MISTAKES = [
     (HEAD + 'robot = "rm2"\n', 2, 'it is for robot "rm2", and this one is "rm1"'),
     (ONE % "7", 4, "7 is no step"),
     (ONE % '{state = "ready"}', 4, "a step says what it does: do = one of go, line, arc"),
-    (ONE % '{do = "gp", state = "ready"}', 4, 'there is no step "gp"; did you mean "go"?'),
+    (ONE % '{do = "goo", state = "ready"}', 4, 'there is no step "goo"; did you mean "go"?'),
     (ONE % "{do = 3}", 4, "do = 3 is not one of"),
     (ONE % '{do = "go", stat = "ready"}', 4, 'go has no key "stat"; did you mean "state"?'),
     (ONE % '{do = "go"}', 4, "a motion goes to one of point, state, joints, position, offset: none is given"),

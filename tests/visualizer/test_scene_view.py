@@ -24,6 +24,8 @@ from schemas.scene import (
     Shape,
     SphereShape,
 )
+from services.arm.model.description import load_arm
+from services.arm.model.gripper import JAWS, jaw_objects
 from services.visualizer.content import entities, palette
 from services.visualizer.content.scene import SceneView
 from services.visualizer.content.updates import ClearEntity, Labels, Poses, SolidMesh, TranslucentArm
@@ -85,6 +87,18 @@ def test_what_is_taken_away_or_let_go_is_gone_from_where_it_was(view):
     gone = [update.entity for update in updates if isinstance(update, ClearEntity)]
     assert gone[:2] == ["world/scene/table", f"world/measured/{TOOL}/carried/cup"]
     assert [update.entity for update in updates if isinstance(update, SolidMesh)] == ["world/scene/cup"]
+
+
+def test_the_jaws_are_drawn_on_the_tool_as_far_apart_as_they_are(view):
+    arm = load_arm(Path(__file__).parents[2] / "urdf" / "rm1")
+    for opening in (0.05, 0.01):
+        view.on_jaws(jaw_objects(arm, opening))
+        drawn = things(view)
+        first, second = (next(mesh for entity, mesh in drawn.items() if entity.endswith(name)) for name in JAWS)
+        assert "efector_link" in first.entity
+        assert first.translation[1] - second.translation[1] == pytest.approx(opening + 0.006)
+    view.on_jaws(jaw_objects(arm, 0.01))
+    assert things(view) == {}
 
 
 @pytest.mark.parametrize(
