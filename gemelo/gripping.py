@@ -12,7 +12,7 @@ from gemelo.session import Session
 from gemelo.targets import number
 from schemas.actions import GoalStatusCode
 from schemas.device import InjectKind, InjectRequest
-from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
+from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
 from schemas.robot import Gripper, ServoGripper
 from schemas.scene import SceneGrip, SceneRelease
 from schemas.topics import DEVICE_INJECT, DEVICE_STATUS, GRIPPER_COMMAND, GRIPPER_STATE
@@ -68,18 +68,16 @@ class Gripping:
         """Sends the goal and waits; attaches and detaches in the scene. Raises `Refused`, `Aborted`, `Lost`."""
         gripper = self._gripper()
         position = opening_of(gripper, to)
-        is_virtual_servo = self._is_virtual() and isinstance(gripper, ServoGripper)
-        if is_virtual_servo:
+        if isinstance(gripper, ServoGripper) and self._is_virtual() and not self._holds():
             self._put_between(position)
-        closes = position < self._session.newest(GRIPPER_STATE).position
-        result = self._carried_out(
-            GripperCommandGoal(position=position, max_effort=max_effort), on_progress, is_cancelled
-        )
+        before = self._session.newest(GRIPPER_STATE)
+        goal = GripperCommandGoal(position=position, max_effort=max_effort)
+        result = self._carried_out(goal, on_progress, is_cancelled)
         held, released = "", ""
-        if result.stalled or (closes and not result.measured):
-            held = self._scene.edit(SceneGrip()).name
-        elif not closes:
+        if opens(gripper, before, position):
             released = self._scene.edit(SceneRelease()).name
+        elif result.stalled or (not result.measured and position < gripper.open):
+            held = self._scene.edit(SceneGrip()).name
         return Gripped(
             result.position, result.effort, result.reached_goal, result.stalled, result.measured, held, released
         )
@@ -95,6 +93,10 @@ class Gripping:
 
     def _is_virtual(self) -> bool:
         return self._session.newest(DEVICE_STATUS).virtual
+
+    def _holds(self) -> bool:
+        """The jaws have closed on an object of the scene."""
+        return any(item.gripped for item in self._scene.objects.values())
 
     def _put_between(self, position: float) -> None:
         """A virtual servo meets what the scene has between its jaws, where that is wider than the goal."""
@@ -152,6 +154,16 @@ class Gripping:
         if not handle.is_over:
             handle.cancel()
             self._session.wait_for(lambda: handle.is_over, TO_STAY)
+
+
+def opens(gripper: Gripper, before: GripperState, position: float) -> bool:
+    """True if the jaws go apart on their way to `position` [m]: what they have held is let go.
+
+    Jaws of which nothing is known open where they are to be open.
+    """
+    if not before.known:
+        return position >= gripper.open
+    return position > before.position + gripper.tolerance
 
 
 def opening_of(gripper: Gripper, to: Grip) -> float:
