@@ -28,8 +28,10 @@ class Row(NamedTuple):
     unit: str
     on_a_stack: bool = False
     broker: str = ""  # of that stack, if the figure depends on it
+    takes_count: bool = False  # of the problems of each arm and family, as --problems says
 
 
+FEW = 4  # problems of each arm and family, where nobody asks for more
 # In the order of measuring: first those that a running stack would disturb.
 FIGURES = {
     "frame_lookup_us": Row("frames:frame_lookup_us", "us"),
@@ -42,6 +44,8 @@ FIGURES = {
     "path_length_ratio": Row("path_quality:path_length_ratio", "ratio"),
     "duration_ratio": Row("path_quality:duration_ratio", "ratio"),
     "plan_python_ms": Row("planning:plan_python_ms", "ms"),
+    "plan_any_ms": Row("any_planning:plan_any_ms", "ms", takes_count=True),
+    "plan_any_success": Row("any_planning:plan_any_success", "%", takes_count=True),
     "plan_mesh_ms": Row("mesh_planning:plan_mesh_ms", "ms"),
     "import_s": Row("import_time:import_s", "s"),
     "fit_excess_mm": Row("fit_quality:fit_excess_mm", "mm"),
@@ -88,18 +92,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="make bench", description="Measure the figures of this machine.")
     parser.add_argument("--only", nargs="+", choices=FIGURES, metavar="NAME", help=", ".join(FIGURES))
     parser.add_argument("--out", type=Path, default=project_root() / "out/bench.json")
+    said = f"problems of each arm and family for plan_any_* ({FEW}; all: 100, which takes an hour)"
+    parser.add_argument("--problems", type=int, default=FEW, metavar="N", help=said)
     options = parser.parse_args()
-    sys.exit(bench(options.only or FIGURES, options.out))
+    sys.exit(bench(options.only or FIGURES, options.out, options.problems))
 
 
-def bench(names: Iterable[str], out: Path) -> int:
-    """Measures the figures `names`, writes `out` and prints the table; returns the exit code."""
+def bench(names: Iterable[str], out: Path, problems: int = FEW) -> int:
+    """Measures the figures `names`, writes `out` and prints the table; returns the exit code. `problems` are those of
+    each arm and family for the figures that count them."""
     wanted = set(names)
     figures: dict[str, Figure] = {}
     with Stacks() as stacks:
         for name in (name for name in FIGURES if name in wanted):
             print(f"bench: {name} ...", flush=True)
-            figures[name] = measured(FIGURES[name], stacks)
+            figures[name] = measured(FIGURES[name], stacks, problems)
     report = report_of(figures, project_root())
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
@@ -107,9 +114,9 @@ def bench(names: Iterable[str], out: Path) -> int:
     return 1 if any(figure.median is None for figure in figures.values()) else 0
 
 
-def measured(row: Row, stacks: Stacks) -> Figure:
+def measured(row: Row, stacks: Stacks, problems: int) -> Figure:
     """The figure of one row of the table; it says why if it could not be measured."""
-    arguments = [stacks] if row.on_a_stack else []
+    arguments = [stacks] if row.on_a_stack else [problems] if row.takes_count else []
     return guarded(partial(function_of(row), *arguments, *filter(None, [row.broker])), row.unit)
 
 

@@ -78,8 +78,8 @@ def reference_ms(kind: type[Reference]) -> tuple[Sequence[float], Sequence[bool]
         for name, scene in SCENES.items():
             planner = kind(arm, scene)
             for index, problem in enumerate(problem_set(arm.name, name).problems[:REFERENCED]):
-                answer = planner.solving_ms(problem.start, problem.goal, seed=index)
-                took.append(1e3 * ALLOWED if answer is None else answer)
+                answer = planner.shortened_path(problem.start, problem.goal, seed=index)
+                took.append(1e3 * ALLOWED if answer is None else answer.took)
                 solved.append(answer is not None)
     return took, solved
 

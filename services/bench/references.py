@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import coal
 import numpy as np
@@ -75,12 +75,20 @@ def solid_of(shape: Shape) -> coal.CollisionGeometry:
     raise ValueError(f"the bench's scenes have boxes and cylinders, not {shape}")
 
 
+class Answer(NamedTuple):
+    """What a reference has found: times [ms] of the clock and of the CPU, and the polyline (m, n) [rad] or [m]."""
+
+    took: float
+    worked: float
+    rows: Array
+
+
 class Reference(Protocol):
     """A planner for one arm in one scene."""
 
     def __init__(self, arm: Arm, scene: PlanningScene) -> None: ...
-    def solving_ms(self, start: JointValues, goal: JointValues, seed: int) -> float | None:
-        """Time [ms] until a shortened path is found; None if none is found within `ALLOWED`."""
+    def shortened_path(self, start: JointValues, goal: JointValues, seed: int) -> Answer | None:
+        """A shortened path; None if none is found within `ALLOWED`."""
 
 
 class PlainOmpl:
@@ -105,11 +113,10 @@ class PlainOmpl:
         self._information.setStateValidityCheckingResolution(STEP / space.getMaximumExtent())
         self._information.setup()
 
-    def solving_ms(self, start: JointValues, goal: JointValues, seed: int) -> float | None:
-        """Time [ms] until a shortened path from `start` to `goal`, (n,) [rad] or [m], is found; None if none is within
-        `ALLOWED`."""
+    def shortened_path(self, start: JointValues, goal: JointValues, seed: int) -> Answer | None:
+        """A path from `start` to `goal`, (n,) [rad] or [m], shortened; None if none is found within `ALLOWED`."""
         self._util.RNG.setSeed(seed + 1)
-        began = time.perf_counter()
+        began, before = time.perf_counter(), time.process_time()
         definition = self._base.ProblemDefinition(self._information)
         definition.setStartAndGoalStates(self._state(start), self._state(goal))
         planner = self._geometric.RRTConnect(self._information)
@@ -118,8 +125,11 @@ class PlainOmpl:
         planner.solve(self._base.timedPlannerTerminationCondition(ALLOWED))
         if not definition.hasExactSolution():
             return None
-        self._geometric.PathSimplifier(self._information).simplifyMax(definition.getSolutionPath())
-        return (time.perf_counter() - began) * 1e3
+        path = definition.getSolutionPath()
+        self._geometric.PathSimplifier(self._information).simplifyMax(path)
+        took, worked = time.perf_counter() - began, time.process_time() - before
+        rows = [[state[index] for index in range(len(start))] for state in path.getStates()]
+        return Answer(took * 1e3, worked * 1e3, np.array(rows))
 
     def _state(self, configuration: JointValues) -> Any:
         state = self._information.allocState()
@@ -150,20 +160,20 @@ class Roboplan:
         )
         self._planner = rrt.RRT(self._scene, options)
 
-    def solving_ms(self, start: JointValues, goal: JointValues, seed: int) -> float | None:
-        """Time [ms] until a shortened path from `start` to `goal`, (n,) [rad] or [m], is found; None if none is within
-        `ALLOWED`."""
+    def shortened_path(self, start: JointValues, goal: JointValues, seed: int) -> Answer | None:
+        """A path from `start` to `goal`, (n,) [rad] or [m], shortened; None if none is found within `ALLOWED`."""
         names = self._scene.getJointNames()
         ends = [self._core.JointConfiguration(names, np.array(values)) for values in (start, goal)]
         self._planner.setRngSeed(seed)
         options = self._core.PathShortcuttingOptions(group_name=GROUP, max_step_size=STEP, seed=seed)
-        began = time.perf_counter()
+        began, before = time.perf_counter(), time.process_time()
         try:
             path = self._planner.plan(*ends)
         except RuntimeError:
             return None
-        self._core.PathShortcutter(self._scene, options).shortcut(path)
-        return (time.perf_counter() - began) * 1e3
+        short = self._core.PathShortcutter(self._scene, options).shortcut(path)
+        took, worked = time.perf_counter() - began, time.process_time() - before
+        return Answer(took * 1e3, worked * 1e3, np.array(short.positions))
 
     def _add_objects(self, scene: PlanningScene) -> None:
         for item in scene.objects:

@@ -1,0 +1,97 @@
+"""Problems of an arm in a family, drawn by seed: a scene, two free configurations in it, and how the goal is asked for.
+
+Nobody knows beforehand whether a way leads from one to the other: what counts as possible is what any planner solves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.joints import JointState
+from schemas.planning import JointGoal, PlanRequest
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
+from services.bench.any_arm.families import FAMILIES, Setting, ToolPose, settings
+from services.bench.problems.problem_sets import ALLOWED, tool_pose
+from services.planner.collision.world import World
+from services.planner.kinematics.ik import InverseKinematics
+from services.planner.kinematics.targets import Target
+from services.planner.request.deadline import NEVER
+
+Array = NDArray[np.float64]
+
+COUNT = 100  # problems of an arm in a family
+SPARE = 0.002  # [m] beyond the clearance that both ends keep
+TRIES = 30  # random configurations for one end, before another scene is drawn
+SOLUTIONS = 6  # of one pose that are looked at
+REVOLUTION = np.pi  # [rad] either way, where a joint can do more: nobody winds it up for one move
+
+
+@dataclass(frozen=True)
+class DrawnProblem:
+    """From rest to rest, (n,) [rad] each; with `is_pose` the tool's pose at the goal is asked for."""
+
+    arm: str
+    family: str
+    seed: int
+    setting: Setting
+    start: tuple[float, ...]
+    goal: tuple[float, ...]
+    is_pose: bool
+
+    def request(self, arm: Arm, kinematics: Kinematics, allowed: float = ALLOWED) -> PlanRequest:
+        """What a client sends, with `allowed` [s] for it."""
+        names = arm.joint_names
+        asked = JointGoal(name=names, position=self.goal)
+        return PlanRequest(
+            goal=tool_pose(arm, kinematics, self.goal) if self.is_pose else asked,
+            start=JointState(name=names, position=self.start),
+            allowed_time=allowed,
+        )
+
+
+class ProblemDrawer:
+    """Draws problems for one arm."""
+
+    def __init__(self, arm: Arm, kinematics: Kinematics) -> None:
+        self._arm, self._kinematics = arm, kinematics
+        self._ik = InverseKinematics(arm, kinematics)
+        lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
+        self._lower, self._upper = np.maximum(lower, -REVOLUTION), np.minimum(upper, REVOLUTION)
+
+    def problem(self, family: str, seed: int) -> DrawnProblem:
+        """The problem of this seed: the same one in every run. Every other one asks for a pose."""
+        random = np.random.default_rng((list(FAMILIES).index(family), seed, len(self._arm.joints)))
+        for setting in settings(family, seed):
+            world = World(self._arm, self._kinematics, setting.scene)
+            goal = self._end(world, setting.goal, random)
+            start = None if goal is None else self._end(world, setting.start, random)
+            if start is not None and goal is not None and start != goal:
+                return DrawnProblem(self._arm.name, family, seed, setting, start, goal, seed % 2 == 0)
+        raise AssertionError("settings do not end")
+
+    def _end(self, world: World, pose: ToolPose | None, random: np.random.Generator) -> tuple[float, ...] | None:
+        """A free configuration (n,) [rad], with the tool at `pose` where there is one; None where none is found."""
+        for near in random.uniform(self._lower, self._upper, (TRIES if pose is None else 2, len(self._lower))):
+            rows = [near] if pose is None else self._solutions(pose, near)
+            for row in rows:
+                if self._is_usable(row) and world.distance(row) > world.clearance + SPARE:
+                    return tuple(row.tolist())
+        return None
+
+    def _solutions(self, pose: ToolPose, near: Array) -> list[Array]:
+        found = self._ik.solutions(Target(pose.position, pose.rotation), near, NEVER)
+        return [np.round(row, 6) for row in islice(found, SOLUTIONS)]
+
+    def _is_usable(self, row: Array) -> bool:
+        return bool((row >= self._lower).all() and (row <= self._upper).all())
+
+
+def problems(arm: Arm, kinematics: Kinematics, family: str, count: int = COUNT) -> list[DrawnProblem]:
+    """The first `count` problems of a family."""
+    drawer = ProblemDrawer(arm, kinematics)
+    return [drawer.problem(family, seed) for seed in range(count)]

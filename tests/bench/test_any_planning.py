@@ -1,0 +1,136 @@
+"""The problems of arms that do not ship, and the figures about them on a few."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import msgspec
+import numpy as np
+import pytest
+
+from schemas.planning import PlanCode, Refusal
+from services.arm.kinematics.kinematics import Kinematics
+from services.bench import any_planning
+from services.bench.any_arm.drawn_problems import ProblemDrawer, problems
+from services.bench.any_arm.families import FAMILIES, FEWEST, MOST, settings
+from services.bench.any_arm.generated_arms import generated_arm, seven_joints, six_joints
+from services.bench.any_planning import AnyTrial, has_contact, planned, trial
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.world import World
+from services.planner.core import Planner
+
+PLAIN = ("six", "seven")  # without meshes, for which spheres are fitted for a quarter of a minute
+FEW = 2
+
+
+@pytest.fixture(scope="module")
+def planner() -> Planner:
+    return Planner(generated_arm("seven"))
+
+
+@pytest.fixture(scope="module")
+def some(planner: Planner) -> list[AnyTrial]:
+    return [trial(planner, problem) for family in ("box", "cage") for problem in problems_of(planner, family)]
+
+
+def problems_of(planner: Planner, family: str):
+    return problems(planner.arm, planner.kinematics, family, FEW)
+
+
+@pytest.mark.parametrize("name", PLAIN)
+def test_the_arms_are_worth_40_to_60_spheres_and_mostly_free_of_themselves(name: str):
+    arm = generated_arm(name)
+    world = World(arm, Kinematics(arm))
+    lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
+    rows = np.random.default_rng(0).uniform(lower, upper, (60, len(lower)))
+    assert world.distance(arm.named_states["home"]) > CLEARANCE
+    assert sum(world.distance(row) > CLEARANCE for row in rows) > 25
+
+
+def test_seven_has_40_to_60_spheres_and_six_solids_that_fill_as_many():
+    sketch = seven_joints()
+    shapes = [*sketch.base, *(solid for link in sketch.links for solid in link.solids)]
+    assert 40 <= len(shapes) <= 60
+    assert all(len(solid.size) == 1 for solid in shapes)
+    solids = [solid for link in six_joints().links for solid in link.solids]
+    filling = sum(max(solid.size) / (2.0 * min(solid.size)) if len(solid.size) > 1 else 1.0 for solid in solids)
+    assert 20 <= filling <= 60
+
+
+@pytest.mark.parametrize(("name", "table"), [("six", (0.0892, 0.425, 0.392, 0.109, 0.095, 0.182)), ("seven", ())])
+def test_the_tool_is_where_the_published_table_has_it(name: str, table: tuple[float, ...]):
+    arm = generated_arm(name)
+    tool = Kinematics(arm).tool((0.0,) * len(arm.joints)).position
+    if name == "six":
+        d1, a2, a3, d4, d5, d6 = table
+        assert tool == pytest.approx([-(a2 + a3), -(d4 + d6), d1 - d5], abs=1e-3)
+    else:
+        assert tool == pytest.approx([0.088, 0.0, 0.333 + 0.316 + 0.384 - 0.2104], abs=1e-9)
+
+
+def test_meshes_are_made_by_code_and_read_as_any_others():
+    arm = generated_arm("six_mesh")
+    assert [path.name for path in sorted(arm.folder.glob("*.stl"))] == ["link_2.stl", "link_3.stl"]
+    assert arm.urdf_path.read_text().count("<mesh") == 2
+    assert arm.joint_names == generated_arm("six").joint_names
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("name", PLAIN)
+def test_both_ends_are_within_limits_and_free_and_drawn_the_same_again(name: str, family: str):
+    arm = generated_arm(name)
+    kinematics = Kinematics(arm)
+    drawn = problems(arm, kinematics, family, FEW)
+    assert [each.is_pose for each in drawn] == [True, False]
+    for problem in drawn:
+        world = World(arm, kinematics, problem.setting.scene)
+        for configuration in (problem.start, problem.goal):
+            assert all(joint.is_within(value) for joint, value in zip(arm.joints, configuration, strict=True))
+            assert world.distance(configuration) > CLEARANCE
+    again = ProblemDrawer(arm, Kinematics(arm)).problem(family, drawn[-1].seed)
+    assert (again.start, again.goal, again.setting.scene) == (
+        drawn[-1].start,
+        drawn[-1].goal,
+        drawn[-1].setting.scene,
+    )
+
+
+def test_cages_have_5_to_40_solids():
+    counts = [len(next(settings("cage", seed)).scene.objects) - 1 for seed in range(60)]
+    assert FEWEST <= min(counts) < 15 < 30 < max(counts) <= MOST
+
+
+def test_a_trial_is_a_whole_plan_without_contact(some: list[AnyTrial]):
+    for each in some:
+        assert each.is_solved
+        assert not each.has_contact
+        assert each.worked > 0.0
+        assert each.best <= each.length
+        assert set(each.others) == {"OMPL", "roboplan"}
+
+
+def test_a_contact_is_seen(planner: Planner):
+    problem = problems_of(planner, "cage")[1]
+    response, *_ = planned(planner, problem)
+    assert not has_contact(planner, problem, response.trajectory)
+    middle = response.trajectory.points[len(response.trajectory.points) // 2]
+    at = Kinematics(planner.arm).tool(middle.positions).position.tolist()
+    [thing, *others] = problem.setting.scene.objects[1:]
+    moved = msgspec.structs.replace(thing, pose=msgspec.structs.replace(thing.pose, translation=tuple(at)))
+    scene = msgspec.structs.replace(problem.setting.scene, objects=(moved, *others))
+    there = dataclasses.replace(problem, setting=dataclasses.replace(problem.setting, scene=scene))
+    assert has_contact(planner, there, response.trajectory)
+
+
+def test_the_figures_count_what_is_not_solved(monkeypatch: pytest.MonkeyPatch, some: list[AnyTrial]):
+    monkeypatch.setattr(any_planning, "every_trial", lambda count: {"seven box": some})
+    assert any_planning.plan_any_success(FEW).met
+    figure = any_planning.plan_any_ms(FEW)
+    assert 0.0 < figure.median <= figure.p99
+    assert figure.reference["of roboplan's, p50"] > 0.0
+    response = msgspec.structs.replace(some[0].response, code=PlanCode.TIMED_OUT, refusal=Refusal(message="too late"))
+    failed = dataclasses.replace(some[0], response=response)
+    monkeypatch.setattr(any_planning, "every_trial", lambda count: {"seven box": [failed, *some[1:]]})
+    figure = any_planning.plan_any_success(FEW)
+    assert (figure.met, figure.median) == (False, 75.0)
+    assert "seven box 0" in figure.note
