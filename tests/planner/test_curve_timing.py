@@ -18,7 +18,7 @@ from services.planner.path.curve import smooth_runs
 from services.planner.path.smoothing import smooth, stopping
 from services.planner.request.deadline import NEVER
 from services.planner.timing import profile
-from services.planner.timing.profile import joint_limits
+from services.planner.timing.profile import joint_limits, trajectory_of
 from services.planner.timing.time_optimal import time_optimal_path
 from services.planner.timing.timing import timed_path
 from services.planner.verification.verify import limit_shares, require_ends, sample
@@ -50,7 +50,7 @@ def corners_of(seed: int, count: int) -> np.ndarray:
 @given(st.integers(0, 10_000), st.integers(2, 5), st.floats(0.05, 1.0), st.floats(0.05, 1.0))
 def test_a_timed_curve_keeps_every_limit_and_its_ends(seed: int, count: int, speed: float, acceleration: float):
     corners, limits = corners_of(seed, count), joint_limits(ARM, speed, acceleration)
-    trajectory = timed_path(ARM.joint_names, smooth(corners, Everywhere(), NEVER), limits)
+    trajectory = trajectory_of(ARM.joint_names, timed_path(smooth(corners, Everywhere(), NEVER), limits))
     require_ends(trajectory, tuple(corners[0].tolist()), tuple(corners[-1].tolist()))
     velocity, accelerations, jerk = limit_shares(sample(trajectory, 100), limits)
     assert max(velocity, accelerations) <= 1.0
@@ -69,7 +69,7 @@ def test_a_curve_is_measured_by_its_length_with_its_derivatives():
 
 def test_a_way_that_cannot_be_rounded_stops_at_every_corner():
     corners = corners_of(5, 4)
-    trajectory = timed_path(ARM.joint_names, stopping(corners), LIMITS)
+    trajectory = trajectory_of(ARM.joint_names, timed_path(stopping(corners), LIMITS))
     rows = np.array([point.positions for point in trajectory.points])
     speeds = np.array([point.velocities for point in trajectory.points])
     for corner in corners:
@@ -82,7 +82,8 @@ def test_a_way_that_cannot_be_rounded_stops_at_every_corner():
 def test_a_jerk_limited_way_takes_at_most_three_times_the_time_optimal_one():
     for seed in range(4):
         control = smooth(corners_of(seed, 3), Everywhere(), NEVER)
-        limited, optimal = (make(ARM.joint_names, control, LIMITS) for make in (timed_path, time_optimal_path))
+        made = (make(control, LIMITS) for make in (timed_path, time_optimal_path))
+        limited, optimal = (trajectory_of(ARM.joint_names, states) for states in made)
         velocity, acceleration, _ = limit_shares(sample(optimal, 100), LIMITS)
         assert max(velocity, acceleration) <= 1.0
         assert limited.points[-1].time_from_start <= 3.0 * optimal.points[-1].time_from_start
@@ -97,7 +98,7 @@ def test_what_ruckig_is_asked_about_a_curve_has_no_waypoints(monkeypatch: pytest
             return super().calculate(demand, trajectory)
 
     monkeypatch.setattr(profile, "Ruckig", Listening)
-    timed_path(ARM.joint_names, smooth(corners_of(1, 4), Everywhere(), NEVER), LIMITS)
+    timed_path(smooth(corners_of(1, 4), Everywhere(), NEVER), LIMITS)
     assert asked
     assert all(demand.intermediate_positions == [] for demand in asked)
 

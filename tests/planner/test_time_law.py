@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.planner.timing.peaks import peak_shares
-from services.planner.timing.profile import JointLimits, stop_and_go, straight_line
+from services.planner.timing.profile import JointLimits, stop_and_go, straight_line, trajectory_of
 from services.planner.timing.time_law import TimeLaw
 from services.planner.verification.verify import limit_shares, sample_between
 
@@ -66,7 +66,7 @@ def test_the_times_go_from_the_begin_to_the_end_with_every_change_of_the_jerk_an
 
 def test_a_way_with_stops_takes_as_long_as_its_legs_one_by_one_and_rests_at_every_corner():
     corners = np.random.default_rng(2).uniform(-1.0, 1.0, (5, 3)).tolist()
-    whole = stop_and_go(("a", "b", "c"), corners, UNIT)
+    whole = trajectory_of(("a", "b", "c"), stop_and_go(np.array(corners), UNIT))
     legs = [straight_line(("a", "b", "c"), start, goal, UNIT) for start, goal in pairwise(corners)]
     ends = [leg.points[-1].time_from_start for leg in legs]
     resting = [point for point in whole.points if not any(point.velocities + point.accelerations)]

@@ -23,8 +23,15 @@ from services.planner.path.path import Start
 from services.planner.request.deadline import Deadline
 from services.planner.request.refusals import PlanRefused, not_verified
 from services.planner.timing.path_timing import law_along
-from services.planner.timing.profile import JointLimits, NoProfile, require_short, straight_line
-from services.planner.timing.timing import States, at_limits, at_speed, trajectory_of
+from services.planner.timing.profile import (
+    JointLimits,
+    NoProfile,
+    States,
+    require_short,
+    straight_line,
+    trajectory_of,
+)
+from services.planner.timing.timing import at_limits, at_speed
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from services.planner.path.path_curve import PathCurve
 from services.planner.request.deadline import Deadline
 from services.planner.timing.path_timing import Law
-from services.planner.timing.profile import MOST_POINTS
-from services.planner.timing.timing import States
+from services.planner.timing.profile import MOST_POINTS, States
 from services.planner.verification.verify import Samples, sample_between
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from services.planner.path.path import Array, Path, Start
 from services.planner.path.smoothing import stopping
 from services.planner.request.deadline import NEVER, Deadline, Stopwatch
 from services.planner.request.refusals import PlanRefused, not_verified
-from services.planner.timing.profile import JointLimits, NoProfile, stop_and_go
+from services.planner.timing.profile import JointLimits, NoProfile, States, stop_and_go, trajectory_of
 from services.planner.timing.time_optimal import time_optimal_path
 from services.planner.timing.timing import timed_path
 from services.planner.verification.feasibility import feasible_scale, require_feasible, slowed
@@ -66,8 +66,11 @@ class TrajectoryBuilder:
 
     def line(self, start: Start, goal: Start) -> VerifiedTrajectory:
         """The straight line of the joints from `start` to `goal`, (n,) [rad] or [m]; raises `TrajectoryTouches` or
-        `PlanRefused`."""
-        return self.verified(self._stopping(np.array((start, goal))), start, goal)
+        `PlanRefused`. It is looked at before it is timed, and again as it will be executed."""
+        ends = np.array((start, goal))
+        with self._watch.phase("verification"):
+            self._require_free(ends)
+        return self.verified(self._told(self._stopping(ends)), start, goal)
 
     def path(self, path: Path) -> VerifiedTrajectory:
         """Around its corners or with a stop at each, whichever is faster and free; raises `TrajectoryTouches` or
@@ -75,33 +78,36 @@ class TrajectoryBuilder:
 
         A joint that must turn back at a corner has to stop there in any case, and so do tight corners cost less time.
         """
-        trajectories = [self._stopping(path.corners)]
+        several = [self._stopping(path.corners)]
         with suppress(TurnsOnTheSpot):
-            trajectories.append(self._along(path.control))
-        faster, *slower = sorted(trajectories, key=_duration)
+            several.append(self._along(path.control))
+        faster, *slower = sorted(several, key=_duration)
         try:
-            return self.verified(faster, path.start, path.goal)
+            return self.verified(self._told(faster), path.start, path.goal)
         except TrajectoryTouches:
             if not slower:
                 raise
-        return self.verified(slower[0], path.start, path.goal)
+        return self.verified(self._told(slower[0]), path.start, path.goal)
 
-    def _stopping(self, corners: Array) -> JointTrajectory:
+    def _told(self, states: States) -> JointTrajectory:
+        with self._watch.phase("timing"):
+            return trajectory_of(self._arm.joint_names, states)
+
+    def _stopping(self, corners: Array) -> States:
         """Straight from corner to corner (m, n), with a stop at each, timed as asked; raises `PlanRefused`."""
         if self._request.timing is Timing.TIME_OPTIMAL:
             return self._along(stopping(corners))
         self._deadline.check()
         with self._watch.phase("timing"):
-            return _timed(lambda: stop_and_go(self._arm.joint_names, corners.tolist(), self._limits))
+            return _timed(lambda: stop_and_go(corners, self._limits))
 
-    def _along(self, control: Array) -> JointTrajectory:
+    def _along(self, control: Array) -> States:
         """On the uniform cubic B-spline of `control`, timed as asked; raises `TurnsOnTheSpot` or `PlanRefused`."""
-        names = self._arm.joint_names
         self._deadline.check()
         with self._watch.phase("timing"):
             if self._request.timing is Timing.TIME_OPTIMAL:
-                return _timed(lambda: time_optimal_path(names, control, self._limits))
-            return _timed(lambda: timed_path(names, control, self._limits))
+                return _timed(lambda: time_optimal_path(control, self._limits))
+            return _timed(lambda: timed_path(control, self._limits))
 
     def verified(self, trajectory: JointTrajectory, start: Start, goal: Start) -> VerifiedTrajectory:
         """The trajectory from `start` to `goal`, (n,) [rad] or [m], slowed where the steppers cannot follow it, then
@@ -139,11 +145,11 @@ class TrajectoryBuilder:
         return slower, require_feasible(self._arm, slower), scale
 
 
-def _duration(trajectory: JointTrajectory) -> float:
-    return trajectory.points[-1].time_from_start
+def _duration(states: States) -> float:
+    return float(states.times[-1])
 
 
-def _timed(time: Callable[[], JointTrajectory]) -> JointTrajectory:
+def _timed(time: Callable[[], States]) -> States:
     try:
         return time()
     except NoProfile as error:

@@ -25,8 +25,8 @@ from services.planner.pipeline.trajectory_builder import TrajectoryTouches, Veri
 from services.planner.request.deadline import Deadline
 from services.planner.request.refusals import PlanRefused, no_path_around, not_verified, timed_out
 from services.planner.timing.path_timing import law_along
-from services.planner.timing.profile import NoProfile, straight_line
-from services.planner.timing.timing import at_limits, trajectory_of
+from services.planner.timing.profile import NoProfile, straight_line, trajectory_of
+from services.planner.timing.timing import at_limits
 
 Array = NDArray[np.float64]
 

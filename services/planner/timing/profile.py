@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +54,25 @@ def joint_limits(arm: Arm, velocity_scaling: float = 1.0, acceleration_scaling: 
     )
 
 
+class States(NamedTuple):
+    """`times` (m,) [s], and joint values and their derivatives (m, n) there."""
+
+    times: Array
+    positions: Array
+    velocities: Array
+    accelerations: Array
+
+
+def trajectory_of(names: Sequence[str], states: States) -> JointTrajectory:
+    """The states as points."""
+    rows = zip(*(column.tolist() for column in states), strict=True)
+    points = [
+        TrajectoryPoint(positions=tuple(p), velocities=tuple(v), accelerations=tuple(a), time_from_start=t)
+        for t, p, v, a in rows
+    ]
+    return JointTrajectory(joint_names=tuple(names), points=tuple(points))
+
+
 def straight_line(
     names: Sequence[str], start: Sequence[float], goal: Sequence[float], limits: JointLimits
 ) -> JointTrajectory:
@@ -60,29 +80,30 @@ def straight_line(
 
     The points stand wherever the profile's jerk changes, and between, so that the quintic through them IS the profile.
     """
-    return stop_and_go(names, (start, goal), limits)
+    return trajectory_of(names, stop_and_go(np.array((start, goal)), limits))
 
 
-def stop_and_go(names: Sequence[str], corners: Sequence[Sequence[float]], limits: JointLimits) -> JointTrajectory:
-    """From corner to corner (n,) [rad] or [m], each leg as `straight_line`, at rest at all of them; raises
-    `NoProfile`."""
-    points = [_rest(corners[0], 0.0)]
+def stop_and_go(corners: Array, limits: JointLimits) -> States:
+    """From corner to corner of the polyline (m, n) [rad] or [m], each leg as `straight_line`, at rest at all of them;
+    raises `NoProfile`."""
+    legs, began = [_rest(corners[0], 0.0)], 0.0
     for start, goal in pairwise(corners):
-        points += _leg(start, goal, limits, points[-1].time_from_start)
-    return JointTrajectory(joint_names=tuple(names), points=tuple(points))
+        legs += _leg(start, goal, limits, began)
+        began = float(legs[-1].times[-1])
+    return States(*(np.concatenate(columns) for columns in zip(*legs, strict=True)))
 
 
-def _leg(start: Sequence[float], goal: Sequence[float], limits: JointLimits, began: float) -> list[TrajectoryPoint]:
-    """The points after the one at `start`, where the leg begins at the time `began` [s]."""
-    displacement = np.subtract(goal, start)
+def _leg(start: Array, goal: Array, limits: JointLimits, began: float) -> list[States]:
+    """What comes after `start`, where the leg begins at the time `began` [s]."""
+    displacement = goal - start
     length = float(np.max(np.abs(displacement) / limits.velocity))  # [s] at full speed
     if length < STANDSTILL:
         return [_rest(goal, began + HOLD)]
     require_short(max(length, float(np.max(np.abs(displacement) / limits.acceleration)) ** 0.5))
     direction = displacement / length
     profile, changes = _time_line(length, direction, limits)
-    inner = _inner_points(start, direction, profile, _times(changes, profile.duration), began)
-    return [*inner, _rest(goal, began + profile.duration)]
+    inner = _inner_states(start, direction, profile, _times(changes, profile.duration), began)
+    return [inner, _rest(goal, began + profile.duration)]
 
 
 def require_short(lasts: float) -> None:
@@ -130,20 +151,12 @@ def _times(changes: Sequence[float], duration: float) -> list[float]:
     return [t for t in times if t < duration - 0.5 * SHORTEST]
 
 
-def _inner_points(
-    start: Sequence[float], direction: Array, profile: Trajectory, times: list[float], began: float
-) -> list[TrajectoryPoint]:
-    """The profile at `times` [s], spread over the joints; as points they are later by `began`."""
+def _inner_states(start: Array, direction: Array, profile: Trajectory, times: list[float], began: float) -> States:
+    """The profile at `times` [s], spread over the joints; told later by `began`."""
     rows = np.array([profile.at_time(t) for t in times]).reshape(len(times), 3, 1) * direction  # (m, 3, n)
-    rows[:, 0] += start
-    return [
-        TrajectoryPoint(positions=tuple(p), velocities=tuple(v), accelerations=tuple(a), time_from_start=began + t)
-        for t, (p, v, a) in zip(times, rows.tolist(), strict=True)
-    ]
+    return States(began + np.array(times), start + rows[:, 0], rows[:, 1], rows[:, 2])
 
 
-def _rest(positions: Sequence[float], t: float) -> TrajectoryPoint:
-    zeros = (0.0,) * len(positions)
-    return TrajectoryPoint(
-        positions=tuple(float(p) for p in positions), velocities=zeros, accelerations=zeros, time_from_start=t
-    )
+def _rest(positions: Array, t: float) -> States:
+    zeros = np.zeros((1, len(positions)))
+    return States(np.array([t]), positions[None], zeros, zeros)

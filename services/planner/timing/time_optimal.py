@@ -5,16 +5,13 @@ toppra is given that curve by its length, not a spline of its own through points
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.motion import JointTrajectory
 from services.planner.path.curve import Curve
 from services.planner.path.path_curve import PathCurve
-from services.planner.timing.profile import JointLimits
-from services.planner.timing.timing import States, along_runs, states_along
+from services.planner.timing.profile import JointLimits, States
+from services.planner.timing.timing import along_runs, states_along
 from services.planner.timing.toppra_speeds import optimal_speeds
 
 Array = NDArray[np.float64]
@@ -27,10 +24,10 @@ FEWEST = 40  # points of a run
 MOST = 4000
 
 
-def time_optimal_path(names: Sequence[str], control: Array, limits: JointLimits) -> JointTrajectory:
-    """The trajectory along the B-spline of `control` (k, n) [rad] or [m], as `timing.timed_path`, but without jerk
+def time_optimal_path(control: Array, limits: JointLimits) -> States:
+    """The states along the B-spline of `control` (k, n) [rad] or [m], as `timing.timed_path`, but without jerk
     limits; raises `NoProfile`."""
-    return along_runs(names, control, limits, _run_states, with_jerk=False)
+    return along_runs(control, limits, _run_states, with_jerk=False)
 
 
 def time_optimal_law(curve: PathCurve, limits: JointLimits, tool: tuple[float, float] = (0.0, 0.0)) -> BlurredLaw:

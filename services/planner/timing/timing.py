@@ -7,14 +7,12 @@ its limits.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 from ruckig import InputParameter, Trajectory
 
-from schemas.motion import JointTrajectory, TrajectoryPoint
 from services.planner.path.curve import Curve, smooth_runs
 from services.planner.timing.peaks import peak_shares
 from services.planner.timing.profile import (
@@ -22,23 +20,15 @@ from services.planner.timing.profile import (
     MOST_POINTS,
     SPACING,
     JointLimits,
+    States,
     require_short,
     solved,
-    straight_line,
+    stop_and_go,
 )
 from services.planner.timing.sections import Section, boundary_speeds, sections_of
 from services.planner.timing.time_law import Stretch, TimeLaw
 
 Array = NDArray[np.float64]
-
-
-class States(NamedTuple):
-    """`times` (m,) [s], and joint values and their derivatives (m, n) there."""
-
-    times: Array
-    positions: Array
-    velocities: Array
-    accelerations: Array
 
 
 def states_along(run: Curve, limits: JointLimits, times: Array, lengths: Array, speeds: Array, bends: Array) -> States:
@@ -51,23 +41,19 @@ def states_along(run: Curve, limits: JointLimits, times: Array, lengths: Array, 
     return States(times, derivatives.value * scale, velocities * scale, accelerations * scale)
 
 
-def timed_path(names: Sequence[str], control: Array, limits: JointLimits) -> JointTrajectory:
+def timed_path(control: Array, limits: JointLimits) -> States:
     """From rest to rest along the uniform cubic B-spline of `control` (k, n) [rad] or [m], both ends exact; raises
     `NoProfile`.
 
     At corners it stops. Raises `TurnsOnTheSpot` where the curve does so without a corner.
     """
-    return along_runs(names, control, limits, _run_states)
+    return along_runs(control, limits, _run_states)
 
 
 def along_runs(
-    names: Sequence[str],
-    control: Array,
-    limits: JointLimits,
-    timed: Callable[[Curve, JointLimits], States],
-    with_jerk: bool = True,
-) -> JointTrajectory:
-    """The trajectory through every smooth run of the curve of `control` (k, n) [rad] or [m], each timed by `timed` from
+    control: Array, limits: JointLimits, timed: Callable[[Curve, JointLimits], States], with_jerk: bool = True
+) -> States:
+    """The states through every smooth run of the curve of `control` (k, n) [rad] or [m], each timed by `timed` from
     rest to rest, as fast as the limits allow; raises `NoProfile`."""
     require_short(float((np.abs(np.diff(control, axis=0)) / limits.velocity).max(axis=1).sum()))
     runs: list[States] = []
@@ -77,13 +63,13 @@ def along_runs(
         runs.append(states._replace(times=states.times + clock))
         clock = float(runs[-1].times[-1])
     if not runs:
-        return straight_line(names, control[0].tolist(), control[-1].tolist(), limits)
+        return stop_and_go(control[[0, -1]], limits)
     whole = States(*(np.concatenate(columns) for columns in zip(*runs, strict=True)))
     kept = np.concatenate(([True], np.diff(whole.times) > 0.0))
     states = States(*(column[kept] for column in whole))
     states.positions[0], states.positions[-1] = control[0], control[-1]
     states.velocities[[0, -1]] = states.accelerations[[0, -1]] = 0.0
-    return trajectory_of(names, at_limits(states, limits, with_jerk))
+    return at_limits(states, limits, with_jerk)
 
 
 def at_limits(states: States, limits: JointLimits, with_jerk: bool) -> States:
@@ -97,16 +83,6 @@ def at_speed(states: States, scale: float) -> States:
     """The same path at `scale` times the speed; `scale` is dimensionless."""
     times, positions, velocities, accelerations = states
     return States(times / scale, positions, velocities * scale, accelerations * scale * scale)
-
-
-def trajectory_of(names: Sequence[str], states: States) -> JointTrajectory:
-    """The states as points."""
-    rows = zip(*(column.tolist() for column in states), strict=True)
-    points = [
-        TrajectoryPoint(positions=tuple(p), velocities=tuple(v), accelerations=tuple(a), time_from_start=t)
-        for t, p, v, a in rows
-    ]
-    return JointTrajectory(joint_names=tuple(names), points=tuple(points))
 
 
 def _run_states(run: Curve, limits: JointLimits) -> States:
