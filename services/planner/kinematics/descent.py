@@ -1,18 +1,26 @@
 """One descent towards a tool target within the joint limits: damped least squares after Levenberg and Marquardt, with
-the joints that press against a limit left out of the step."""
+the joints that press against a limit left out of the step.
+
+The compiled descents take the same steps. Python does what they do not know: tolerances, a tool that only has to point
+somewhere, and everything where they are not built.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
-from services.planner.kinematics.targets import Target
+from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, Target
+
+if TYPE_CHECKING:
+    from services.planner.native.tool_descent import NativeDescent
 
 Array = NDArray[np.float64]
 Residual = Callable[[Array], tuple[Array, Array]]  # what is missing at a configuration, and how the joints change that
@@ -22,6 +30,9 @@ Test = Callable[[Array], bool]
 ITERATIONS = 40
 STALL = 1e-5  # share of the squared error by which an iteration must improve
 LARGEST_STEP = 0.8  # [rad] or [m] a joint may move in one iteration
+
+
+NOTHING = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -41,6 +52,7 @@ class Descent:
         self._lower = np.array([joint.lower for joint in arm.joints])
         self._upper = np.array([joint.upper for joint in arm.joints])
         self._identity = np.eye(len(arm.joints))
+        self._native = native_descent(arm)
 
     def clip(self, positions: Array) -> Array:
         """The nearest joint values (n,) [rad] or [m] within the limits."""
@@ -50,14 +62,21 @@ class Descent:
     def descend(self, target: Target, start: Array) -> Attempt:
         """The nearest local optimum from `start` (n,) [rad] or [m]: exact where it can be, else at the edge of the
         tolerances."""
-        attempt = self._descend(
-            target, start, lambda q: target.error_and_jacobian(self._kinematics, q), target.is_exact
-        )
+        attempt = self._exact(target, start)
         if attempt.is_solution or not target.is_tolerant:
             return attempt
         edge = self._descend(target, attempt.positions, lambda q: self._tolerant(target, q), target.is_at_edge)
         error, _ = target.error_and_jacobian(self._kinematics, edge.positions)
         return Attempt(edge.positions, math.sqrt(float(error @ error)), target.is_met(error))
+
+    def _exact(self, target: Target, start: Array) -> Attempt:
+        if self._native is None or target.pointing is not None:
+            return self._descend(
+                target, start, lambda q: target.error_and_jacobian(self._kinematics, q), target.is_exact
+            )
+        rotation = NOTHING if target.rotation is None else target.rotation.reshape(9)
+        tolerances = POSITION_TOLERANCE, ROTATION_TOLERANCE
+        return Attempt(*self._native.descend(start, target.position, rotation, target.metres_per_radian, *tolerances))
 
     def _tolerant(self, target: Target, positions: Array) -> tuple[Array, Array]:
         return target.beyond_tolerances(*target.error_and_jacobian(self._kinematics, positions))
@@ -101,3 +120,12 @@ class Descent:
         if longest > LARGEST_STEP:
             step *= LARGEST_STEP / longest
         return self.clip(positions + step)
+
+
+def native_descent(arm: Arm) -> NativeDescent | None:
+    """The compiled descents of this arm; None where they are not built."""
+    try:
+        from services.planner.native.tool_descent import NativeDescent
+    except ImportError:
+        return None
+    return NativeDescent(arm)

@@ -8,6 +8,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "cover.h"
+#include "descent.h"
 #include "kernels.h"
 #include "plan.h"
 
@@ -68,6 +69,58 @@ std::shared_ptr<const Chain> make_chain(const Integers& links, const Rows& numbe
     }
     chain->require_sound();
     return chain;
+}
+
+// The frames between the base and the tool, of rows as of `make_chain`; `pose` is the tool's in the frame `number`.
+std::shared_ptr<const ToolDescent> make_tool_descent(const Integers& links, const Rows& numbers, int number,
+                                                     const Row& pose, const Rows& bounds) {
+    require_columns(links.shape(1), 3, "links (parent, drive, slides)");
+    require_columns(numbers.shape(1), 15, "numbers (12 of the transform, multiplier, offset, travel)");
+    require_columns(pose.size(), 12, "a pose");
+    require(links.shape(0) == numbers.shape(0) && bounds.shape(0) == 2, "bounds are two rows: lower, upper");
+    const size_t dof = bounds.shape(1);
+    require(dof >= 1 && dof <= static_cast<size_t>(kMaxDof), "an arm has 1 to 16 joint values");
+    auto arm = std::make_shared<ToolDescent>();
+    std::copy(pose.data(), pose.data() + 12, arm->tool.begin());
+    arm->lower.assign(bounds.data(), bounds.data() + dof);
+    arm->upper.assign(bounds.data() + dof, bounds.data() + 2 * dof);
+    for (int i = number; i > 0; i = links(static_cast<size_t>(i), 0)) {
+        const size_t row = static_cast<size_t>(i);
+        require(row < links.shape(0) && links(row, 0) < i && links(row, 0) >= 0,
+                "a frame's parent must come before it");
+        require(links(row, 1) >= 0 && static_cast<size_t>(links(row, 1)) < dof, "a frame's joint value must exist");
+        ToolFrame frame{links(row, 0), links(row, 1), links(row, 2), numbers(row, 12), numbers(row, 13), {}};
+        std::copy(&numbers(row, 0), &numbers(row, 0) + 12, frame.fixed.begin());
+        arm->frames.insert(arm->frames.begin(), frame);
+        require(arm->frames.size() <= static_cast<size_t>(kMaxFrames), "an arm has at most 32 frames");
+    }
+    return arm;
+}
+
+// Where the descents from `starts` (m, n) end: rows (m, n + 2) of joint values, error [m], and 1 for what is there.
+nb::ndarray<nb::numpy, double> descend(const ToolDescent& arm, const Rows& starts, const Row& position,
+                                       const Row& rotation, double metres_per_radian, double position_tolerance,
+                                       double rotation_tolerance) {
+    const size_t dof = arm.lower.size(), count = starts.shape(0);
+    require_columns(starts.shape(1), dof, "joint values");
+    require_columns(position.size(), 3, "a position");
+    require(rotation.size() == 9 || rotation.size() == 0, "a rotation has 9 numbers, or none");
+    ToolTarget target{{}, {}, rotation.size() == 9, metres_per_radian, position_tolerance, rotation_tolerance};
+    std::copy(position.data(), position.data() + 3, target.position.begin());
+    std::copy(rotation.data(), rotation.data() + rotation.size(), target.rotation.begin());
+    std::vector<double> rows(count * (dof + 2));
+    {
+        nb::gil_scoped_release release;
+        DescentRun run(arm, target);
+        for (size_t i = 0; i < count; ++i) {
+            double* row = rows.data() + i * (dof + 2);
+            std::copy(&starts(i, 0), &starts(i, 0) + dof, row);
+            const DescentEnd end = run.run(row);
+            row[dof] = end.error;
+            row[dof + 1] = end.is_there ? 1.0 : 0.0;
+        }
+    }
+    return array_of(std::move(rows), {count, dof + 2});
 }
 
 std::vector<Sphere> spheres_of(const Rows& rows) {
@@ -298,6 +351,7 @@ NB_MODULE(_motion, module) {
     using namespace gemelo;
     using namespace nb::literals;
     nb::class_<Chain>(module, "Chain");
+    nb::class_<ToolDescent>(module, "ToolDescent");
     nb::class_<Part>(module, "Part");
     nb::class_<TriangleMesh>(module, "TriangleMesh");
     nb::class_<Obstacle>(module, "Obstacle");
@@ -329,6 +383,9 @@ NB_MODULE(_motion, module) {
     module.def(
         "kernel", [](const std::string& name) { return &kernel_named(name); }, "name"_a, nb::rv_policy::reference);
     module.def("chain", &make_chain, "links"_a, "numbers"_a, "dof"_a);
+    module.def("tool_descent", &make_tool_descent, "links"_a, "numbers"_a, "frame"_a, "pose"_a, "bounds"_a);
+    module.def("descend", &descend, "arm"_a, "starts"_a, "position"_a, "rotation"_a, "metres_per_radian"_a,
+               "position_tolerance"_a, "rotation_tolerance"_a);
     module.def("part", &make_part, "frame"_a, "spheres"_a, "solids"_a);
     module.def("cover", &cover, "cells"_a, "candidates"_a, "least"_a);
     module.def("mesh", &make_mesh, "vertices"_a, "faces"_a);

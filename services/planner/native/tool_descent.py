@@ -1,0 +1,46 @@
+"""Compiled descents of one arm's joints towards a target of the tool (native/src/descent.h)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from services.arm.model.description import Arm
+from services.planner.native.binding import motion
+from services.planner.native.chain import frames_of, transform_row
+
+Array = NDArray[np.float64]
+
+
+class NativeDescent:
+    """Joint values are (n,) [rad] or [m] in the arm's order, poses in its base frame."""
+
+    def __init__(self, arm: Arm) -> None:
+        frames = frames_of(arm)
+        frame, pose = frames.places[arm.tool_frame]
+        bounds = np.array([[joint.lower for joint in arm.joints], [joint.upper for joint in arm.joints]])
+        self._arm = motion.tool_descent(frames.links, frames.numbers, frame, transform_row(pose), bounds)
+
+    def descend(
+        self,
+        start: Array,
+        position: Array,
+        rotation: Array,
+        metres_per_radian: float,
+        position_tolerance: float,
+        rotation_tolerance: float,
+    ) -> tuple[Array, float, bool]:
+        """Where the descent from `start` (n,) ends, how far from `position` (3,) [m] and `rotation` (9,), by rows or
+        empty, and True if that is within the tolerances [m] and [rad]; the error is in [m], a radian counts
+        `metres_per_radian`."""
+        rows = np.ascontiguousarray(start, dtype=np.float64)[None]
+        end = motion.descend(
+            self._arm,
+            rows,
+            np.ascontiguousarray(position, dtype=np.float64),
+            np.ascontiguousarray(rotation, dtype=np.float64),
+            metres_per_radian,
+            position_tolerance,
+            rotation_tolerance,
+        )[0]
+        return end[:-2].copy(), float(end[-2]), bool(end[-1])

@@ -1,0 +1,75 @@
+"""The compiled descents against those in Python, on arms of every kind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm, load_arm
+from services.planner.kinematics.descent import Descent
+from services.planner.kinematics.targets import Target
+from services.runtime.deployment import project_root
+
+ARMS = Path(__file__).parents[1] / "arms"
+FOLDERS = [project_root() / "urdf/rm1", project_root() / "urdf/parol6", *sorted(ARMS.iterdir())]
+STARTS = 12
+
+
+class Both:
+    """One arm's descents, compiled and not, and random configurations within its limits."""
+
+    def __init__(self, arm: Arm) -> None:
+        self.kinematics = Kinematics(arm)
+        self.compiled, self.plain = Descent(arm, self.kinematics), Descent(arm, self.kinematics)
+        assert self.compiled._native is not None
+        self.plain._native = None
+        spans = np.array([(max(joint.lower, -3.0), min(joint.upper, 3.0)) for joint in arm.joints]).T
+        self.rows = np.random.default_rng(1).uniform(*spans, (2 * STARTS, len(arm.joints)))
+
+    def pairs(self):
+        return zip(self.rows[:STARTS], self.rows[STARTS:], strict=True)
+
+
+@pytest.fixture(params=FOLDERS, ids=lambda folder: folder.name)
+def both(request: pytest.FixtureRequest) -> Both:
+    return Both(load_arm(request.param))
+
+
+@pytest.mark.parametrize("with_turn", [False, True])
+def test_they_end_where_those_in_python_end(both: Both, with_turn: bool):
+    for wanted, start in both.pairs():
+        pose = both.kinematics.tool(wanted)
+        target = Target(pose.position, pose.rotation if with_turn else None)
+        one, other = both.compiled.descend(target, start), both.plain.descend(target, start)
+        assert one.is_solution == other.is_solution
+        assert one.error == pytest.approx(other.error, abs=1e-6, rel=1e-2)
+
+
+@pytest.mark.parametrize("with_turn", [False, True])
+def test_what_they_call_a_solution_meets_the_target(both: Both, with_turn: bool):
+    for wanted, start in both.pairs():
+        pose = both.kinematics.tool(wanted)
+        target = Target(pose.position, pose.rotation if with_turn else None)
+        for near in (start, wanted + 0.01):
+            attempt = both.compiled.descend(target, near)
+            error, _ = target.error_and_jacobian(both.kinematics, attempt.positions)
+            assert attempt.error == pytest.approx(float(np.linalg.norm(error)), abs=1e-9)
+            assert attempt.is_solution == target.is_exact(error)
+            assert (both.compiled.clip(attempt.positions) == attempt.positions).all()
+
+
+@pytest.mark.parametrize("angle", [1e-9, 1e-4, 1.0, 3.0, np.pi - 1e-4])
+def test_turns_of_every_size_are_taken_as_pinocchio_does(angle: float):
+    both = Both(load_arm(project_root() / "urdf/parol6"))
+    axes = np.random.default_rng(2).normal(size=(len(both.rows), 3))
+    for start, axis in zip(both.rows, axes, strict=True):
+        pose = both.kinematics.tool(start)
+        turn = pin.exp3(angle * axis / np.linalg.norm(axis))
+        target = Target(pose.position, turn @ pose.rotation)
+        one, other = both.compiled.descend(target, start), both.plain.descend(target, start)
+        assert one.is_solution == other.is_solution
+        assert one.error == pytest.approx(other.error, abs=1e-6, rel=1e-2)
