@@ -85,5 +85,6 @@ def plan(
     margin: float,
     seconds: float,
     cancel: CancelFlag | None,
+    enough: int,
 ) -> Plan: ...
 def centres(world: World, kernel: Kernel, rows: Array) -> NDArray[np.float32]: ...

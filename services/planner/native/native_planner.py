@@ -155,17 +155,20 @@ class NativePlanner:
         seed: int = 0,
         time_limit: float = math.inf,
         cancel: CancelFlag | None = None,
+        enough: int = 0,
     ) -> FreePath | NoPath:
         """A path from `start` (n,) to one of `goals` (n,) or (m, n), by RRT-Connect, shortened and smoothed.
 
         The same seed gives the same path, unless `time_limit` [s] cuts the shortening off. Distances are counted in
-        time at full speed. The interpreter's lock is released; `cancel` may be set from another thread.
+        time at full speed. Until `enough` configurations have been checked, or the path is nearly as short as any can
+        be, other searches look for a shorter one. The interpreter's lock is released; `cancel` may be set from another thread.
         """
         rows = self._rows(np.atleast_2d(np.asarray(goals, dtype=np.float64)))
         at = self._row(start)
         bounds = np.array([*self._span(np.vstack((at, rows))), [1.0 / joint.velocity for joint in self.arm.joints]])
         flag = cancel if isinstance(cancel, NativeCancelFlag) else None  # another kind is only seen by the caller
-        done = motion.plan(self._scene.world, self._kernel, bounds, at, rows, seed, self.margin, time_limit, flag)
+        world, margin = self._scene.world, self.margin
+        done = motion.plan(world, self._kernel, bounds, at, rows, seed, margin, time_limit, flag, enough)
         effort = Effort(done.search_s, done.shorten_s, done.smooth_s, done.iterations, done.checks)
         if done.outcome != FOUND:
             return NoPath(FailureReason(done.outcome), effort)

@@ -311,11 +311,11 @@ std::vector<Joints> each_row(const Rows& rows, const World& world, const char* w
 }
 
 Plan find(const World& world, const Kernel& kernel, const Rows& bounds, const Row& start, const Rows& goals,
-          uint64_t seed, double margin, double seconds, Flag cancel) {
+          uint64_t seed, double margin, double seconds, Flag cancel, uint64_t enough) {
     const auto limits = each_row(bounds, world, "bounds (lower, upper, weights)");
     require(limits.size() == 3, "bounds are three rows: lower, upper, weights");
     const Space space{limits[0], limits[1], limits[2]};
-    PlanQuery query{joints_of(start, world), each_row(goals, world, "goals"), seed};
+    PlanQuery query{joints_of(start, world), each_row(goals, world, "goals"), seed, enough};
     require(!query.goals.empty(), "a plan needs at least one goal");
     nb::gil_scoped_release release;
     Tolerances tolerances;
@@ -399,6 +399,6 @@ NB_MODULE(_motion, module) {
                "cancel"_a.none());
     module.def("unresolved_intervals", &unresolved_intervals, "world"_a, "kernel"_a, "rows"_a, "margin"_a, "finest"_a);
     module.def("plan", &find, "world"_a, "kernel"_a, "bounds"_a, "start"_a, "goals"_a, "seed"_a, "margin"_a,
-               "seconds"_a, "cancel"_a.none());
+               "seconds"_a, "cancel"_a.none(), "enough"_a);
     module.def("centres", &centres, "world"_a, "kernel"_a, "rows"_a);
 }

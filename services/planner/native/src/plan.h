@@ -1,4 +1,4 @@
-// A plan: search, shorten, smooth, each within the same time and until the same flag.
+// A plan: searches, each shortened, and the shortest path smoothed, within the same time and until the same flag.
 #pragma once
 
 #include "shorten.h"
@@ -20,8 +20,12 @@ struct PlanQuery {
     Joints start;
     std::vector<Joints> goals;  // any of them will do
     uint64_t seed = 0;
-    int patience = 30;  // of the shortener
+    uint64_t enough = 0;  // configurations to check, after which no other search is begun; 0: one search
+    int patience = 30;    // of the shortener
 };
+
+constexpr double kCloseEnough = 1.05;    // of the least length that any path can have: no other search is begun
+constexpr uint64_t kNextSeed = 1000003;  // from search to search: the next request's is another one
 
 // How finely lines are told apart while searching: a line that comes so near to something is no loss, unless the start
 // or a goal is as near itself.
@@ -37,12 +41,39 @@ inline Tolerances while_searching(const World& world, const Kernel& kernel, cons
     return has_room ? hasty : tolerances;
 }
 
+// The shortest path of several searches into `result`; none where the first one was stopped. The others only look where
+// a shorter path may lead, and shorten what they find.
+inline void find_shortest(const Space& space, MotionValidator& validator, const PlanQuery& query,
+                          const std::vector<Joints>& goals, const StopCondition& stop, Plan& result) {
+    double least = std::numeric_limits<double>::infinity(), bound = least;
+    for (const Joints& goal : goals) bound = std::min(bound, space.distance(query.start.data(), goal.data()));
+    for (uint64_t seed = query.seed;; seed = (seed + kNextSeed) % (uint64_t{1} << 32)) {
+        Random random(seed);
+        const double began = stop.elapsed();
+        Search search(space, validator, random, stop);
+        std::vector<Joints> path = result.path.empty() ? search.find(query.start, goals)
+                                                       : search.find_shorter(query.start, goals, least, query.enough);
+        const double found = stop.elapsed();
+        result.search_s += found - began;
+        result.iterations += search.iterations();
+        if (path.empty()) return;
+        Shortener shortener(space, validator, random, stop);
+        path = shortener.shorten(std::move(path), query.patience);
+        const double length = shortener.length(path);
+        result.shorten_s += stop.elapsed() - found;
+        if (length < least) {
+            least = length;
+            result.path = std::move(path);
+        }
+        if (least <= kCloseEnough * bound || validator.checks() >= query.enough || stop()) return;
+    }
+}
+
 inline Plan plan(const World& world, const Kernel& kernel, const Space& space, const Tolerances& tolerances,
                  const PlanQuery& query, const StopCondition& stop) {
     Plan result;
     MotionValidator validator(world, kernel, while_searching(world, kernel, tolerances, query));
     MotionValidator last(world, kernel, tolerances);
-    Random random(query.seed);
     std::vector<Joints> goals;
     for (const Joints& goal : query.goals) {
         if (validator.is_free(goal.data())) goals.push_back(goal);
@@ -55,17 +86,12 @@ inline Plan plan(const World& world, const Kernel& kernel, const Space& space, c
         result.outcome = Outcome::kGoalTouches;
         return result;
     }
-    Search search(space, validator, random, stop);
-    result.path = search.find(query.start, goals);
-    result.search_s = stop.elapsed();
-    result.iterations = search.iterations();
+    find_shortest(space, validator, query, goals, stop, result);
     if (result.path.empty()) {
         result.outcome = stop.is_cancelled() ? Outcome::kCancelled : Outcome::kTimedOut;
         result.checks = validator.checks();
         return result;
     }
-    result.path = Shortener(space, validator, random, stop).shorten(std::move(result.path), query.patience);
-    result.shorten_s = stop.elapsed() - result.search_s;
     result.control = Smoother(last, stop).smooth(result.path);
     result.smooth_s = stop.elapsed() - result.search_s - result.shorten_s;
     result.checks = validator.checks() + last.checks();

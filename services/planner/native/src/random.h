@@ -1,6 +1,7 @@
 // Random numbers that are the same on every machine, unlike the standard library's distributions.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -21,10 +22,14 @@ class Random {
     // In [0, 1).
     double share() { return static_cast<double>(next() >> 11) * 0x1p-53; }
 
+    // Normally distributed about 0 with deviation 1 (Box and Muller 1958).
+    double normal() { return std::sqrt(-2.0 * std::log(1.0 - share())) * std::cos(kTurn * share()); }
+
     // In [0, count).
     size_t below(size_t count) { return static_cast<size_t>(next() % count); }
 
   private:
+    static constexpr double kTurn = 6.283185307179586;
     uint64_t state_;
 };
 

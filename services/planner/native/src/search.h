@@ -82,15 +82,26 @@ class Search {
         for (const Joints& goal : goals) {
             if (validator_.is_free_line(start.data(), goal.data(), stop_)) return {start, goal};
         }
+        return grown(start, goals, std::numeric_limits<double>::infinity(), std::numeric_limits<uint64_t>::max());
+    }
+
+    // As `find`, where none of the goals can be seen from the start: only configurations are drawn by which a path
+    // shorter than `longest` may lead (Gammell et al. 2014); none too once so many configurations have been checked.
+    std::vector<Joints> find_shorter(const Joints& start, const std::vector<Joints>& goals, double longest,
+                                     uint64_t most_checks) {
+        return grown(start, goals, longest, most_checks);
+    }
+
+  private:
+    std::vector<Joints> grown(const Joints& start, const std::vector<Joints>& goals, double longest,
+                              uint64_t most_checks) {
         SearchTree from_start(space_), from_goals(space_);
         from_start.add(start.data(), 0);
         for (const Joints& goal : goals) from_goals.add(goal.data(), from_goals.size());
         SearchTree *grows = &from_start, *meets = &from_goals;
         Joints sample(start.size());
-        for (iterations_ = 1; !stop_(); ++iterations_) {
-            for (size_t i = 0; i < sample.size(); ++i) {
-                sample[i] = space_.lower[i] + random_.share() * (space_.upper[i] - space_.lower[i]);
-            }
+        for (iterations_ = 1; !stop_() && validator_.checks() < most_checks; ++iterations_) {
+            if (!draw(start, goals, longest, sample)) break;
             const size_t before = grows->size();
             extend(*grows, grows->nearest(sample.data()), sample.data());
             if (grows->size() > before && connect(*grows, *meets)) {
@@ -102,7 +113,51 @@ class Search {
         return {};
     }
 
-  private:
+    // Somewhere between the bounds, by which a path shorter than `longest` may lead; false where so many draws have
+    // found nothing.
+    bool draw(const Joints& start, const std::vector<Joints>& goals, double longest, Joints& sample) {
+        if (std::isinf(longest)) {
+            for (size_t i = 0; i < sample.size(); ++i) {
+                sample[i] = space_.lower[i] + random_.share() * (space_.upper[i] - space_.lower[i]);
+            }
+            return true;
+        }
+        for (int tried = 0; tried < kMostDraws; ++tried) {
+            if (draw_around(start, goals[random_.below(goals.size())], longest, sample)) return true;
+        }
+        return false;
+    }
+
+    // Evenly in the ellipsoid around both of all that is no farther than `longest` from them together: a ball,
+    // stretched along the first axis and mirrored so that this lies between them. False where there is none, or beyond
+    // the bounds.
+    bool draw_around(const Joints& start, const Joints& goal, double longest, Joints& sample) {
+        const size_t dof = sample.size();
+        const double distance = space_.distance(start.data(), goal.data());
+        if (!(distance < longest) || distance < 1e-9) return false;
+        double length = 0.0, mirror[kMaxDof], along = 0.0, mirrored = 0.0;
+        for (size_t i = 0; i < dof; ++i) {
+            sample[i] = random_.normal();
+            length += sample[i] * sample[i];
+        }
+        const double radius = std::pow(random_.share(), 1.0 / static_cast<double>(dof)) / std::sqrt(length);
+        const double wide = 0.5 * std::sqrt(longest * longest - distance * distance);
+        for (size_t i = 0; i < dof; ++i) {
+            sample[i] *= radius * (i == 0 ? 0.5 * longest : wide);
+            mirror[i] = (i == 0 ? 1.0 : 0.0) - space_.weights[i] * (goal[i] - start[i]) / distance;
+            mirrored += mirror[i] * mirror[i];
+            along += mirror[i] * sample[i];
+        }
+        const double share = mirrored > 1e-12 ? 2.0 * along / mirrored : 0.0;
+        for (size_t i = 0; i < dof; ++i) {
+            sample[i] = 0.5 * (start[i] + goal[i]) + (sample[i] - share * mirror[i]) / space_.weights[i];
+            if (!(sample[i] >= space_.lower[i] && sample[i] <= space_.upper[i])) return false;
+        }
+        return true;
+    }
+
+    static constexpr int kMostDraws = 200;
+
     // One step of at most `range_` from a node towards `target`; true when it got there.
     bool extend(SearchTree& tree, size_t from, const double* target) {
         const double distance = space_.distance(tree.row(from), target);
