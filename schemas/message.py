@@ -38,7 +38,7 @@ M = TypeVar("M", bound=Message)
 
 
 def _require_finite(field: str, values: Sequence[object]) -> None:
-    if values and type(values[0]) is float and _has_finite_sum(values):
+    if values and type(values[0]) is float and has_finite_sum(values):
         return
     for index, value in enumerate(values):
         if type(value) is float:
@@ -48,7 +48,7 @@ def _require_finite(field: str, values: Sequence[object]) -> None:
             _require_finite(f"{field}[{index}]", value)
 
 
-def _has_finite_sum(values: Sequence[object]) -> bool:
+def has_finite_sum(values: Sequence[object]) -> bool:
     """True only for numbers of which each is finite: what is not stays in the sum. A quick answer for long vectors."""
     try:
         return math.isfinite(sum(values))  # type: ignore[arg-type]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from schemas.message import Message, Vector
+from schemas.message import Message, Vector, has_finite_sum
 
 
 class TrajectoryPoint(Message, frozen=True, kw_only=True):
@@ -18,6 +18,12 @@ class TrajectoryPoint(Message, frozen=True, kw_only=True):
     velocities: Vector = ()  # [rad/s] or [m/s]
     accelerations: Vector = ()  # [rad/s^2] or [m/s^2]
     time_from_start: float = 0.0  # [s]
+
+    def __post_init__(self) -> None:
+        """As of any message, by one look at all numbers together: a trajectory has hundreds of points."""
+        vectors = (*self.positions, *self.velocities, *self.accelerations, self.time_from_start)
+        if not has_finite_sum(vectors):
+            super().__post_init__()
 
 
 class JointTrajectory(Message, frozen=True, kw_only=True):

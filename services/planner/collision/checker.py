@@ -54,12 +54,20 @@ class CollisionChecker:
     def keeps(self, positions: Positions, margin: float) -> bool:
         """True if everything is farther than `margin` [m] in this configuration (n,)."""
         self.deadline.check()
-        return self._spheres.is_free(self.world, positions, margin) or self.world.distance(positions) > margin
+        if self._spheres.is_free(self.world, positions, margin):
+            return True
+        if self._spheres.touches(self.world, positions, margin):
+            return False
+        return self.world.distance(positions) > margin
 
     def distance(self, positions: Positions) -> float:
         """Distance [m] of the nearest pair, as `World.distance`."""
         self.deadline.check()
         return self.world.distance(positions)
+
+    def least_distance(self, positions: Positions) -> float:
+        """[m] that every pair is apart at least, by the spheres alone; 0 where they touch."""
+        return self._spheres.least_distance(self.world, positions)
 
     def touching(self, positions: Array, margin: float) -> Array | None:
         """A configuration (n,) on the polyline through `positions` (m, n) nearer than `margin` [m], or None."""

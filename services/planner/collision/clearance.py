@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,14 @@ class DistanceChecker(Protocol):
 
     def pairs_within(self, positions: Sequence[float] | Array, margin: float = 0.0) -> list[tuple[str, str]]:
         """Names of the pairs nearer than `margin` [m] at joint values (n,) [rad] or [m]."""
+
+
+@runtime_checkable
+class BoundingChecker(Protocol):
+    """One that also knows quickly what a distance is at least."""
+
+    def least_distance(self, positions: Sequence[float] | Array) -> float:
+        """[m] that every pair is apart at least, at joint values (n,) [rad] or [m]; 0 where that is not known."""
 
 
 class PathChecker(DistanceChecker, Protocol):
@@ -82,7 +90,9 @@ def _walk(checker: DistanceChecker, positions: Array, margin: float, deadline: D
     along, last = 0.0, positions[0]
     while not deadline.has_passed():
         configuration = _configuration_at(along, moved, positions)
-        clearance = checker.distance(configuration) - margin
+        clearance = _quick_distance(checker, configuration) - margin
+        if clearance <= least:
+            clearance = checker.distance(configuration) - margin
         if clearance <= 0.0:
             return last, configuration
         if along >= end:
@@ -90,6 +100,11 @@ def _walk(checker: DistanceChecker, positions: Array, margin: float, deadline: D
         last = configuration
         along = min(end, along + max(clearance, least))
     return last, None
+
+
+def _quick_distance(checker: DistanceChecker, configuration: Array) -> float:
+    """[m] that every pair is apart at least; 0 where that takes long to know."""
+    return checker.least_distance(configuration) if isinstance(checker, BoundingChecker) else 0.0
 
 
 def _movement(checker: DistanceChecker, positions: Array) -> Array:

@@ -50,6 +50,12 @@ class SphereCheck(Protocol):
     def is_free(self, world: World, positions: Positions, margin: float) -> bool:
         """True if the configuration (n,) [rad] or [m] surely keeps `margin` [m]."""
 
+    def touches(self, world: World, positions: Positions, margin: float) -> bool:
+        """True if the configuration (n,) [rad] or [m] surely does not keep `margin` [m]."""
+
+    def least_distance(self, world: World, positions: Positions) -> float:
+        """[m] that every pair is apart at least in this configuration (n,) [rad] or [m]; 0 where nothing is known."""
+
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
         """What is certain of the polyline through `rows` (m, n) [rad] or [m], m >= 2, with `margin` [m] to keep."""
 
@@ -73,6 +79,16 @@ class NativeCheck:
     def is_free(self, world: World, positions: Positions, margin: float) -> bool:
         """True if the spheres around the links keep the margin [m] in this configuration (n,)."""
         return bool(self.planner(world, margin).free(np.array([positions]))[0])
+
+    def touches(self, world: World, positions: Positions, margin: float) -> bool:
+        """True if the spheres are in something by more than they bulge, less the margin [m], in this configuration
+        (n,)."""
+        return self.planner(world, margin).touching(np.array([positions, positions])) is not None
+
+    def least_distance(self, world: World, positions: Positions) -> float:
+        """[m] between the spheres and what is nearest to them in this configuration (n,); 0 where they touch."""
+        planner = self._planner if self._shown is world else self.planner(world, world.clearance)
+        return planner.distance(positions)
 
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
         """The result of the spheres for the polyline through `rows` (m, n) [rad] or [m] with `margin` [m] to keep, and
@@ -102,6 +118,14 @@ class ExactShapesOnly:
     def is_free(self, world: World, positions: Positions, margin: float) -> bool:
         """False for every configuration (n,) [rad] or [m]: nothing is known."""
         return False
+
+    def touches(self, world: World, positions: Positions, margin: float) -> bool:
+        """False for every configuration (n,) [rad] or [m]: nothing is known."""
+        return False
+
+    def least_distance(self, world: World, positions: Positions) -> float:
+        """0 for every configuration (n,) [rad] or [m]: nothing is known."""
+        return 0.0
 
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
         """The whole polyline through `rows` (m, n) [rad] or [m], unresolved."""

@@ -36,13 +36,13 @@ class Centring:
         """True if the joints can move at `solution` (n,) [rad] or [m] without the tool leaving its target."""
         return len(self._free_motions(target, solution)) > 0
 
-    def centred(self, target: Target, solution: Array) -> Array:
+    def centred(self, target: Target, solution: Array) -> Array | None:
         """Joint values (n,) [rad] or [m] nearer to the middles of their ranges, reached from `solution` (n,) by
-        self-motion; `solution` itself where no self-motion brings them nearer."""
-        for _ in range(STEPS):
+        self-motion; `solution` itself where no self-motion brings them nearer, None where there is none."""
+        for step_number in range(STEPS):
             motions = self._free_motions(target, solution)
             if not len(motions):
-                break
+                return solution if step_number else None
             offset = (solution - self._middle) * self._weight
             amounts = np.linalg.lstsq((motions * self._weight).T, -offset, rcond=None)[0]
             step = amounts @ motions

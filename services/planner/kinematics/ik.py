@@ -85,8 +85,12 @@ class InverseKinematics:
     def _closed_form_solutions(self, target: Target, near: Array) -> Iterator[Array]:
         """The closed form's configurations, each refined until it meets the target; lazily, the nearest first."""
         configurations = self._closed_form_configurations(target, near)
-        for positions in sorted(configurations, key=lambda positions: self.travel(near, positions)):
-            attempt = self._descent.descend(target, positions)
+        if not configurations:
+            return
+        rows = np.array(configurations)
+        travels = np.abs(rows - near) / self._speed
+        for place in np.argsort(travels.max(axis=1), kind="stable").tolist():
+            attempt = self._descent.descend(target, rows[place])
             if attempt.is_solution:
                 yield attempt.positions
 
@@ -169,15 +173,17 @@ class InverseKinematics:
 
     def _collect(self, target: Target, positions: Array, found: list[Array], new: list[Array]) -> None:
         """Puts a solution that is none of those found into both lists; far from `near`, freedom goes to the middles."""
-        is_redundant = self._centring.is_redundant(target, positions)
-        if is_redundant:
-            positions = self._centring.centred(target, positions)
+        centred = self._centring.centred(target, positions)
+        is_redundant = centred is not None
+        positions = positions if centred is None else centred
         if self._is_new(positions, found, SAME_REDUNDANT if is_redundant else SAME):
             found.append(positions)
             new.append(positions)
 
     def _is_new(self, positions: Array, found: list[Array], same: float) -> bool:
-        return all(self.travel(positions, other) > same for other in found)
+        if not found:
+            return True
+        return bool((np.abs(np.array(found) - positions) / self._speed).max(axis=1).min() > same)
 
     def _attempts(self, target: Target, near: Array, deadline: Deadline) -> Iterator[Attempt]:
         """Descents from starts spread over the limits; the first few lie around `near`."""

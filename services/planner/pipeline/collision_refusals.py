@@ -113,7 +113,9 @@ class CollisionRefusals:
         for share in np.linspace(0.0, 1.0, LOOKS).tolist():
             if least <= 0.0 or deadline.has_passed():
                 return 0.0
-            least = min(least, self._checker.distance(rows[0] + share * (rows[1] - rows[0])))
+            configuration = rows[0] + share * (rows[1] - rows[0])
+            if self._checker.least_distance(configuration) < least:
+                least = min(least, self._checker.distance(configuration))
         return least
 
     def _smaller(self, distance: float, margin: float) -> str:
