@@ -161,7 +161,8 @@ class NativePlanner:
 
         The same seed gives the same path, unless `time_limit` [s] cuts the shortening off. Distances are counted in
         time at full speed. Until `enough` configurations have been checked, or the path is nearly as short as any can
-        be, other searches look for a shorter one. The interpreter's lock is released; `cancel` may be set from another thread.
+        be, other searches look for a shorter one. The interpreter's lock is released; `cancel` may be set from another
+        thread.
         """
         rows = self._rows(np.atleast_2d(np.asarray(goals, dtype=np.float64)))
         at = self._row(start)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from msgspec.structs import replace
@@ -33,15 +34,41 @@ FULL = 1.0 + 1e-3  # knots are rounded to 1/256 step, so a profile that touches 
 MOST_KNOTS = 30_000  # that are looked at at once
 SLOWEST = 0.01  # time scale below which slowing down is no remedy
 HALVINGS = 24
+SHARES = (np.arange(1, round(KNOT / SLOT) + 1) * SLOT / KNOT)[None, :, None]  # of the time between two knots
 
 
 @dataclass(frozen=True)
 class StepStream:
-    """What the device will make of a trajectory: rows are slots of 1 ms, columns joints."""
+    """What the device will make of a trajectory: rows are slots of 1 ms, columns joints.
 
-    steps: Counts  # (m + 1, n) executed at the slots' ends; the first row is the start
-    rates: Array  # (m, n) [steps/s] of the path
-    accelerations: Array  # (m, n) [steps/s^2]
+    Between two knots it is first + u (start + u (square + u cube)), u from 0 to 1, in 1/256 steps; each is (k, 1, n).
+    """
+
+    first: Array
+    start: Array
+    square: Array
+    cube: Array
+
+    @property
+    def steps(self) -> Counts:
+        """(m + 1, n) executed at the slots' ends; the first row is the start."""
+        path = self.first + SHARES * (self.start + SHARES * (self.square + SHARES * self.cube))
+        columns = path.shape[2]
+        rows = np.concatenate((self.first[:1].reshape(1, columns), path.reshape(-1, columns)))
+        return np.floor(rows / Q8 + 0.5).astype(np.int64)
+
+    @cached_property
+    def rates(self) -> Array:
+        """(m, n) [steps/s] of the path."""
+        speed = SHARES * (SHARES * (3.0 / (KNOT * Q8) * self.cube) + 2.0 / (KNOT * Q8) * self.square)
+        speed += self.start / (KNOT * Q8)
+        return np.asarray(speed.reshape(-1, speed.shape[2]))
+
+    @cached_property
+    def accelerations(self) -> Array:
+        """(m, n) [steps/s^2]."""
+        bend = (2 * self.square + SHARES * 6 * self.cube) / KNOT**2
+        return np.asarray(bend.reshape(-1, bend.shape[2]) / Q8)
 
 
 def step_stream(arm: Arm, trajectory: JointTrajectory, part: tuple[int, int] | None = None) -> StepStream:
@@ -58,16 +85,9 @@ def step_stream(arm: Arm, trajectory: JointTrajectory, part: tuple[int, int] | N
     slope = np.rint(samples.velocities * scale) * KNOT
     if end == last:
         slope[-1] = 0.0
-    u = (np.arange(1, round(KNOT / SLOT) + 1) * SLOT / KNOT)[None, :, None]
-    first, start, end = position[:-1, None], slope[:-1, None], slope[1:, None]
+    first, start, end_slope = position[:-1, None], slope[:-1, None], slope[1:, None]
     rise = position[1:, None] - first
-    square, cube = 3 * rise - 2 * start - end, start + end - 2 * rise
-    path = first + u * (start + u * (square + u * cube))
-    columns = position.shape[1]
-    speed = (start + u * (2 * square + u * 3 * cube)) / KNOT
-    bend = (2 * square + u * 6 * cube) / KNOT**2
-    made = np.floor(np.concatenate((position[:1], path.reshape(-1, columns))) / Q8 + 0.5).astype(np.int64)
-    return StepStream(made, speed.reshape(-1, columns) / Q8, bend.reshape(-1, columns) / Q8)
+    return StepStream(first, start, 3 * rise - 2 * start - end_slope, start + end_slope - 2 * rise)
 
 
 def margins(arm: Arm, stream: StepStream) -> tuple[StepMargin, ...]:
@@ -175,10 +195,10 @@ def _can(arm: Arm, trajectory: JointTrajectory) -> bool:
 
 
 def _margin(arm: Arm, joint: Joint, index: int, stream: StepStream) -> StepMargin:
-    rates, accelerations = np.abs(stream.rates[:, index]), stream.accelerations[:, index]
-    peak = float(rates.max())
+    rates = stream.rates[:, index]
+    peak = max(float(rates.max()), -float(rates.min()))
     limit, by = _rate_limit(arm, joint)
-    share, torque = peak / limit, _torque_share(joint, rates, accelerations, stream.rates[:, index])
+    share, torque = peak / limit, _torque_share(joint, index, stream)
     if torque > share:
         share, by = torque, "pull-out torque"
     return StepMargin(name=joint.name, peak_rate=peak, rate_limit=limit, share=share, limited_by=by)
@@ -194,7 +214,7 @@ def _rate_limit(arm: Arm, joint: Joint) -> tuple[float, str]:
     )
 
 
-def _torque_share(joint: Joint, rates: Array, accelerations: Array, signed: Array) -> float:
+def _torque_share(joint: Joint, index: int, stream: StepStream) -> float:
     """The largest share of the pull-out torque that inertia and friction ask for; 0 for a motor without a curve.
 
     T = J dw/dt + friction at the motor's shaft, w = 2 pi steps / pulses_per_turn (any text on stepper selection).
@@ -202,9 +222,10 @@ def _torque_share(joint: Joint, rates: Array, accelerations: Array, signed: Arra
     curve = joint.drive.motor.pull_out
     if curve is None:
         return 0.0
+    signed, accelerations = stream.rates[:, index], stream.accelerations[:, index]
     turn = math.tau / joint.drive.motor.pulses_per_turn
     needed = np.abs(curve.inertia * accelerations * turn + curve.friction * np.sign(signed))
-    available = np.interp(rates, curve.speed, curve.torque, right=0.0)
+    available = np.interp(np.abs(signed), curve.speed, curve.torque, right=0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = np.where(needed > 0.0, needed / available, 0.0)
     return float(min(shares.max(), 1e6))
