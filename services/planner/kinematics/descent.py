@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +18,12 @@ from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, Target
 
-if TYPE_CHECKING:
+try:
     from services.planner.native.tool_descent import NativeDescent
+except ImportError:  # not built for this interpreter, or hidden
+    IS_BUILT = False
+else:
+    IS_BUILT = True
 
 Array = NDArray[np.float64]
 Residual = Callable[[Array], tuple[Array, Array]]  # what is missing at a configuration, and how the joints change that
@@ -30,8 +33,6 @@ Test = Callable[[Array], bool]
 ITERATIONS = 40
 STALL = 1e-5  # share of the squared error by which an iteration must improve
 LARGEST_STEP = 0.8  # [rad] or [m] a joint may move in one iteration
-
-
 NOTHING = np.zeros(0)
 
 
@@ -52,7 +53,7 @@ class Descent:
         self._lower = np.array([joint.lower for joint in arm.joints])
         self._upper = np.array([joint.upper for joint in arm.joints])
         self._identity = np.eye(len(arm.joints))
-        self._native = native_descent(arm)
+        self._native = NativeDescent(arm) if IS_BUILT else None
 
     def clip(self, positions: Array) -> Array:
         """The nearest joint values (n,) [rad] or [m] within the limits."""
@@ -120,12 +121,3 @@ class Descent:
         if longest > LARGEST_STEP:
             step *= LARGEST_STEP / longest
         return self.clip(positions + step)
-
-
-def native_descent(arm: Arm) -> NativeDescent | None:
-    """The compiled descents of this arm; None where they are not built."""
-    try:
-        from services.planner.native.tool_descent import NativeDescent
-    except ImportError:
-        return None
-    return NativeDescent(arm)
