@@ -28,7 +28,7 @@ from services.collision_fitting.mesh_fit import LinkFit, fit_links
 from services.planner.collision.world import World
 from services.planner.core import Planner
 
-PROBLEMS, SEED = 12, 6
+PROBLEMS, SEED = 8, 6
 ALLOWED = 1.0  # [s] for a plan
 CLEAR = 0.012  # [m] that start and goal stand from everything, by the meshes themselves
 WIDTH, THICKNESS = 60.0, 16.0  # [mm] of a bracket
