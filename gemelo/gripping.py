@@ -75,9 +75,9 @@ class Gripping:
         result = self._carried_out(goal, on_progress, is_cancelled)
         held, released = "", ""
         if opens(gripper, before, position):
-            released = self._scene.edit(SceneRelease()).name
+            released = self._scene.edit(SceneRelease(opening=result.position)).name
         elif result.stalled or (not result.measured and position < gripper.open):
-            held = self._scene.edit(SceneGrip()).name
+            held = self._scene.edit(SceneGrip(opening=result.position)).name
         return Gripped(
             result.position, result.effort, result.reached_goal, result.stalled, result.measured, held, released
         )

@@ -115,10 +115,13 @@ class SceneGrip(Message, frozen=True, kw_only=True, tag="grip"):
     """Attach what stands between the gripper's jaws to the tool, if anything does; the answer names it."""
 
     look: bool = False  # only say what it is
+    opening: float | None = None  # [m] between the jaws now; None: as the gripper's state has it
 
 
 class SceneRelease(Message, frozen=True, kw_only=True, tag="release"):
     """Detach what `SceneGrip` has attached; it stays where it is now."""
+
+    opening: float | None = None  # [m] between the jaws now; None: as the gripper's state has it
 
 
 class SceneAllow(Message, frozen=True, kw_only=True, tag="allow"):

@@ -219,6 +219,10 @@ def test_the_planner_checks_the_jaws_at_their_opening_and_does_not_show_them_as_
         assert scene.message is not None
         assert scene.message.objects == (thing,)
         assert scene.message.version > version, "what was planned with closed jaws is of another scene"
+        assert edit(asker, SceneRelease(opening=0.0)).accepted
+        assert asker.call(STATE_VALIDITY, here, timeout=60.0).code is PlanCode.SUCCESS, "at once, before their state"
+        assert edit(asker, SceneRelease(opening=0.05)).accepted
+        assert asker.call(STATE_VALIDITY, here, timeout=60.0).code is not PlanCode.SUCCESS
         assert edit(asker, SceneAllow(pair=AllowedPair(first="thing", second=JAWS[0]))).accepted
         assert edit(asker, SceneAllow(pair=AllowedPair(first="thing", second=JAWS[1]))).accepted
         assert asker.call(STATE_VALIDITY, here, timeout=60.0).code is PlanCode.SUCCESS

@@ -12,7 +12,7 @@ from schemas.gripper import GripperState
 from schemas.joints import JointState
 from schemas.message import Vector
 from schemas.planning import PlanCode, PlanResponse
-from schemas.scene import Contacts, PlanningScene, SceneRequest, SceneResponse
+from schemas.scene import Contacts, PlanningScene, SceneGrip, SceneRelease, SceneRequest, SceneResponse
 from schemas.topics import CONTACTS, GRIPPER_STATE, SCENE, SCENE_EDIT
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
@@ -82,9 +82,10 @@ class SceneKeeper:
         self._show()
 
     def _edit(self, request: SceneRequest) -> SceneResponse:
-        before = self._store.scene
+        before, apart = self._store.scene, self._apart
+        self._take_opening(request)
         response = self._store.edit(request, self._links, self._node.now())
-        if self._store.scene is before:
+        if self._store.scene is before and self._apart == apart:
             return response
         try:
             world = self._built(self._store.scene)
@@ -95,6 +96,13 @@ class SceneKeeper:
         self._show()
         self._tell_what_touches_here()
         return msgspec.structs.replace(response, reason=self._save(self._store.scene))
+
+    def _take_opening(self, request: SceneRequest) -> None:
+        """Who grips says how far the jaws are apart: what is planned next must not wait for their next state."""
+        edit = request.edit
+        if isinstance(edit, SceneGrip | SceneRelease) and edit.opening is not None and self._apart is not None:
+            said = GripperState(known=True, position=edit.opening)
+            self._apart = jaws_apart(self._arm, said)
 
     def _tell_what_touches_here(self) -> None:
         """After an edit: what touches where the arm stands; what a refused plan has shown was of another scene."""
