@@ -85,7 +85,8 @@ def test_the_part_stands_where_it_was_to_go_and_no_step_is_lost(operator: Operat
     assert not jumps(operator.arm, operator.seen)
 
     assert operator.wait_for(lambda: is_as_found(scenes[-1]), 3.0)
-    first, carried, last = (parts(scenes)[index] for index in (0, -2, -1))
+    first, last = parts(scenes)[0], parts(scenes)[-1]
+    carried = next(item for item in reversed(parts(scenes)) if item.attached)
     assert (first.attached, carried.attached, last.attached) == (False, True, False)
     assert (first.gripped, carried.gripped, last.gripped) == (False, True, False)
     assert carried.frame == operator.arm.tool_frame

@@ -28,6 +28,7 @@ from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.runtime.topics import Latest
 
+SETTLING = 0.003  # [m] chosen: by less the jaws settle, and plans stay those of the present scene
 OnWorld = Callable[[World], None]
 
 
@@ -75,11 +76,13 @@ class SceneKeeper:
         apart = jaws_apart(self._arm, state)
         if apart == self._apart:
             return
-        has_opened, self._apart = self._apart is not None and apart > self._apart, apart
+        has_opened, self._apart = self._apart is not None and apart > self._apart + SETTLING, apart
         if has_opened:
             self._store.touch(self._node.now())
         self.world = self._built(self._store.scene)
-        self._show()
+        self._on_world(self._built(self._store.scene))
+        if has_opened:
+            self._scene.put(self._store.scene)
 
     def _edit(self, request: SceneRequest) -> SceneResponse:
         before, apart = self._store.scene, self._apart
