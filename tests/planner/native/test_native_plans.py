@@ -9,6 +9,11 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
+from services.arm.kinematics.kinematics import Kinematics
+from services.bench.scenes import SCENES
+from services.planner.collision.clearance import CLEARANCE
+from services.planner.collision.sphere_check import NativeCheck
+from services.planner.collision.world import World
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 from services.planner.native.binding import CancelFlag
 from services.planner.native.native_planner import NativePlanner
@@ -85,6 +90,40 @@ def test_the_same_seed_gives_the_same_path_and_another_seed_another(core, config
     assert np.array_equal(once.control, again.control)
     assert once.effort.checks == again.effort.checks
     assert not np.array_equal(once.control, other.control)
+
+
+def test_more_searches_make_no_path_longer_and_all_are_free(arm, core, configurations):
+    core.set_scene(SHELF)
+    rows = configurations(400, 5)
+    rows = rows[core.free(rows)]
+    speeds = np.array([joint.velocity for joint in arm.joints])
+    once, more = [], []
+    for seed, (start, goal) in enumerate(zip(rows[0:40:2], rows[1:41:2], strict=True)):
+        single, several = (core.plan(start, goal, seed=seed, time_limit=20.0, enough=enough) for enough in (0, 20_000))
+        if isinstance(single, NoPath):
+            continue
+        assert isinstance(several, FreePath)
+        assert core.path_free(several.corners)
+        assert core.spline_free(several.control)
+        assert np.array_equal(several.corners[[0, -1]], [start, goal])
+        for found, path in ((once, single), (more, several)):
+            found.append(float(np.linalg.norm(np.diff(path.corners, axis=0) / speeds, axis=1).sum()))
+    assert len(once) >= 10
+    assert (np.array(more) <= np.array(once) + 1e-9).all()
+    assert sum(more) < sum(once)
+
+
+def test_what_the_spheres_say_of_a_configuration_for_certain_is_so_on_the_exact_shapes(arm, configurations):
+    world = World(arm, Kinematics(arm), SCENES["shelf"])
+    check = NativeCheck(arm)
+    touching = 0
+    for row in configurations(150, 6):
+        distance = world.distance(row)
+        assert check.least_distance(world, row) <= max(distance, 0.0) + UNSURE
+        if check.touches(world, row, CLEARANCE):
+            touching += 1
+            assert distance < CLEARANCE
+    assert touching > 10
 
 
 def _bent(core: NativePlanner, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
