@@ -69,7 +69,9 @@ def fit_links(
         place = f'link "{name}" ({number} of {len(drawn)}), {len(mesh.faces)} triangles'
         p95, worst = 1000.0 * fits[-1].excess.p95, 1000.0 * fits[-1].excess.worst
         reach = f"95 % of their surface within {p95:.1f} mm, the worst place {worst:.1f} mm beyond"
-        tell(f"{place}: {len(fits[-1].shapes)} shapes after {time.monotonic() - began:.1f} s, {reach}")
+        count = len(fits[-1].shapes)
+        shapes = "1 shape" if count == 1 else f"{count} shapes"
+        tell(f"{place}: {shapes} after {time.monotonic() - began:.1f} s, {reach}")
     return fits
 
 
