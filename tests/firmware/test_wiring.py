@@ -60,7 +60,7 @@ def test_every_fault_has_a_row_with_its_remedy(fault: int) -> None:
 def test_every_reset_cause_of_the_board_has_a_row() -> None:
     source = (ROOT / "firmware/platform/esp32/main/reset_cause.cpp").read_text()
     causes = set(re.findall(r'return \{"(\w+)"', source)) - {"unknown"}
-    assert len(causes) == 8
+    assert len(causes) == 7
     for cause in causes:
         assert f"`{cause}`" in README, cause
 

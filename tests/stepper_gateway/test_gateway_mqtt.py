@@ -204,8 +204,8 @@ def test_a_retained_configuration_of_another_robot_is_replaced_and_nothing_moves
         assert gateway.run(
             5.0, lambda: [e.event for e in gateway.published["device/events"] if e.event in taken] == taken
         )
+        assert gateway.run(5.0, lambda: said(gateway).config_crc32 == config_crc(config_text(wanted)))
         assert gateway.run(5.0, lambda: gateway.published["device/configuration"][-1].accepted)
-        assert said(gateway).config_crc32 == config_crc(config_text(wanted))
         for kind in (ArmCommand(), ReferenceCommand()):
             gateway.run(0.4)
             assert gateway.answer(kind, seconds=8.0).accepted
