@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from threading import Event
@@ -63,6 +64,7 @@ class Execution:
         self._queue: deque[Leg] = deque()
         self._next: Prepared | None = None
         self._motion: Motion | None = None
+        self.is_starting = False  # True while a motion is handed over: the arm may move, and `is_moving` not know it
         self.leg: Leg | None = None  # that is carried out, or was the last
         self._done = self._planned = 0
 
@@ -137,6 +139,7 @@ class Execution:
         prepared, self._next = self._next, None
         if prepared is None or prepared.leg is not leg:
             prepared = Prepared(leg)
+        self.is_starting = prepared.motion is not None
         motion = prepared.motion or self._start(leg, prepared.plan)
         try:
             self._follow(motion)
@@ -151,6 +154,10 @@ class Execution:
         self._motion = motion
         if self._controls.stop.is_set():
             motion.cancel()  # asked for while it was being started
+        elif self._controls.holds:  # so was this
+            with suppress(Refused):  # it has ended already
+                self._arm.hold()
+        self.is_starting = False
         self._prepare_handover(motion)
         motion.wait()
 
@@ -181,10 +188,18 @@ class Execution:
         """Along the plan if that still leads from here, else along a new one."""
         if plan is not None:
             try:
-                return self._arm.start(plan)
+                return self._begin(plan)
             except Refused:
                 pass  # moved by hand meanwhile, or the scene is another
-        return self._arm.start(self._plan(leg, None))
+        return self._begin(self._plan(leg, None))
+
+    def _begin(self, plan: Plan) -> Motion:
+        self.is_starting = True
+        try:
+            return self._arm.start(plan)
+        except BaseException:
+            self.is_starting = False
+            raise
 
     def _prepare_next(self, motion: Motion) -> Prepared | None:
         """Plans the next motion from the end of this one; returns it where it follows at once."""

@@ -118,14 +118,16 @@ class ProgramRun:
         with self._lock:
             self._require(RunStatus.RUNNING)
             execution = self._execution
-            if execution is None or not execution.is_moving:
+            if execution is None or not (execution.is_moving or execution.is_starting):
                 return self.pause()
+            was_starting = execution.is_starting
             self._controls.holds = True
             try:
                 self._arm.hold()
-            except BaseException:
-                self._controls.holds = False
-                raise
+            except BaseException as error:
+                if not (was_starting and isinstance(error, Refused)):  # else the motion is held as soon as it is known
+                    self._controls.holds = False
+                    raise
             self._put(replace(self._state, status=RunStatus.PAUSED, message="held on its path"))
 
     def resume(self) -> None:

@@ -28,7 +28,8 @@ def test_any_yaml_reader_gets_back_what_was_echoed(value):
 
 def test_a_message_is_echoed_field_by_field():
     message = JointState(stamp=5, name=("brazo_joint", "q"), position=(0.5, -1e-7))
-    assert dump(message) == ("stamp: 5\nname: [brazo_joint, q]\nposition: [0.5, -1.0e-07]\nvelocity: []\neffort: []\n")
+    assert dump(message) == ("stamp: 5\nname: [brazo_joint, q]\nposition: [0.5, -1.0e-07]\nvelocity: []\neffort: []\n"
+                             "commanded: false\n")  # fmt: skip
 
 
 def test_an_enum_is_a_number_with_its_name_beside_it():

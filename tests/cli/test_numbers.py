@@ -224,7 +224,7 @@ def test_no_option_with_a_unit_is_missing_from_this_table():
 
 
 def test_no_option_but_these_takes_a_bare_number():
-    """Counts, rates, seeds and directions have no unit; `--scale` is metres for each unit of a file."""
+    """Counts, rates, efforts, seeds and directions have no unit; `--scale` is metres for each unit of a file."""
     bare = set()
     for command in COMMANDS:
         parser = Parser(add_help=False)
@@ -236,5 +236,6 @@ def test_no_option_but_these_takes_a_bare_number():
         }
     assert bare == {
         "move --quat", "move --axis", "move --along", "move --free-axis", "move --seed", "ik --quaternion",
-        "ik --axis", "ik --along", "ik --free-axis", "topic pub --rate", "scene add --scale", "scene resize --scale",
+        "ik --axis", "ik --along", "ik --free-axis", "topic pub --rate", "tf echo --rate", "link bench --rate",
+        "grip --max-effort", "scene add --scale", "scene resize --scale",
     }  # fmt: skip

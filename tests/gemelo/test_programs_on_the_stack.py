@@ -10,10 +10,12 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections import UserDict
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -40,7 +42,7 @@ from gemelo.programs import (
     export_script,
 )
 from gemelo.programs.steps import AnyStep
-from schemas.device import DeviceState
+from schemas.device import DeviceMode, DeviceState
 from services.stack.stack import Stack
 from tests.gemelo.conftest import make_ready
 from tests.gemelo.test_docstrings import OPTIONS
@@ -197,6 +199,28 @@ def test_it_pauses_between_steps_goes_step_by_step_and_holds_on_its_path(cell: C
     run.resume()
     assert run.wait(LONGEST).status is RunStatus.DONE
     assert run.state.done == 6
+
+
+def test_a_hold_while_a_motion_is_just_being_started_holds_it(cell: Cell, monkeypatch: pytest.MonkeyPatch) -> None:
+    start, is_started, is_held = cell.arm.start, threading.Event(), threading.Event()
+
+    def start_slowly(plan: gemelo.Plan, **options: Any) -> gemelo.Motion:
+        motion = start(plan, **options)
+        is_started.set()
+        is_held.wait(LONGEST)
+        return motion
+
+    monkeypatch.setattr(cell.arm, "start", start_slowly)
+    run = cell.run(*SHUTTLE)
+    run.start()
+    assert is_started.wait(LONGEST)
+    run.hold()
+    is_held.set()
+    assert run.state.status is RunStatus.PAUSED
+    assert cell.arm.wait_for(lambda: cell.arm.device.state.mode is DeviceMode.HOLD, LONGEST)
+    assert rests(cell.arm, 0.3)
+    run.resume()
+    assert run.wait(LONGEST).status is RunStatus.DONE
 
 
 def test_a_stop_decelerates_and_nothing_begins_again_by_itself(cell: Cell) -> None:
