@@ -107,7 +107,7 @@ def test_a_sigterm_ends_it_at_once_with_zero_and_takes_its_readiness_back(broker
     started = time.monotonic()
     output = broker.stop()
     assert broker.popen.returncode == 0, output
-    assert time.monotonic() - started < 3.0
+    assert time.monotonic() - started < 6.0
     wait_until(lambda: not broker.ready.exists(), 2.0)
     assert not broker.ready.exists()
 

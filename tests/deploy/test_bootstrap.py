@@ -22,7 +22,7 @@ def test_everything_is_done_once(machine):
     started = time.monotonic()
     second = machine.bootstrap()
     assert (second.returncode, second.stdout, second.stderr) == (0, "", "")
-    assert time.monotonic() - started < 0.5
+    assert time.monotonic() - started < 5.0
 
 
 def test_only_what_changed_is_done_again(machine):

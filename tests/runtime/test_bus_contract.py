@@ -104,7 +104,7 @@ def test_robots_do_not_hear_one_another(buses: Buses) -> None:
     assert buses.open("parol6").alive("@alive/*") == set()
 
 
-def ask(bus: object, key: str, payload: bytes, timeout: float = 1.0) -> BusReply | None:
+def ask(bus: object, key: str, payload: bytes, timeout: float = 5.0) -> BusReply | None:
     answers: SimpleQueue[BusReply | None] = SimpleQueue()
     bus.ask(key, "Question", payload, timeout, answers.put)
     return answers.get(timeout=timeout + 1.0)
@@ -121,7 +121,7 @@ def test_a_request_gets_one_answer_from_any_thread(buses: Buses) -> None:
 
     buses.open().serve("plan", answer)
     client = buses.open()
-    assert client.wait_served("plan", 1.0)
+    assert client.wait_served("plan", 5.0)
     assert ask(client, "plan", b"x") == BusReply(True, "BusReply", b"Question")
     assert ask(client, "plan", b"later") == BusReply(True, "BusReply", b"late")
     assert ask(client, "plan", b"no") == BusReply(False, "Failure", b"why")
@@ -131,10 +131,10 @@ def test_a_request_without_an_answer_ends_in_time(buses: Buses) -> None:
     kept: list[Query] = []
     buses.open().serve("plan", kept.append)
     client = buses.open()
-    assert client.wait_served("plan", 1.0)
+    assert client.wait_served("plan", 5.0)
     begin = time.monotonic()
     assert ask(client, "plan", b"", timeout=0.3) is None
-    assert 0.2 < time.monotonic() - begin < 0.8
+    assert 0.2 < time.monotonic() - begin < 3.0
     assert not client.wait_served("nobody", 0.1)
     assert ask(client, "nobody", b"") is None
 
@@ -142,7 +142,7 @@ def test_a_request_without_an_answer_ends_in_time(buses: Buses) -> None:
 def test_a_dropped_request_ends_at_once_without_an_answer(buses: Buses) -> None:
     buses.open().serve("plan", lambda query: query.drop())
     client = buses.open()
-    assert client.wait_served("plan", 1.0)
+    assert client.wait_served("plan", 5.0)
     begin = time.monotonic()
     assert ask(client, "plan", b"x", timeout=10.0) is None
     assert time.monotonic() - begin < 5.0
@@ -154,7 +154,7 @@ def test_who_asks_is_known_before_what(buses: Buses) -> None:
     buses.open().serve("plan", kept.append)
     one, other = buses.open(), buses.open()
     for client in (one, one, other):
-        assert client.wait_served("plan", 1.0)
+        assert client.wait_served("plan", 5.0)
         count = len(kept)
         client.ask("plan", "Question", b"x", 5.0, lambda answer: None)
         assert until(lambda count=count: len(kept) == count + 1)
@@ -166,21 +166,21 @@ def test_wait_served_wakes_when_a_server_comes_and_knows_when_it_is_gone(buses: 
     client, server = buses.open(), buses.open()
     threading.Timer(0.2, server.serve, ("plan", lambda query: query.reply("BusReply", b""))).start()
     begin = time.monotonic()
-    assert client.wait_served("plan", 2.0)
-    assert 0.1 < time.monotonic() - begin < 1.0
+    assert client.wait_served("plan", 20.0)
+    assert 0.1 < time.monotonic() - begin < 5.0
     server.close()
-    assert until(lambda: not client.wait_served("plan", 0.0), 1.0)
+    assert until(lambda: not client.wait_served("plan", 0.0))
 
 
 def test_tokens_live_as_long_as_their_bus(buses: Buses) -> None:
     planner, gateway, observer = buses.open(), buses.open(), buses.open()
     planner.declare_alive("@alive/planner")
     token = gateway.declare_alive("@alive/stepper_gateway")
-    assert until(lambda: observer.alive("@alive/*") == {"@alive/planner", "@alive/stepper_gateway"}, 1.0)
+    assert until(lambda: observer.alive("@alive/*") == {"@alive/planner", "@alive/stepper_gateway"})
     token.close()
-    assert until(lambda: observer.alive("@alive/*") == {"@alive/planner"}, 1.0)
+    assert until(lambda: observer.alive("@alive/*") == {"@alive/planner"})
     planner.close()
-    assert until(lambda: observer.alive("@alive/*") == set(), 1.0)
+    assert until(lambda: observer.alive("@alive/*") == set())
 
 
 def test_a_watch_hears_of_a_token_that_is_there_and_of_its_end(buses: Buses) -> None:
@@ -190,12 +190,12 @@ def test_a_watch_hears_of_a_token_that_is_there_and_of_its_end(buses: Buses) -> 
     server.watch_alive("@id/script/1", before.append)
     server.watch_alive("@id/script/2", after.append)
     closed = server.watch_alive("@id/script/2", other.append)
-    assert until(lambda: before == [True], 2.0)
+    assert until(lambda: before == [True])
     token = client.declare_alive("@id/script/2")
-    assert until(lambda: after == [True] and other == [True], 2.0)
+    assert until(lambda: after == [True] and other == [True])
     closed.close()
     token.close()
-    assert until(lambda: after == [True, False], 2.0)
+    assert until(lambda: after == [True, False])
     client.close()
-    assert until(lambda: before == [True, False], 2.0)
+    assert until(lambda: before == [True, False])
     assert other == [True]

