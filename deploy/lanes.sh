@@ -13,11 +13,12 @@ trap 'end_lanes 129' HUP
 
 # Tells how the lanes get on until all have ended; fails with what the failed steps have to say.
 await_lanes() {
-    local left=${#lanes[@]} last=$SECONDS failed='' word name rest pid
+    local left=${#lanes[@]} last=$SECONDS failed='' words='' piece word name rest pid
     while [ "$left" -gt 0 ]; do
-        if read -r -t 1 -u "$told" word name rest; then
+        if IFS= read -r -t 1 -u "$told" piece; then
+            read -r word name rest <<<"$words$piece" && words=''
             hear "$word" "$name" "$rest"
-        elif [ -z "$(jobs -rp)" ]; then
+        elif words+=$piece && [ -z "$(jobs -rp)" ]; then # the time may be over in the middle of a line
             break # one was killed before it could say that it ends
         fi
         [ $((SECONDS - last)) -lt "$beat" ] || { status && last=$SECONDS; }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import time
 
 import pytest
@@ -125,3 +126,22 @@ def test_words_that_two_steps_have_in_common_are_said_once(machine):
     assert "the firmware core for Python (firmware/bindings): FAILED" in failed.stdout
     assert "the motion core of the planner (services/planner/native): FAILED" in failed.stdout
     assert failed.stderr.count("there is no C++ compiler") == 1
+
+
+def test_a_word_that_comes_in_two_pieces_is_one(pytestconfig):
+    """On a busy machine the look that ends each second may fall into the middle of a line."""
+    script = """
+        set -euo pipefail
+        bold='' plain='' red='' logs=$(mktemp -d) say=''
+        say() { printf '%s\\n' "$1"; }
+        source deploy/lanes.sh
+        exec {told}< <(printf 'begin core the fir'; sleep 1.5; printf 'mware core\\ndo'; sleep 1.5
+                       printf 'ne core 7\\nend \\n'; sleep 0.5)
+        sleep 4 & lanes=($!)
+        await_lanes
+    """
+    done = subprocess.run(
+        ["bash", "-c", script], cwd=pytestconfig.rootpath, capture_output=True, text=True, timeout=30.0
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines() == ["==> the firmware core", "    the firmware core: done in 7 s"]
