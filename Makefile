@@ -22,9 +22,9 @@ down: ## stop a twin that runs elsewhere
 
 test: setup ## all tests: Python, firmware, whole stack
 	@deploy/test_firmware
-	@$(bin)/pytest -rfE -n auto --maxprocesses 4 --dist worksteal $(side_by_side)
-	@$(bin)/pytest -rfE -n auto --maxprocesses 4 --dist loadfile $(file_by_file)
-	@$(bin)/pytest -rfE $(one_by_one)
+	@deploy/run_tests worksteal $(side_by_side)
+	@deploy/run_tests loadfile $(file_by_file)
+	@deploy/run_tests no $(one_by_one)
 	@deploy/optional
 
 check: setup ## ruff, mypy, import-linter, clang-format

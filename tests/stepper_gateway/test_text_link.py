@@ -51,7 +51,7 @@ def wired(board: PtyBoard, baud: int = 115_200) -> Iterator[tuple[WiredGateway, 
 
 
 def reference(gateway: WiredGateway) -> None:
-    gateway.run(1.0, lambda: not gateway.core.device.unreachable_reason(gateway.moment))
+    assert gateway.run(10.0, lambda: not gateway.core.device.unreachable_reason(gateway.moment))
     gateway.command(DeviceCommandKind.REFERENCE)
     gateway.ready()
 
