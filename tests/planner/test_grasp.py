@@ -186,6 +186,8 @@ def test_the_jaws_are_taken_to_be_open_where_that_is_not_known_and_on_their_way(
     assert jaws_apart(arm, GripperState(known=True, position=0.01, target=0.03)) == 0.01
     assert jaws_apart(arm, GripperState(known=True, position=0.01, target=0.03, moving=True)) == 0.03
     assert jaws_apart(arm, GripperState(known=True, position=-0.001)) == 0.0
+    assert jaws_apart(arm, GripperState(known=True, position=1e308)) == 0.05
+    assert jaws_apart(arm, GripperState(known=True, position=-1e308)) == 0.0
     assert jaw_objects(replace(arm, gripper=None), 0.05) == ()
 
 

@@ -124,7 +124,8 @@ def jaws_apart(arm: Arm, state: GripperState | None) -> float:
     if state is None or not state.known:
         return arm.gripper.open
     widest = max(state.position, state.target) if state.moving else state.position
-    return min(max(round(widest / APART) * APART, arm.gripper.closed), arm.gripper.open)
+    within = min(max(widest, arm.gripper.closed), arm.gripper.open)  # a foreign word of 1e308 m cannot be rounded
+    return min(max(round(within / APART) * APART, arm.gripper.closed), arm.gripper.open)
 
 
 def gripper_unit(arm: Arm) -> str:
