@@ -29,7 +29,8 @@ class AustinStepper:
         self._acceleration = acceleration
         self._shortest = 1.0 / speed
         self._first = FIRST * math.sqrt(2.0 / acceleration)
-        self._interval = self._last = 0.0
+        self._interval = 0.0
+        self._last = -math.inf  # the last step, or the power-on: both were long ago when the first message comes
         self._count = 0  # of the ramp: negative while it slows down
         self._direction = 1
         self._wait = 0.0  # the present step interval; 0: stands
