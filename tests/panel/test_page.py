@@ -223,6 +223,25 @@ def test_a_planner_that_is_killed_is_named_and_planning_goes_on_when_it_is_back(
     arrives(arm, ARM, 20.0)
 
 
+def test_the_gripper_opens_closes_and_goes_where_its_slider_stands(person: Person, arm: gemelo.Arm) -> None:
+    gripper = arm.description.gripper
+    assert gripper is not None
+    person.tab("Device")
+    for name, opening in (("Close", gripper.closed), ("Open", gripper.open)):
+        person.press(name)
+        until(lambda: _jaws(arm), lambda at, wanted=opening: abs(at - wanted) < 1e-3)
+    person.types("Opening [mm]", 20)
+    assert _jaws(arm) > 0.03  # the slider alone moves nothing
+    person.press("Go to this opening")
+    until(lambda: _jaws(arm), lambda at: abs(at - 0.02) < 1e-3)
+    person.reads("20.0 mm")
+
+
+def _jaws(arm: gemelo.Arm) -> float:
+    """[m] between them, as their sensor reads it."""
+    return arm.gripper.position
+
+
 def test_absurd_names_numbers_and_files_are_refused_in_a_sentence(
     person: Person, arm: gemelo.Arm, tmp_path: Path
 ) -> None:
