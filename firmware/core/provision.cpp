@@ -23,6 +23,8 @@ constexpr Field kFields[] = {
     text("mqtt_user", offsetof(Credentials, mqtt_user), sizeof Credentials::mqtt_user),
     text("mqtt_password", offsetof(Credentials, mqtt_password), sizeof Credentials::mqtt_password),
     text("mqtt_ca", offsetof(Credentials, mqtt_ca), sizeof Credentials::mqtt_ca),
+    text("mqtt_certificate", offsetof(Credentials, mqtt_certificate), sizeof Credentials::mqtt_certificate),
+    text("mqtt_key", offsetof(Credentials, mqtt_key), sizeof Credentials::mqtt_key),
     text("serial_baud", offsetof(Credentials, serial_baud), sizeof Credentials::serial_baud),
     Field{"factory_reset", Kind::Truth, false, offsetof(Credentials, is_factory_reset)},
 };
@@ -44,6 +46,8 @@ const char* find_fault(const Credentials& credentials) {
         return "\"mqtt_uri\" does not begin with mqtt:// or mqtts://";
     if (credentials.serial_baud[0] != 0 && read_baud(credentials.serial_baud) == 0)
         return "\"serial_baud\" is not a number of 9600 to 3000000";
+    if ((credentials.mqtt_certificate[0] != 0) != (credentials.mqtt_key[0] != 0))
+        return "\"mqtt_certificate\" and \"mqtt_key\" belong together: give both, or both empty";
     const bool has_password = credentials.wifi_password[0] != 0;
     if (has_password && memchr(credentials.wifi_password, 0, kLeastWifiPassword) != nullptr)
         return "\"wifi_password\" is shorter than the 8 bytes of WPA2";

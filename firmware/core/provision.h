@@ -16,9 +16,11 @@ struct Credentials {
     char mqtt_uri[128] = "";
     char mqtt_user[64] = "";
     char mqtt_password[64] = "";
-    char mqtt_ca[2049] = "";        // PEM
-    char serial_baud[8] = "";       // of the serial line; empty: 921600
-    bool is_factory_reset = false;  // asked for; nothing to be kept
+    char mqtt_ca[2049] = "";           // PEM
+    char mqtt_certificate[2049] = "";  // PEM, the device's own, by which a broker knows it
+    char mqtt_key[2049] = "";          // PEM, of that certificate
+    char serial_baud[8] = "";          // of the serial line; empty: 921600
+    bool is_factory_reset = false;     // asked for; nothing to be kept
 };
 
 // Puts what is said into `credentials`; what is not said stays. False with a refusal that holds nothing of what was

@@ -49,8 +49,21 @@ TEST(Provision, EveryKeyArrivesAndWhatIsMissingStays) {
 }
 
 TEST(Provision, EveryBoundHoldsToTheByteAndIsNamed) {
-    const std::pair<const char*, size_t> bounds[] = {{"device", 31},    {"wifi_ssid", 32},     {"wifi_password", 63},
-                                                     {"mqtt_user", 63}, {"mqtt_password", 63}, {"mqtt_ca", 2048}};
+    const std::pair<const char*, size_t> bounds[] = {{"device", 31},     {"wifi_ssid", 32},     {"wifi_password", 63},
+                                                     {"mqtt_user", 63},  {"mqtt_password", 63}, {"mqtt_ca", 2048},
+                                                     {"update_key", 256}};
+    const std::pair<const char*, const char*> pairs[] = {{"mqtt_certificate", "mqtt_key"},
+                                                         {"mqtt_key", "mqtt_certificate"}};
+    for (const auto& [key, other] : pairs) {
+        const auto both = [&](size_t size) {
+            return "{\"" + std::string(other) + "\":\"x\",\"" + key + "\":\"" + std::string(size, 'a') + "\"}";
+        };
+        Credentials credentials;
+        EXPECT_TRUE(parse(both(2048), &credentials)) << key;
+        EXPECT_EQ(reason_of(both(2049)), "\"" + std::string(key) + "\" is longer than 2048 bytes");
+        EXPECT_EQ(reason_of(member(key, "x")),
+                  "\"mqtt_certificate\" and \"mqtt_key\" belong together: give both, or both empty");
+    }
     for (const auto& [key, most] : bounds) {
         Credentials credentials;
         EXPECT_TRUE(parse(member(key, std::string(most, 'a')), &credentials)) << key;

@@ -10,11 +10,14 @@ from pathlib import Path
 import msgspec
 
 from services.cli.errors import usage
+from services.mqtt.access import AccessError, require_private
 
 WIFI_PASSWORD, MQTT_PASSWORD = "GEMELO_WIFI_PASSWORD", "GEMELO_MQTT_PASSWORD"
 MQTT_DEVICE_PASSWORD = "GEMELO_MQTT_DEVICE_PASSWORD"  # wins over the other, which is the gateway's too
 LONGEST_SSID = 32  # [bytes] IEEE 802.11
 BAUD = (9_600, 3_000_000)  # the firmware's bounds
+HIDDEN = ("wifi_password", "mqtt_password", "mqtt_ca", "mqtt_certificate", "mqtt_key")
+LONGEST_PEM = 2048  # [bytes] that a board keeps of one
 WPA = (8, 63)  # [characters] of a passphrase
 
 
@@ -28,6 +31,8 @@ class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     mqtt_user: str | None = None
     mqtt_password: str | None = None
     mqtt_ca: str | None = None  # PEM
+    mqtt_certificate: str | None = None  # PEM, of the device itself
+    mqtt_key: str | None = None  # PEM, of that certificate
     serial_baud: str | None = None  # of its serial line, a decimal number
     factory_reset: bool = False
 
@@ -39,7 +44,7 @@ class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
         """The given fields as a line, without a password."""
         said = [f"{name} {value}" for name in ("device", "wifi_ssid", "mqtt_uri", "mqtt_user", "serial_baud")
                 if (value := getattr(self, name)) is not None]  # fmt: skip
-        hidden = [name for name in ("wifi_password", "mqtt_password", "mqtt_ca") if getattr(self, name) is not None]
+        hidden = [name for name in HIDDEN if getattr(self, name) is not None]
         return ", ".join([*said, *(f"{name} given" for name in hidden)])
 
 
@@ -54,6 +59,8 @@ def require_sound(credentials: Credentials) -> Credentials:
         raise usage(f'--mqtt-uri "{uri}" is written as mqtt://host:1883, or mqtts://host:8883 with TLS')
     if credentials.serial_baud is not None and not BAUD[0] <= int(credentials.serial_baud) <= BAUD[1]:
         raise usage(f"--serial-baud {credentials.serial_baud} is not within {BAUD[0]} to {BAUD[1]}")
+    if (credentials.mqtt_certificate is None) != (credentials.mqtt_key is None):
+        raise usage("--mqtt-cert and --mqtt-key belong together: a certificate is worth nothing without its key")
     if credentials == Credentials():
         raise usage("nothing to tell the device: give --device, --wifi-ssid, --mqtt-uri, ... or --factory-reset")
     return credentials
@@ -75,14 +82,32 @@ def password(what: str, variable: str, environ: Mapping[str, str], *more: str) -
     return line.rstrip("\r\n")
 
 
-def certificate(path: Path | None) -> str | None:
+def certificate(path: Path | None, option: str = "--mqtt-ca") -> str | None:
     """The text of a PEM file; raises `CommandError` if it cannot be read or holds no certificate."""
+    return None if path is None else _pem(path, option, "CERTIFICATE-----", "certificate")
+
+
+def private_key(path: Path | None) -> str | None:
+    """The text of a PEM file that its owner alone can read; raises `CommandError` if it holds no plain private key."""
     if path is None:
         return None
+    text = _pem(path, "--mqtt-key", "PRIVATE KEY-----", "private key")
+    try:
+        require_private(str(path))
+    except AccessError as error:
+        raise usage(f"--mqtt-key: {error}") from error
+    if "ENCRYPTED" in text:
+        raise usage(f"--mqtt-key: {path} is encrypted, and a board has nobody to ask: take its password away")
+    return text
+
+
+def _pem(path: Path, option: str, marker: str, what: str) -> str:
     try:
         text = path.read_text(encoding="ascii")
     except (OSError, UnicodeDecodeError) as error:
-        raise usage(f"--mqtt-ca: cannot read {path}: {error}") from error
-    if "-----BEGIN CERTIFICATE-----" not in text:
-        raise usage(f"--mqtt-ca: {path} holds no certificate in PEM")
+        raise usage(f"{option}: cannot read {path}: {error}") from error
+    if marker not in text:
+        raise usage(f"{option}: {path} holds no {what} in PEM")
+    if len(text) > LONGEST_PEM:
+        raise usage(f"{option}: {path} has {len(text)} bytes, a board keeps {LONGEST_PEM}: take one with a P-256 key")
     return text

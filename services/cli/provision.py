@@ -18,6 +18,7 @@ from services.cli.credentials import (
     Credentials,
     certificate,
     password,
+    private_key,
     require_sound,
 )
 from services.cli.errors import CommandError, ExitCode, usage
@@ -45,6 +46,8 @@ def add_options(parser: Parser) -> None:
     parser.add_argument("--mqtt-uri", metavar="URI", help="as mqtt://host:1883, or mqtts://host:8883")
     parser.add_argument("--mqtt-user", metavar="NAME", help="at the broker; its password is asked for")
     parser.add_argument("--mqtt-ca", type=Path, metavar="FILE", help="the certificate that mqtts trusts, PEM")
+    parser.add_argument("--mqtt-cert", type=Path, metavar="FILE", help="its own certificate for mqtts, PEM")
+    parser.add_argument("--mqtt-key", type=Path, metavar="FILE", help="the key of that certificate, PEM, mode 600")
     parser.add_argument(
         "--serial-baud",
         type=positive_integer,
@@ -59,7 +62,8 @@ def add_options(parser: Parser) -> None:
 def run(options: Options) -> ExitCode:
     """Provisions the board, or resets it to its factory state after asking."""
     given = (
-        options.device, options.wifi_ssid, options.mqtt_uri, options.mqtt_user, options.mqtt_ca, options.serial_baud,
+        options.device, options.wifi_ssid, options.mqtt_uri, options.mqtt_user, options.mqtt_ca, options.mqtt_cert,
+        options.mqtt_key, options.serial_baud,
     )  # fmt: skip
 
     if options.factory_reset:
@@ -74,6 +78,8 @@ def run(options: Options) -> ExitCode:
         mqtt_uri=options.mqtt_uri,
         mqtt_user=mqtt,
         mqtt_ca=certificate(options.mqtt_ca),
+        mqtt_certificate=certificate(options.mqtt_cert, "--mqtt-cert"),
+        mqtt_key=private_key(options.mqtt_key),
         serial_baud=None if options.serial_baud is None else str(options.serial_baud),
         wifi_password=None if wifi is None else password("Wi-Fi password", WIFI_PASSWORD, os.environ),
         mqtt_password=None

@@ -13,9 +13,10 @@ import msgspec
 import pytest
 
 from services.cli import provision as module
-from services.cli.credentials import Credentials, certificate, password, require_sound
+from services.cli.credentials import Credentials, certificate, password, private_key, require_sound
 from services.cli.errors import CommandError, ExitCode
 from services.cli.main import run
+from services.mqtt.certificates import Authority
 from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 
 
@@ -92,6 +93,34 @@ def test_a_board_is_told_the_baud_rate_of_its_line(line, capsys):
     assert "taken: serial_baud 115200" in capsys.readouterr().out
 
 
+def test_a_board_is_told_its_own_certificate_with_its_key(line, capsys, tmp_path):
+    board, port = line
+    Authority(tmp_path / "ca.pem", tmp_path / "ca.key").sign_client("rm1", tmp_path / "rm1.pem", tmp_path / "rm1.key")
+    given = ["--mqtt-cert", str(tmp_path / "rm1.pem"), "--mqtt-key", str(tmp_path / "rm1.key")]
+    assert run(["device", "provision", "--serial", port, *given]) is ExitCode.OK
+    files = {"mqtt_certificate": "rm1.pem", "mqtt_key": "rm1.key"}
+    assert board.told == [{key: (tmp_path / file).read_text() for key, file in files.items()}]
+    assert "taken: mqtt_certificate given, mqtt_key given" in capsys.readouterr().out
+
+
+def test_a_key_that_others_can_read_or_that_is_none_is_not_sent(tmp_path):
+    pem = tmp_path / "key.pem"
+    pem.write_text("-----BEGIN PRIVATE KEY-----\nMIIB\n-----END PRIVATE KEY-----\n")
+    pem.chmod(0o644)
+    with pytest.raises(CommandError, match=r"--mqtt-key: .*mode 644.*chmod 600"):
+        private_key(pem)
+    pem.chmod(0o600)
+    assert private_key(pem) == pem.read_text()
+    pem.write_text("-----BEGIN ENCRYPTED PRIVATE KEY-----\nMIIB\n-----END ENCRYPTED PRIVATE KEY-----\n")
+    with pytest.raises(CommandError, match="is encrypted"):
+        private_key(pem)
+    pem.write_text("-----BEGIN PRIVATE KEY-----\n" + 2048 * "A")
+    with pytest.raises(CommandError, match="a board keeps 2048"):
+        private_key(pem)
+    with pytest.raises(CommandError, match="holds no certificate"):
+        certificate(pem, "--mqtt-cert")
+
+
 def test_a_board_that_starts_while_it_is_told_is_told_again(line, quick):
     board, port = line
     board.deaf = 2
@@ -161,6 +190,7 @@ def test_a_password_comes_from_the_environment_a_terminal_or_a_pipe(monkeypatch)
         (Credentials(wifi_ssid="ñ" * 17), "34 bytes"),
         (Credentials(wifi_ssid="lab", wifi_password="short"), "5 characters, not 8 to 63"),
         (Credentials(mqtt_uri="10.0.0.2"), "mqtt://host:1883"),
+        (Credentials(mqtt_certificate="PEM"), "belong together"),
         (Credentials(serial_baud="300"), "300 is not within 9600 to 3000000"),
     ],
 )

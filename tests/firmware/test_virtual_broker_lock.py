@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from firmware.platform.host.flash import Credentials
 from firmware.platform.host.link import Connected, Denied, DeviceLink, Disconnected, Item
-from firmware.platform.host.network import broker_address
+from firmware.platform.host.network import AddressError, broker_address
 from services.mqtt import secure_folder
 from services.mqtt.access import BrokerAccess, device_access
 from services.mqtt.certificates import Authority
@@ -60,6 +60,29 @@ def told(section, **changes):
 
 def test_a_provisioned_board_joins(section):
     assert isinstance(joined(told(section), 10.0)[-1], Connected)
+
+
+def test_a_broker_that_asks_for_certificates_lets_a_board_in_that_was_given_one(tmp_path):
+    section = locked(tmp_path / "lock")
+    folder = Path(section.secure_folder)
+    own, key = tmp_path / "rm1.pem", tmp_path / "rm1.key"
+    Authority(folder / "ca.pem", folder / "ca.key").sign_client("rm1", own, key)
+    Authority(tmp_path / "other.pem", tmp_path / "other.key").sign_client("rm1", tmp_path / "x.pem", tmp_path / "x.key")
+    wants = (f"cafile {folder / 'ca.pem'}", "require_certificate true")
+    with closing(Mosquitto(tmp_path, section, *wants)):
+        (without, *_) = joined(told(section), 1.0)
+        stranger = told(
+            section, mqtt_certificate=(tmp_path / "x.pem").read_text(), mqtt_key=(tmp_path / "x.key").read_text()
+        )
+        (unknown, *_) = joined(stranger, 1.0)
+        (known, *_) = joined(told(section, mqtt_certificate=own.read_text(), mqtt_key=key.read_text()), 10.0)
+    assert isinstance(without, Disconnected)
+    assert "certificate" in without.reason
+    assert isinstance(unknown, Disconnected)
+    assert "certificate" in unknown.reason
+    assert isinstance(known, Connected)
+    with pytest.raises(AddressError, match="mqtt_certificate and mqtt_key cannot be used"):
+        told(section, mqtt_certificate=own.read_text(), mqtt_key=(tmp_path / "x.key").read_text())
 
 
 def test_each_refusal_is_the_same_sentence_again_and_again_at_growing_pauses(section, tmp_path):

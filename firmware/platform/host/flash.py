@@ -21,6 +21,8 @@ class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     mqtt_user: str = ""
     mqtt_password: str = ""
     mqtt_ca: str = ""  # PEM
+    mqtt_certificate: str = ""  # PEM, of the device itself
+    mqtt_key: str = ""  # PEM, of that certificate
     serial_baud: str = ""  # empty: 921600; a pseudo-terminal has none
 
     def __repr__(self) -> str:

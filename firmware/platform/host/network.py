@@ -6,7 +6,9 @@ import json
 import logging
 import queue
 import ssl
+import tempfile
 import time
+from pathlib import Path
 from urllib.parse import urlsplit
 
 from firmware.bindings.device import Device
@@ -107,14 +109,29 @@ def broker_address(credentials: Credentials, default: BrokerAccess) -> BrokerAcc
         port or (MQTTS_PORT if is_secure else MQTT_PORT),
         credentials.mqtt_user,
         credentials.mqtt_password if credentials.mqtt_user else "",
-        _tls(credentials.mqtt_ca) if is_secure else None,
+        _tls(credentials) if is_secure else None,
         authority="the board's mqtt_ca" if credentials.mqtt_ca else "",
+        has_certificate=bool(credentials.mqtt_certificate),
     )
 
 
-def _tls(authority: str) -> ssl.SSLContext:
-    """Of a provisioned certificate (PEM text), else of this system's authorities; raises AddressError."""
+def _tls(credentials: Credentials) -> ssl.SSLContext:
+    """Trusts the provisioned authority, else this system's; shows a provisioned certificate. Raises AddressError."""
     try:
-        return ssl.create_default_context(cadata=authority or None)
+        context = ssl.create_default_context(cadata=credentials.mqtt_ca or None)
     except ssl.SSLError as error:
         raise AddressError(f"the provisioned certificate authority cannot be read: {error}") from error
+    if credentials.mqtt_certificate:
+        _show_ourselves(context, credentials)
+    return context
+
+
+def _show_ourselves(context: ssl.SSLContext, credentials: Credentials) -> None:
+    with tempfile.TemporaryDirectory() as folder:  # ssl reads files only; this folder is for its owner alone
+        certificate, key = Path(folder, "certificate"), Path(folder, "key")
+        certificate.write_text(credentials.mqtt_certificate, encoding="ascii")
+        key.write_text(credentials.mqtt_key, encoding="ascii")
+        try:
+            context.load_cert_chain(certificate, key, password=lambda: "")
+        except ssl.SSLError as error:
+            raise AddressError(f"the provisioned mqtt_certificate and mqtt_key cannot be used: {error}") from error

@@ -28,8 +28,10 @@ struct Entries {
                 {"mqtt_user", c.mqtt_user, sizeof c.mqtt_user},
                 {"mqtt_password", c.mqtt_password, sizeof c.mqtt_password},
                 {"mqtt_ca", c.mqtt_ca, sizeof c.mqtt_ca},
+                {"mqtt_cert", c.mqtt_certificate, sizeof c.mqtt_certificate},  // NVS takes 15 bytes of a key
+                {"mqtt_key", c.mqtt_key, sizeof c.mqtt_key},
                 {"serial_baud", c.serial_baud, sizeof c.serial_baud}} {}
-    Entry entry[8];
+    Entry entry[10];
 };
 
 }  // namespace

@@ -10,7 +10,7 @@ extern "C" int esp_transport_get_socket(esp_transport_handle_t t);
 namespace gemelo {
 
 // By the scheme of `mqtt_uri`. With mqtts:// the broker must show a certificate of `mqtt_ca`, or of a public authority
-// where that is empty. `credentials` must stay.
+// where that is empty, and is shown `mqtt_certificate` if there is one. `credentials` must stay.
 esp_transport_handle_t make_transport(const Credentials& credentials);
 
 }  // namespace gemelo

@@ -313,8 +313,18 @@ esp_transport_handle_t esp_transport_tcp_init(void) { return nullptr; }
 esp_transport_handle_t esp_transport_ssl_init(void) { return nullptr; }
 esp_err_t esp_transport_set_default_port(esp_transport_handle_t, int) { return ESP_OK; }
 int esp_transport_get_socket(esp_transport_handle_t) { return -1; }
-void esp_transport_ssl_set_cert_data(esp_transport_handle_t, const char*, int) {}
-void esp_transport_ssl_crt_bundle_attach(esp_transport_handle_t, esp_err_t (*)(void*)) {}
+void esp_transport_ssl_set_cert_data(esp_transport_handle_t, const char* data, int length) {
+    chip.tls_authority.assign(data, static_cast<size_t>(length));
+}
+void esp_transport_ssl_set_client_cert_data(esp_transport_handle_t, const char* data, int length) {
+    chip.tls_certificate.assign(data, static_cast<size_t>(length));
+}
+void esp_transport_ssl_set_client_key_data(esp_transport_handle_t, const char* data, int length) {
+    chip.tls_key.assign(data, static_cast<size_t>(length));
+}
+void esp_transport_ssl_crt_bundle_attach(esp_transport_handle_t, esp_err_t (*)(void*)) {
+    chip.tls_authority = "public authorities";
+}
 esp_err_t esp_crt_bundle_attach(void*) { return ESP_OK; }
 
 esp_err_t adc_oneshot_new_unit(const adc_oneshot_unit_init_cfg_t*, adc_oneshot_unit_handle_t*) { return ESP_OK; }

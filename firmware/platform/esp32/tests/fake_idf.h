@@ -38,7 +38,8 @@ struct Chip {
     esp_reset_reason_t reset_reason = ESP_RST_POWERON;
     std::map<std::string, std::string> nvs;
     uint32_t flash_writes = 0;
-    std::vector<std::string> subscriptions;  // topic and QoS
+    std::string tls_authority, tls_certificate, tls_key;  // of the transport; empty: it was given none
+    std::vector<std::string> subscriptions;               // topic and QoS
     esp_mqtt_client_config_t mqtt{};
     std::string will;
     esp_event_handler_t mqtt_handler = nullptr;

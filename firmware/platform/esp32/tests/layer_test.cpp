@@ -293,6 +293,23 @@ TEST(Esp32Layer, CredentialsAreKeptAndNeverSaid) {
     EXPECT_TRUE(running.has_restarted());
 }
 
+TEST(Esp32Layer, ACertificateOfTheBoardsOwnIsKeptWithItsKeyAndNotWithoutIt) {
+    chip.nvs.clear();
+    Running running(ESP_RST_POWERON);
+    running.tell_over_wire(FrameType::Provision, R"({"mqtt_certificate":"CERTIFICATE"})");
+    EXPECT_TRUE(has(running.said_on_wire(), "belong together"));
+    EXPECT_EQ(chip.nvs.count("mqtt_cert"), 0u);
+    running.tell_over_wire(FrameType::Provision, R"({"mqtt_certificate":"CERTIFICATE","mqtt_key":"KEY"})");
+    const std::string said = running.said_on_wire();
+    EXPECT_TRUE(has(said, "\"accepted\": true"));
+    EXPECT_FALSE(has(said, "KEY"));
+    Credentials kept;
+    load_credentials(&kept);
+    EXPECT_STREQ(kept.mqtt_certificate, "CERTIFICATE");
+    EXPECT_STREQ(kept.mqtt_key, "KEY");
+    for (const auto& [key, value] : chip.nvs) EXPECT_LE(key.size(), 15u) << key;  // as NVS has it
+}
+
 TEST(Esp32Layer, AFactoryResetForgetsAll) {
     chip.nvs = {{"config", kConfig}, {"wifi_password", "hush-hush"}};
     Running running(ESP_RST_POWERON);

@@ -10,6 +10,7 @@
 #include "board.h"
 #include "fake_idf.h"
 #include "frames.h"
+#include "transport.h"
 
 using namespace gemelo;
 using fake::chip;
@@ -60,6 +61,27 @@ TEST(Esp32Mqtt, TheBrokerKeepsALastWillThatSaysWhoIsGone) {
     EXPECT_EQ(chip.mqtt.session.last_will.qos, 1);
     EXPECT_EQ(chip.mqtt.session.last_will.retain, 1);
     EXPECT_FALSE(chip.mqtt.session.disable_clean_session);
+}
+
+TEST(Esp32Mqtt, ADeviceShowsItsOwnCertificateOverTlsOnlyAndOnlyIfItHasOne) {
+    Credentials credentials;
+    std::strcpy(credentials.mqtt_ca, "the authority");
+    std::strcpy(credentials.mqtt_certificate, "who I am");
+    std::strcpy(credentials.mqtt_key, "its key");
+    fake::reset();
+    std::strcpy(credentials.mqtt_uri, "mqtt://host");
+    make_transport(credentials);
+    EXPECT_EQ(chip.tls_authority + chip.tls_certificate + chip.tls_key, "");
+    std::strcpy(credentials.mqtt_uri, "mqtts://host");
+    make_transport(credentials);
+    EXPECT_EQ(chip.tls_authority, "the authority");
+    EXPECT_EQ(chip.tls_certificate, "who I am");
+    EXPECT_EQ(chip.tls_key, "its key");
+    fake::reset();
+    credentials.mqtt_ca[0] = credentials.mqtt_certificate[0] = credentials.mqtt_key[0] = 0;
+    make_transport(credentials);
+    EXPECT_EQ(chip.tls_authority, "public authorities");
+    EXPECT_EQ(chip.tls_certificate + chip.tls_key, "");
 }
 
 TEST(Esp32Mqtt, SubscribesToWhatADeviceHears) {
