@@ -102,6 +102,33 @@ TEST(BoardCheck, RefusesThePinsOfTheFlashAndOfTheSerialWire) {
     EXPECT_EQ(fault(config), "avanzar: its pin belongs to the serial wire");
 }
 
+TEST(BoardCheck, AWireOverTheChipsUsbTakesItsPinsAndFreesThoseOfTheUart) {
+    struct Board {
+        const Chip &uart, &usb;
+        uint8_t minus, plus;
+    };
+    for (const Board& board : {Board{kEsp32S3, kEsp32S3Usb, 19, 20}, Board{kEsp32C3, kEsp32C3Usb, 18, 19}}) {
+        DeviceConfig config{};
+        config.tick_hz = 50000;
+        config.outputs = 1;
+        std::strcpy(config.output[0].name, "avanzar");
+        config.enable_pin = kNone;
+        config.servo.pin = kNone;
+        const auto with = [&](uint8_t pin, const Chip& chip) {
+            config.output[0].pin = pin;
+            return fault(config, chip);
+        };
+        for (const uint8_t pin : {board.minus, board.plus}) {
+            EXPECT_EQ(with(pin, board.usb), "avanzar: its pin belongs to the serial wire");
+            EXPECT_EQ(with(pin, board.uart), "");
+        }
+        for (const uint8_t pin : {board.uart.wire_tx, board.uart.wire_rx}) {
+            EXPECT_EQ(with(pin, board.usb), "");
+            EXPECT_EQ(with(pin, board.uart), "avanzar: its pin belongs to the serial wire");
+        }
+    }
+}
+
 TEST(BoardCheck, RefusesAPinThatTheChipDoesNotHave) {
     for (const int pin : {20, 24, 28, 40, 63, 64, 200}) {
         DeviceConfig config = wired();

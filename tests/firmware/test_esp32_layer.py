@@ -187,6 +187,7 @@ def test_platformio_builds_the_three_chips_from_what_is_there() -> None:
     settings = configparser.ConfigParser()
     settings.read(FIRMWARE / "platformio.ini")
     envs = {f"env:{chip}{kind}" for chip in CHIPS for kind in ("", "-debug")}
+    envs |= {f"env:{chip}-usb" for chip in ("esp32s3", "esp32c3")}  # an ESP32 has no USB of its own
     assert envs == {section for section in settings if section.startswith("env:")}
     assert re.fullmatch(r"espressif32@\d+\.\d+\.\d+", settings["env"]["platform"])
     assert settings["env"]["framework"] == "espidf"
@@ -210,6 +211,21 @@ def test_a_debug_build_speaks_on_a_console_that_is_not_the_serial_wire(chip: str
     project = (FIRMWARE / "CMakeLists.txt").read_text()
     assert "platform/esp32/sdkconfig.debug" in project
     assert "-DGEMELO_DEBUG=1" in (FIRMWARE / "platformio.ini").read_text()
+
+
+@pytest.mark.parametrize("chip", ["esp32s3", "esp32c3"])
+def test_a_wire_over_the_chips_usb_has_that_socket_for_itself(objects: Path, chip: str) -> None:
+    settings = configparser.ConfigParser()
+    settings.read(FIRMWARE / "platformio.ini")
+    assert settings[f"env:{chip}-usb"]["extends"] == f"env:{chip}, usb"
+    assert settings["usb"]["board_build.cmake_extra_args"] == "-DGEMELO_USB_WIRE=1"
+    assert "platform/esp32/sdkconfig.usb" in (FIRMWARE / "CMakeLists.txt").read_text()
+    assert "CONFIG_ESP_CONSOLE_SECONDARY_NONE=y" in (LAYER / "sdkconfig.usb").read_text()
+    assert "GEMELO_USB_WIRE=1" in (LAYER / "main/CMakeLists.txt").read_text()
+    assert {"usb_port", "uart_port", "wire"} <= {path.stem for path in (objects / f"{chip}-usb").glob("*.o")}
+    driver = (objects / f"{chip}-usb/usb_port.o").read_bytes()
+    assert b"usb_serial_jtag_driver_install" in driver
+    assert b"uart_driver_install" not in (objects / f"{chip}-usb/uart_port.o").read_bytes()
 
 
 def test_the_partitions_do_not_overlap_and_fit_the_flash() -> None:

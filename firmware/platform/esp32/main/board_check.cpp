@@ -9,7 +9,7 @@ const char* find_pin_fault(const PinUse& use, const Chip& chip) {
     const uint64_t bit = pin(use.pin);
     if ((chip.pins & bit) == 0) return "this chip has no such pin";
     if ((chip.flash & bit) != 0) return "its pin belongs to the flash memory";
-    if (use.pin == chip.uart_tx || use.pin == chip.uart_rx) return "its pin belongs to the serial wire";
+    if (use.pin == chip.wire_tx || use.pin == chip.wire_rx) return "its pin belongs to the serial wire";
     const bool is_input_only = (chip.input_only & bit) != 0;
     if (use.use == Use::Output && is_input_only) return "its pin can only be an input";
     if (use.pull != Pull::None && is_input_only) return "its pin has no pull resistor: fit one and say pull none";

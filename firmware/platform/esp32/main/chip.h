@@ -13,8 +13,8 @@ struct Chip {
     uint64_t psram;       // PSRAM, in some modules
     uint64_t strapping;   // their level at reset chooses how the chip starts
     uint64_t analog;      // ADC1; ADC2 cannot be used beside Wi-Fi
-    uint8_t uart_tx;      // of UART0, the serial wire
-    uint8_t uart_rx;
+    uint8_t wire_tx;      // of the serial wire: UART0, or D- and D+ of the chip's USB
+    uint8_t wire_rx;
     uint8_t boot_button;  // active low on the usual boards
 };
 
@@ -52,5 +52,15 @@ constexpr Chip kEsp32S3 = {
 constexpr Chip kEsp32C3 = {
     "esp32c3", pins(0, 21), 0, pins(12, 17), 0, pin(2) | pin(8) | pin(9), pins(0, 4), 21, 20, 9,
 };
+
+// The same chip on a board that has only its own USB: that is the serial wire, and UART0's pins are free.
+constexpr Chip wired_by_usb(Chip chip, uint8_t minus, uint8_t plus) {
+    chip.wire_tx = minus;
+    chip.wire_rx = plus;
+    return chip;
+}
+
+constexpr Chip kEsp32S3Usb = wired_by_usb(kEsp32S3, 19, 20);
+constexpr Chip kEsp32C3Usb = wired_by_usb(kEsp32C3, 18, 19);
 
 }  // namespace gemelo

@@ -6,7 +6,13 @@
 
 namespace gemelo {
 
-#if CONFIG_IDF_TARGET_ESP32
+#if GEMELO_USB_WIRE && CONFIG_IDF_TARGET_ESP32S3
+inline constexpr const Chip& kThisChip = kEsp32S3Usb;
+#elif GEMELO_USB_WIRE && CONFIG_IDF_TARGET_ESP32C3
+inline constexpr const Chip& kThisChip = kEsp32C3Usb;
+#elif GEMELO_USB_WIRE
+#error "this chip has no USB of its own: build it without GEMELO_USB_WIRE"
+#elif CONFIG_IDF_TARGET_ESP32
 inline constexpr const Chip& kThisChip = kEsp32;
 #elif CONFIG_IDF_TARGET_ESP32S3
 inline constexpr const Chip& kThisChip = kEsp32S3;

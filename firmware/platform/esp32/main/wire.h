@@ -1,5 +1,5 @@
-// The serial wire's task: bytes from UART0 into the board's ring, and what the device says out of it, at the baud rate
-// that was provisioned, or at that of whoever speaks.
+// The serial wire's task: bytes from UART0 or from the chip's USB into the board's ring, and what the device says out
+// of it; on a UART at the baud rate that was provisioned, or at that of whoever speaks.
 #pragma once
 
 #include <stdint.h>
