@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 PREFIX = "gemelo/v1"
-TO_DEVICE = ("traj", "cmd", "hb", "sync", "config", "inject")  # only a gateway writes them
+TO_DEVICE = ("traj", "cmd", "hb", "sync", "config", "inject", "update")  # only a gateway writes them
 FROM_DEVICE = (
     "status", "traj/ack", "cmd/ack", "sync/r", "state", "event", "config/ack", "sensors", "shaft",
+    "update/ack",
 )  # fmt: skip
 
 

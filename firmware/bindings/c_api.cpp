@@ -32,18 +32,19 @@ struct GemeloSnapshot {
     uint32_t servo_us;  // 0: no pulses
     uint32_t servo_target_us;
     double horn_us;  // where the horn truly is
+    uint32_t told_status;
 };
 
 // The device of a configuration, or nullptr and why not; `part` has room for 32 bytes, `reason` for 128. An empty text
-// makes a device that has no configuration yet.
+// makes a device that has no configuration yet. `slot` is what its firmware runs from, where it has any.
 VirtualDevice* gemelo_create(const char* text, size_t size, char* part, char* reason, uint32_t boot_id,
-                             const char* reset_cause, uint64_t now_us) {
+                             const char* reset_cause, uint64_t now_us, const char* slot) {
     DeviceConfig config{};
     gemelo::Refusal refusal;
     const bool is_taken = size == 0 || gemelo::parse_config(text, size, &config, &refusal);
     memcpy(part, refusal.part, sizeof refusal.part);
     memcpy(reason, refusal.reason, sizeof refusal.reason);
-    return is_taken ? new VirtualDevice(config, boot_id, reset_cause, now_us) : nullptr;
+    return is_taken ? new VirtualDevice(config, boot_id, reset_cause, now_us, slot) : nullptr;
 }
 
 void gemelo_start(VirtualDevice* device, const int32_t* steps, const int32_t* shaft, int referenced) {
@@ -151,6 +152,7 @@ void gemelo_snapshot(VirtualDevice* device, GemeloSnapshot* snapshot) {
     snapshot->servo_us = machine.servo().pulse_us();
     snapshot->servo_target_us = machine.servo().target_us();
     snapshot->horn_us = device->world().horn().place_us();
+    snapshot->told_status = device->has_told_status();
     for (uint8_t j = 0; j < gemelo::kMaxJoints; ++j) {
         snapshot->steps[j] = machine.stepper().executed(j);
         snapshot->shaft[j] = device->world().shaft(j);

@@ -5,12 +5,14 @@ from __future__ import annotations
 import ctypes as c
 import json
 from collections.abc import Sequence
+from pathlib import Path
 
 import msgspec
 
+from firmware.bindings.firmware_slot import FirmwareSlot, firmware_calls
 from firmware.bindings.frames import OUTPUTS, InputLevels, OutFrame, PinChange, PlatformRequest
 from firmware.bindings.horn import horn_record
-from firmware.bindings.library import MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
+from firmware.bindings.library import LIBRARY, MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
 from firmware.bindings.motor import MotorError, motor_record
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, config_text
@@ -31,7 +33,8 @@ class Device:
 
     `config` may be the JSON text itself, and None for a device that has none yet. `motors` are ideal where there are
     none; the shafts stand at `steps` unless `shaft` says where they truly are. A servo `gripper` has a virtual servo at
-    its jaws, which are open at first; the sensor that reads them does so in `gripper_unit`.
+    its jaws, which are open at first; the sensor that reads them does so in `gripper_unit`. The firmware itself is that
+    of `library`, and runs from `slot`.
     """
 
     def __init__(
@@ -46,8 +49,10 @@ class Device:
         shaft: Sequence[int] | None = None,
         gripper: Gripper | None = None,
         gripper_unit: str = "mm",
+        library: Path = LIBRARY,
+        slot: str = "",
     ) -> None:
-        self._library = load_library()
+        self._library = load_library(library)
         self._handle = None
         self.boot_id = boot_id
         self._buffer = (c.c_uint8 * LARGEST_OUTPUT)()
@@ -58,7 +63,7 @@ class Device:
         start = steps if steps is not None else (0,) * count
         if len(start) != count:
             raise ConfigError(f"{len(start)} start positions for {count} joints of {self._config.name!r}")
-        self._handle = self._created(text, boot_id, reset_cause, now_us)
+        self._handle = self._created(text, boot_id, reset_cause, now_us, slot)
         for index, motor in enumerate(motors[:MAX_JOINTS]):
             try:
                 record = motor_record(motor)
@@ -73,10 +78,10 @@ class Device:
         self._library.gemelo_start(self._handle, _positions(start), true, referenced)
         self._config_crc = self._snapshot().config_crc32
 
-    def _created(self, text: bytes, boot_id: int, reset_cause: str, now_us: int) -> int:
+    def _created(self, text: bytes, boot_id: int, reset_cause: str, now_us: int, slot: str) -> int:
         part, reason = c.create_string_buffer(PART_SIZE), c.create_string_buffer(REASON_SIZE)
         handle: int | None = self._library.gemelo_create(
-            text, len(text), part, reason, boot_id, reset_cause.encode(), now_us
+            text, len(text), part, reason, boot_id, reset_cause.encode(), now_us, slot.encode()
         )
         if handle is None:
             subject = f"{part.value.decode()!r} of device" if part.value else "device"
@@ -117,6 +122,11 @@ class Device:
         text = (c.c_uint8 * size)()
         self._library.gemelo_kept(self._handle, text, size)
         return bytes(text)
+
+    def attach_firmware_slot(self, slot: FirmwareSlot) -> None:
+        """From now on the device takes a new firmware into `slot`."""
+        self._firmware_calls = firmware_calls(slot)
+        self._library.gemelo_set_firmware_slot(self._handle, c.byref(self._firmware_calls))
 
     def advance(self, until_us: int) -> None:
         """Let time pass; every tick before `until_us` is run."""
@@ -223,6 +233,11 @@ class Device:
         return bool(self._snapshot().still)
 
     @property
+    def told_status(self) -> bool:
+        """It has said `status` over its serial line to somebody who had spoken there."""
+        return bool(self._snapshot().told_status)
+
+    @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs that are on."""
         bits = self._snapshot().outputs
@@ -251,7 +266,12 @@ class Device:
         return json.dumps(report).encode()
 
     def inherit_environment(self, before: Device) -> None:
-        """Takes over the environment of the previous device: held switches, blocked shafts and sensor readings."""
+        """Takes over the environment of the previous device: held switches, blocked shafts and sensor readings.
+
+        Of a device with other firmware it takes nothing: the same bytes may mean something else there.
+        """
+        if before._library is not self._library:
+            return
         self._library.gemelo_inherit(self._handle, before._handle)
 
     def press_input(self, index: int, pressed: bool | None) -> None:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from services.runtime.serial_frames import JsonFrame
 
-OUTPUTS = ("traj/ack", "cmd/ack", "sync/r", "state", "event", "status", "config/ack", "sensors", "text")
+OUTPUTS = ("traj/ack", "cmd/ack", "sync/r", "state", "event", "status", "config/ack", "sensors", "text", "update/ack")
 
 
 class OutFrame(NamedTuple):

@@ -40,6 +40,7 @@ class SnapshotRecord(c.Structure):
         ("servo_us", c.c_uint32),
         ("servo_target_us", c.c_uint32),
         ("horn_us", c.c_double),
+        ("told_status", c.c_uint32),
     )
 
 
@@ -70,6 +71,22 @@ class HornRecord(c.Structure):
     )
 
 
+Bytes = c.POINTER(c.c_uint8)
+Reason = c.POINTER(c.c_char)
+
+
+class FirmwareCalls(c.Structure):
+    """`FirmwareCalls` of platform/host/virtual_device.h."""
+
+    _fields_ = (
+        ("verify", c.CFUNCTYPE(c.c_int, Bytes, Bytes, c.c_size_t, Reason)),
+        ("begin", c.CFUNCTYPE(c.c_int, c.c_uint32, Reason)),
+        ("write", c.CFUNCTYPE(c.c_int, Bytes, c.c_size_t, Reason)),
+        ("finish", c.CFUNCTYPE(c.c_int, Bytes, Reason)),
+        ("abort", c.CFUNCTYPE(None)),
+    )
+
+
 @functools.cache
 def load_library(path: Path = LIBRARY) -> c.CDLL:
     """The library with its functions typed; raises LibraryMissing with the remedy where there is none."""
@@ -85,7 +102,7 @@ def load_library(path: Path = LIBRARY) -> c.CDLL:
     motor, motor_config = c.c_void_p, c.POINTER(MotorRecord)
     u32s, u64s = c.POINTER(c.c_uint32), c.POINTER(c.c_uint64)
     signatures: dict[str, tuple[object, list[object]]] = {
-        "create": (device, [text, size, text, text, u32, text, u64]),
+        "create": (device, [text, size, text, text, u32, text, u64, text]),
         "start": (None, [device, i32s, i32s, c.c_int]),
         "destroy": (None, [device]),
         "receive": (None, [device, c.c_char_p, size, c.c_int, u64]),
@@ -98,6 +115,7 @@ def load_library(path: Path = LIBRARY) -> c.CDLL:
         "read_config": (c.c_int64, [text, size, text, text, text, size]),
         "check_provision": (c.c_int, [text, size, c.POINTER(c.c_int), text]),
         "kept": (size, [device, u8, size]),
+        "set_firmware_slot": (None, [device, c.POINTER(FirmwareCalls)]),
         "advance": (None, [device, u64]),
         "halt": (None, [device]),
         "report_status": (None, [device]),
@@ -124,6 +142,8 @@ def load_library(path: Path = LIBRARY) -> c.CDLL:
         "motor_shaft": (c.c_int32, [motor]),
     }
     for name, (result, arguments) in signatures.items():
-        function = getattr(library, f"gemelo_{name}")
+        function = getattr(library, f"gemelo_{name}", None)
+        if function is None:
+            raise LibraryMissing(f"{path} has no function gemelo_{name}: it was built from another version")
         function.restype, function.argtypes = result, arguments
     return library

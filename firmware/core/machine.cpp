@@ -26,6 +26,7 @@ void Machine::begin(DeviceConfig& config, const Identity& identity, const Sink& 
     heard_ = 0;
     slots_to_state_ = slots_to_sensors_ = 0;
     reporter_.begin(sink, identity.boot_id, config.joints);
+    update_.begin(sink.firmware);  // a transfer that is under way goes on
     rules_.joints = config.joints;
     for (uint8_t j = 0; j < rules_.joints; ++j) {
         const JointConfig& joint = config.joint[j];

@@ -17,6 +17,7 @@
 #include "servo.h"
 #include "stepper.h"
 #include "stream_log.h"
+#include "update.h"
 
 namespace gemelo {
 
@@ -26,6 +27,7 @@ struct Identity {
     const char* reset_cause;
     bool is_virtual = false;
     const char* device = "";  // what it is called until a configuration says it
+    const char* slot = "";    // that its firmware runs from
 };
 
 // A frame as it came off the wire.
@@ -111,6 +113,7 @@ class Machine {
     Code reference(const Frame& frame, uint16_t joints);
     void receive_heartbeat(const Frame& frame, const Arrival& arrival);
     void receive_sync(const Frame& frame, const Arrival& arrival);
+    void receive_update(const Frame& frame, const Arrival& arrival);
 
     // Motion that is no stream.
     Code home(uint16_t joints);
@@ -172,6 +175,7 @@ class Machine {
     Stepper stepper_;
     StreamLog streams_;
     CommandLog commands_;
+    UpdateReceiver update_;
     Servo servo_;
 
     Point points_[kPoints];

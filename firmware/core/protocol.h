@@ -27,6 +27,8 @@ enum class FrameType : uint8_t {
     ProvisionAck,
     Inject,  // virtual devices only
     Shaft,   // virtual devices only
+    Update,
+    UpdateAck,  // JSON, as the others of a serial line
 };
 
 enum class Code : uint8_t {

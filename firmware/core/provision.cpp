@@ -25,6 +25,7 @@ constexpr Field kFields[] = {
     text("mqtt_ca", offsetof(Credentials, mqtt_ca), sizeof Credentials::mqtt_ca),
     text("mqtt_certificate", offsetof(Credentials, mqtt_certificate), sizeof Credentials::mqtt_certificate),
     text("mqtt_key", offsetof(Credentials, mqtt_key), sizeof Credentials::mqtt_key),
+    text("update_key", offsetof(Credentials, update_key), sizeof Credentials::update_key),
     text("serial_baud", offsetof(Credentials, serial_baud), sizeof Credentials::serial_baud),
     Field{"factory_reset", Kind::Truth, false, offsetof(Credentials, is_factory_reset)},
 };

@@ -19,6 +19,7 @@ struct Credentials {
     char mqtt_ca[2049] = "";           // PEM
     char mqtt_certificate[2049] = "";  // PEM, the device's own, by which a broker knows it
     char mqtt_key[2049] = "";          // PEM, of that certificate
+    char update_key[257] = "";         // PEM, the public key that a new firmware is signed for; empty: takes none
     char serial_baud[8] = "";          // of the serial line; empty: 921600
     bool is_factory_reset = false;     // asked for; nothing to be kept
 };

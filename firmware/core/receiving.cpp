@@ -1,4 +1,4 @@
-// Received frames: chunks of knots, heartbeats and clock synchronisation.
+// Received frames: chunks of knots, heartbeats, clock synchronisation and updates.
 #include "bytes.h"
 #include "machine.h"
 
@@ -27,6 +27,8 @@ void Machine::receive(const Frame& frame, const Arrival& arrival, uint64_t now_u
             return receive_heartbeat(frame, arrival);
         case FrameType::Sync:
             return receive_sync(frame, arrival);
+        case FrameType::Update:
+            return receive_update(frame, arrival);
         default:
             ++bad_frames_;
     }
@@ -159,6 +161,14 @@ void Machine::receive_sync(const Frame& frame, const Arrival& arrival) {
         return;
     }
     reporter_.answer_sync(load_u64(frame.bytes + 8), arrival.received_us, now_us_);
+}
+
+// Between two pieces the arm may be armed and moved as ever: the next piece is refused then, and waits.
+void Machine::receive_update(const Frame& frame, const Arrival& arrival) {
+    UpdateAnswer answer;
+    const bool is_free = keeps_still() && !is_armed_;
+    if (!update_.receive(frame, identity_.boot_id, arrival.is_retained, is_free, &answer)) return count_bad_frame();
+    reporter_.acknowledge_update(answer);
 }
 
 }  // namespace gemelo

@@ -113,6 +113,7 @@ void Reporter::status(const StatusReport& report) const {
     json.field("armed", report.is_armed);
     json.field("config_crc32", static_cast<uint64_t>(report.config->crc32));
     json.field("virtual", report.is_virtual);
+    if (report.slot[0] != 0) json.field("slot", report.slot);
     const size_t size = json.close();
     sink_.put(sink_.context, Output::Status, json.bytes(), size);
 }
@@ -135,6 +136,17 @@ void Reporter::acknowledge_config(uint32_t crc32, bool accepted, const char* par
     json.field("reason", reason);
     const size_t size = json.close();
     say(Output::ConfigAck, json.bytes(), size);
+}
+
+void Reporter::acknowledge_update(const UpdateAnswer& answer) const {
+    JsonWriter json;
+    json.field("session", static_cast<uint64_t>(answer.session));
+    json.field("next", static_cast<uint64_t>(answer.next));
+    json.field("accepted", answer.is_accepted);
+    json.field("receiving", answer.is_receiving);
+    json.field("reason", answer.refusal.reason);
+    const size_t size = json.close();
+    say(Output::UpdateAck, json.bytes(), size);
 }
 
 }  // namespace gemelo

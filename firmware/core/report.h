@@ -6,13 +6,14 @@
 
 #include "config.h"
 #include "protocol.h"
+#include "update.h"
 
 namespace gemelo {
 
 constexpr const char* kFirmwareVersion = "1.0.0";
 
 // Where an output goes; in the order of the topics in PROTOCOL.md.
-enum class Output : uint8_t { TrajAck, CmdAck, SyncReply, State, Event, Status, ConfigAck, Sensors, Text };
+enum class Output : uint8_t { TrajAck, CmdAck, SyncReply, State, Event, Status, ConfigAck, Sensors, Text, UpdateAck };
 
 constexpr uint8_t kFlagArmed = 1;
 
@@ -24,6 +25,8 @@ struct Sink {
     void (*keep)(void* context, const uint8_t* text, size_t size) = nullptr;
     // What keeps this board from serving a configuration that is without a fault; may be null.
     ConfigFault (*check)(void* context, const DeviceConfig& config) = nullptr;
+    // Takes a new firmware; may be null.
+    const FirmwareSlot* firmware = nullptr;
 };
 
 struct Acknowledgement {
@@ -59,6 +62,7 @@ struct StatusReport {
     const char* device;
     const char* reset_cause;
     uint32_t boot_id;
+    const char* slot;  // that the firmware runs from; empty: not known
     bool is_referenced, is_armed, is_virtual;
 };
 
@@ -85,6 +89,7 @@ class Reporter {
     void status(const StatusReport& report) const;
     void sensors(const SensorReport& report) const;
     void acknowledge_config(uint32_t crc32, bool accepted, const char* part, const char* reason) const;
+    void acknowledge_update(const UpdateAnswer& answer) const;
     // Bytes as they are.
     void say(Output output, const uint8_t* bytes, size_t size) const { sink_.put(sink_.context, output, bytes, size); }
     const Sink& sink() const { return sink_; }

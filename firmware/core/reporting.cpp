@@ -57,6 +57,7 @@ void Machine::report_status() const {
     report.is_referenced = is_referenced();
     report.is_armed = is_armed_;
     report.is_virtual = identity_.is_virtual;
+    report.slot = identity_.slot;
     reporter_.status(report);
 }
 

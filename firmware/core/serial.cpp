@@ -15,7 +15,7 @@ bool is_sign_of_life(FrameType type) {
 
 bool is_answer(Output output) {
     return output == Output::TrajAck || output == Output::CmdAck || output == Output::SyncReply ||
-           output == Output::ConfigAck || output == Output::Text;
+           output == Output::ConfigAck || output == Output::Text || output == Output::UpdateAck;
 }
 
 bool is_for_both(Output output) { return output == Output::Status || output == Output::Event; }
@@ -24,6 +24,8 @@ FrameType type_of(Output output) {
     switch (output) {
         case Output::ConfigAck:
             return FrameType::ConfigAck;
+        case Output::UpdateAck:
+            return FrameType::UpdateAck;
         case Output::Sensors:
             return FrameType::Sensors;
         case Output::Status:
@@ -125,6 +127,7 @@ size_t SerialPort::wrap(Output output, const uint8_t* payload, size_t size, uint
             for (size_t i = 0; i < size; ++i) out[i] = payload[i];
             return size;
         case Output::ConfigAck:
+        case Output::UpdateAck:
         case Output::Sensors:
         case Output::Status:
         case Output::Event:

@@ -31,6 +31,24 @@ Bytes header(gemelo::FrameType type, size_t joints, uint32_t boot_id) {
 
 }  // namespace
 
+Bytes build_update(gemelo::UpdateStep step, uint32_t session, uint32_t offset, const Bytes& content, uint32_t boot_id) {
+    Bytes bytes(gemelo::kHeaderSize + 12);
+    gemelo::write_header(bytes.data(), gemelo::FrameType::Update, 0, boot_id);
+    gemelo::store_u32(&bytes[8], session);
+    gemelo::store_u32(&bytes[12], offset);
+    bytes[16] = static_cast<uint8_t>(step);
+    bytes.insert(bytes.end(), content.begin(), content.end());
+    return seal(bytes);
+}
+
+Bytes build_update_begin(uint32_t size, uint8_t digest) {
+    Bytes content(4);
+    gemelo::store_u32(content.data(), size);
+    content.resize(4 + gemelo::kDigestSize, digest);
+    content.resize(4 + gemelo::kDigestSize + 8, 0x30);
+    return content;
+}
+
 Bytes seal(Bytes bytes) {
     const size_t size = bytes.size();
     bytes.resize(size + gemelo::kCrcSize);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "protocol.h"
+#include "update.h"
 
 namespace rig {
 
@@ -36,6 +37,10 @@ Bytes build_command(gemelo::Command command, uint32_t id, const std::vector<int3
                     uint64_t expires_us = kNever, uint32_t boot_id = kBoot, uint8_t index = 0, uint16_t argument = 0);
 Bytes build_heartbeat(uint32_t session, uint32_t counter, uint32_t boot_id = 0);
 Bytes build_sync(uint64_t t0);
+Bytes build_update(gemelo::UpdateStep step, uint32_t session, uint32_t offset = 0, const Bytes& content = {},
+                   uint32_t boot_id = kBoot);
+// The content of a BEGIN: `size`, a digest of bytes `digest`, and a signature of eight bytes.
+Bytes build_update_begin(uint32_t size, uint8_t digest);
 // Appends the CRC.
 Bytes seal(Bytes bytes);
 

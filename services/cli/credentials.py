@@ -16,7 +16,7 @@ WIFI_PASSWORD, MQTT_PASSWORD = "GEMELO_WIFI_PASSWORD", "GEMELO_MQTT_PASSWORD"
 MQTT_DEVICE_PASSWORD = "GEMELO_MQTT_DEVICE_PASSWORD"  # wins over the other, which is the gateway's too
 LONGEST_SSID = 32  # [bytes] IEEE 802.11
 BAUD = (9_600, 3_000_000)  # the firmware's bounds
-HIDDEN = ("wifi_password", "mqtt_password", "mqtt_ca", "mqtt_certificate", "mqtt_key")
+HIDDEN = ("wifi_password", "mqtt_password", "mqtt_ca", "mqtt_certificate", "mqtt_key", "update_key")
 LONGEST_PEM = 2048  # [bytes] that a board keeps of one
 WPA = (8, 63)  # [characters] of a passphrase
 
@@ -33,6 +33,7 @@ class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     mqtt_ca: str | None = None  # PEM
     mqtt_certificate: str | None = None  # PEM, of the device itself
     mqtt_key: str | None = None  # PEM, of that certificate
+    update_key: str | None = None  # PEM, the public key of updates
     serial_baud: str | None = None  # of its serial line, a decimal number
     factory_reset: bool = False
 
@@ -101,13 +102,18 @@ def private_key(path: Path | None) -> str | None:
     return text
 
 
-def _pem(path: Path, option: str, marker: str, what: str) -> str:
+def update_key(path: Path | None) -> str | None:
+    """The text of a public key that updates are signed for; raises `CommandError` for another one."""
+    return None if path is None else _pem(path, "--update-key", "-----BEGIN PUBLIC KEY-----", "public key", 256)
+
+
+def _pem(path: Path, option: str, marker: str, what: str, longest: int = LONGEST_PEM) -> str:
     try:
         text = path.read_text(encoding="ascii")
     except (OSError, UnicodeDecodeError) as error:
         raise usage(f"{option}: cannot read {path}: {error}") from error
     if marker not in text:
         raise usage(f"{option}: {path} holds no {what} in PEM")
-    if len(text) > LONGEST_PEM:
-        raise usage(f"{option}: {path} has {len(text)} bytes, a board keeps {LONGEST_PEM}: take one with a P-256 key")
+    if len(text) > longest:
+        raise usage(f"{option}: {path} has {len(text)} bytes, a board keeps {longest}: take one with a P-256 key")
     return text

@@ -20,6 +20,7 @@ from services.cli.credentials import (
     password,
     private_key,
     require_sound,
+    update_key,
 )
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.parser import Options, Parser, positive_integer
@@ -49,6 +50,9 @@ def add_options(parser: Parser) -> None:
     parser.add_argument("--mqtt-cert", type=Path, metavar="FILE", help="its own certificate for mqtts, PEM")
     parser.add_argument("--mqtt-key", type=Path, metavar="FILE", help="the key of that certificate, PEM, mode 600")
     parser.add_argument(
+        "--update-key", type=Path, metavar="FILE", help="the public key of `gemelo device update --make-key`"
+    )
+    parser.add_argument(
         "--serial-baud",
         type=positive_integer,
         metavar="BAUD",
@@ -63,7 +67,7 @@ def run(options: Options) -> ExitCode:
     """Provisions the board, or resets it to its factory state after asking."""
     given = (
         options.device, options.wifi_ssid, options.mqtt_uri, options.mqtt_user, options.mqtt_ca, options.mqtt_cert,
-        options.mqtt_key, options.serial_baud,
+        options.mqtt_key, options.update_key, options.serial_baud,
     )  # fmt: skip
 
     if options.factory_reset:
@@ -80,6 +84,7 @@ def run(options: Options) -> ExitCode:
         mqtt_ca=certificate(options.mqtt_ca),
         mqtt_certificate=certificate(options.mqtt_cert, "--mqtt-cert"),
         mqtt_key=private_key(options.mqtt_key),
+        update_key=update_key(options.update_key),
         serial_baud=None if options.serial_baud is None else str(options.serial_baud),
         wifi_password=None if wifi is None else password("Wi-Fi password", WIFI_PASSWORD, os.environ),
         mqtt_password=None

@@ -33,6 +33,7 @@ class JsonFrame(IntEnum):
     PROVISION_ACK = 15
     INJECT = 16
     SHAFT = 17
+    UPDATE_ACK = 19
 
 
 class JsonText(NamedTuple):

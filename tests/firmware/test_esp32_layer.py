@@ -234,5 +234,17 @@ def test_the_partitions_do_not_overlap_and_fit_the_flash() -> None:
     assert places[0][0] >= 0x9000
     for (_, end), (begin, _) in pairwise(places):
         assert end <= begin
-    assert places[-1][0] % 0x10000 == 0
     assert places[-1][1] <= 4 << 20
+
+
+def test_there_are_two_slots_of_the_same_size_and_a_new_firmware_is_on_trial() -> None:
+    rows = [line.split(",") for line in (LAYER / "partitions.csv").read_text().splitlines() if line[:1] not in "#"]
+    kinds = {row[2].strip(): (int(row[3], 16), int(row[4], 16)) for row in rows}
+    assert "factory" not in kinds  # the boot loader would fall back to it, not to the firmware before
+    assert kinds["ota_0"][1] == kinds["ota_1"][1] >= 0x180000
+    assert all(kinds[slot][0] % 0x10000 == 0 for slot in ("ota_0", "ota_1"))  # of what the chip maps
+    assert kinds["ota"][1] == 0x2000
+    assert "CONFIG_BOOTLOADER_APP_ROLLBACK_ENABLE=y" in (LAYER / "sdkconfig.defaults").read_text()
+    assert kinds["ota_0"][0] == 0x20000
+    readme = (FIRMWARE / "README.md").read_text()
+    assert f"erase-region {kinds['ota'][0]:#x} {kinds['ota'][1]:#x}" in readme

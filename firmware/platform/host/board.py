@@ -11,6 +11,7 @@ import msgspec
 
 from firmware.bindings.device import ConfigError, Device, joint_count
 from firmware.bindings.parsers import ProvisionRefused, asks_for_factory_reset
+from firmware.platform.host.firmware_slots import Booted, FirmwareSlots
 from firmware.platform.host.flash import Credentials, Flash
 from firmware.platform.host.memory import BootState, PositionStore, StoredPosition
 from schemas.device_config import config_text
@@ -59,8 +60,10 @@ class Board:
         self.name = arm.device.name
         self._flash = Flash(folder / f"{name}_flash.json", self.name)
         self._memory = PositionStore(folder / f"{name}.json", self.name)
+        self.firmware = FirmwareSlots(folder, name, lambda: self.credentials.update_key)
         self._shaft: tuple[int, ...] = ()  # [steps] where the arm truly is; empty: as the memory has it
         self._crc32 = 0  # of the configuration that the flash has
+        self.is_on_trial = False  # the firmware that runs, until it has said status to somebody
 
     @property
     def credentials(self) -> Credentials:
@@ -75,14 +78,22 @@ class Board:
         """The device after a reset; `reset_cause` says why, unless its memory knows better."""
         kept = self._flash.configuration
         text = self._factory if kept is None else kept.encode()
+        booted = self.firmware.boot()
+        self.is_on_trial = booted.is_on_trial
+        cause = "update_rolled_back" if booted.is_rolled_back else reset_cause
         try:
-            return self._boot(text, reset_cause)
+            return self._boot(text, cause, booted)
         except ConfigError as error:
             log.warning("%s; the board starts without a configuration", error)
-            return self._boot(b"", reset_cause)
+            return self._boot(b"", cause, booted)
 
     def remember(self, device: Device) -> None:
-        """Keep what a restart must find; to be called often, writes seldom."""
+        """Keep what a restart must find; to be called often, writes seldom.
+
+        A firmware on trial is not asked: it may say anything.
+        """
+        if self.is_on_trial:
+            return
         if device.config_crc32 != self._crc32:
             self._crc32 = device.config_crc32
             self._flash.keep_configuration(device.kept_config.decode())
@@ -113,7 +124,7 @@ class Board:
             )
         )
 
-    def _boot(self, text: bytes, reset_cause: str) -> Device:
+    def _boot(self, text: bytes, reset_cause: str, booted: Booted) -> Device:
         boot_state = self._memory.wake(self._reference)
         self._shaft = self._shaft or boot_state.shaft
         count = joint_count(text)
@@ -128,7 +139,10 @@ class Board:
             shaft=self._shaft,
             gripper=self._gripper,
             gripper_unit=self._gripper_unit,
+            library=booted.library,
+            slot=booted.slot,
         )
+        device.attach_firmware_slot(self.firmware)
         self._crc32 = device.config_crc32
         return device
 

@@ -23,6 +23,7 @@ class Credentials(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     mqtt_ca: str = ""  # PEM
     mqtt_certificate: str = ""  # PEM, of the device itself
     mqtt_key: str = ""  # PEM, of that certificate
+    update_key: str = ""  # PEM, the public key that a new firmware is signed for
     serial_baud: str = ""  # empty: 921600; a pseudo-terminal has none
 
     def __repr__(self) -> str:

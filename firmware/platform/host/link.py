@@ -16,15 +16,17 @@ from schemas.device_topics import topic
 from services.mqtt.access import BrokerAccess
 from services.mqtt.client import NO_ANSWER, OLD_BROKER, MqttClient, code_of, is_failure
 from services.mqtt.failures import denial, failure, needs_a_person, refusal, silence
+from services.runtime.firmware_update import UPDATE
 
 log = logging.getLogger("virtual_esp32")
 
-COMMANDS = {"traj": 1, "cmd": 1, "hb": 0, "sync": 0, "config": 1, "inject": 1}  # QoS of the subscription
+COMMANDS = {"traj": 1, "cmd": 1, "hb": 0, "sync": 0, "config": 1, "inject": 1, "update": 1}  # QoS of the subscription
 REPORTS = {  # QoS of the publication
     "traj/ack": 0, "cmd/ack": 1, "sync/r": 0, "state": 0, "event": 1, "status": 1,
     "config/ack": 1, "sensors": 0, "shaft": 0,
+    "update/ack": 1,
 }  # fmt: skip
-FRAME_TYPES = {"traj": 1, "cmd": 3, "hb": 5, "sync": 6}
+FRAME_TYPES = {"traj": 1, "cmd": 3, "hb": 5, "sync": 6, "update": UPDATE}
 LARGEST = 16_384  # [bytes] the largest chunk has 8,228
 FULL_INBOX = 4096  # [messages]
 KEEP_ALIVE = 5  # [s]

@@ -3,9 +3,10 @@
 namespace gemelo {
 
 VirtualDevice::VirtualDevice(const DeviceConfig& config, uint32_t boot_id, const std::string& reset_cause,
-                             uint64_t now_us)
-    : config_(config), reset_cause_(reset_cause), now_us_(now_us), slot_start_us_(now_us) {
-    machine_.begin(config_, Identity{boot_id, reset_cause_.c_str(), true}, Sink{this, put, keep});
+                             uint64_t now_us, const std::string& slot)
+    : config_(config), reset_cause_(reset_cause), slot_(slot), now_us_(now_us), slot_start_us_(now_us) {
+    const Identity identity{boot_id, reset_cause_.c_str(), true, "", slot_.c_str()};
+    machine_.begin(config_, identity, Sink{this, put, keep, nullptr, &firmware_});
     serial_.begin(machine_, boot_id, take_request, this);
 }
 
@@ -13,6 +14,7 @@ void VirtualDevice::put(void* context, Output output, const uint8_t* bytes, size
     VirtualDevice& self = *static_cast<VirtualDevice*>(context);
     if (self.serial_.leaves_to_mqtt(output)) self.outputs_.push_back(OutFrame{output, {bytes, bytes + size}});
     if (!self.has_line_ || !self.serial_.carries(output)) return;
+    if (output == Output::Status && self.serial_.understood() != 0) self.has_told_status_ = true;
     uint8_t wrapped[SerialPort::kLargestReport];
     const size_t length = self.serial_.wrap(output, bytes, size, wrapped, sizeof wrapped);
     self.line_.append(reinterpret_cast<const char*>(wrapped), length);

@@ -29,9 +29,20 @@ struct PinChange {
     Pins pins;
 };
 
+// What a platform in another language does for a FirmwareSlot: 1, or 0 with the reason in `reason` (128 bytes).
+struct FirmwareCalls {
+    int (*verify)(const uint8_t* digest, const uint8_t* signature, size_t size, char* reason);
+    int (*begin)(uint32_t size, char* reason);
+    int (*write)(const uint8_t* bytes, size_t size, char* reason);
+    int (*finish)(const uint8_t* digest, char* reason);
+    void (*abort)();
+};
+
 class VirtualDevice {
   public:
-    VirtualDevice(const DeviceConfig& config, uint32_t boot_id, const std::string& reset_cause, uint64_t now_us);
+    // `slot`: that its firmware runs from, where it has any.
+    VirtualDevice(const DeviceConfig& config, uint32_t boot_id, const std::string& reset_cause, uint64_t now_us,
+                  const std::string& slot = "");
     VirtualDevice(const VirtualDevice&) = delete;
     VirtualDevice& operator=(const VirtualDevice&) = delete;
 
@@ -41,6 +52,11 @@ class VirtualDevice {
     void receive(const std::vector<uint8_t>& bytes) { receive(bytes.data(), bytes.size(), false, now_us_); }
     void receive_config(const uint8_t* text, size_t size, bool is_retained, uint64_t received_us);
     void receive_serial(const uint8_t* bytes, size_t size, uint64_t received_us);
+    // Takes a new firmware; its functions may all be null.
+    FirmwareSlot& firmware() { return firmware_; }
+    FirmwareCalls& firmware_calls() { return firmware_calls_; }
+    // It has said `status` over the line to somebody who had spoken there.
+    bool has_told_status() const { return has_told_status_; }
     // From now on somebody takes what goes over the serial line.
     void attach_line() { has_line_ = true; }
     // JSON of the platform's own: EVENT, SHAFT or PROVISION_ACK; true if it is to be said over MQTT too, by the caller.
@@ -94,6 +110,9 @@ class VirtualDevice {
 
     DeviceConfig config_;
     std::string reset_cause_;
+    std::string slot_;
+    FirmwareSlot firmware_;
+    FirmwareCalls firmware_calls_{};
     Machine machine_;
     SerialPort serial_;
     World world_;
@@ -110,6 +129,7 @@ class VirtualDevice {
     std::deque<Request> requests_;
     std::string kept_;
     bool has_line_ = false;
+    bool has_told_status_ = false;
     std::deque<PinChange> trace_;
     Pins traced_;
     bool is_tracing_ = false;

@@ -35,6 +35,7 @@ STALL = 0.1  # [s] a loop that was late by more was stopped by the operating sys
 LAST_SLOTS = 2000  # [us] that run after a stall: one slot, and what is begun of the next
 LONGEST_STOP = 5.0  # [s] when the process is asked to end while the arm moves
 BEAT = 1.0  # [s] of the readiness file
+TRIAL = 30.0  # [s] that a new firmware has to say status to somebody
 REPLY_TIME = 0.1  # [s] that an answer has to leave, before the wire is lost
 LARGEST_DRIFT = 10_000.0  # [ppm]
 LONGEST_OFFLINE = 3600.0  # [s]
@@ -84,9 +85,21 @@ class VirtualEsp32:
             self._handle(item)
         self._advance(time.monotonic())
         self._board.remember(self._device)
-        self._wires.publish(self._device, now)
+        has_told = self._wires.publish(self._device, now)
+        self._look_after_firmware(now, has_told)
         self._beat(now)
         self._do_what_is_due(now)
+
+    def _look_after_firmware(self, now: float, has_told: bool) -> None:
+        """Ends the trial of a new firmware, one way or the other, or restarts into one at rest and disarmed."""
+        if self._board.is_on_trial and has_told:
+            self._board.is_on_trial = False
+            self._board.firmware.confirm()
+        elif self._board.is_on_trial and now > self._booted + TRIAL:
+            self._start_anew("trial_over")  # whom nobody has heard, nobody has moved
+        elif self._device.still and self._board.firmware.is_ready and not self._device.armed:
+            self._board.firmware.is_ready = False
+            self._later.append((now + REPLY_TIME, partial(self._start_anew, "update")))
 
     def _do_what_is_due(self, now: float) -> None:
         due = [action for when, action in self._later if when <= now]
@@ -194,6 +207,7 @@ class VirtualEsp32:
 
     def _boot(self, cause: str = "") -> Device:
         device = self._board.boot(cause)
+        self._booted = time.monotonic()
         self._wires.attach(device)
         return device
 

@@ -47,8 +47,12 @@ class Wires:
         if self._line is not None:
             self._line.close()
 
-    def publish(self, device: Device, now: float) -> None:
-        """Sends the device's frames, and its shaft positions ten times a second; `now` in [s] monotonic."""
+    def publish(self, device: Device, now: float) -> bool:
+        """Sends the device's frames, and its shaft positions ten times a second; `now` in [s] monotonic.
+
+        True if `status` was among them and has reached somebody: the broker, or whoever speaks on the line.
+        """
+        has_told = False
         if now >= self._next_shaft:
             self._next_shaft = now + SHAFT_PERIOD
             report = device.shaft_report()
@@ -57,9 +61,11 @@ class Wires:
         for frame in device.take():
             if frame.kind == "event":
                 _log_event(frame)
+            has_told = has_told or (frame.kind == "status" and self.network.is_connected)
             self.network.publish(frame)
         if self._line is not None:
             self._line.write(device.take_serial())
+        return has_told or device.told_status
 
 
 def say_event(device: Device, name: str, detail: str) -> None:

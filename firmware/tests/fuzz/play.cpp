@@ -7,6 +7,7 @@
 
 #include "config_text.h"
 #include "json_reader.h"
+#include "phrase.h"
 #include "promises.h"
 #include "provision.h"
 #include "serial.h"
@@ -57,10 +58,60 @@ void check_wrapping(const SerialPort& port, Output output, const uint8_t* bytes,
     PROMISE(memcmp(packets.bytes() + (is_frame ? 0 : kHeaderSize), bytes, size) == 0);
 }
 
+// A slot of the flash: it is opened, written and closed in this order, never armed and never in motion.
+struct Flash {
+    Flash() : slot{this, kVirtualChip, verify, begin, write, finish, abort} {}
+
+    static Flash& of(void* self) {
+        Flash& flash = *static_cast<Flash*>(self);
+        PROMISE(flash.machine->keeps_still() && !flash.machine->is_enabled());
+        return flash;
+    }
+    static bool answer(bool is_good, Refusal* refusal) {
+        if (!is_good) Phrase(refusal->reason, sizeof refusal->reason).add("no");
+        return is_good;
+    }
+    static bool verify(void* self, const uint8_t* digest, const uint8_t* signature, size_t size, Refusal* refusal) {
+        of(self);
+        PROMISE(size >= 8 && size <= kMaxSignature);
+        return answer((signature[size - 1] ^ digest[kDigestSize - 1]) % 16 != 2, refusal);
+    }
+    static bool begin(void* self, uint32_t size, Refusal* refusal) {
+        Flash& flash = of(self);
+        PROMISE(!flash.is_open && size >= kImageHeaderSize);
+        flash.is_open = size <= 100000;
+        flash.left = size;
+        return answer(flash.is_open, refusal);
+    }
+    static bool write(void* self, const uint8_t* bytes, size_t size, Refusal* refusal) {
+        Flash& flash = of(self);
+        PROMISE(flash.is_open && size > 0 && size <= kMaxUpdatePiece && size <= flash.left);
+        flash.left -= size;
+        return answer(bytes[size - 1] != 255, refusal);
+    }
+    static bool finish(void* self, const uint8_t*, Refusal* refusal) {
+        Flash& flash = of(self);
+        PROMISE(flash.is_open && flash.left == 0);
+        flash.is_open = false;
+        return answer(!flash.is_done, refusal) && (flash.is_done = true);
+    }
+    static void abort(void* self) {
+        Flash& flash = of(self);
+        PROMISE(flash.is_open);
+        flash.is_open = false;
+    }
+
+    FirmwareSlot slot;
+    const Machine* machine = nullptr;
+    size_t left = 0;
+    bool is_open = false, is_done = false;
+};
+
 class Bench {
   public:
     Bench() : config_(first_config()) {
-        machine_.begin(config_, Identity{kBoot, "power_on", true}, Sink{this, put, keep, nullptr});
+        flash_.machine = &machine_;
+        machine_.begin(config_, Identity{kBoot, "power_on", true}, Sink{this, put, keep, nullptr, &flash_.slot});
         port_.begin(machine_, kBoot, other, this);
         const int32_t steps[kMaxJoints] = {};
         machine_.start(now_us_, steps, true);
@@ -101,6 +152,7 @@ class Bench {
 
     DeviceConfig config_;
     Machine machine_;
+    Flash flash_;
     SerialPort port_;
     Levels levels_;
     uint8_t unsettled_ = 0;  // slots in which every tick is run

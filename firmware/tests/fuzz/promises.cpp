@@ -99,6 +99,7 @@ bool is_refusal(Output output, const uint8_t* bytes, size_t size) {
         case Output::Text:
             return text.compare(0, 5, "<NAK,") == 0;
         case Output::ConfigAck:
+        case Output::UpdateAck:
             return text.find("\"accepted\": false") != std::string::npos;
         default:
             return false;

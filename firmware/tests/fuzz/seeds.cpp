@@ -1,5 +1,6 @@
 #include <string>
 
+#include "bytes.h"
 #include "frame.h"
 #include "frames.h"
 #include "play.h"
@@ -38,6 +39,14 @@ Bytes json_frame(FrameType type, const std::string& words) {
     write_header(bytes.data(), type, 0, 0);
     bytes.insert(bytes.end(), words.begin(), words.end());
     return rig::seal(bytes);
+}
+
+// Bytes of an image for a virtual device.
+Bytes image(size_t from, size_t to) {
+    Bytes bytes(64, 7);
+    bytes[0] = kImageMagic;
+    store_u16(&bytes[kImageChipOffset], kVirtualChip);
+    return Bytes(bytes.begin() + static_cast<long>(from), bytes.begin() + static_cast<long>(to));
 }
 
 const char* const kSmall =
@@ -106,14 +115,28 @@ std::vector<std::vector<Item>> seeds() {
          {Kind::Retained, command(Command::Hold, 3)},
          {Kind::Frame, rig::build_sync(5)},
          silence(9)},
+        {{Kind::Frame, command(Command::Disarm, 1)},
+         {Kind::Frame, rig::build_update(UpdateStep::Begin, 5, 0, rig::build_update_begin(64, 1))},
+         {Kind::Frame, rig::build_update(UpdateStep::Data, 5, 0, image(0, 40))},
+         {Kind::Packet, rig::build_update(UpdateStep::Data, 5, 40, image(40, 64))},
+         {Kind::Frame, rig::build_update(UpdateStep::End, 5)}},
+        {{Kind::Frame, command(Command::Disarm, 1)},
+         {Kind::Packet, rig::build_update(UpdateStep::Begin, 5, 0, rig::build_update_begin(64, 1))},
+         {Kind::Frame, rig::build_update(UpdateStep::Data, 5, 0, image(0, 40))},
+         {Kind::Frame, rig::build_update(UpdateStep::Begin, 6, 0, rig::build_update_begin(64, 1))},
+         {Kind::Frame, rig::build_update(UpdateStep::Data, 6, 0, image(0, 40))},
+         {Kind::Frame, rig::build_update(UpdateStep::Abort, 6)},
+         {Kind::Frame, command(Command::Arm, 2)},
+         {Kind::Retained, rig::build_update(UpdateStep::Begin, 7, 0, rig::build_update_begin(64, 1))}},
         {{Kind::Packet, rig::build_sync(5)},
          {Kind::Packet, json_frame(FrameType::Config, kSmall)},
          {Kind::Packet, json_frame(FrameType::Provision, "{}")},
          {Kind::Packet, chunk(0, 0, 2560, true, true)},
          slots(60)},
         {{Kind::Provision,
-          text(R"({"device":"rm1","wifi_ssid":"n","wifi_password":"s\u00e9cretsecret","mqtt_uri":)"
-               R"("mqtts://h:8883","mqtt_user":"u","mqtt_password":"p","mqtt_ca":"PEM","factory_reset":false})")}},
+          text(
+              R"({"device":"rm1","wifi_ssid":"n","wifi_password":"s\u00e9cretsecret","mqtt_uri":)"
+              R"("mqtts://h:8883","mqtt_user":"u","mqtt_password":"p","mqtt_ca":"PEM","mqtt_certificate":"PEM","mqtt_key":"PEM","update_key":"PEM","factory_reset":false})")}},
         {{Kind::Json, text(kSmall)}},
         {{Kind::Json, text(R"({"a":[1,-2,{"b":"\ud83d\ude00"}],"c":null,"d":true})")}},
         {{Kind::Serial, Bytes{0, 2, 0x67, 0, '<', '1', ',', '0', '.', '1', ',', '0', '>', '\n', 0xff, 0, 0}},

@@ -16,6 +16,7 @@ struct Chip {
     uint8_t wire_tx;      // of the serial wire: UART0, or D- and D+ of the chip's USB
     uint8_t wire_rx;
     uint8_t boot_button;  // active low on the usual boards
+    uint16_t image_id;    // esp_chip_id_t, which every image carries
 };
 
 constexpr uint64_t pin(uint8_t number) { return number < 64 ? 1ull << number : 0; }
@@ -34,6 +35,7 @@ constexpr Chip kEsp32 = {
     1,
     3,
     0,
+    0,
 };
 
 constexpr Chip kEsp32S3 = {
@@ -47,10 +49,11 @@ constexpr Chip kEsp32S3 = {
     43,
     44,
     0,
+    9,
 };
 
 constexpr Chip kEsp32C3 = {
-    "esp32c3", pins(0, 21), 0, pins(12, 17), 0, pin(2) | pin(8) | pin(9), pins(0, 4), 21, 20, 9,
+    "esp32c3", pins(0, 21), 0, pins(12, 17), 0, pin(2) | pin(8) | pin(9), pins(0, 4), 21, 20, 9, 5,
 };
 
 // The same chip on a board that has only its own USB: that is the serial wire, and UART0's pins are free.

@@ -32,6 +32,7 @@ void Device::begin(const Credentials& credentials, uint32_t boot_id) {
     device_ = credentials.device;
     boot_id_ = boot_id;
     provisioning_.begin(credentials, serial_);
+    ota_.begin(credentials, clock_us());
 }
 
 // What is in the flash was taken once; with another firmware or on another board it may not be good any more.
@@ -54,6 +55,7 @@ void Device::run() {
         serve();
         keep_config();
         provisioning_.restart_if_due(machine_, clock_us());
+        ota_.turn(machine_, clock_us());
         if (slots_++ % kSlotsPerFeeding == 0) esp_task_wdt_reset();
     }
 }
@@ -63,7 +65,8 @@ void Device::wake_up() {
     const ResetCause cause = reset_cause();
     const Awakening awakening = wake(pose_memory, cause.is_warm, config_.crc32);
     Phrase(reset_cause_, sizeof reset_cause_).add(cause.text).add(awakening.was_moving ? " while moving" : "");
-    machine_.begin(config_, Identity{boot_id_, reset_cause_, false, device_}, Sink{this, put, keep, check});
+    machine_.begin(config_, Identity{boot_id_, reset_cause_, false, device_, ota_.label()},
+                   Sink{this, put, keep, check, ota_.slot()});
     serial_.begin(machine_, boot_id_, other, this);
     tick_.begin(machine_.stepper(), xTaskGetCurrentTaskHandle());
     machine_.start(clock_us(), awakening.steps, awakening.is_referenced);
@@ -111,6 +114,7 @@ void Device::dispatch(const Record& record) {
         case Inbound::Config:
             return machine_.receive_config(arrival, now_us);
         case Inbound::Connected:
+            is_connected_ = true;
             return machine_.report_status();
         case Inbound::Bytes:
             serial_.receive(record.bytes, record.size, record.time_us, now_us);

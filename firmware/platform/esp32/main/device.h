@@ -8,6 +8,7 @@
 #include "freertos/FreeRTOS.h"
 #include "freertos/task.h"
 #include "machine.h"
+#include "ota.h"
 #include "pins.h"
 #include "pose_memory.h"
 #include "provisioning.h"
@@ -50,6 +51,8 @@ class Device {
     Tick tick_;
     SlowPins pins_;
     Provisioning provisioning_;
+    Ota ota_;
+    bool is_connected_ = false;  // to the broker, some time since the start
     TaskHandle_t network_ = nullptr;
     const char* device_ = "";
     uint32_t boot_id_ = 0;

@@ -13,6 +13,8 @@ namespace gemelo {
 void Device::put(void* self, Output output, const uint8_t* bytes, size_t size) {
     Device& device = *static_cast<Device*>(self);
     const uint8_t kind = static_cast<uint8_t>(output);
+    const bool is_heard = device.is_connected_ || device.serial_.understood() != 0;
+    if (output == Output::Status && is_heard) device.ota_.status_said();
     if (device.serial_.carries(output)) {
         uint8_t framed[SerialPort::kLargestReport];
         const size_t length = device.serial_.wrap(output, bytes, size, framed, sizeof framed);

@@ -30,8 +30,9 @@ struct Entries {
                 {"mqtt_ca", c.mqtt_ca, sizeof c.mqtt_ca},
                 {"mqtt_cert", c.mqtt_certificate, sizeof c.mqtt_certificate},  // NVS takes 15 bytes of a key
                 {"mqtt_key", c.mqtt_key, sizeof c.mqtt_key},
+                {"update_key", c.update_key, sizeof c.update_key},
                 {"serial_baud", c.serial_baud, sizeof c.serial_baud}} {}
-    Entry entry[10];
+    Entry entry[11];
 };
 
 }  // namespace

@@ -21,7 +21,7 @@ constexpr UBaseType_t kNetworkPriority = 6;
 constexpr UBaseType_t kSensorPriority = 2;
 
 // Stacks in bytes.
-constexpr uint32_t kSlotStack = 12288;
+constexpr uint32_t kSlotStack = 16384;  // of which checking a signature takes some 4 kB
 constexpr uint32_t kWireStack = 4096;
 constexpr uint32_t kNetworkStack = 6144;
 constexpr uint32_t kSensorStack = 4096;

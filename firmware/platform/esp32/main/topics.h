@@ -19,7 +19,7 @@ struct Heard {
 
 constexpr Heard kHeard[] = {
     {"traj", FrameType::Traj, 1}, {"cmd", FrameType::Cmd, 1},       {"hb", FrameType::Heartbeat, 0},
-    {"sync", FrameType::Sync, 0}, {"config", FrameType::Config, 1},
+    {"sync", FrameType::Sync, 0}, {"config", FrameType::Config, 1}, {"update", FrameType::Update, 1},
 };
 
 struct Said {
@@ -44,6 +44,8 @@ inline Said said(Output output) {
             return {"status", 1, true};
         case Output::ConfigAck:
             return {"config/ack", 1, false};
+        case Output::UpdateAck:
+            return {"update/ack", 1, false};
         case Output::Sensors:
             return {"sensors", 0, false};
         default:

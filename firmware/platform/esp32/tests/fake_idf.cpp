@@ -16,6 +16,7 @@
 #include "esp_adc/adc_cali_scheme.h"
 #include "esp_crt_bundle.h"
 #include "esp_netif.h"
+#include "esp_ota_ops.h"
 #include "esp_random.h"
 #include "esp_rom_sys.h"
 #include "esp_task_wdt.h"
@@ -99,15 +100,29 @@ void pass_time() {
     chip.now_us += chip.waking_us;
 }
 
+// As the boot loader with rollback: a new image is started once, and again only if it was marked valid meanwhile.
+Flash started(Flash flash) {
+    if (flash.state == ESP_OTA_IMG_PENDING_VERIFY || flash.state == ESP_OTA_IMG_INVALID) {
+        flash.boot = 1 - flash.boot;
+        flash.state = ESP_OTA_IMG_VALID;
+    }
+    if (flash.state == ESP_OTA_IMG_NEW) flash.state = ESP_OTA_IMG_PENDING_VERIFY;
+    flash.running = flash.boot;
+    flash.is_open = false;
+    return flash;
+}
+
 }  // namespace
 
 void reset() {
     map_registers();
-    const auto flash = chip.nvs;
+    const auto nvs = chip.nvs;
+    const Flash flash = started(chip.flash);
     const uint32_t writes = chip.flash_writes;
     const esp_reset_reason_t reason = chip.reset_reason;
     chip = Chip{};
-    chip.nvs = flash;
+    chip.nvs = nvs;
+    chip.flash = flash;
     chip.flash_writes = writes;
     chip.reset_reason = reason;
     timer = Timer{};
@@ -286,6 +301,50 @@ esp_err_t nvs_erase_all(nvs_handle_t) {
 esp_err_t nvs_commit(nvs_handle_t) {
     ++chip.flash_writes;
     return ESP_OK;
+}
+
+static const esp_partition_t kSlots[] = {{0x20000, 0x1e0000, "ota_0"}, {0x200000, 0x1e0000, "ota_1"}};
+static int slot_of(const esp_partition_t* partition) { return static_cast<int>(partition - kSlots); }
+const esp_partition_t* esp_ota_get_running_partition(void) { return &kSlots[chip.flash.running]; }
+const esp_partition_t* esp_ota_get_next_update_partition(const esp_partition_t*) {
+    return &kSlots[1 - chip.flash.running];
+}
+esp_err_t esp_ota_begin(const esp_partition_t* partition, size_t, esp_ota_handle_t* handle) {
+    if (chip.flash.is_open || slot_of(partition) == chip.flash.running) return ESP_ERR_NO_MEM;
+    chip.flash.is_open = true;
+    chip.flash.slot[slot_of(partition)].clear();
+    *handle = static_cast<esp_ota_handle_t>(slot_of(partition));
+    return ESP_OK;
+}
+esp_err_t esp_ota_write(esp_ota_handle_t handle, const void* data, size_t size) {
+    if (!chip.flash.is_open) return ESP_ERR_NO_MEM;
+    chip.flash.slot[handle].append(static_cast<const char*>(data), size);
+    return ESP_OK;
+}
+esp_err_t esp_ota_abort(esp_ota_handle_t) {
+    if (!chip.flash.is_open) return ESP_ERR_NO_MEM;
+    chip.flash.is_open = false;
+    return ESP_OK;
+}
+esp_err_t esp_ota_end(esp_ota_handle_t handle) {
+    return esp_ota_abort(handle) == ESP_OK && chip.flash.is_valid ? ESP_OK : ESP_ERR_NO_MEM;
+}
+esp_err_t esp_ota_set_boot_partition(const esp_partition_t* partition) {
+    chip.flash.boot = slot_of(partition);
+    chip.flash.state = ESP_OTA_IMG_NEW;
+    return ESP_OK;
+}
+esp_err_t esp_ota_get_state_partition(const esp_partition_t*, esp_ota_img_states_t* state) {
+    *state = chip.flash.state;
+    return ESP_OK;
+}
+esp_err_t esp_ota_mark_app_valid_cancel_rollback(void) {
+    chip.flash.state = ESP_OTA_IMG_VALID;
+    return ESP_OK;
+}
+esp_err_t esp_ota_mark_app_invalid_rollback_and_reboot(void) {
+    chip.flash.state = ESP_OTA_IMG_INVALID;
+    throw fake::Restarted{};
 }
 
 esp_mqtt_client_handle_t esp_mqtt_client_init(const esp_mqtt_client_config_t* config) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "esp_event.h"
+#include "esp_ota_ops.h"
 #include "esp_system.h"
 #include "mqtt_client.h"
 
@@ -21,6 +22,15 @@ struct Restarted {};  // thrown by esp_restart()
 struct Ended {};      // thrown where the task would wait for ever
 
 constexpr int kAnalogMv = 1500, kPulledUpMv = 3100;  // [mV] what a pin at the ADC reads, and one that was let go
+
+// The two slots for firmware, and what the boot loader knows of them.
+struct Flash {
+    std::string slot[2];
+    int running = 0, boot = 0;
+    esp_ota_img_states_t state = ESP_OTA_IMG_UNDEFINED;  // of the slot to boot
+    bool is_open = false;                                // between esp_ota_begin() and esp_ota_end() or _abort()
+    bool is_valid = true;                                // what esp_ota_end() finds
+};
 
 struct Chip {
     uint64_t now_us = 0;
@@ -38,6 +48,7 @@ struct Chip {
     esp_reset_reason_t reset_reason = ESP_RST_POWERON;
     std::map<std::string, std::string> nvs;
     uint32_t flash_writes = 0;
+    Flash flash;
     std::string tls_authority, tls_certificate, tls_key;  // of the transport; empty: it was given none
     std::vector<std::string> subscriptions;               // topic and QoS
     esp_mqtt_client_config_t mqtt{};

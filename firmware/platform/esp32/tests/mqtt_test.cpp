@@ -86,8 +86,9 @@ TEST(Esp32Mqtt, ADeviceShowsItsOwnCertificateOverTlsOnlyAndOnlyIfItHasOne) {
 
 TEST(Esp32Mqtt, SubscribesToWhatADeviceHears) {
     Connected connected;
-    const std::vector<std::string> expected = {"gemelo/v1/rm1/traj 1", "gemelo/v1/rm1/cmd 1", "gemelo/v1/rm1/hb 0",
-                                               "gemelo/v1/rm1/sync 0", "gemelo/v1/rm1/config 1"};
+    const std::vector<std::string> expected = {"gemelo/v1/rm1/traj 1",   "gemelo/v1/rm1/cmd 1",
+                                               "gemelo/v1/rm1/hb 0",     "gemelo/v1/rm1/sync 0",
+                                               "gemelo/v1/rm1/config 1", "gemelo/v1/rm1/update 1"};
     EXPECT_EQ(chip.subscriptions, expected);
 }
 
