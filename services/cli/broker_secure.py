@@ -11,8 +11,9 @@ from services.cli.credentials import WIFI_PASSWORD, Credentials, certificate, pa
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.provision import BAUD, PASSWORDS, provision
+from services.credentials.private_files import AccessError
 from services.mqtt import secure_folder
-from services.mqtt.access import AUTHORITY, AccessError
+from services.mqtt.access import AUTHORITY
 from services.runtime.deployment import load_deployment, project_root
 
 FOLDER = ".gemelo/broker"

@@ -25,7 +25,8 @@ from services.cli.parser import Options
 from services.cli.session import Session, connect
 from services.cli.text_table import table
 from services.cli.version import version_text
-from services.mqtt.access import AccessError, gateway_access
+from services.credentials.private_files import AccessError
+from services.mqtt.access import gateway_access
 from services.runtime.deployment import load_deployment, project_root
 
 UP = "start the twin with `make up`"

@@ -7,21 +7,16 @@ from __future__ import annotations
 
 import os
 import ssl
-import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from schemas.deployment import Broker, MqttSection
-from schemas.errors import ConfigurationError
+from services.credentials.private_files import AccessError, require_private
 
 PASSWORD, DEVICE_PASSWORD = "GEMELO_MQTT_PASSWORD", "GEMELO_MQTT_DEVICE_PASSWORD"  # in the environment
 GATEWAY = "gateway"  # its user name, where `gemelo broker secure` names it
 AUTHORITY = "ca.pem"  # of a secure folder
-
-
-class AccessError(ConfigurationError):
-    """A broker that cannot be joined for what the deployment says; the text names the key or file and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -72,16 +67,6 @@ def read_secret(path: str) -> str:
     if not secret:
         raise AccessError(f"{path} holds no password in its first line")
     return secret
-
-
-def require_private(path: str) -> None:
-    """Returns if only its owner can read the file; else raises `AccessError` with the remedy."""
-    try:
-        mode = stat.S_IMODE(os.stat(path).st_mode)
-    except OSError as error:
-        raise AccessError(f"cannot read {path}: {error.strerror}") from None
-    if mode & 0o077:
-        raise AccessError(f"{path} has mode {mode:03o}, so others can read the secret in it: chmod 600 {path}")
 
 
 def _require_consistent(section: MqttSection) -> None:

@@ -13,8 +13,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from schemas.device_topics import FROM_DEVICE, TO_DEVICE, topic
-from services.mqtt.access import AUTHORITY, GATEWAY, AccessError, read_secret
-from services.mqtt.certificates import Authority
+from services.credentials.authority import Authority
+from services.credentials.private_files import AccessError, write
+from services.mqtt.access import AUTHORITY, GATEWAY, read_secret
 
 ACL, USERS, CERTIFICATE, KEY = "acl", "users", "server.pem", "server.key"
 SALT, HASH, ITERATIONS = 12, 64, 10_000  # [bytes], [bytes]; of mosquitto's "$7$": PBKDF2 with SHA-512
@@ -77,15 +78,6 @@ def hashed(password: str) -> str:
     salt = secrets.token_bytes(SALT)
     digest = hashlib.pbkdf2_hmac("sha512", password.encode(), salt, ITERATIONS, HASH)
     return f"$7${ITERATIONS}${base64.b64encode(salt).decode()}${base64.b64encode(digest).decode()}"
-
-
-def write(path: Path, text: str) -> None:
-    """Replaces a file that only its owner can read."""
-    beside = path.with_name(f"{path.name}.new")
-    beside.unlink(missing_ok=True)
-    with os.fdopen(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as file:
-        file.write(text)
-    os.replace(beside, path)
 
 
 def _rights(user: str, device: str, writes: Iterable[str], reads: Iterable[str]) -> str:

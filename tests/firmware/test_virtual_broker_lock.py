@@ -13,9 +13,9 @@ from msgspec.structs import replace
 from firmware.platform.host.flash import Credentials
 from firmware.platform.host.link import Connected, Denied, DeviceLink, Disconnected, Item
 from firmware.platform.host.network import AddressError, broker_address
+from services.credentials.authority import Authority
 from services.mqtt import secure_folder
 from services.mqtt.access import BrokerAccess, device_access
-from services.mqtt.certificates import Authority
 from tests.stepper_gateway.locked import Mosquitto, locked, renew
 
 WATCHED = 2.5  # [s] attempts at 0, 1 and 3 s

@@ -8,9 +8,10 @@ import pytest
 from msgspec.structs import replace
 
 from schemas.deployment import Broker, MqttSection
+from services.credentials.authority import Authority, openssl
+from services.credentials.private_files import AccessError
 from services.mqtt import secure_folder
-from services.mqtt.access import AccessError, device_access, gateway_access, read_secret
-from services.mqtt.certificates import Authority, openssl
+from services.mqtt.access import device_access, gateway_access, read_secret
 
 STRANGE = MqttSection(broker=Broker.EXTERNAL, host="broker.lan", port=8883)
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from services.mqtt.access import AccessError, BrokerAccess, read_secret, tls_context
+from services.credentials.private_files import AccessError
+from services.mqtt.access import BrokerAccess, read_secret, tls_context
 from services.mqtt.failures import NO_TLS, WANTS_CERTIFICATE, denial, failure, refusal, silence
 from services.runtime.deployment import load_deployment, project_root
 from services.stepper_gateway.device.session import DeviceSession

@@ -10,8 +10,8 @@ import pytest
 
 from services.cli.errors import ExitCode
 from services.cli.main import run
+from services.credentials.private_files import AccessError
 from services.mqtt import secure_folder
-from services.mqtt.access import AccessError
 from tests.optional import need
 
 LONGEST_ON_A_BOARD = 2048  # [bytes] of mqtt_ca in firmware/PROTOCOL.md

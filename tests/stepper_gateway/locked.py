@@ -12,9 +12,9 @@ from msgspec.structs import replace
 
 from schemas.deployment import Broker, MqttSection
 from services.broker import mosquitto
+from services.credentials.authority import Authority
 from services.mqtt import secure_folder
 from services.mqtt.access import BrokerAccess, gateway_access
-from services.mqtt.certificates import Authority
 from services.mqtt.client import MqttClient
 from services.stepper_gateway.links.mqtt import MqttLink
 from tests.optional import need

@@ -11,9 +11,9 @@ from msgspec.structs import replace
 
 from firmware.platform.host.link import COMMANDS, REPORTS
 from schemas.deployment import MqttSection
+from services.credentials.authority import Authority
 from services.mqtt import secure_folder
 from services.mqtt.access import device_access, gateway_access
-from services.mqtt.certificates import Authority
 from services.stepper_gateway.links.link import FROM_DEVICE, TO_DEVICE, Kind
 from services.stepper_gateway.links.mqtt import MqttLink
 from tests.stepper_gateway.locked import Mosquitto, external, locked, published, reason_of, renew, secret, wait_for

@@ -24,7 +24,8 @@ from schemas.deployment import Deployment, DeviceKind, Wire
 from schemas.robot import Dialect
 from services.arm.errors import DescriptionError
 from services.arm.model.description import load_arm
-from services.mqtt.access import AccessError, device_access
+from services.credentials.private_files import AccessError
+from services.mqtt.access import device_access
 from services.runtime.deployment import DeploymentError, load_deployment, project_root
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.readiness import Readiness

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from services.mqtt.access import AccessError
+from services.credentials.private_files import AccessError
 
 DAYS = 3650  # of the authority and of what it signs
 KEY = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes")  # small enough for a board

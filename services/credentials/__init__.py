@@ -1,0 +1,1 @@
+"""Certificates and files of secrets, for broker and bus alike."""
