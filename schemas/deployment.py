@@ -45,8 +45,23 @@ class ViewerMode(StrEnum):
 
 
 class RouterSection(DeploymentRecord, frozen=True, kw_only=True):
-    host: str = "127.0.0.1"
+    """With TLS both ends show a certificate, and the common name of a node's is its role (schemas/roles.py)."""
+
+    host: str = "127.0.0.1"  # that nodes connect to
     port: int = 7447
+    listen_host: str = ""  # that the process `router` listens on; empty: host
+    listen_port: int = 0  # the same; 0: port
+    configuration: str = ""  # json5 of `gemelo deploy render`: addresses, TLS and permissions; empty: open
+    tls: bool = False
+    ca: str = ""  # PEM file of the authority that signed the certificates of router and nodes
+    certificate: str = ""  # PEM file of this node's own
+    key: str = ""  # its private key, of mode 600
+    insecure: bool = False  # may listen beyond loopback without TLS
+
+    @property
+    def listening(self) -> tuple[str, int]:
+        """Host and port that our own router listens on."""
+        return self.listen_host or self.host, self.listen_port or self.port
 
 
 class MqttSection(DeploymentRecord, frozen=True, kw_only=True):
@@ -66,6 +81,7 @@ class MqttSection(DeploymentRecord, frozen=True, kw_only=True):
     ca: str = ""  # PEM file of the authority that signed the broker's certificate; empty: those of this system
     certificate: str = ""  # PEM file of our own, where the broker asks for one
     key: str = ""  # its private key, of mode 600; empty: in the same file
+    insecure: bool = False  # may listen beyond loopback without TLS
 
     @property
     def listening(self) -> tuple[str, int]:
@@ -83,11 +99,13 @@ class ViewerSection(DeploymentRecord, frozen=True, kw_only=True):
     host: str = "127.0.0.1"
     port: int = 9876  # gRPC
     web_port: int = 9090  # the page
+    insecure: bool = False  # may listen beyond loopback: it has no TLS
 
 
 class PanelSection(DeploymentRecord, frozen=True, kw_only=True):
     host: str = "127.0.0.1"
     port: int = 8088  # the operator's page
+    insecure: bool = False  # may listen beyond loopback: it has no TLS
 
 
 class PathsSection(DeploymentRecord, frozen=True, kw_only=True):

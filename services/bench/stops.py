@@ -80,7 +80,7 @@ class Caller:
     def __init__(self, running: Running) -> None:
         router = running.deployment.router
         self._running = running
-        self.bus = ZenohBus(router.host, router.port, running.arm.name)
+        self.bus = ZenohBus(router, running.arm.name)
         self.wire = Wire(running.deployment.mqtt.port, running.arm.device.name)
         self.states = running.node.latest(JOINT_STATES)
 

@@ -26,6 +26,7 @@ from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
 from schemas.actions import GoalRequest
+from schemas.deployment import RouterSection
 from schemas.device import (
     ConfigureRequest,
     DeviceCommandRequest,
@@ -180,7 +181,7 @@ def _flood(options: argparse.Namespace) -> None:
 
 
 def _bus(what: str, options: argparse.Namespace) -> Callable[[], None]:
-    bus = ZenohBus("127.0.0.1", options.port, options.robot)
+    bus = ZenohBus(RouterSection(port=options.port), options.robot)
     if what == "targets":
         publication = bus.publish(JOINT_TARGETS.key, JointTargets.__name__, JOINT_TARGETS.delivery)
         payload = encode(JointTargets())

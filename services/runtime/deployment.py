@@ -3,22 +3,32 @@
 from __future__ import annotations
 
 import difflib
+import ipaddress
 import os
 import re
 import tomllib
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
-from schemas.deployment import Deployment
+from schemas.deployment import Deployment, DeploymentRecord
 from schemas.errors import ConfigurationError
 
 DEFAULT_FILE = "deploy/local.toml"
 MQTT_FILES = ("secure_folder", "password_file", "device_password_file", "ca", "certificate", "key")
+ROUTER_FILES = ("configuration", "ca", "certificate", "key")
 PREFIX = "GEMELO_"
+REMEDIES = {
+    "router": "`gemelo deploy` gives router and nodes certificates (deploy/README.md)",
+    "mqtt": "`gemelo broker secure` gives it TLS (docs/my_broker.md)",
+    "panel": "Its page reaches another machine through ssh (ssh -L 8088:127.0.0.1:8088)",
+    "viewer": "Its pictures reach another machine through ssh (ssh -L 9876:127.0.0.1:9876)",
+}  # by section of the deployment
+
+S = TypeVar("S", bound=DeploymentRecord)
 
 
 class DeploymentError(ConfigurationError):
@@ -59,6 +69,29 @@ def robot_name(deployment: Deployment) -> str:
     if not isinstance(name, str) or not name or "/" in name:
         raise DeploymentError(f'{file}: key "name" must be a text without "/"')
     return name
+
+
+def exposure(section: str, host: str, is_locked: bool, is_insecure: bool) -> str:
+    """What to say at the start of what listens on `host`: nothing where only this machine reaches it, or it is locked.
+
+    Raises `DeploymentError` for an open port that other machines reach, unless the deployment says `insecure`.
+    """
+    if is_locked or is_loopback(host):
+        return ""
+    if not is_insecure:
+        raise DeploymentError(
+            f"[{section}] would listen on {host}, beyond this machine, without TLS: who reaches it could move the arm. "
+            f"{REMEDIES[section]}, or write insecure = true in [{section}] (GEMELO_{section.upper()}_INSECURE=true)"
+        )
+    return f"INSECURE: [{section}] listens on {host} without TLS (insecure = true): who reaches it can move the arm"
+
+
+def is_loopback(host: str) -> bool:
+    """True if only this machine reaches the address; a name other than localhost may be any machine's."""
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 def _read(file: Path) -> dict[str, Any]:
@@ -123,6 +156,13 @@ def _with_absolute_paths(deployment: Deployment, root: Path) -> Deployment:
         out=str(root / deployment.paths.out),
         programs=str(root / deployment.paths.programs),
     )
-    files = {name: str(root / path) for name in MQTT_FILES if (path := getattr(deployment.mqtt, name))}
-    mqtt = msgspec.structs.replace(deployment.mqtt, **files)
-    return msgspec.structs.replace(deployment, robot=str(root / deployment.robot), mqtt=mqtt, paths=paths)
+    mqtt = _with_absolute(deployment.mqtt, MQTT_FILES, root)
+    router = _with_absolute(deployment.router, ROUTER_FILES, root)
+    robot = str(root / deployment.robot)
+    return msgspec.structs.replace(deployment, robot=robot, router=router, mqtt=mqtt, paths=paths)
+
+
+def _with_absolute(section: S, names: tuple[str, ...], root: Path) -> S:
+    """The section with its files that are named in it below `root`."""
+    files = {name: str(root / path) for name in names if (path := getattr(section, name))}
+    return msgspec.structs.replace(section, **files)

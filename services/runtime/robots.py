@@ -18,7 +18,7 @@ def robots_on(router: RouterSection, node: str = "*") -> tuple[str, ...]:
     from services.runtime.bus.zenoh_config import client_config
 
     try:
-        with zenoh.open(client_config(router.host, router.port)) as session:
+        with zenoh.open(client_config(router)) as session:
             replies = session.liveliness().get(f"*/{ALIVE}/{node}", timeout=TO_ANSWER)
             keys = [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
     except zenoh.ZError:

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import zenoh
 
+from schemas.deployment import RouterSection
 from services.runtime.bus.zenoh_config import router_config
-from services.runtime.deployment import DeploymentError, load_deployment
+from services.runtime.deployment import DeploymentError, exposure, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.readiness import Readiness
 from services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
 
 BEAT = 1.0  # [s]
+_LOCATOR = re.compile(r"(tcp|tls)/(.+):(\d+)")
 # Zenoh's own threads of the router, 2 without this. One that brings an answer to a client that does not read waits for
 # up to LONGEST_BLOCK_US, and with it every link that the same thread serves: chosen as one for each process and script.
 RECEIVING_THREADS = 16
@@ -34,16 +38,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("ZENOH_RUNTIME", f"(rx: (worker_threads: {RECEIVING_THREADS}))")
     try:
         deployment = load_deployment(options.config)
-        section = deployment.router
+        config, (host, port), is_locked = configured(deployment.router)
+        if warning := exposure("router", host, is_locked, deployment.router.insecure):
+            log.warning("%s", warning)
         with stop_on_signals(stop):
-            require_free(section.host, section.port, "router")
-            with zenoh.open(router_config(section.host, section.port)):
-                log.info("listening on %s port %d", section.host, section.port)
+            require_free(host, port, "router", "listen_port" if deployment.router.listen_port else "port")
+            with zenoh.open(config):
+                locked = " with TLS, for certificates of its authority" if is_locked else ""
+                log.info("listening on %s port %d%s", host, port, locked)
                 _beat_until(stop, Readiness(Path(deployment.paths.run), "router"))
     except (DeploymentError, PortTaken, zenoh.ZError) as error:
         log.error("%s", error)
         return 1
     return 0
+
+
+def configured(section: RouterSection) -> tuple[zenoh.Config, tuple[str, int], bool]:
+    """Zenoh's configuration, where it listens, and whether it asks everybody for a certificate and for permission.
+
+    That is the file `configuration` where there is one, else an open router. Raises `DeploymentError`.
+    """
+    if not section.configuration:
+        if section.tls:
+            raise DeploymentError("router.tls needs router.configuration, which `gemelo deploy render` writes")
+        return router_config(*section.listening), section.listening, False
+    try:
+        config = zenoh.Config.from_file(section.configuration)
+        (locator,) = json.loads(config.get_json("listen/endpoints"))
+        protocol, host, port = _LOCATOR.fullmatch(locator).groups()  # type: ignore[union-attr]
+    except (zenoh.ZError, ValueError, AttributeError, TypeError) as error:
+        raise DeploymentError(f"router.configuration: {section.configuration} cannot be used: {error}") from error
+    is_asked = json.loads(config.get_json("transport/link/tls/enable_mtls")) is True
+    permits = json.loads(config.get_json("access_control"))
+    is_locked = is_asked and permits["enabled"] and permits["default_permission"] == "deny"
+    return config, (host.strip("[]"), int(port)), protocol == "tls" and is_locked
 
 
 def _beat_until(stop: ShutdownRequest, readiness: Readiness) -> None:

@@ -29,6 +29,6 @@ def buses(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Buses]:
         buses = Buses(lambda robot: MemoryBus(networks.setdefault(robot, MemoryNetwork())), deployment)
     else:
         router: RouterProcess = request.getfixturevalue("router")
-        buses = Buses(lambda robot: ZenohBus("127.0.0.1", router.port, robot), router.deployment)
+        buses = Buses(lambda robot: ZenohBus(router.deployment.router, robot), router.deployment)
     yield buses
     buses.close()

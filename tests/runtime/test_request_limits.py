@@ -173,7 +173,7 @@ def test_the_last_stop_of_a_flood_is_carried_out(buses: Buses) -> None:
 def test_a_key_whose_requests_nobody_takes_delays_no_other(
     router: RouterProcess, request: pytest.FixtureRequest
 ) -> None:
-    server, client = (ZenohBus("127.0.0.1", router.port, "rm1") for _ in range(2))
+    server, client = (ZenohBus(router.deployment.router, "rm1") for _ in range(2))
     request.addfinalizer(client.close)
     request.addfinalizer(server.close)
     is_over = threading.Event()
@@ -193,7 +193,7 @@ def test_a_key_whose_requests_nobody_takes_delays_no_other(
 def test_every_urgent_request_arrives_however_slowly_they_are_taken(
     router: RouterProcess, request: pytest.FixtureRequest
 ) -> None:
-    server, client = (ZenohBus("127.0.0.1", router.port, "rm1") for _ in range(2))
+    server, client = (ZenohBus(router.deployment.router, "rm1") for _ in range(2))
     request.addfinalizer(client.close)
     request.addfinalizer(server.close)
     may_go_on = threading.Event()
@@ -210,7 +210,7 @@ def test_every_urgent_request_arrives_however_slowly_they_are_taken(
 def test_a_request_that_waits_for_its_answer_costs_no_thread(
     router: RouterProcess, request: pytest.FixtureRequest
 ) -> None:
-    server, client = (ZenohBus("127.0.0.1", router.port, "rm1") for _ in range(2))
+    server, client = (ZenohBus(router.deployment.router, "rm1") for _ in range(2))
     request.addfinalizer(client.close)
     request.addfinalizer(server.close)
     kept: list[Query] = []

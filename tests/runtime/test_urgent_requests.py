@@ -175,7 +175,7 @@ def _goal(goal_id: str) -> GoalRequest:
 
 
 def test_a_flood_of_stops_that_are_not_read_in_time_fills_no_link_but_its_own(router: RouterProcess) -> None:
-    server, flooder, client = (ZenohBus("127.0.0.1", router.port, "rm1") for _ in range(3))
+    server, flooder, client = (ZenohBus(router.deployment.router, "rm1") for _ in range(3))
     is_released, is_blocked = threading.Event(), threading.Event()
 
     def block(query: Query) -> None:

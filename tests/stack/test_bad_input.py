@@ -10,6 +10,7 @@ import paho.mqtt.client as paho
 import pytest
 
 from schemas.actions import GoalStatusCode
+from schemas.deployment import RouterSection
 from schemas.device import DeviceState, DeviceStatus
 from schemas.message import encode
 from schemas.motion import FollowJointTrajectoryGoal, JointTrajectory, TrajectoryPoint
@@ -73,7 +74,7 @@ def rubbish_for(kind):
 @pytest.fixture
 def stranger(stack, operator):
     """A participant of the bus that keeps to no rule."""
-    bus = ZenohBus("127.0.0.1", int(stack.deployment["GEMELO_ROUTER_PORT"]), operator.arm.name)
+    bus = ZenohBus(RouterSection(port=int(stack.deployment["GEMELO_ROUTER_PORT"])), operator.arm.name)
     yield bus
     bus.close()
 
@@ -87,7 +88,7 @@ class Neighbour(Operator):
 
     def __init__(self, stack):
         super().__init__(stack, "neighbour")
-        self.stranger = ZenohBus("127.0.0.1", int(stack.deployment["GEMELO_ROUTER_PORT"]), self.arm.name)
+        self.stranger = ZenohBus(RouterSection(port=int(stack.deployment["GEMELO_ROUTER_PORT"])), self.arm.name)
         self.bad: dict[tuple[str, str], int] = {}  # by node and key
         self._toward = NEARBY
         self.objection = ""  # why the last move did not succeed

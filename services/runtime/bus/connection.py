@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import logging
+import os
+import socket
+import ssl
 import time
 
 from schemas.deployment import RouterSection
+from services.credentials.private_files import require_private
 from services.runtime.bus.interface import Bus
+from services.runtime.errors import BusError
 from services.runtime.process.shutdown import ShutdownRequest
 
 RETRY_PERIOD = 0.1  # [s]
+HANDSHAKE = 1.0  # [s] for the router to say why it refuses a certificate
 SILENT_WAIT = 1.0  # [s] of waiting that are not worth a word: all processes start at once
 
 
@@ -17,14 +23,15 @@ def connect(router: RouterSection, robot: str, log: logging.Logger, stop: Shutdo
     """A session of the router; ends the process cleanly where it is asked to stop while waiting."""
     from services.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus, router_answers
 
+    require_certificate(router)
     is_said = False
     started = time.monotonic()
     while not stop.is_set:
         if router_answers(router.host, router.port):
             try:
-                bus = ZenohBus(router.host, router.port, robot)
+                bus = ZenohBus(router, robot)
             except BusNotOpen as error:
-                reason = f" ({error})"
+                reason = f" ({refusal(router) or error})"
             else:
                 if is_said:
                     log.info("the router is there")
@@ -36,3 +43,42 @@ def connect(router: RouterSection, robot: str, log: logging.Logger, stop: Shutdo
             log.warning("waiting for the router at %s:%d%s; `make up` starts it", router.host, router.port, reason)
         stop.wait(RETRY_PERIOD)
     raise SystemExit(0)
+
+
+def require_certificate(router: RouterSection) -> None:
+    """Returns if the section has what TLS needs; else raises `BusError` with the key of the deployment or the file."""
+    if not router.tls:
+        if router.certificate or router.key or router.ca:
+            raise BusError("router.ca, router.certificate and router.key are for TLS: set router.tls = true too")
+        return
+    for name in ("ca", "certificate", "key"):
+        path = getattr(router, name)
+        if not path:
+            raise BusError(f"router.tls is set, but router.{name} is not: `gemelo deploy keys` makes the files")
+        if not os.access(path, os.R_OK):
+            raise BusError(f"router.{name}: cannot read {path}: `gemelo deploy keys` makes it")
+    require_private(router.key)
+
+
+def refusal(router: RouterSection) -> str:
+    """Why TLS with the router fails, with the remedy; empty where TLS is not the reason."""
+    if not router.tls:
+        return ""
+    try:
+        context = ssl.create_default_context(cafile=router.ca)
+        context.load_cert_chain(router.certificate, router.key)
+        plain = socket.create_connection((router.host, router.port), HANDSHAKE)
+        with plain, context.wrap_socket(plain, server_hostname=router.host) as link:
+            link.recv(1)  # TLS 1.3 tells of a refused certificate only here
+    except TimeoutError:
+        return ""
+    except ssl.SSLCertVerificationError as error:
+        return f"the router's certificate is not one of {router.ca} for {router.host}: {error.verify_message}"
+    except ssl.SSLError as error:
+        said = str(error.reason).lower().replace("_", " ")
+        if "expired" in said:
+            return f"{router.certificate} has expired: `gemelo deploy keys` renews it"
+        return f"the router does not take {router.certificate}, which its own authority must have signed: {said}"
+    except OSError as error:
+        return str(error)
+    return ""

@@ -16,6 +16,7 @@ import zenoh
 import zenoh.ext as zx
 from zenoh.handlers import Callback
 
+from schemas.deployment import RouterSection
 from schemas.topics import Delivery
 from services.runtime.bus.interface import Arrival, BusReply, Query
 from services.runtime.bus.zenoh_config import client_config
@@ -46,9 +47,9 @@ class BusNotOpen(BusError):
 class ZenohBus:
     """One node's session, and a second one where it serves urgent keys."""
 
-    def __init__(self, host: str, port: int, robot: str) -> None:
+    def __init__(self, router: RouterSection, robot: str) -> None:
         """Raises `BusNotOpen` where the router does not take the session."""
-        self._router, self._robot = (host, port), robot
+        self._router, self._robot = router, robot
         self._session = self._open()
         self._urgent_session: zenoh.Session | None = None
         self._name = str(self._session.zid()).encode()
@@ -69,12 +70,12 @@ class ZenohBus:
 
     def _open(self) -> zenoh.Session:
         try:
-            return zenoh.open(client_config(*self._router, self._robot))
+            return zenoh.open(client_config(self._router, self._robot))
         except zenoh.ZError as error:
             raise BusNotOpen(str(error)) from error
 
     def require_reconnection(self) -> None:
-        if self.is_connected or not router_answers(*self._router, timeout=0.1):
+        if self.is_connected or not router_answers(self._router.host, self._router.port, timeout=0.1):
             self._disconnected_since = None
             return
         self._disconnected_since = self._disconnected_since or time.monotonic()

@@ -1,0 +1,128 @@
+"""Roles: who may say and hear what on the bus, beside what schemas/topics.py says of writers and servers.
+
+A role is the common name of a certificate. The nodes of a role write the topics and serve the requests and actions
+that the table of topics gives to their names; here stands what else the role may do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from schemas.message import Message
+from schemas.topics import (
+    ACTIONS,
+    ANY,
+    CONTACTS,
+    DESCRIPTION,
+    DEVICE_COMMAND,
+    DEVICE_CONFIGURE,
+    DEVICE_ECHO,
+    DEVICE_EVENTS,
+    DEVICE_INJECT,
+    DEVICE_SHAFT,
+    DEVICE_STATE,
+    DEVICE_STATUS,
+    DEVICE_STOP,
+    FK,
+    GATEWAY,
+    GRIPPER_STATE,
+    IK,
+    JOG,
+    JOINT_COMMANDS,
+    JOINT_STATES,
+    JOINT_TARGETS,
+    LOG,
+    PLAN,
+    PLAN_CANCEL,
+    PLANNED_PATH,
+    REQUESTS,
+    SCENE,
+    SCENE_EDIT,
+    SENSORS,
+    STATE_VALIDITY,
+    STATISTICS,
+    STEP_ERRORS,
+    TOPICS,
+    Action,
+    Request,
+    Topic,
+)
+
+AnyTopic = Topic[Message]
+AnyRequest = Request[Message, Message]
+AnyAction = Action[Message, Message, Message]
+
+
+@dataclass(frozen=True)
+class Role:
+    """A row of the table of roles."""
+
+    name: str
+    about: str
+    node: str = ""  # the one node of this role; empty: any name that no service has
+    writes: tuple[AnyTopic, ...] = ()  # of the topics that `any` may write, beside its log and its statistics
+    reads: tuple[AnyTopic, ...] = ()
+    asks: tuple[AnyRequest, ...] = ()
+    acts: tuple[AnyAction, ...] = ()  # sends, follows and cancels goals
+    watches: tuple[AnyAction, ...] = ()  # hears how goals stand
+    sets_parameters: bool = False
+
+
+BY_EVERY_NODE: tuple[AnyTopic, ...] = (LOG, STATISTICS)
+BY_HAND: tuple[AnyTopic, ...] = (JOG, JOINT_TARGETS)
+RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
+STOPS: tuple[AnyRequest, ...] = (DEVICE_STOP,)  # whoever may connect may stop the arm
+LOOKS: tuple[AnyRequest, ...] = (IK, FK, STATE_VALIDITY)  # answers that change nothing
+MOVES: tuple[AnyRequest, ...] = (PLAN, PLAN_CANCEL, SCENE_EDIT, DEVICE_COMMAND)
+
+ROLES: tuple[Role, ...] = (
+    Role("gateway", "trajectories to step knots", GATEWAY, reads=(JOINT_TARGETS, SCENE)),
+    Role(
+        "planner", "goals to verified trajectories, and jogging", "planner",
+        writes=(JOINT_TARGETS,), reads=(JOINT_STATES, GRIPPER_STATE, DEVICE_STATUS, JOG), asks=STOPS,
+    ),
+    Role("state_publisher", "joint states to frames", "state_publisher", reads=(JOINT_STATES,), asks=STOPS),
+    Role("logger", "everything recorded to files", "logger", reads=RECORDED, asks=STOPS),
+    Role(
+        "visualizer", "everything that is seen to Rerun", "visualizer",
+        reads=(DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, DEVICE_STATE, DEVICE_STATUS, DEVICE_EVENTS,
+               SENSORS, DEVICE_SHAFT, PLANNED_PATH, SCENE, GRIPPER_STATE, CONTACTS, LOG),
+        asks=STOPS,
+    ),
+    Role(
+        "panel", "the operator's page", "panel",
+        writes=BY_HAND, reads=TOPICS, asks=(*STOPS, *LOOKS, *MOVES, DEVICE_CONFIGURE, DEVICE_INJECT), acts=ACTIONS,
+    ),
+    Role(
+        "operator", "a person who moves the arm and sets parameters",
+        writes=BY_HAND, reads=TOPICS, asks=REQUESTS, acts=ACTIONS, sets_parameters=True,
+    ),
+    Role("viewer", "a person who only looks, and may stop", reads=TOPICS, asks=(*STOPS, *LOOKS), watches=ACTIONS),
+    Role(
+        "script", "a program that moves the arm",
+        writes=BY_HAND, reads=TOPICS, asks=(*STOPS, *LOOKS, *MOVES, DEVICE_ECHO), acts=ACTIONS,
+    ),
+)  # fmt: skip
+
+SERVICES = tuple(sorted({role.node for role in ROLES if role.node}))  # names that only their role may bear
+
+
+def role(name: str) -> Role:
+    """The role of that name; raises `KeyError`."""
+    return {each.name: each for each in ROLES}[name]
+
+
+def written_by(role: Role) -> tuple[AnyTopic, ...]:
+    """The topics that a role may publish."""
+    own = tuple(topic for topic in TOPICS if topic.writer != ANY and topic.writer == role.node)
+    return (*own, *role.writes, *BY_EVERY_NODE)
+
+
+def served_by(role: Role) -> tuple[AnyRequest, ...]:
+    """The requests of the table that a role may answer; its node's requests about itself come in addition."""
+    return tuple(request for request in REQUESTS if role.node and request.server == role.node)
+
+
+def carried_out_by(role: Role) -> tuple[AnyAction, ...]:
+    """The actions that a role may serve."""
+    return tuple(action for action in ACTIONS if role.node and action.server == role.node)

@@ -1,0 +1,266 @@
+"""Every role tries every key: all passes an open router, and a locked one only what the tables give the role."""
+
+from __future__ import annotations
+
+import threading
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import product
+
+import pytest
+import zenoh
+
+from schemas.deployment import RouterSection
+from schemas.message import Message
+from schemas.roles import ROLES, role
+from schemas.topics import DEVICE_EVENTS, DEVICE_STATUS, TOPICS, Delivery, Topic
+from services.runtime.bus.zenoh_bus import ZenohBus
+from services.runtime.permissions import ABOUT, SET, Permissions, permissions
+from services.runtime.robots import robots_on
+from tests.runtime.locks import Lock, LockedRouter, sessions
+from tests.runtime.support import RouterProcess, until
+
+MAY: dict[str, Permissions] = {each.name: permissions(each) for each in ROLES}
+NAMES = tuple(MAY)
+SPOKEN = tuple(sorted(set().union(*(may.publishes | may.subscribes for may in MAY.values()))))
+ASKED = tuple(sorted(key for key in set().union(*(may.serves for may in MAY.values())) if "@node" not in key))
+TO_ANSWER = 3.0  # [s] for all questions of all roles together
+Sessions = dict[str, zenoh.Session]
+Pairs = dict[str, set[tuple[str, str]]]  # by key: who was heard or answered by whom
+
+
+@pytest.fixture(scope="module")
+def lock(tmp_path_factory) -> Lock:
+    return Lock(tmp_path_factory.mktemp("lock"))
+
+
+@pytest.fixture(scope="module")
+def locked(lock, tmp_path_factory) -> Iterator[Sessions]:
+    router = LockedRouter(tmp_path_factory.mktemp("locked"), lock)
+    with sessions({name: router.section(name) for name in NAMES}) as opened:
+        yield opened
+    router.stop()
+
+
+@pytest.fixture(scope="module")
+def unlocked(tmp_path_factory) -> Iterator[Sessions]:
+    router = RouterProcess(tmp_path_factory.mktemp("open"))
+    with sessions(dict.fromkeys(NAMES, router.deployment.router)) as opened:
+        yield opened
+    router.stop()
+
+
+def own_node(name: str) -> str:
+    return role(name).node or f"some_{name}"
+
+
+def heard(opened: Sessions) -> Pairs:
+    """By key, the pairs (writer, reader) of which the reader heard the writer: every role listens and speaks."""
+    pairs: Pairs = defaultdict(set)
+    declared = [
+        session.declare_subscriber(
+            key, lambda sample, key=key, name=name: pairs[key].add((sample.payload.to_string(), name)),
+            allowed_origin=zenoh.Locality.REMOTE,
+        )
+        for name, session in opened.items() for key in SPOKEN
+    ]  # fmt: skip
+    exchange(opened)
+    for name, session in opened.items():
+        for key in SPOKEN:
+            session.put(key, name, congestion_control=zenoh.CongestionControl.BLOCK)
+    exchange(opened)
+    for each in declared:
+        each.undeclare()
+    return pairs
+
+
+def exchange(opened: Sessions) -> None:
+    """Every session has a question answered by every other: what was sent before has then arrived, or never will."""
+    keys = {name: f"@node/{own_node(name)}/info" for name in opened}
+    served = [opened[name].declare_queryable(key, answer(key, "here")) for name, key in keys.items()]
+    for name, session in opened.items():
+        for key in (key for other, key in keys.items() if other != name):
+            assert until(partial(is_answered, session, key)), f"{name} has no answer to {key}"
+    for each in served:
+        each.undeclare()
+
+
+def is_answered(session: zenoh.Session, key: str) -> bool:
+    return any(reply.ok is not None for reply in session.get(key, timeout=2.0))
+
+
+def answer(key: str, text: str) -> Callable[[zenoh.Query], None]:
+    def reply(query: zenoh.Query) -> None:
+        with query:
+            query.reply(key, text)
+
+    return reply
+
+
+def answered(opened: Sessions, keys: tuple[str, ...] = ASKED) -> Pairs:
+    """By key, the pairs (server, client) of which the client got the server's answer: every role serves and asks."""
+    pairs: Pairs = defaultdict(set)
+    served = [
+        session.declare_queryable(key, answer(key, name)) for name, session in opened.items() for key in keys
+    ]  # fmt: skip
+    exchange(opened)
+    waiting = threading.Semaphore(0)
+    for name, session in opened.items():
+        for key in keys:
+            ask(session, key, lambda said, key=key, name=name: pairs[key].add((said, name)), waiting.release)
+    for _ in product(opened, keys):
+        assert waiting.acquire(timeout=2 * TO_ANSWER)
+    for each in served:
+        each.undeclare()
+    return pairs
+
+
+def ask(session: zenoh.Session, key: str, on_answer: Callable[[str], object], on_end: Callable[[], None]) -> None:
+    def on_reply(reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            on_answer(reply.ok.payload.to_string())
+
+    session.get(
+        key, zenoh.handlers.Callback(on_reply, on_end), timeout=TO_ANSWER, target=zenoh.QueryTarget.ALL,
+        consolidation=zenoh.ConsolidationMode.NONE, allowed_destination=zenoh.Locality.REMOTE,
+    )  # fmt: skip
+
+
+def all_pairs() -> set[tuple[str, str]]:
+    return {(one, other) for one, other in product(NAMES, NAMES) if one != other}
+
+
+def test_where_the_lock_is_open_everybody_speaks_and_hears_on_every_key(unlocked):
+    assert heard(unlocked) == dict.fromkeys(SPOKEN, all_pairs())
+
+
+def test_where_the_lock_is_open_everybody_serves_and_asks_every_request(unlocked):
+    assert answered(unlocked) == dict.fromkeys(ASKED, all_pairs())
+
+
+def test_behind_the_lock_a_key_passes_only_from_its_writers_to_its_readers(locked):
+    may = {
+        key: {(one, other) for one, other in all_pairs()
+              if key in MAY[one].publishes and key in MAY[other].subscribes}
+        for key in SPOKEN
+    }  # fmt: skip
+    assert heard(locked) == {key: pairs for key, pairs in may.items() if pairs}
+
+
+def test_behind_the_lock_a_request_passes_only_from_who_may_ask_to_its_server(locked):
+    may = {
+        key: {(server, client) for server, client in all_pairs()
+              if key in MAY[server].serves and key in MAY[client].asks}
+        for key in ASKED
+    }  # fmt: skip
+    assert answered(locked) == {key: pairs for key, pairs in may.items() if pairs}
+
+
+@pytest.mark.parametrize("wider", ["**", "**/log", "l$*"])
+def test_a_wider_key_than_ones_own_hears_what_is_secret_only_where_the_lock_is_open(locked, unlocked, wider):
+    def heard_of_others(opened: Sessions) -> list[zenoh.Sample]:
+        heard: list[zenoh.Sample] = []
+        subscriber = opened["planner"].declare_subscriber(wider, heard.append)
+        exchange(opened)
+        opened["operator"].put("log", "secret", congestion_control=zenoh.CongestionControl.BLOCK)
+        exchange(opened)
+        subscriber.undeclare()
+        return heard
+
+    assert heard_of_others(unlocked)
+    assert not heard_of_others(locked)
+
+
+def test_a_robot_that_is_not_the_routers_is_nobodys(lock, tmp_path):
+    def passes(sections: dict[str, RouterSection], within: float) -> bool:
+        with sessions(sections, "parol6") as opened:
+            subscriber = opened["viewer"].declare_subscriber("joint_states")
+            has_come = until(lambda: opened["gateway"].put("joint_states", "") or subscriber.try_recv(), within)
+            return bool(has_come)
+
+    router, open_router = LockedRouter(tmp_path / "locked", lock), RouterProcess(tmp_path / "open")
+    roles = ("gateway", "viewer")
+    assert passes(dict.fromkeys(roles, open_router.deployment.router), 5.0)
+    assert not passes({name: router.section(name) for name in roles}, 0.5)
+    router.stop()
+    open_router.stop()
+
+
+def bearers(opened: Sessions) -> dict[str, set[str]]:
+    """By service, the roles whose token under its name others see."""
+    services = [each.node for each in ROLES if each.node]
+    tokens = [
+        session.liveliness().declare_token(f"@id/{service}/{name}")
+        for name, session in opened.items() for service in services
+    ]  # fmt: skip
+    exchange(opened)
+    seen: dict[str, set[str]] = {service: set() for service in services}
+    for looker in ("viewer", "operator"):
+        replies = opened[looker].liveliness().get("@id/*/*", timeout=2.0)
+        for _, service, name in (str(reply.ok.key_expr).split("/") for reply in replies if reply.ok):
+            seen[service] |= {name} - {looker}  # its own token needs no router
+    for each in tokens:
+        each.undeclare()
+    return seen
+
+
+def test_a_name_of_a_service_is_borne_by_its_role_alone(locked, unlocked):
+    assert bearers(unlocked) == {each.node: set(NAMES) for each in ROLES if each.node}
+    assert bearers(locked) == {each.node: {each.name} for each in ROLES if each.node}
+
+
+def test_parameters_are_set_by_the_operator_alone_and_read_by_all(locked):
+    keys = tuple(f"@node/planner/{each}" for each in (*ABOUT, SET))
+    pairs = answered(locked, keys)
+    assert {client for server, client in pairs[f"@node/planner/{SET}"]} == {"operator"}
+    assert all({server for server, _ in pairs[key]} == {"planner"} for key in keys)
+    for each in ABOUT:
+        assert {client for _, client in pairs[f"@node/planner/{each}"]} == set(NAMES) - {"planner"}
+
+
+def test_a_late_joiner_gets_what_is_latched_behind_the_lock_and_what_it_missed_of_every_message(lock, tmp_path):
+    router = LockedRouter(tmp_path, lock)
+    gateway, viewer, planner = (ZenohBus(router.section(name), "rm1") for name in ("gateway", "viewer", "planner"))
+    arrived: list[tuple[str, bytes]] = []
+
+    def listen(bus: ZenohBus, topic: Topic[Message]) -> None:
+        bus.subscribe(
+            topic.key, topic.delivery, lambda each: arrived.append((each.writer, each.payload)), lambda n: None
+        )
+
+    forged = planner.publish(DEVICE_STATUS.key, "DeviceStatus", Delivery.LATCHED, "stepper_gateway")
+    true = gateway.publish(DEVICE_STATUS.key, "DeviceStatus", Delivery.LATCHED, "stepper_gateway")
+    forged.put(b"forged")
+    true.put(b"true")
+    listen(viewer, DEVICE_STATUS)
+    assert until(lambda: arrived == [("stepper_gateway", b"true")]), arrived
+    listen(viewer, DEVICE_EVENTS)
+    events = gateway.publish(DEVICE_EVENTS.key, "DeviceEvent", Delivery.EVERY, "stepper_gateway")
+    assert until(lambda: events.put(b"joined") or (arrived[-1][1] == b"joined"))
+    router.kill()
+    events.put(b"while the router was away")
+    router.start()
+    assert until(lambda: arrived[-1][1] == b"while the router was away", 10.0), arrived
+    assert not any(payload == b"forged" for _, payload in arrived)
+    gateway.declare_alive("@alive/stepper_gateway")
+    assert until(lambda: robots_on(router.section("viewer"), "stepper_gateway") == ("rm1",))
+    for bus in (gateway, viewer, planner):
+        bus.close()
+    router.stop()
+
+
+def test_what_the_issue_says_of_the_roles_is_what_the_tables_give():
+    of_a_viewer = MAY["viewer"].publishes | MAY["viewer"].asks
+    moving = {"joint_targets", "jog", "plan", "device/command", "scene/edit", "follow_joint_trajectory/goal"}
+    assert not of_a_viewer & moving
+    assert "plan" not in MAY["viewer"].serves
+    assert not any(key.startswith("device/") for key in MAY["planner"].publishes | MAY["planner"].serves)
+    assert [name for name in NAMES if "joint_states" in MAY[name].publishes] == ["gateway"]
+    assert all("device/stop" in may.asks for name, may in MAY.items() if name != "gateway")
+
+
+def test_every_topic_has_a_role_that_writes_it_and_one_that_reads_it():
+    for topic in TOPICS:
+        assert any(topic.key in may.publishes for may in MAY.values()), topic.key
+        assert any(topic.key in may.subscribes for may in MAY.values()), topic.key
