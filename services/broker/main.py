@@ -12,8 +12,9 @@ from pathlib import Path
 
 from schemas.deployment import Broker, Deployment
 from services.broker import mosquitto
-from services.mqtt.access import AccessError, gateway_access
-from services.runtime.deployment import DeploymentError, load_deployment
+from services.credentials.private_files import AccessError
+from services.mqtt.access import gateway_access
+from services.runtime.deployment import DeploymentError, exposure, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.readiness import Readiness
@@ -43,6 +44,8 @@ def run(deployment: Deployment, log: logging.Logger) -> int:
         return stand_aside(readiness)
     gateway_access(section)  # raises where its users and TLS cannot be
     host, port = section.listening
+    if warning := exposure("mqtt", host, bool(section.secure_folder), section.insecure):
+        log.warning("%s", warning)
     require_free(host, port, "mqtt", "listen_port" if section.listen_port else "port")
 
     def beat() -> None:

@@ -20,7 +20,7 @@ from services.panel.model.readings import Readings
 from services.panel.view.own_pages import own_pages_only
 from services.panel.view.page import Page
 from services.panel.view.world import World
-from services.runtime.deployment import load_deployment
+from services.runtime.deployment import DeploymentError, exposure, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.shutdown import ShutdownRequest, end_soon, stop_on_signals
@@ -94,8 +94,10 @@ class Panel:
 def run(deployment: Deployment, config: Path | None, log: logging.Logger, stop: ShutdownRequest) -> int:
     """Waits for the twin, then serves the page; returns the exit code."""
     try:
+        if warning := exposure(NAME, deployment.panel.host, False, deployment.panel.insecure):
+            log.warning("%s", warning)
         require_free(deployment.panel.host, deployment.panel.port, NAME)
-    except PortTaken as error:
+    except (DeploymentError, PortTaken) as error:
         log.error("%s", error)
         return 1
     arm = _connected(config, log, stop)

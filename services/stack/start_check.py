@@ -11,7 +11,7 @@ from services.arm.model.description import Arm, load_arm, require_motors
 from services.arm.model.virtual_drive import NO_MOTORS
 from services.mqtt.access import device_access, gateway_access
 from services.mqtt.secure_folder import listener
-from services.runtime.deployment import load_deployment, project_root
+from services.runtime.deployment import exposure, load_deployment, project_root
 from services.runtime.process.ports import PortTaken, require_free
 
 
@@ -26,7 +26,9 @@ def start_problems(deployment: Deployment) -> list[str]:
         found.append(str(error))
     found += broker_problems(deployment, device)
     router, mqtt, viewer, panel = deployment.router, deployment.mqtt, deployment.viewer, deployment.panel
-    ports = [(router.host, router.port, "router", "port"), (panel.host, panel.port, "panel", "port")]
+    found += exposed(deployment)
+    router_port = (*router.listening, "router", "listen_port" if router.listen_port else "port")
+    ports = [router_port, (panel.host, panel.port, "panel", "port")]
     if mqtt.broker is not Broker.EXTERNAL:
         ports.append((*mqtt.listening, "mqtt", "listen_port" if mqtt.listen_port else "port"))
     if viewer.mode is not ViewerMode.NONE:
@@ -35,6 +37,24 @@ def start_problems(deployment: Deployment) -> list[str]:
         try:
             require_free(host, port, section, key)
         except PortTaken as error:
+            found.append(str(error))
+    return found
+
+
+def exposed(deployment: Deployment) -> list[str]:
+    """What would listen beyond this machine without TLS, where the deployment does not say `insecure`."""
+    router, mqtt, viewer, panel = deployment.router, deployment.mqtt, deployment.viewer, deployment.panel
+    listening = [
+        ("router", router.listening[0], bool(router.configuration), router.insecure),
+        ("mqtt", mqtt.listening[0], bool(mqtt.secure_folder) or mqtt.broker is Broker.EXTERNAL, mqtt.insecure),
+        ("panel", panel.host, False, panel.insecure),
+        ("viewer", viewer.host, viewer.mode is ViewerMode.NONE, viewer.insecure),
+    ]
+    found = []
+    for section, host, is_locked, is_insecure in listening:
+        try:
+            exposure(section, host, is_locked, is_insecure)
+        except ConfigurationError as error:
             found.append(str(error))
     return found
 

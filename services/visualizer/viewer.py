@@ -18,7 +18,7 @@ from typing import IO
 from urllib.parse import quote
 
 from schemas.deployment import Deployment, ViewerMode, ViewerSection
-from services.runtime.deployment import load_deployment, project_root
+from services.runtime.deployment import DeploymentError, exposure, load_deployment, project_root
 from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.priority import step_behind
 from services.runtime.process.readiness import Readiness
@@ -69,6 +69,8 @@ def run(deployment: Deployment, memory: str, stopping: threading.Event) -> int:
     try:
         if mode is ViewerMode.NONE:
             return _idle(readiness, stopping)
+        if warning := exposure("viewer", deployment.viewer.host, False, deployment.viewer.insecure):
+            print(f"viewer: {warning}", flush=True)
         require_free(deployment.viewer.host, deployment.viewer.port, "viewer")
         if mode is ViewerMode.WEB:
             require_free(deployment.viewer.host, deployment.viewer.web_port, "viewer", "web_port")
@@ -77,7 +79,7 @@ def run(deployment: Deployment, memory: str, stopping: threading.Event) -> int:
             print("viewer: no window could be opened; showing it in the browser instead", flush=True)
             return _keep(deployment.viewer, ViewerMode.WEB, memory, readiness, stopping)
         return code
-    except PortTaken as error:
+    except (DeploymentError, PortTaken) as error:
         return _say_error(f"viewer: {error}")
     finally:
         readiness.not_ready()

@@ -11,7 +11,11 @@ import viser
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from schemas.deployment import Deployment, PanelSection
+from services.panel.main import run
 from services.panel.view.own_pages import objection, own_names, own_pages_only
+from services.runtime.process.logs import line_logger
+from services.runtime.process.shutdown import ShutdownRequest
 
 PROTOCOL = [f"viser-v{viser.__version__}"]
 
@@ -59,3 +63,9 @@ def test_this_machine_goes_by_its_names_and_addresses(host: str, monkeypatch: py
 @pytest.mark.parametrize("host", [None, "", "[", "evil.example", "127.0.0.1.evil.example"])
 def test_no_name_and_a_broken_one_are_refused_with_the_names_that_count(host: str | None) -> None:
     assert "localhost" in objection(host, None, own_names("127.0.0.1"))
+
+
+def test_a_page_that_other_machines_reach_is_not_served_unless_the_deployment_says_insecure(capsys):
+    deployment = Deployment(panel=PanelSection(host="0.0.0.0"))
+    assert run(deployment, None, line_logger("panel"), ShutdownRequest()) == 1
+    assert "[panel] would listen on 0.0.0.0, beyond this machine, without TLS" in capsys.readouterr().err
