@@ -1,9 +1,14 @@
-"""`<run>/<name>.ready`: the file by which a process says that its state is valid. Read by deploy/probe."""
+"""`<run>/<name>.ready`: the file by which a process says that its state is valid. Read by deploy/probe.
+
+Under systemd it is told too (sd_notify(3)): ready with the first valid state, and alive with every beat, so that a
+process whose loop stands still is started anew, and one whose board is off is not.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import socket
 from pathlib import Path
 
 
@@ -24,15 +29,18 @@ class Readiness:
         if not self._is_ready:
             self._is_ready = True
             self._write()
+            notify("READY=1\nSTATUS=ready")
 
     def not_ready(self) -> None:
         """The state is not valid (any more)."""
         if self._is_ready:
             self._is_ready = False
             self._remove()
+            notify("STATUS=not ready")
 
     def beat(self) -> None:
-        """Call once a second; does nothing while not ready."""
+        """Call once a second, ready or not."""
+        notify("WATCHDOG=1")
         if not self._is_ready:
             return
         try:
@@ -47,3 +55,12 @@ class Readiness:
     def _remove(self) -> None:
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):
             self._file.unlink()
+
+
+def notify(state: str) -> None:
+    """Tells systemd, where it has started this process and listens."""
+    address = os.environ.get("NOTIFY_SOCKET", "")
+    if not address:
+        return
+    with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as link:
+        link.sendto(state.encode(), f"\0{address[1:]}" if address.startswith("@") else address)
