@@ -15,19 +15,6 @@ from schemas.deployment import MqttSection
 from services.mqtt import secure_folder
 
 BEAT = 1.0  # [s]
-CONF = """\
-# Written by gemelo-broker at every start.
-listener {port} {host}
-{door}
-set_tcp_nodelay true
-persistence false
-# No limit: a stop must not wait until a device has acknowledged what came before it.
-max_inflight_messages 0
-connection_messages false
-log_dest stderr
-log_type error
-log_type warning
-"""
 OPEN = "allow_anonymous true"
 
 
@@ -72,7 +59,7 @@ def configuration(section: MqttSection) -> str:
     """The text of mosquitto.conf: open, or with the lock that `gemelo broker secure` has made."""
     host, port = section.listening
     door = secure_folder.listener(Path(section.secure_folder)) if section.secure_folder else OPEN
-    return CONF.format(host=host, port=port, door=door)
+    return secure_folder.mosquitto_conf(host, port, door)
 
 
 def _watch_broker(section: MqttSection, alive: int, beat: Callable[[], None], on_end: Callable[[], None]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import ssl
 import subprocess
 import tempfile
 from collections.abc import Iterable
@@ -38,9 +39,20 @@ class Authority:
         extensions = EXTENSIONS.format(use="serverAuth", names=f"subjectAltName = {alternatives}")
         self._issue("gemelo broker", extensions, certificate, key, days)
 
-    def sign_client(self, name: str, certificate: Path, key: Path, days: int = DAYS) -> None:
-        """Makes a key and a certificate by which a client shows who it is."""
-        self._issue(name, EXTENSIONS.format(use="clientAuth", names=""), certificate, key, days)
+    def sign_client(self, name: str, certificate: Path, key: Path, days: int = DAYS, unit: str = "") -> None:
+        """Makes a key and a certificate by which a client shows who it is; `unit` is the host that it is for."""
+        self._issue(name, EXTENSIONS.format(use="clientAuth", names=""), certificate, key, days, unit)
+
+    def has_signed(self, certificate: Path, key: Path, hosts: Iterable[str] = ()) -> bool:
+        """True if both files are there, signed by this authority, and for all `hosts`."""
+        if not (certificate.exists() and key.exists()):
+            return False
+        try:
+            openssl("verify", "-no_check_time", "-CAfile", str(self._certificate), str(certificate))
+            named = openssl("x509", "-in", str(certificate), "-noout", "-ext", "subjectAltName") if hosts else ""
+        except AccessError:
+            return False
+        return {_alternative_name(host) for host in hosts} <= set(_named_in(named))
 
     def _make(self) -> None:
         usage = ("-addext", "keyUsage = critical, keyCertSign, cRLSign")
@@ -48,18 +60,25 @@ class Authority:
         files = ("-keyout", str(self._key), "-out", str(self._certificate))
         openssl("req", "-x509", *KEY, *subject, *usage, *files)
 
-    def _issue(self, subject: str, extensions: str, certificate: Path, key: Path, days: int) -> None:
+    def _issue(self, name: str, extensions: str, certificate: Path, key: Path, days: int, unit: str = "") -> None:
+        subject = f"/OU={unit}/CN={name}" if unit else f"/CN={name}"
         with tempfile.TemporaryDirectory() as scratch:
             request, wanted = Path(scratch, "request"), Path(scratch, "extensions")
             wanted.write_text(extensions)
-            openssl("req", "-new", *KEY, "-subj", f"/CN={subject}", "-keyout", str(key), "-out", str(request))
+            openssl("req", "-new", *KEY, "-subj", subject, "-keyout", str(key), "-out", str(request))
             by = ("-CA", str(self._certificate), "-CAkey", str(self._key), "-set_serial", _serial())
             files = ("-in", str(request), "-out", str(certificate), "-extfile", str(wanted))
             openssl("x509", "-req", *by, "-days", str(days), *files)
 
 
-def openssl(*arguments: str) -> None:
-    """Runs the openssl command, which writes files for their owner alone; raises `AccessError` if it cannot."""
+def expiry(certificate: Path) -> float:
+    """[s] UNIX time after which a certificate is not valid; raises `AccessError`."""
+    said = openssl("x509", "-in", str(certificate), "-noout", "-enddate")
+    return float(ssl.cert_time_to_seconds(said.strip().removeprefix("notAfter=")))
+
+
+def openssl(*arguments: str) -> str:
+    """What the openssl command prints; it writes files for their owner alone. Raises `AccessError` if it cannot."""
     try:
         done = subprocess.run(
             ["openssl", *arguments], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, umask=0o077
@@ -70,6 +89,16 @@ def openssl(*arguments: str) -> None:
         ) from None
     if done.returncode:
         raise AccessError(f"openssl {arguments[0]} failed: {done.stderr.strip().splitlines()[-1:]}")
+    return done.stdout
+
+
+def _named_in(extension: str) -> list[str]:
+    """The names of a printed subjectAltName, as `_alternative_name` writes them."""
+    names = extension.partition("\n")[2].strip().split(", ") if extension else []
+    return [
+        f"IP:{ipaddress.ip_address(each.removeprefix('IP Address:'))}" if each.startswith("IP Address:") else each
+        for each in names
+    ]
 
 
 def _serial() -> str:

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from schemas.device_topics import FROM_DEVICE, TO_DEVICE, topic
-from services.credentials.authority import Authority
+from services.credentials.authority import DAYS, Authority
 from services.credentials.private_files import AccessError, write
 from services.mqtt.access import AUTHORITY, GATEWAY, read_secret
 
@@ -22,17 +22,35 @@ SALT, HASH, ITERATIONS = 12, 64, 10_000  # [bytes], [bytes]; of mosquitto's "$7$
 SECRET = 24  # [bytes] of a password
 LONGEST_NAME = 31  # [bytes] that a board keeps of its name
 
+CONF = """\
+# Written by gemelo.
+listener {port} {host}
+{door}
+set_tcp_nodelay true
+persistence false
+# No limit: a stop must not wait until a device has acknowledged what came before it.
+max_inflight_messages 0
+connection_messages false
+log_dest stderr
+log_type error
+log_type warning
+"""
 
-def make(folder: Path, hosts: Iterable[str], devices: Iterable[str]) -> tuple[str, ...]:
+
+def make(
+    folder: Path, hosts: Iterable[str], devices: Iterable[str], authority: Authority | None = None, days: int = DAYS
+) -> tuple[str, ...]:
     """Writes or renews the folder; returns the devices that now have a user.
 
+    `authority` signs, else one of the folder's own, which is made if it is not there; `days` are the certificate's.
     The authority and the passwords that are there stay, so that boards need not be told anew; the broker's certificate
     is made anew for `hosts` (names and IP addresses). Raises `AccessError`.
     """
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     folder.chmod(0o700)
     write(folder / ".gitignore", "*\n")
-    Authority(folder / AUTHORITY, folder / "ca.key").sign(hosts, folder / CERTIFICATE, folder / KEY)
+    signer = authority or Authority(folder / AUTHORITY, folder / "ca.key")
+    signer.sign(hosts, folder / CERTIFICATE, folder / KEY, days)
     names = tuple(sorted({*map(_require_name, devices), *devices_in(folder)}))
     passwords = {user: _password(folder, user) for user in (GATEWAY, *names)}
     write(folder / USERS, "".join(f"{user}:{hashed(password)}\n" for user, password in passwords.items()))
@@ -57,10 +75,20 @@ def listener(folder: Path) -> str:
         raise AccessError(f"mqtt.secure_folder: {folder} has no {missing[0]}: `gemelo broker secure` makes it")
     # Started by root, mosquitto would become a user who cannot read these files.
     stays = "user root\n" if os.geteuid() == 0 else ""
+    return f"{stays}{lines(folder)}"
+
+
+def lines(folder: Path) -> str:
+    """The lines of a listener that ask everybody for TLS and a password, for the folder on any machine."""
     return (
-        f"{stays}allow_anonymous false\ncertfile {folder / CERTIFICATE}\nkeyfile {folder / KEY}\n"
+        f"allow_anonymous false\ncertfile {folder / CERTIFICATE}\nkeyfile {folder / KEY}\n"
         f"password_file {folder / USERS}\nacl_file {folder / ACL}"
     )
+
+
+def mosquitto_conf(host: str, port: int, door: str) -> str:
+    """The text of mosquitto.conf; `door` are the lines that say who may come in."""
+    return CONF.format(host=host, port=port, door=door)
 
 
 def acl(devices: Iterable[str]) -> str:

@@ -1,0 +1,178 @@
+"""What would not work of a site, found before anything is written: every problem with its line."""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+import tomllib
+from collections import defaultdict
+from pathlib import Path, PurePosixPath
+
+from gemelo.programs.toml_lines import Where
+from schemas.deployment import DeviceKind, Wire
+from schemas.errors import ConfigurationError
+from schemas.roles import ROLES
+from schemas.site import Site
+from services.arm.model.description import load_arm
+from services.hosts.deployments import HOST
+from services.hosts.layout import BROKER, OF_A_ROBOT, ROUTER
+from services.hosts.site_file import Problems, nearest, read_site
+
+USER = re.compile(r"[a-z_][a-z0-9_-]{0,31}")  # as useradd takes it
+LABEL = re.compile(r"[A-Za-z0-9]([A-Za-z0-9-]{0,61}[A-Za-z0-9])?")  # of a host's name (RFC 1123)
+HAS_MEANING = re.compile(r"[$%\\]")  # to systemd, process-compose and compose, whatever stands around it
+GATEWAY, DEVICE = "stepper_gateway", "virtual_esp32"
+NEEDED = (GATEWAY, "state_publisher")  # without them a robot has no state
+
+
+def load_site(file: Path, project: Path) -> Site:
+    """The site of `file`, checked against the robots below `project`; raises `SiteError` with all that is wrong."""
+    site, problems = read_site(file)
+    for check in (_addresses, _places, _services, _roles, _listeners, _paths):
+        check(site, problems)
+    _robots(site, problems, project)
+    problems.raise_any()
+    return site
+
+
+def _addresses(site: Site, problems: Problems) -> None:
+    seen: dict[str, str] = {}
+    for name, host in site.hosts.items():
+        for key, address in (("address", host.address), ("listen", host.listen)):
+            if address and not _is_address(address):
+                problems.add(("hosts", name, key), f"{address!r} is neither a host name nor an IP address")
+        if host.address in seen:
+            problems.add(("hosts", name, "address"), f"{host.address} is the address of {seen[host.address]} too")
+        seen.setdefault(host.address, name)
+        if _is_unspecified(host.address):
+            problems.add(("hosts", name, "address"), f"nobody can connect to {host.address}: that is for `listen`")
+
+
+def _places(site: Site, problems: Problems) -> None:
+    for key, host in ((ROUTER, site.router.host), (BROKER, site.broker.host)):
+        if host not in site.hosts:
+            hint = nearest(host, site.hosts)
+            problems.add((key, "host"), f'the {key} is on "{host}", which is not in [hosts]: {hint}')
+
+
+def _services(site: Site, problems: Problems) -> None:
+    where: dict[tuple[str, str], str] = {}
+    for name, host in site.hosts.items():
+        for robot, services in host.services.items():
+            place: Where = ("hosts", name, "services", robot)
+            if robot not in site.robots:
+                problems.add(place, f'there is no robot "{robot}" in [robots]: {nearest(robot, site.robots)}')
+            for index, service in enumerate(services):
+                if service not in OF_A_ROBOT:
+                    said = f"[{service}] says where it runs" if service in (ROUTER, BROKER) else ""
+                    hint = said or nearest(service, OF_A_ROBOT)
+                    problems.add((*place, index), f'"{service}" is not a service of a robot: {hint}')
+                elif other := where.get((robot, service)):
+                    problems.add((*place, index), f"{robot} has two of {service}, on {other} and on {name}")
+                else:
+                    where[robot, service] = name
+    for robot, settings in site.robots.items():
+        _require_complete(robot, settings.device, {each: where.get((robot, each), "") for each in OF_A_ROBOT}, problems)
+
+
+def _require_complete(robot: str, device: DeviceKind, where: dict[str, str], problems: Problems) -> None:
+    """`where` is the host of each service, empty for none."""
+    place: Where = ("robots", robot)
+    needed = (*NEEDED, *((DEVICE,) if device is DeviceKind.VIRTUAL else ()))
+    for missing in (service for service in needed if not where[service]):
+        problems.add(place, f"{robot} has no {missing} on any host: write it into [hosts.<host>.services]")
+    if where[DEVICE] and device is DeviceKind.BOARD:
+        problems.add(place, f'{robot} has device = "board", so {DEVICE} has nothing to do on {where[DEVICE]}')
+    if where["visualizer"] != where["viewer"]:
+        problems.add(place, f"the visualizer of {robot} shows in a viewer on its own host: put both on one")
+
+
+def _roles(site: Site, problems: Problems) -> None:
+    people = [role.name for role in ROLES if not role.node]
+    for name, host in site.hosts.items():
+        for index, role in enumerate(host.roles):
+            if role not in people:
+                text = f'"{role}" has no permission that a person or script could use: {nearest(role, people)}'
+                problems.add(("hosts", name, "roles", index), text)
+
+
+def _listeners(site: Site, problems: Problems) -> None:
+    """Two that would listen on one port of a host."""
+    ports: defaultdict[str, list[tuple[int, str, Where]]] = defaultdict(list)
+    ports[site.router.host].append((site.router.port, "the router", (ROUTER, "port")))
+    ports[site.broker.host].append((site.broker.port, "the broker", (BROKER, "port")))
+    for name, host in site.hosts.items():
+        for robot, services in host.services.items():
+            settings = site.robots.get(robot)
+            for service, key in (("panel", "panel_port"), ("viewer", "viewer_port"), ("viewer", "web_port")):
+                if settings is not None and service in services:
+                    place: Where = ("robots", robot, key)
+                    ports[name].append((getattr(settings, key), f"{service} of {robot} ({key})", place))
+    for name, wanted in ports.items():
+        taken: dict[int, str] = {}
+        for port, who, place in wanted:
+            if not 0 < port < 65536:
+                problems.add(place, f"{port} is no port: 1 to 65535")
+            elif port in taken:
+                problems.add(place, f"port {port} of {name} is wanted by {taken[port]} and by {who}: give one another")
+            taken[port] = who
+
+
+def _paths(site: Site, problems: Problems) -> None:
+    for key in ("project", "config", "state"):
+        path = getattr(site, key)
+        if not PurePosixPath(path).is_absolute() or ".." in PurePosixPath(path).parts or path == "/":
+            problems.add((key,), f'{key} = "{path}" must be an absolute path without ".."')
+        _require_meaningless(path, (key,), problems)
+    for robot, settings in site.robots.items():
+        for key in ("folder", "serial"):
+            _require_meaningless(getattr(settings, key), ("robots", robot, key), problems)
+    if not USER.fullmatch(site.user):
+        problems.add(("user",), f'"{site.user}" cannot be a user\'s name: lower-case letters, digits, "_" and "-"')
+    if site.user == "root":
+        problems.add(("user",), "the services do not run as root: take a user of their own")
+    if site.certificate_days < 1:
+        problems.add(("certificate_days",), f"{site.certificate_days} days: a certificate needs at least 1")
+
+
+def _robots(site: Site, problems: Problems, project: Path) -> None:
+    """The robots' own files: their names, and the names of their devices at the broker."""
+    devices: dict[str, str] = {}
+    for robot, settings in site.robots.items():
+        place: Where = ("robots", robot, "folder")
+        if robot == HOST:
+            problems.add(("robots", robot), f'no robot can have the name "{HOST}": {HOST}.toml is of router and broker')
+        if PurePosixPath(settings.folder).is_absolute() or ".." in PurePosixPath(settings.folder).parts:
+            problems.add(place, f'folder = "{settings.folder}" must be below the project, as "urdf/{robot}"')
+            continue
+        try:
+            arm = load_arm(project / settings.folder)
+        except (ConfigurationError, OSError, tomllib.TOMLDecodeError) as error:
+            problems.add(place, f"{robot}: {error}")
+            continue
+        if arm.name != robot:
+            problems.add(place, f'the robot of {settings.folder} is named "{arm.name}": write [robots.{arm.name}]')
+        if arm.device.name in devices and settings.wire is Wire.MQTT:
+            other = devices[arm.device.name]
+            problems.add(place, f'{robot} and {other} both have the device "{arm.device.name}" at the broker')
+        devices[arm.device.name] = robot
+
+
+def _require_meaningless(path: str, place: Where, problems: Problems) -> None:
+    if HAS_MEANING.search(path) or path != path.strip():
+        problems.add(place, f'"{path}" cannot be a path here: no $, % or \\, and no blank at either end')
+
+
+def _is_address(text: str) -> bool:
+    try:
+        ipaddress.ip_address(text)
+    except ValueError:
+        return len(text) < 254 and all(LABEL.fullmatch(each) for each in text.split("."))
+    return True
+
+
+def _is_unspecified(text: str) -> bool:
+    try:
+        return ipaddress.ip_address(text).is_unspecified
+    except ValueError:
+        return False

@@ -1,0 +1,89 @@
+"""The same processes without systemd: a process-compose file, and a compose file with one Containerfile."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from typing import Any
+
+from schemas.deployment import Wire
+from schemas.site import Site
+from services.hosts.deployments import HOST, environment
+from services.hosts.layout import Process, processes
+
+IN_IMAGE = "/opt/gemelo"  # where the Containerfile puts the project
+CONTAINERFILE = """\
+# Written by `gemelo deploy render`. Build it in the project's folder: podman build -t gemelo -f <this file> .
+FROM docker.io/library/debian:12-slim
+RUN apt-get update \\
+    && apt-get install -y --no-install-recommends \\
+       ca-certificates curl g++ git make mosquitto openssl python3 python3-dev python3-venv xz-utils \\
+    && rm -rf /var/lib/apt/lists/*
+COPY . /opt/gemelo
+RUN cd /opt/gemelo && deploy/bootstrap
+"""
+
+
+def process_compose(site: Site, host: str) -> str:
+    """process-compose.yaml of a host, as JSON, which YAML contains."""
+    made = {process.unit: _supervised(site, process) for process in processes(site, host)}
+    return _text({"version": "0.5", "name": f"gemelo-{host}", "is_strict": True, "processes": made})
+
+
+def compose(site: Site, host: str) -> str:
+    """compose.yaml of a host, as JSON: the host's network, no capabilities, nothing written but the state."""
+    made = {process.unit: _contained(site, process) for process in processes(site, host)}
+    return _text({"name": f"gemelo-{host}", "services": made})
+
+
+def _supervised(site: Site, process: Process) -> dict[str, Any]:
+    program = shlex.quote(f"{site.project}/.venv/bin/{process.program}")
+    return {
+        "description": process.service.about,
+        "command": f"exec {program} 2>&1",
+        "environment": [f"{name}={value}" for name, value in environment(site, process).items()],
+        "availability": {"restart": "always", "backoff_seconds": 1},
+        "shutdown": {"signal": 15, "timeout_seconds": 5},
+        "readiness_probe": {
+            "period_seconds": 1,
+            "timeout_seconds": 2,
+            "failure_threshold": 1_000_000_000,
+            "exec": {"command": _probe(site, process, site.project)},
+        },
+    }
+
+
+def _contained(site: Site, process: Process) -> dict[str, Any]:
+    settings = site.robots.get(process.robot)
+    has_line = settings is not None and settings.wire is Wire.SERIAL and process.service.name == "stepper_gateway"
+    return {
+        "image": "gemelo",
+        "command": [f"{IN_IMAGE}/.venv/bin/{process.program}"],
+        "environment": environment(site, process),
+        "network_mode": "host",
+        "restart": "always",
+        "init": True,
+        "read_only": True,
+        "cap_drop": ["ALL"],
+        "security_opt": ["no-new-privileges:true"],
+        "mem_limit": process.service.memory.lower(),
+        "pids_limit": 256,
+        "tmpfs": ["/tmp"],
+        "volumes": [_mount(site.config, is_read_only=True), _mount(site.state, is_read_only=False)],
+        **({"devices": [{"source": settings.serial, "target": settings.serial}]} if settings and has_line else {}),
+        "healthcheck": {"test": ["CMD-SHELL", _probe(site, process, IN_IMAGE)], "interval": "5s"},
+    }
+
+
+def _mount(path: str, is_read_only: bool) -> dict[str, Any]:
+    return {"type": "bind", "source": path, "target": path, "read_only": is_read_only}
+
+
+def _probe(site: Site, process: Process, project: str) -> str:
+    """A line of shell that succeeds while the process says that it is ready."""
+    run = shlex.quote(f"{site.state}/{process.robot or HOST}/run")
+    return f"GEMELO_PATHS_RUN={run} {shlex.quote(f'{project}/deploy/probe')} {process.service.name}"
+
+
+def _text(content: dict[str, Any]) -> str:
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,107 @@
+"""The certificates and passwords of a site: one small authority, a certificate for each host and role, and renewal.
+
+The authority's key stays in its own folder below out/; every host's folder holds what that host shows, and no more.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from schemas.site import Site
+from services.arm.model.description import load_arm
+from services.credentials.authority import Authority, expiry
+from services.credentials.private_files import write
+from services.hosts.layout import listening, processes, roles
+from services.mqtt import secure_folder
+from services.mqtt.access import AUTHORITY, GATEWAY
+
+DAY = 86_400.0  # [s]
+RENEW_WITHIN = 30.0  # [days] before its end a certificate is made anew
+LOOPBACK = ("localhost", "127.0.0.1")
+UNSPECIFIED = ("0.0.0.0", "::")
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """One certificate of a site."""
+
+    host: str
+    name: str  # the role, "router" or "broker"
+    expires: float  # [s] UNIX time
+    is_new: bool
+
+
+def make_keys(site: Site, folder: Path, project: Path, renew_within: float = RENEW_WITHIN) -> tuple[Certificate, ...]:
+    """Writes what is missing, wrong or ends within `renew_within` [days] below `folder`; raises `AccessError`."""
+    _private(folder)
+    own = _private(folder / "authority")
+    authority = Authority(own / "ca.pem", own / "ca.key")
+    made = [
+        certificate for host in site.hosts
+        for certificate in _of_host(site, host, authority, _private(folder / host / "keys"), renew_within)
+    ]  # fmt: skip
+    for host in site.hosts:
+        shutil.copyfile(own / "ca.pem", folder / host / "keys" / "ca.pem")
+    return (*made, _broker(site, folder, project, authority))
+
+
+def _of_host(
+    site: Site, host: str, authority: Authority, folder: Path, renew_within: float
+) -> Iterator[Certificate]:  # fmt: skip
+    days = site.certificate_days
+    names = tuple(addresses(site, host)) if site.router.host == host else ()
+    wanted: dict[str, Callable[[Path, Path], None]] = {
+        role: partial(authority.sign_client, role, days=days, unit=host) for role in roles(site, host)
+    }
+    if names:
+        wanted["router"] = partial(authority.sign, names, days=days)
+    for name, sign in wanted.items():
+        certificate, key = folder / f"{name}.pem", folder / f"{name}.key"
+        is_sound = authority.has_signed(certificate, key, names if name == "router" else ())
+        is_new = not is_sound or expiry(certificate) - time.time() < renew_within * DAY
+        if is_new:
+            sign(certificate, key)
+        yield Certificate(host, name, expiry(certificate), is_new)
+    for stray in {each.stem for each in folder.glob("*.pem")} - wanted.keys() - {"ca"}:
+        for end in (".pem", ".key"):
+            (folder / f"{stray}{end}").unlink(missing_ok=True)
+
+
+def _broker(site: Site, folder: Path, project: Path, authority: Authority) -> Certificate:
+    """The broker's lock on its host, and on the others the password of each end that runs there."""
+    home = folder / site.broker.host / "broker"
+    devices = {robot: load_arm(project / settings.folder).device.name for robot, settings in site.robots.items()}
+    names = tuple(addresses(site, site.broker.host))
+    secure_folder.make(home, names, devices.values(), authority, site.certificate_days)
+    shutil.copyfile(folder / "authority" / "ca.pem", home / AUTHORITY)
+    for host in site.hosts:
+        for process in processes(site, host):
+            user = {"stepper_gateway": GATEWAY, "virtual_esp32": devices.get(process.robot)}.get(process.service.name)
+            if host != site.broker.host and user:
+                _give(home, _private(folder / host / "broker"), user)
+    return Certificate(site.broker.host, "broker", expiry(home / secure_folder.CERTIFICATE), True)
+
+
+def _give(home: Path, folder: Path, user: str) -> None:
+    """Copies the password of one user, and what the broker is known by."""
+    shutil.copyfile(home / AUTHORITY, folder / AUTHORITY)
+    write(folder / f"{user}.password", secure_folder.password_of(home, user) + "\n")
+
+
+def addresses(site: Site, host: str) -> Iterator[str]:
+    """What router or broker of a host may be called by who connects."""
+    yield site.hosts[host].address
+    if listening(site, host) not in (site.hosts[host].address, *UNSPECIFIED):
+        yield listening(site, host)
+    yield from LOOPBACK
+
+
+def _private(folder: Path) -> Path:
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    folder.chmod(0o700)
+    return folder

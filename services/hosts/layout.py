@@ -1,0 +1,89 @@
+"""What runs where: every process of a site, with its robot, its role and the certificate that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from schemas.roles import ROLES
+from schemas.site import Site
+
+ROLE_OF = {role.node: role.name for role in ROLES if role.node}
+ROUTER, BROKER = "router", "broker"
+
+
+@dataclass(frozen=True)
+class Service:
+    """A row of the table of services."""
+
+    name: str
+    about: str
+    memory: str  # [systemd's] above which it is ended: three times and more of what it takes on rm1
+    extras: tuple[str, ...] = ()  # of pyproject.toml
+
+
+SERVICES = {
+    each.name: each
+    for each in (
+        Service(ROUTER, "the Zenoh router", "512M"),
+        Service(BROKER, "the MQTT broker", "256M"),
+        Service("virtual_esp32", "the firmware core on real MQTT", "256M"),
+        Service("stepper_gateway", "trajectories to step knots", "512M"),
+        Service("state_publisher", "joint states to frames", "256M"),
+        Service("planner", "goals to verified trajectories", "4G", ("planner",)),
+        Service("logger", "everything to MCAP, every command to CSV", "1G"),
+        Service("visualizer", "everything to Rerun", "2G", ("view",)),
+        Service("viewer", "the Rerun viewer", "6G", ("view",)),
+        Service("panel", "the operator's page", "2G", ("panel",)),
+    )
+}
+OF_A_ROBOT = tuple(name for name in SERVICES if name not in (ROUTER, BROKER))
+
+
+@dataclass(frozen=True)
+class Process:
+    """One process on one host."""
+
+    service: Service
+    robot: str = ""  # empty: of the whole site
+
+    @property
+    def unit(self) -> str:
+        """Its name among all of the host."""
+        return "-".join(filter(None, ("gemelo", self.robot, self.service.name)))
+
+    @property
+    def program(self) -> str:
+        """Its console script."""
+        return f"gemelo-{self.service.name.replace('_', '-')}"
+
+    @property
+    def role(self) -> str:
+        """The certificate that it shows to the router; empty where it does not join."""
+        return ROLE_OF.get(self.service.name, "")
+
+
+def processes(site: Site, host: str) -> Iterator[Process]:
+    """What runs on a host, router and broker first."""
+    if site.router.host == host:
+        yield Process(SERVICES[ROUTER])
+    if site.broker.host == host:
+        yield Process(SERVICES[BROKER])
+    for robot, names in site.hosts[host].services.items():
+        yield from (Process(SERVICES[name], robot) for name in names)
+
+
+def roles(site: Site, host: str) -> tuple[str, ...]:
+    """The roles that need a certificate on a host."""
+    of_services = {process.role for process in processes(site, host)} - {""}
+    return tuple(sorted(of_services | set(site.hosts[host].roles)))
+
+
+def robots(site: Site, host: str) -> tuple[str, ...]:
+    """The robots that a host needs a deployment file for: its services', and all of them where people work."""
+    return tuple(site.robots) if site.hosts[host].roles else tuple(site.hosts[host].services)
+
+
+def listening(site: Site, host: str) -> str:
+    """The address that router and broker listen on there."""
+    return site.hosts[host].listen or site.hosts[host].address

@@ -1,0 +1,57 @@
+"""Everything that a host of a site needs, as files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from schemas.site import Site
+from services.hosts import deployments
+from services.hosts.containers import CONTAINERFILE, compose, process_compose
+from services.hosts.layout import listening, robots
+from services.hosts.units import units
+from services.mqtt.secure_folder import lines, mosquitto_conf
+from services.runtime.bus.zenoh_config import locked_router
+from services.runtime.permissions import access_control
+
+
+def rendered(site: Site, host: str) -> dict[str, str]:
+    """The files of a host by path, relative to its folder; none of them holds a secret."""
+    files = {f"{robot}.toml": deployments.deployment_of_robot(site, host, robot) for robot in robots(site, host)}
+    if host in (site.router.host, site.broker.host):
+        files[f"{deployments.HOST}.toml"] = deployments.deployment_of_host(site, host)
+    if host == site.router.host:
+        files["router.json5"] = router(site)
+    if host == site.broker.host:
+        files["mosquitto.conf"] = mosquitto(site)
+    files |= {f"systemd/{name}": text for name, text in units(site, host).items()}
+    return files | {
+        "process-compose.yaml": process_compose(site, host),
+        "compose.yaml": compose(site, host),
+        "Containerfile": CONTAINERFILE,
+    }
+
+
+def write(site: Site, host: str, folder: Path) -> tuple[Path, ...]:
+    """Writes the files of a host into `folder`, and returns them."""
+    written = []
+    for name, text in rendered(site, host).items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        written.append(path)
+    return tuple(written)
+
+
+def router(site: Site) -> str:
+    """The router's json5, for gemelo-router and for zenohd: addresses, TLS, and the permissions of every role."""
+    folder = deployments.keys(site)
+    files = (f"{folder}/ca.pem", f"{folder}/router.pem", f"{folder}/router.key")
+    address = listening(site, site.router.host)
+    return json.dumps(locked_router(address, site.router.port, *files, access_control(site.robots)), indent=1) + "\n"
+
+
+def mosquitto(site: Site) -> str:
+    """mosquitto.conf, as gemelo-broker writes it too: TLS, users and an ACL."""
+    door = lines(Path(deployments.broker_folder(site)))
+    return mosquitto_conf(listening(site, site.broker.host), site.broker.port, door)

@@ -1,0 +1,129 @@
+"""Reads a site's file; every problem is a sentence with its line."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from gemelo.programs.toml_lines import Where, toml_lines
+from schemas.errors import ConfigurationError
+from schemas.site import Site, SiteBroker, SiteHost, SiteRecord, SiteRobot, SiteRouter
+
+NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,30}")  # of a host or a site: part of file names, units and certificates
+TABLES: dict[str, type[SiteRecord]] = {"router": SiteRouter, "broker": SiteBroker}
+TABLES_BY_NAME: dict[str, type[SiteRecord]] = {"robots": SiteRobot, "hosts": SiteHost}
+
+R = TypeVar("R", bound=SiteRecord)
+
+
+class SiteError(ConfigurationError):
+    """A site that cannot be deployed; one line for each problem."""
+
+
+class Problems:
+    """What is wrong with a file, with lines."""
+
+    def __init__(self, file: Path, text: str) -> None:
+        self._file, self._lines = file, toml_lines(text)
+        self._found: list[tuple[int, str]] = []
+
+    def add(self, place: Where, text: str) -> None:
+        """At the line of `place`, or of the nearest thing around it that stands in the file."""
+        at = next((self._lines[place[:end]] for end in range(len(place), 0, -1) if place[:end] in self._lines), 1)
+        self._found.append((at, text))
+
+    def raise_any(self) -> None:
+        """Raises `SiteError` if there is any."""
+        if self._found:
+            raise SiteError("\n".join(f"{self._file}, line {at}: {text}" for at, text in sorted(self._found)))
+
+
+def read_site(file: Path) -> tuple[Site, Problems]:
+    """The site, and where to add what else is wrong; raises `SiteError`."""
+    try:
+        text = file.read_text(encoding="utf-8")
+        raw = tomllib.loads(text)
+    except FileNotFoundError:
+        raise SiteError(f"{file}: there is no such file; deploy/hosts/example.toml is one to copy") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise SiteError(f"{file}: {error}") from error
+    problems = Problems(file, text)
+    site = _site(raw, file.stem, problems)
+    problems.raise_any()
+    assert site is not None
+    return site, problems
+
+
+def _site(raw: dict[str, Any], name: str, problems: Problems) -> Site | None:
+    if "name" in raw:
+        problems.add(("name",), f'a site has the name of its file, "{name}": take the key "name" away')
+    if not NAME.fullmatch(name):
+        problems.add((), f'"{name}" cannot be the name of a site: 1 to 31 lower-case letters, digits, "_" or "-"')
+    values = {**raw, "name": name}
+    for key, kind in TABLES.items():
+        if isinstance(raw.get(key), dict):
+            values[key] = _record(kind, raw[key], (key,), problems)
+    for key, kind in TABLES_BY_NAME.items():
+        if isinstance(raw.get(key), dict):
+            values[key] = _named(kind, raw[key], key, problems)
+    return _record(Site, values, (), problems)
+
+
+def _named(kind: type[R], tables: dict[str, Any], key: str, problems: Problems) -> dict[str, R | None]:
+    for name, table in tables.items():
+        if not NAME.fullmatch(name):
+            problems.add((key, name), f'{name!r} cannot be a name in [{key}]: lower-case letters, digits, "_" and "-"')
+        if not isinstance(table, dict):
+            problems.add((key, name), f"[{key}.{name}] must be a table")
+    return {
+        name: _record(kind, table, (key, name), problems) for name, table in tables.items() if isinstance(table, dict)
+    }
+
+
+def _record(kind: type[R], raw: dict[str, Any], place: Where, problems: Problems) -> R | None:
+    """None where something of it is wrong, which has been added to `problems`."""
+    fields = {field.name: field for field in msgspec.structs.fields(kind)}
+    for key in raw:
+        if key not in fields:
+            problems.add((*place, key), f'unknown key "{".".join(map(str, (*place, key)))}": {nearest(key, fields)}')
+    values, is_whole = {}, all(key in fields for key in raw)
+    for name, field in fields.items():
+        if name not in raw:
+            is_whole &= not field.required
+            if field.required:
+                problems.add(place, f'key "{".".join(map(str, (*place, name)))}" is missing')
+            continue
+        try:
+            values[name] = msgspec.convert(raw[name], field.type)
+            _require_plain(raw[name])
+        except (msgspec.ValidationError, ValueError) as error:
+            is_whole = False
+            if raw[name] is not None and not _is_reported(raw[name]):
+                problems.add((*place, name), f'key "{".".join(map(str, (*place, name)))}": {error}')
+    return kind(**values) if is_whole else None
+
+
+def _is_reported(value: object) -> bool:
+    """True for a table of tables of which one was wrong already."""
+    return isinstance(value, dict) and any(each is None for each in value.values())
+
+
+def _require_plain(value: object) -> None:
+    """No text may hold what ends a line in the files that are written of it."""
+    if isinstance(value, str) and not value.isprintable():
+        raise ValueError(f"{value!r} holds a character that cannot be printed")
+    for inner in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        _require_plain(inner)
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A hint for a name that is not known."""
+    names = list(known)
+    near = difflib.get_close_matches(name, names, n=1)
+    return f'did you mean "{near[0]}"?' if near else f"known are {', '.join(names)}"

@@ -1,0 +1,102 @@
+"""systemd's units: a user of their own, no privileges, a watchdog that each process feeds while its loop runs."""
+
+from __future__ import annotations
+
+from schemas.deployment import Wire
+from schemas.site import Site
+from services.hosts.deployments import environment
+from services.hosts.layout import Process, processes
+from services.hosts.quoting import systemd
+
+TARGET = "gemelo.target"
+UNIT = """\
+# Written by `gemelo deploy render {site} {host}`.
+[Unit]
+Description={description}
+Wants=network-online.target
+After=network-online.target
+PartOf={target}
+
+[Service]
+Type=notify
+NotifyAccess=all
+User={user}
+{environment}
+ExecStart={command}
+# Ready when its state is valid, however long that takes: a board may be off. From then on its loop feeds the watchdog.
+TimeoutStartSec=infinity
+WatchdogSec=5
+Restart=always
+RestartSec=1
+TimeoutStopSec=5
+
+MemoryMax={memory}
+TasksMax=256
+LimitNOFILE=4096
+LimitCORE=0
+UMask=0077
+NoNewPrivileges=yes
+CapabilityBoundingSet=
+AmbientCapabilities=
+ProtectSystem=strict
+ProtectHome=read-only
+ReadWritePaths={state}
+PrivateTmp=yes
+{devices}
+ProtectClock=yes
+ProtectControlGroups=yes
+ProtectHostname=yes
+ProtectKernelLogs=yes
+ProtectKernelModules=yes
+ProtectKernelTunables=yes
+RestrictAddressFamilies=AF_INET AF_INET6 AF_UNIX
+RestrictNamespaces=yes
+RestrictRealtime=yes
+RestrictSUIDSGID=yes
+LockPersonality=yes
+SystemCallArchitectures=native
+
+[Install]
+WantedBy={target}
+"""
+WHOLE = """\
+# Written by `gemelo deploy render {site} {host}`: `systemctl start gemelo.target` starts all of this host.
+[Unit]
+Description=gemelo on {host}
+Wants={units}
+
+[Install]
+WantedBy=multi-user.target
+"""
+
+
+def units(site: Site, host: str) -> dict[str, str]:
+    """The files of /etc/systemd/system by name."""
+    files = {f"{process.unit}.service": _unit(site, host, process) for process in processes(site, host)}
+    return files | {TARGET: WHOLE.format(site=site.name, host=host, units=" ".join(files))}
+
+
+def _unit(site: Site, host: str, process: Process) -> str:
+    service = process.service
+    variables = environment(site, process).items()
+    return UNIT.format(
+        site=site.name,
+        host=host,
+        target=TARGET,
+        description=f"gemelo: {service.about}{f' ({process.robot})' if process.robot else ''}",
+        user=site.user,
+        environment="\n".join(f"Environment={systemd(f'{name}={value}')}" for name, value in variables),
+        # ":" keeps systemd from looking for variables in the words.
+        command=f":{systemd(f'{site.project}/.venv/bin/{process.program}')}",
+        memory=service.memory,
+        state=systemd(site.state),
+        devices=_devices(site, process),
+    )
+
+
+def _devices(site: Site, process: Process) -> str:
+    """Only a gateway on a serial line sees a device."""
+    settings = site.robots.get(process.robot)
+    if settings is None or settings.wire is not Wire.SERIAL or process.service.name != "stepper_gateway":
+        return "PrivateDevices=yes"
+    return f"DevicePolicy=closed\nDeviceAllow={systemd(settings.serial)} rw\nSupplementaryGroups=dialout"

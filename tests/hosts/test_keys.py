@@ -1,0 +1,93 @@
+"""The keys of a site: of mode 600, below out/ alone, no more of them on a host than it shows, and renewed in time."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from schemas.roles import ROLES
+from services.credentials.authority import Authority, expiry, openssl
+from services.hosts.keys import make_keys
+from services.runtime.deployment import project_root
+from tests.hosts.sites import site
+
+DAY = 86_400.0
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    lab = site(folder)
+    make_keys(lab, folder / "out", project_root())
+    return lab, folder / "out"
+
+
+def names(folder) -> set[str]:
+    return {file.name for file in folder.iterdir()}
+
+
+def test_a_host_has_the_keys_of_what_runs_there_and_no_others(made):
+    _, out = made
+    assert names(out / "cell/keys") == {
+        "ca.pem",
+        "gateway.pem",
+        "gateway.key",
+        "state_publisher.pem",
+        "state_publisher.key",
+    }
+    assert names(out / "brain/keys") == {
+        "ca.pem", "router.pem", "router.key", "planner.pem", "planner.key", "logger.pem", "logger.key",
+    }  # fmt: skip
+    assert not (out / "brain/broker").exists()
+    assert not (out / "desk/broker").exists()
+    assert [file.parent.name for file in out.rglob("ca.key")] == ["authority"]
+
+
+def test_keys_and_passwords_are_their_owners_alone_and_the_whole_folder_is(made):
+    _, out = made
+    secrets = [*out.rglob("*.key"), *out.rglob("*.password")]
+    assert len(secrets) >= 10
+    assert {file.stat().st_mode & 0o777 for file in secrets} == {0o600}
+    assert out.stat().st_mode & 0o777 == 0o700
+
+
+def test_a_certificates_name_is_the_role_and_its_unit_the_host(made):
+    _, out = made
+    for file in out.glob("*/keys/*.pem"):
+        if file.stem in {role.name for role in ROLES}:
+            said = openssl("x509", "-in", str(file), "-noout", "-subject").replace(" ", "")
+            assert said.strip() == f"subject=OU={file.parent.parent.name},CN={file.stem}"
+
+
+def test_what_is_sound_is_kept_and_what_ends_soon_or_has_another_address_is_renewed(tmp_path):
+    lab = site(tmp_path)
+    first = {(each.host, each.name): each for each in make_keys(lab, tmp_path / "out", project_root())}
+    assert all(each.is_new for each in first.values())
+    assert all(364 * DAY < each.expires - time.time() < 366 * DAY for each in first.values())
+    key = (tmp_path / "out/brain/keys/planner.key").read_bytes()
+    again = {(each.host, each.name): each for each in make_keys(lab, tmp_path / "out", project_root())}
+    assert not any(each.is_new for name, each in again.items() if name != ("cell", "broker"))
+    assert (tmp_path / "out/brain/keys/planner.key").read_bytes() == key
+
+    moved = site(tmp_path, '"10.0.0.12"', '"10.0.0.99"')
+    renewed = {(each.host, each.name) for each in make_keys(moved, tmp_path / "out", project_root()) if each.is_new}
+    assert renewed == {("brain", "router"), ("cell", "broker")}
+
+    authority = Authority(tmp_path / "out/authority/ca.pem", tmp_path / "out/authority/ca.key")
+    old = tmp_path / "out/brain/keys"
+    authority.sign_client("planner", old / "planner.pem", old / "planner.key", days=29)
+    renewed = {(each.host, each.name) for each in make_keys(moved, tmp_path / "out", project_root()) if each.is_new}
+    assert renewed == {("brain", "planner"), ("cell", "broker")}
+    assert expiry(old / "planner.pem") - time.time() > 300 * DAY
+
+
+def test_a_new_authority_renews_everything_and_a_role_that_left_is_taken_away(tmp_path):
+    lab, out = site(tmp_path), tmp_path / "out"
+    make_keys(lab, out, project_root())
+    for file in (out / "authority").iterdir():
+        file.unlink()
+    assert all(each.is_new for each in make_keys(lab, out, project_root()))
+    without = site(tmp_path, 'roles = ["operator", "viewer"]', 'roles = ["viewer"]')
+    make_keys(without, out, project_root())
+    assert names(out / "desk/keys") == {"ca.pem", "viewer.pem", "viewer.key", "panel.pem", "panel.key"}

@@ -1,0 +1,176 @@
+"""What is rendered can be read by what it is for, and nothing that a person writes becomes more than a value in it."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import yaml
+import zenoh
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from schemas.site import Site
+from services.hosts.checks import load_site
+from services.hosts.layout import processes, robots
+from services.hosts.render import rendered
+from services.hosts.site_file import SiteError
+from services.runtime.deployment import load_deployment, project_root
+from tests.hosts.sites import changed, escaped, site
+
+NASTY = (
+    'a"b', "a'b", "a b", "ñandú/机器人", "a;reboot", "a && b", "`id`", "a#b", "{x}", "a: b", "- a", "a\\", "$(id)",
+    "%h", "a\nExecStart=/bin/evil", "a\r\n[Service]", "\x00", "\u2028x", "{{.Env}}", "!!python/object", "${HOME}",
+)  # fmt: skip
+texts = st.one_of(st.sampled_from(NASTY), st.text(max_size=30), st.text(" \"'\\$%;`#[]{}=\n", max_size=12))
+Unit = list[tuple[str, str, str]]  # section, key, value
+
+
+def directives(text: str) -> Unit:
+    """A unit's directives as systemd.syntax(7) reads them; a continued line would join the next."""
+    section, found = "", []
+    for line in text.split("\n"):
+        if not line or line.startswith(("#", ";")):
+            continue
+        if header := re.fullmatch(r"\[(.+)\]", line):
+            section = header[1]
+            continue
+        assert not line.endswith("\\"), line
+        key, equals, value = line.partition("=")
+        assert equals, line
+        found.append((section, key, value))
+    return found
+
+
+def words(value: str) -> list[str]:
+    """The words of a value, unquoted, with the specifiers that systemd knows resolved."""
+    lexer = shlex.shlex(value, posix=True)
+    lexer.whitespace_split, lexer.commenters, lexer.quotes = True, "", '"'
+    found = list(lexer)
+    assert not any(re.search("%(?!%)", word.replace("%%", "")) for word in found), value
+    return [word.replace("%%", "%") for word in found]
+
+
+def keys(unit: Unit) -> list[tuple[str, str]]:
+    return [(section, key) for section, key, _ in unit]
+
+
+def values(unit: Unit, key: str) -> list[str]:
+    return [value for _, each, value in unit if each == key]
+
+
+def require_nothing_injected(lab: Site, plain: Site) -> None:
+    """The files of `lab` say the same things as those of `plain`, with its own values."""
+    for host in lab.hosts:
+        files, ordinary = rendered(lab, host), rendered(plain, host)
+        assert files.keys() == ordinary.keys()
+        for process in processes(lab, host):
+            name = f"systemd/{process.unit}.service"
+            unit = directives(files[name])
+            assert keys(unit) == keys(directives(ordinary[name]))
+            (command,) = values(unit, "ExecStart")
+            assert words(command.removeprefix(":")) == [f"{lab.project}/.venv/bin/{process.program}"]
+            assert words(values(unit, "ReadWritePaths")[0]) == [lab.state]
+            assert words(values(unit, "Environment")[0])[0].startswith(f"GEMELO_CONFIG={lab.config}/")
+            assert values(unit, "User") == [lab.user]
+        supervised = yaml.safe_load(files["process-compose.yaml"])["processes"]
+        for process in processes(lab, host):
+            made = supervised[process.unit]
+            assert shlex.split(made["command"]) == ["exec", f"{lab.project}/.venv/bin/{process.program}", "2>&1"]
+            assert shlex.split(made["readiness_probe"]["exec"]["command"]) == [
+                f"GEMELO_PATHS_RUN={lab.state}/{process.robot or 'host'}/run",
+                f"{lab.project}/deploy/probe", process.service.name,
+            ]  # fmt: skip
+        assert "$" not in files["process-compose.yaml"] + files["compose.yaml"]
+        if "mosquitto.conf" in files:
+            of_lab, of_plain = (text.splitlines() for text in (files["mosquitto.conf"], ordinary["mosquitto.conf"]))
+            assert [line.split(" ")[0] for line in of_lab] == [line.split(" ")[0] for line in of_plain]
+
+
+def require_readable(lab: Site, folder: Path) -> None:
+    for host in lab.hosts:
+        for robot in robots(lab, host):
+            file = folder / f"{robot}.toml"
+            file.write_text(rendered(lab, host)[f"{robot}.toml"], encoding="utf-8")
+            read = load_deployment(file, {})
+            assert read.router.ca == f"{lab.config}/keys/ca.pem"
+            assert read.paths.run == f"{lab.state}/{robot}/run"
+            assert read.serial.device == lab.robots[robot].serial
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.fixed_dictionaries({}, optional=dict.fromkeys(("project", "config", "state", "user", "serial"), texts)))
+@example({"project": "/opt/a \"b\" 'c' ; ñ", "state": "/var/my 'state", "serial": "/dev/tty ACM#0"})
+@example({"config": "/etc/x\nExecStart=/bin/evil"})
+def test_whatever_a_person_writes_is_refused_or_stays_one_value(tmp_path, written):
+    top = "".join(f"{key} = {escaped(rooted(key, text))}\n" for key, text in written.items() if key != "serial")
+    file = changed(tmp_path, "[router]", f"{top}[router]")
+    if "serial" in written:
+        robot = f'[robots.rm1]\nwire = "serial"\nserial = {escaped(written["serial"])}'
+        file.write_text(file.read_text(encoding="utf-8").replace("[robots.rm1]", robot), encoding="utf-8")
+    try:
+        lab = load_site(file, project_root())
+    except (SiteError, UnicodeEncodeError):
+        return
+    wire = '[robots.rm1]\nwire = "serial"' if "serial" in written else "[robots.rm1]"
+    require_nothing_injected(lab, site(tmp_path, "[robots.rm1]", wire))
+    require_readable(lab, tmp_path)
+
+
+def rooted(key: str, text: str) -> str:
+    return text if key == "user" or text.startswith("/") else f"/{text}"
+
+
+@pytest.mark.parametrize("name", ["mi brazo ñ", "a'b", 'a"b', "a;b #c"])
+def test_a_robots_folder_may_have_any_printable_name(tmp_path, name):
+    project = tmp_path / "project"
+    project.mkdir()
+    (project / name).symlink_to(project_root() / "urdf/rm1")
+    lab = load_site(changed(tmp_path, '"urdf/rm1"', escaped(name)), project)
+    file = tmp_path / "rm1.toml"
+    file.write_text(rendered(lab, "cell")["rm1.toml"], encoding="utf-8")
+    assert load_deployment(file, {}).robot == str(project_root() / name)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(texts.filter(lambda text: not re.fullmatch("[a-z0-9][a-z0-9_-]{0,30}", text)))
+def test_a_name_of_a_host_or_robot_that_is_not_plain_is_refused(tmp_path, name):
+    for old, new in (("[hosts.desk]", "[hosts.{}]"), ("[robots.rm1]", "[robots.{}]")):
+        with pytest.raises((SiteError, UnicodeEncodeError)):
+            site(tmp_path, old, new.format(escaped(name)))
+
+
+def test_the_example_is_rendered_hardened_and_readable(tmp_path):
+    lab = site(tmp_path)
+    require_nothing_injected(lab, lab)
+    require_readable(lab, tmp_path)
+    unit = directives(rendered(lab, "cell")["systemd/gemelo-rm1-stepper_gateway.service"])
+    wanted = """NoNewPrivileges=yes User=gemelo ProtectSystem=strict CapabilityBoundingSet= Type=notify WatchdogSec=5
+        Restart=always MemoryMax=512M PrivateDevices=yes"""
+    for directive in wanted.split():
+        assert tuple(directive.split("=", 1)) in [(key, value) for _, key, value in unit]
+    files = rendered(lab, "brain")
+    assert files["systemd/gemelo.target"].count("gemelo-rm1-planner.service") == 1
+    config = tmp_path / "router.json5"
+    config.write_text(files["router.json5"])
+    read = zenoh.Config.from_file(str(config))
+    assert json.loads(read.get_json("listen/endpoints")) == ["tls/10.0.0.12:7447"]
+    assert json.loads(read.get_json("access_control"))["default_permission"] == "deny"
+
+
+def test_only_a_gateway_on_a_serial_line_sees_a_device(tmp_path):
+    lab = site(tmp_path, "[robots.rm1]", '[robots.rm1]\nwire = "serial"')
+    files = rendered(lab, "cell")
+    gateway = directives(files["systemd/gemelo-rm1-stepper_gateway.service"])
+    assert words(values(gateway, "DeviceAllow")[0]) == ["/dev/ttyUSB0", "rw"]
+    assert values(gateway, "DevicePolicy") == ["closed"]
+    assert values(directives(files["systemd/gemelo-broker.service"]), "PrivateDevices") == ["yes"]
+
+
+def test_no_rendered_file_of_a_host_names_the_authoritys_key(tmp_path):
+    lab = site(tmp_path)
+    for host in lab.hosts:
+        assert not any("ca.key" in text for text in rendered(lab, host).values())

@@ -1,0 +1,117 @@
+"""What is wrong with a site is said before anything is written, with its line."""
+
+from __future__ import annotations
+
+import pytest
+
+from services.hosts.checks import load_site
+from services.hosts.layout import processes, roles
+from services.hosts.site_file import SiteError
+from services.runtime.deployment import project_root
+from tests.hosts.sites import EXAMPLE, changed, site
+
+SERVICES = 'rm1 = ["stepper_gateway", "virtual_esp32", "state_publisher"]'
+PLANS = 'rm1 = ["planner", "logger"]'
+
+
+def line_of(text: str) -> int:
+    return EXAMPLE.read_text(encoding="utf-8").split(text)[0].count("\n") + 1
+
+
+def problem(folder, old: str, new: str) -> str:
+    with pytest.raises(SiteError) as caught:
+        site(folder, old, new)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"planner", "logger"', '"planer", "logger"', '"planer" is not a service of a robot: did you mean "planner"?'),
+        ('"planner", "logger"', '"router"', '"router" is not a service of a robot: [router] says where it runs'),
+        (PLANS, 'rm1 = ["stepper_gateway"]', "rm1 has two of stepper_gateway, on cell and on brain"),
+        ('rm1 = ["panel"]', 'rm2 = ["panel"]', 'there is no robot "rm2" in [robots]: did you mean "rm1"?'),
+        (
+            'roles = ["operator"',
+            'roles = ["operater"',
+            '"operater" has no permission that a person or script could use',
+        ),
+        ('roles = ["operator"', 'roles = ["gateway"', '"gateway" has no permission that a person or script'),
+        ('address = "10.0.0.13"', 'address = "10.0.0.12"', "10.0.0.12 is the address of brain too"),
+        ('address = "10.0.0.13"', 'address = "a b"', "'a b' is neither a host name nor an IP address"),
+        ('address = "10.0.0.13"', 'address = "0.0.0.0"', "nobody can connect to 0.0.0.0: that is for `listen`"),
+        ('address = "10.0.0.13"', "address = 13", 'key "hosts.desk.address": Expected `str`, got `int`'),
+        ('address = "10.0.0.13"', 'adress = "10.0.0.13"', 'unknown key "hosts.desk.adress": did you mean'),
+        (
+            'host = "brain"',
+            'host = "brian"',
+            'the router is on "brian", which is not in [hosts]: did you mean "brain"?',
+        ),
+        ('folder = "urdf/rm1"', 'folder = "urdf/rm2"', "rm1: "),
+        ('folder = "urdf/rm1"', 'folder = "urdf/parol6"', 'the robot of urdf/parol6 is named "parol6"'),
+        ('folder = "urdf/rm1"', 'folder = "/rm1"', 'folder = "/rm1" must be below the project'),
+        ('device = "virtual"', 'device = "board"', "so virtual_esp32 has nothing to do on cell"),
+        ('device = "virtual"', 'device = "real"', 'key "robots.rm1.device": Invalid enum value'),
+    ],
+)
+def test_each_mistake_is_named_with_its_line(tmp_path, old, new, said):
+    text = problem(tmp_path, old, new)
+    assert said in text
+    at = line_of(old) if said != "so virtual_esp32 has nothing to do on cell" else line_of("[robots.rm1]")
+    assert any(f"lab.toml, line {at}: " in line for line in text.splitlines() if said in line), text
+
+
+def test_a_robot_without_what_makes_its_state_is_refused(tmp_path):
+    assert "rm1 has no stepper_gateway on any host" in problem(tmp_path, SERVICES, 'rm1 = ["virtual_esp32"]')
+    assert "rm1 has no virtual_esp32 on any host" in problem(
+        tmp_path, SERVICES, 'rm1 = ["stepper_gateway", "state_publisher"]'
+    )
+
+
+def test_two_that_would_listen_on_one_port_are_named(tmp_path):
+    text = problem(tmp_path, 'host = "cell"', 'host = "brain"\nport = 7447')
+    assert "port 7447 of brain is wanted by the router and by the broker" in text
+    parol6 = '[robots.parol6]\nfolder = "urdf/parol6"\n[hosts.cell]'
+    file = changed(tmp_path, "[hosts.cell]", parol6)
+    every = 'parol6 = ["stepper_gateway", "virtual_esp32", "state_publisher", "panel"]'
+    file.write_text(file.read_text().replace('rm1 = ["panel"]', f'rm1 = ["panel"]\n{every}'))
+    with pytest.raises(SiteError, match=r"port 8088 of desk is wanted by panel of rm1 .* and by panel of parol6"):
+        load_site(file, project_root())
+    file.write_text(file.read_text().replace('"urdf/parol6"', '"urdf/parol6"\npanel_port = 8089'))
+    assert set(load_site(file, project_root()).robots) == {"rm1", "parol6"}
+
+
+def test_a_viewer_is_on_the_host_of_its_visualizer(tmp_path):
+    text = problem(tmp_path, PLANS, 'rm1 = ["planner", "visualizer"]')
+    assert "the visualizer of rm1 shows in a viewer on its own host" in text
+
+
+def test_all_mistakes_are_said_at_once_in_the_order_of_the_lines(tmp_path):
+    file = changed(tmp_path, '"planner", "logger"', '"planer"')
+    file.write_text(file.read_text().replace('roles = ["operator"', 'roles = ["nobody"').replace('"10.0.0.11"', '"-"'))
+    with pytest.raises(SiteError) as caught:
+        load_site(file, project_root())
+    lines = [int(each.split("line ")[1].split(":")[0]) for each in str(caught.value).splitlines()]
+    assert len(lines) == 3
+    assert lines == sorted(lines)
+
+
+@pytest.mark.parametrize("key", ["project", "config", "state"])
+@pytest.mark.parametrize("path", ["relative", "/", "/a/../b", "/a$HOME", "/a%h", "/a\\\\", "/a\\n/b", "/a "])
+def test_a_path_that_means_more_than_a_path_is_refused(tmp_path, key, path):
+    assert "line 1: " in problem(tmp_path, "# A lab", f'{key} = "{path}"\n# A lab')
+
+
+@pytest.mark.parametrize("user", ["root", "", "a b", "x;reboot", "Ünal"])
+def test_a_user_that_cannot_be_or_should_not_be_is_refused(tmp_path, user):
+    assert "line 1: " in problem(tmp_path, "# A lab", f'user = "{user}"\n# A lab')
+
+
+def test_a_host_needs_certificates_for_its_services_and_its_people_alone(tmp_path):
+    lab = site(tmp_path)
+    assert roles(lab, "cell") == ("gateway", "state_publisher")
+    assert roles(lab, "brain") == ("logger", "planner")
+    assert roles(lab, "desk") == ("operator", "panel", "viewer")
+    assert [each.unit for each in processes(lab, "brain")] == [
+        "gemelo-router", "gemelo-rm1-planner", "gemelo-rm1-logger",
+    ]  # fmt: skip
