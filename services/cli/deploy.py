@@ -1,0 +1,104 @@
+"""`gemelo deploy`: a site of several hosts: whether it is sound, what each host needs, and its certificates."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from schemas.errors import ConfigurationError
+from schemas.site import Site
+from services.cli.errors import CommandError, ExitCode, unknown
+from services.cli.parser import Options, Parser, positive_number
+from services.cli.text_table import table
+from services.runtime.deployment import load_deployment, project_root
+
+FOLDER = "deploy/hosts"
+DAY = 86_400.0  # [s]
+
+
+def site_option(parser: Parser) -> None:
+    """Adds the site."""
+    parser.add_argument("site", metavar="SITE", help=f"a file of {FOLDER} by its name, or any by its path")
+
+
+def render_options(parser: Parser) -> None:
+    """Adds the site and its hosts."""
+    site_option(parser)
+    parser.add_argument("hosts", nargs="*", metavar="HOST", help="of the site [all]")
+
+
+def keys_options(parser: Parser) -> None:
+    """Adds the site and the time of renewal."""
+    site_option(parser)
+    parser.add_argument(
+        "--renew-within", type=positive_number, default=30.0, metavar="DAYS",
+        help="renew what ends within this time [30]; a number above the certificates' own life renews all",
+    )  # fmt: skip
+
+
+def run_check(options: Options) -> ExitCode:
+    """Says what runs where, or everything that is wrong, with lines."""
+    from services.hosts.layout import processes
+
+    site = _site(options.site)
+    rows = []
+    for name, host in site.hosts.items():
+        running = ", ".join(process.unit.removeprefix("gemelo-") for process in processes(site, name))
+        rows.append((name, host.address, running or "-", ", ".join(host.roles) or "-"))
+    print(table(("host", "address", "runs", "people"), rows))
+    return ExitCode.OK
+
+
+def run_render(options: Options) -> ExitCode:
+    """Writes the files of some hosts below out/."""
+    from services.hosts.render import write
+
+    site = _site(options.site)
+    for host in options.hosts:
+        if host not in site.hosts:
+            raise unknown("host", host, site.hosts)
+    for host in options.hosts or site.hosts:
+        folder = _folder(site) / host
+        print(f"{_said(folder)}: {', '.join(str(file.relative_to(folder)) for file in write(site, host, folder))}")
+    print(
+        f"the folder of a host goes to {site.config} there, and its systemd/ to /etc/systemd/system (deploy/README.md)"
+    )
+    return ExitCode.OK
+
+
+def run_keys(options: Options) -> ExitCode:
+    """Makes and renews certificates and passwords below out/."""
+    from services.hosts.keys import make_keys
+
+    site = _site(options.site)
+    try:
+        made = make_keys(site, _folder(site), project_root(), options.renew_within)
+    except ConfigurationError as error:
+        raise CommandError(str(error)) from error
+    rows = [
+        (each.host, each.name, time.strftime("%Y-%m-%d", time.gmtime(each.expires)), "new" if each.is_new else "kept")
+        for each in made
+    ]
+    print(table(("host", "certificate of", "valid until", ""), rows))
+    print(f"in {_said(_folder(site))}, for you alone. Its authority/ stays here; keys/ and broker/ of a host go to it")
+    return ExitCode.OK
+
+
+def _site(name: str) -> Site:
+    from services.hosts.checks import load_site
+
+    root = project_root()
+    file = Path(name) if name.endswith(".toml") else root / FOLDER / f"{name}.toml"
+    try:
+        return load_site(file, root)
+    except ConfigurationError as error:
+        raise CommandError(str(error)) from error
+
+
+def _folder(site: Site) -> Path:
+    return Path(load_deployment().paths.out) / "deploy" / site.name
+
+
+def _said(folder: Path) -> Path:
+    root = project_root()
+    return folder.relative_to(root) if folder.is_relative_to(root) else folder
