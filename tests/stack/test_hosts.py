@@ -1,0 +1,98 @@
+"""Three hosts with TLS, each with the files that `gemelo deploy` has made for it: the arm, the planner, the desk."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from services.hosts.checks import load_site
+from services.runtime.deployment import project_root
+from tests.optional import need
+from tests.stack.namespaces import Hosts, Lab
+
+SITE = """
+[router]
+host = "brain"
+[broker]
+host = "cell"
+[robots.rm1]
+folder = "urdf/rm1"
+[hosts.cell]
+address = "10.77.0.1"
+[hosts.cell.services]
+rm1 = ["stepper_gateway", "virtual_esp32", "state_publisher"]
+[hosts.brain]
+address = "10.77.0.2"
+[hosts.brain.services]
+rm1 = ["planner"]
+[hosts.desk]
+address = "10.77.0.3"
+roles = ["operator", "viewer"]
+"""
+CUT = 1.0  # [s]
+
+
+@pytest.fixture(scope="module")
+def hosts(tmp_path_factory) -> Iterator[tuple[Hosts, Lab]]:
+    need("ip")
+    need("mosquitto")
+    if os.geteuid() != 0:
+        pytest.skip("network namespaces are root's to make: sudo .venv/bin/pytest tests/stack/test_hosts.py")
+    folder = tmp_path_factory.mktemp("lab")
+    file = folder / "lab.toml"
+    file.write_text(SITE)
+    site = load_site(file, project_root())
+    with Hosts(site) as made, Lab(site, made, folder / "out") as lab:
+        yield made, lab
+
+
+@pytest.fixture(scope="module")
+def desk(hosts) -> Iterator[subprocess.Popen[str]]:
+    made, lab = hosts
+    with subprocess.Popen(
+        made.command("desk", sys.executable, "-m", "tests.stack.desk"), cwd=project_root(), text=True, bufsize=1,
+        env=lab.environment("desk", "rm1"), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    ) as process:  # fmt: skip
+        assert process.stdout.readline() == '{"ready": "SUCCEEDED"}\n', lab.logs()
+        yield process
+        process.stdin.close()
+
+
+def gemelo(hosts, *words: str, role: str = "operator") -> subprocess.CompletedProcess[str]:
+    made, lab = hosts
+    keys = f"{lab.sites['desk'].config}/keys"
+    shown = {"GEMELO_ROUTER_CERTIFICATE": f"{keys}/{role}.pem", "GEMELO_ROUTER_KEY": f"{keys}/{role}.key"}
+    return subprocess.run(
+        made.command("desk", sys.executable, "-m", "services.cli.main", *words), cwd=project_root(), text=True,
+        env=lab.environment("desk", "rm1") | shown, capture_output=True, timeout=60.0,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("host", ["desk", "cell"])
+def test_a_move_from_the_desk_goes_on_exactly_when_a_link_is_cut_and_healed(hosts, desk, host):
+    made, _ = hosts
+    desk.stdin.write("move\n")
+    assert desk.stdout.readline() == "moving\n"
+    with made.cut(host):
+        time.sleep(CUT)  # how long the link is down is what this is about
+    outcome = json.loads(desk.stdout.readline())
+    assert outcome["longest_gap"] > CUT / 2, "the cut was not felt"
+    assert {key: outcome[key] for key in ("status", "is_exact", "jumps", "positions_afterwards")} == {
+        "status": "SUCCEEDED", "is_exact": True, "jumps": [], "positions_afterwards": 1,
+    }  # fmt: skip
+
+
+def test_a_viewer_sees_the_arm_may_stop_it_and_cannot_move_it(hosts):
+    assert "brazo_joint" in gemelo(hosts, "state", role="viewer").stdout
+    refused = gemelo(hosts, "move", "--named", "ready", role="viewer")
+    assert refused.returncode != 0
+    assert "plan" in refused.stderr
+    stopped = gemelo(hosts, "stop", role="viewer")
+    assert stopped.returncode == 0, stopped.stderr
+    assert gemelo(hosts, "param", "set", "planner", "planning_time", "1.0", role="viewer").returncode != 0
