@@ -92,7 +92,8 @@ def test_a_viewer_sees_the_arm_may_stop_it_and_cannot_move_it(hosts):
     assert "brazo_joint" in gemelo(hosts, "state", role="viewer").stdout
     refused = gemelo(hosts, "move", "--named", "ready", role="viewer")
     assert refused.returncode != 0
-    assert "plan" in refused.stderr
+    assert "nobody serves plan to" in refused.stderr
+    assert "viewer.pem: is planner running, and may this role ask it?" in refused.stderr
     stopped = gemelo(hosts, "stop", role="viewer")
     assert stopped.returncode == 0, stopped.stderr
     assert gemelo(hosts, "param", "set", "planner", "planning_time", "1.0", role="viewer").returncode != 0

@@ -76,6 +76,11 @@ class Bus(Protocol):
         """True if messages can be sent now; False without a router."""
         ...
 
+    @property
+    def certificate(self) -> str:
+        """The file that tells the router the role of this process; empty where it asks for none."""
+        ...
+
     def require_reconnection(self) -> None:
         """Call once a second; raises `BusError` if the router listens but this session stays disconnected."""
         ...
@@ -94,7 +99,8 @@ class Bus(Protocol):
     ) -> Declaration:
         """`on_miss(n)`: n messages of an EVERY or LATCHED key are lost for good; `own`: hear this bus too.
 
-        Of an EVERY key comes what is written from now on by the writer's clock, of a LATCHED one also the last before.
+        Of an EVERY key comes what is written from now on, by the writers' sequence numbers whatever clocks say; of a
+        LATCHED one also the last before.
         """
         ...
 

@@ -30,6 +30,10 @@ class MemoryBus:
     def is_connected(self) -> bool:
         return self.network.is_connected
 
+    @property
+    def certificate(self) -> str:
+        return ""
+
     def require_reconnection(self) -> None:
         pass
 

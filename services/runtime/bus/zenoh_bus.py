@@ -37,6 +37,7 @@ from services.runtime.errors import BusError
 CACHE = 1024  # messages of an EVERY key that survive while the router is away
 HEARTBEAT = 0.5  # [s] after which a reader notices that it misses the last message
 CLOSE_TIMEOUT = 1.0  # [s]
+TO_ANSWER = 1.0  # [s] for a writer to say what it wrote last; one that is frozen is gone after the lease of 1 s
 RECONNECTION_TIMEOUT = 10.0  # [s] that a session may take to come back to a router that listens
 
 
@@ -73,6 +74,10 @@ class ZenohBus:
             return zenoh.open(client_config(self._router, self._robot))
         except zenoh.ZError as error:
             raise BusNotOpen(str(error)) from error
+
+    @property
+    def certificate(self) -> str:
+        return self._router.certificate if self._router.tls else ""
 
     def require_reconnection(self) -> None:
         if self.is_connected or not router_answers(self._router.host, self._router.port, timeout=0.1):
@@ -116,11 +121,12 @@ class ZenohBus:
         if delivery is Delivery.LATEST:
             return ZenohDeclaration(self._session.declare_subscriber(key, on_sample, allowed_origin=origin))
         latched = delivery is Delivery.LATCHED
-        joined = self._session.new_timestamp()
+        said_before = {} if latched else self._newest(key)
 
         def on_news(sample: zenoh.Sample) -> None:
             # Recovery would hand a late joiner the writer's whole cache, which was never meant for it.
-            if sample.timestamp is None or sample.timestamp >= joined:
+            source = sample.source_info
+            if source is None or source.source_sn > said_before.get(_epoch(source), -1):
                 on_sample(sample)
 
         subscriber = zx.declare_advanced_subscriber(
@@ -133,6 +139,21 @@ class ZenohBus:
         )
         misses = subscriber.sample_miss_listener(lambda miss: on_miss(0 if latched else miss.nb))
         return ZenohDeclaration(misses, subscriber)
+
+    def _newest(self, key: str) -> dict[str, int]:
+        """The sequence number of each writer's newest message of an EVERY key, by the writer's epoch.
+
+        Asked of the writers' caches: their clocks say nothing, as those of two hosts differ.
+        """
+        replies = self._session.get(
+            f"{key}/@adv/pub/**?_max=1",
+            timeout=TO_ANSWER,
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            accept_replies=zenoh.ReplyKeyExpr.ANY,
+        )
+        sources = [reply.ok.source_info for reply in replies if reply.ok is not None]
+        return {_epoch(source): source.source_sn for source in sources if source is not None}
 
     def serve(self, key: str, on_query: Callable[[Query], None], urgent: bool = False) -> ZenohQueryable:
         if urgent and self._urgent_session is None:
@@ -212,6 +233,11 @@ class ZenohBus:
         end = time.monotonic() + CLOSE_TIMEOUT
         for queryable in self._queryables:
             queryable.join(max(0.0, end - time.monotonic()))
+
+
+def _epoch(source: zenoh.SourceInfo) -> str:
+    """One declaration of a publisher: a process that starts anew has another, and counts from 0."""
+    return str(source.source_id)
 
 
 def router_answers(host: str, port: int, timeout: float = 0.5) -> bool:

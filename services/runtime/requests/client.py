@@ -86,4 +86,9 @@ def _away(request: Request[Q, R]) -> str:
 def _nobody(bus: Bus, request: Request[Q, R]) -> str:
     if not bus.is_connected:
         return _away(request)
+    if bus.certificate:
+        return (
+            f"nobody serves {request.key} to {bus.certificate}: is {request.server} running, and may this role ask it? "
+            "schemas/roles.py says who may"
+        )
     return f"nobody serves {request.key}: is {request.server} running? `gemelo node list` shows who is"
