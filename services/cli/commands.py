@@ -86,6 +86,8 @@ COMMANDS = (
             "deploy:run_render", "deploy:render_options", "gemelo deploy render example brain"),
     Command(("deploy", "keys"), "make and renew the certificates of hosts and roles",
             "deploy:run_keys", "deploy:keys_options", "gemelo deploy keys example"),
+    Command(("deploy", "install"), "give a host its files over ssh, and start what does not run there yet",
+            "deploy:run_install", "deploy:install_options", "gemelo deploy install example brain --dry-run"),
     Command(("topic", "list"), "all topics: message, rate, delivery, writer",
             "topic:run_list", "topic:list_options", "gemelo topic list -t"),
     Command(("topic", "info"), "one topic and the fields of its message",

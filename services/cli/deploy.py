@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from pathlib import Path
 
@@ -34,6 +35,13 @@ def keys_options(parser: Parser) -> None:
         "--renew-within", type=positive_number, default=30.0, metavar="DAYS",
         help="renew what ends within this time [30]; a number above the certificates' own life renews all",
     )  # fmt: skip
+
+
+def install_options(parser: Parser) -> None:
+    """Adds the site, one host, and whether to show only."""
+    site_option(parser)
+    parser.add_argument("host", metavar="HOST", help="of the site")
+    parser.add_argument("--dry-run", action="store_true", help="show the commands, and run none")
 
 
 def run_check(options: Options) -> ExitCode:
@@ -81,6 +89,25 @@ def run_keys(options: Options) -> ExitCode:
     ]
     print(table(("host", "certificate of", "valid until", ""), rows))
     print(f"in {_said(_folder(site))}, for you alone. Its authority/ stays here; keys/ and broker/ of a host go to it")
+    return ExitCode.OK
+
+
+def run_install(options: Options) -> ExitCode:
+    """Gives a host its folder over ssh, and starts what does not run there yet."""
+    from services.hosts import install
+
+    site = _site(options.site)
+    if options.host not in site.hosts:
+        raise unknown("host", options.host, site.hosts)
+    try:
+        commands = install.commands(site, options.host, _folder(site) / options.host)
+        for command in commands:
+            print(shlex.join(command), flush=True)
+        if not options.dry_run:
+            install.run(commands)
+            print("what ran already runs on with its old files: `systemctl restart gemelo.target` there, arm at rest")
+    except ConfigurationError as error:
+        raise CommandError(str(error)) from error
     return ExitCode.OK
 
 

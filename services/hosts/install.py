@@ -1,0 +1,59 @@
+"""How a host gets its folder: over ssh as root, in commands that can be shown before they are run."""
+
+from __future__ import annotations
+
+import ipaddress
+import shlex
+import subprocess
+from pathlib import Path
+
+from schemas.site import Site
+from services.hosts.site_file import SiteError
+from services.hosts.units import TARGET
+
+Command = tuple[str, ...]
+MADE_BY = {"systemd": "gemelo deploy render", "keys": "gemelo deploy keys"}  # folders of a host
+
+
+def commands(site: Site, host: str, folder: Path) -> tuple[Command, ...]:
+    """What is run on this machine; services that run already are not restarted, as an arm may move.
+
+    `folder` is the host's own; raises `SiteError` where something of it was not made yet.
+    """
+    for name, maker in MADE_BY.items():
+        if not (folder / name).is_dir():
+            raise SiteError(f"{folder} has no {name}/: `{maker} {site.name}` makes it")
+    address = site.hosts[host].address
+    config, state, user = shlex.quote(site.config), shlex.quote(site.state), site.user
+    prepare = (
+        f"id -u {user} >/dev/null 2>&1 || useradd --system --home-dir {state} {user}; "
+        f"install -d -m 700 -o {user} {config} {state}"
+    )
+    start = (
+        f"install -m 644 {config}/systemd/* /etc/systemd/system/ && systemctl daemon-reload "
+        f"&& systemctl enable --now {TARGET}"
+    )
+    return (
+        ("ssh", f"root@{address}", prepare),
+        ("rsync", "--archive", "--protect-args", "--chmod=go=", f"--chown={user}:", f"{folder}/",
+         f"root@{_bracketed(address)}:{site.config}/"),
+        ("ssh", f"root@{address}", start),
+    )  # fmt: skip
+
+
+def run(wanted: tuple[Command, ...]) -> None:
+    """Runs them in order; raises `SiteError` with the first that fails, after which nothing more is done."""
+    for command in wanted:
+        try:
+            code = subprocess.run(command, check=False).returncode
+        except FileNotFoundError:
+            raise SiteError(f"the command {command[0]} is missing: sudo apt-get install {command[0]}") from None
+        if code:
+            raise SiteError(f"ended with {code}: {shlex.join(command)}")
+
+
+def _bracketed(address: str) -> str:
+    try:
+        return f"[{address}]" if ipaddress.ip_address(address).version == 6 else address
+    except ValueError:
+        return address

@@ -1,0 +1,94 @@
+"""`gemelo deploy` as a person types it; ssh and rsync are recorded by programs of their names."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+
+from services.cli.main import run
+from services.hosts.install import commands
+from services.runtime.deployment import project_root
+from tests.hosts.sites import EXAMPLE, site
+
+RECORDER = """#!{python}
+import json, sys
+with open({log!r}, "a") as log:
+    log.write(json.dumps(sys.argv) + "\\n")
+sys.exit({code})
+"""
+
+
+@pytest.fixture
+def out(tmp_path, monkeypatch) -> Path:
+    monkeypatch.setenv("GEMELO_PATHS_OUT", str(tmp_path / "out"))
+    return tmp_path / "out/deploy/example"
+
+
+def recording(folder: Path, monkeypatch, **codes: int) -> Path:
+    """A log of what ssh and rsync were called with; they end with `codes`."""
+    log = folder / "log"
+    for name in ("ssh", "rsync"):
+        program = folder / name
+        program.write_text(RECORDER.format(python=sys.executable, log=str(log), code=codes.get(name, 0)))
+        program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(folder), prepend=":")
+    return log
+
+
+def gemelo(*words: str) -> int:
+    return int(run(words))
+
+
+def test_check_says_what_runs_where_and_a_mistake_ends_with_its_line(tmp_path, capsys):
+    assert gemelo("deploy", "check", "example") == 0
+    assert "router, rm1-planner, rm1-logger" in capsys.readouterr().out
+    file = tmp_path / "lab.toml"
+    file.write_text(EXAMPLE.read_text().replace('"planner", "logger"', '"planer"'))
+    assert gemelo("deploy", "check", str(file)) == 1
+    assert f'{file}, line 22: "planer" is not a service of a robot' in capsys.readouterr().err
+    assert gemelo("deploy", "check", "nowhere") == 1
+    assert "there is no such file" in capsys.readouterr().err
+
+
+def test_render_and_keys_write_below_out_and_install_shows_before_it_does(out, tmp_path, capsys, monkeypatch):
+    log = recording(tmp_path, monkeypatch)
+    assert gemelo("deploy", "install", "example", "brain", "--dry-run") == 1
+    assert "`gemelo deploy render example` makes it" in capsys.readouterr().err
+    assert gemelo("deploy", "render", "example", "brain") == 0
+    assert gemelo("deploy", "install", "example", "brain", "--dry-run") == 1
+    assert "`gemelo deploy keys example` makes it" in capsys.readouterr().err
+    assert gemelo("deploy", "keys", "example") == 0
+    assert "valid until" in capsys.readouterr().out
+    assert {each.name for each in out.iterdir()} == {"authority", "brain", "cell", "desk"}
+
+    assert gemelo("deploy", "install", "example", "brain", "--dry-run") == 0
+    shown = [shlex.split(line) for line in capsys.readouterr().out.splitlines()]
+    assert not log.exists()
+    assert gemelo("deploy", "install", "example", "brain") == 0
+    done = [json.loads(line) for line in log.read_text().splitlines()]
+    assert [[Path(each[0]).name, *each[1:]] for each in done] == shown
+    assert not any("authority" in word for each in done for word in each)
+
+
+def test_an_install_stops_at_the_first_command_that_fails(out, tmp_path, capsys, monkeypatch):
+    for words in (("render", "example", "brain"), ("keys", "example")):
+        assert gemelo("deploy", *words) == 0
+    log = recording(tmp_path, monkeypatch, rsync=23)
+    assert gemelo("deploy", "install", "example", "brain") == 1
+    assert "ended with 23: rsync" in capsys.readouterr().err
+    assert len(log.read_text().splitlines()) == 2
+
+
+def test_a_path_with_quotes_stays_one_word_of_the_other_hosts_shell(tmp_path):
+    lab = site(tmp_path, "# A lab", "config = \"/etc/a 'b'; reboot\"\n# A lab")
+    for name in ("systemd", "keys"):
+        (tmp_path / "brain" / name).mkdir(parents=True)
+    prepare, copy, _ = commands(lab, "brain", tmp_path / "brain")
+    assert shlex.split(prepare[2])[-2:] == [lab.config, lab.state]
+    assert "reboot" not in shlex.split(prepare[2])
+    assert copy[-1] == f"root@10.0.0.12:{lab.config}/"
+    assert project_root() not in Path(copy[-1]).parents
