@@ -16,7 +16,7 @@ from services.cli import provision as module
 from services.cli.credentials import Credentials, certificate, password, private_key, require_sound
 from services.cli.errors import CommandError, ExitCode
 from services.cli.main import run
-from services.mqtt.certificates import Authority
+from services.credentials.authority import Authority
 from services.runtime.serial_frames import JsonFrame, PacketDecoder, json_frame, packet, parse_json_frame
 
 
