@@ -1,0 +1,5 @@
+"""`python -m services.chaos`."""
+
+from services.chaos.main import main
+
+main()

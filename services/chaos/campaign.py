@@ -1,0 +1,169 @@
+"""Faults in a seeded order, each in the middle of a move, and what came of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from random import Random
+
+import msgspec
+
+import gemelo
+from services.chaos.faults import FAULTS, READY, Fault
+from services.chaos.invariants import jerks, jumps, misses, moved, segments
+from services.chaos.person import Person, quietly_cancel
+from services.chaos.site import Site
+from services.stack.stack import StackError
+
+TO_END = 25.0  # [s] beyond the move's own time in which its client must know its end
+TO_BEGIN = 5.0  # [s] for a move to get under way
+MUTED = 2.0  # [s] after such a fault until everything is recorded again
+
+
+class Episode(msgspec.Struct, frozen=True, kw_only=True):
+    """One fault in one move."""
+
+    number: int
+    fault: str
+    chosen: str  # what of the fault was random
+    ended: str  # how the client was told that the move ended
+    reason: str = ""  # that it was given, where it did not succeed
+    to_end: float = 0.0  # [s] from the fault to the client's knowledge
+    to_ready: float = 0.0  # [s] from the heal until every process is ready
+    hands: tuple[str, ...] = ()  # what a person had to do
+    violations: tuple[str, ...] = ()
+
+
+def order(seed: int, faults: Sequence[Fault] = FAULTS) -> Iterator[tuple[int, Fault, Random]]:
+    """Number, fault and source of chance of every episode: all faults once in random order, then again.
+
+    An episode's chance depends on seed and number alone, so that one can be repeated by itself.
+    """
+    bag: list[Fault] = []
+    number, shuffler = 0, Random(f"{seed}")
+    while True:
+        if not bag:
+            bag = list(faults)
+            shuffler.shuffle(bag)
+        yield number, bag.pop(), Random(f"{seed} {number}")
+        number += 1
+
+
+class Campaign:
+    """Carries out episodes on a site, one after the other."""
+
+    def __init__(self, site: Site, say: Callable[[str], object]) -> None:
+        self.person = Person(site.arm)
+        self.muted: list[tuple[int, int]] = []  # [ns] UNIX, from and to when records may be lost
+        self._site, self._say = site, say
+
+    def episode(self, number: int, fault: Fault, random: Random) -> Episode:
+        """One move with one fault; never raises for what the stack does."""
+        person, violations = self.person, list[str]()
+        if unready := person.make_ready(READY, reference=False):
+            violations.append(f"not ready to move: {unready}")
+        person.forget()
+        motion = self._start(random, violations)
+        if motion is None:
+            return Episode(number=number, fault=fault.name, chosen="", ended="not begun", violations=tuple(violations))
+        self._reach(motion, random.uniform(0.1, 0.8))
+        begun_at, begun = time.monotonic(), time.time_ns()
+        chosen = self._begin(fault, random, violations)
+        person.pause(random.uniform(*fault.lasts))
+        self._heal(fault)
+        healed = time.monotonic()
+        ended, reason = self._end(motion, begun_at)
+        to_end = time.monotonic() - begun_at
+        if ended == "unknown":
+            violations.append(f"its client heard no end within {TO_END:g} s of the move's own time")
+        to_ready = self._await_ready(healed, violations)
+        if fault.mutes:
+            self.muted.append((begun - int(MUTED * 1e9), time.time_ns() + int(MUTED * 1e9)))
+        violations += self._judge(motion, ended, fault)
+        person.hands.clear()
+        if unready := person.make_ready(READY, reference=fault.slips):
+            violations.append(f"not ready to move again: {unready}")
+        violations += unexpected_hands(fault, person.hands)
+        return Episode(
+            number=number, fault=fault.name, chosen=chosen, ended=ended, reason=reason, to_end=to_end,
+            to_ready=to_ready, hands=tuple(person.hands), violations=tuple(violations),
+        )  # fmt: skip
+
+    def _start(self, random: Random, violations: list[str]) -> gemelo.Motion | None:
+        end, error = time.monotonic() + READY, ""
+        while time.monotonic() < end:
+            try:
+                return self.person.start(random)
+            except gemelo.Error as refused:
+                error = str(refused)
+                self.person.pause(0.2)
+                self.person.make_ready(1.0, reference=False)
+        violations.append(f"no move was accepted for {READY:g} s: {error}")
+        return None
+
+    def _reach(self, motion: gemelo.Motion, share: float) -> None:
+        self._site.arm.wait_for(lambda: motion.is_over or motion.progress > share, TO_BEGIN + motion.plan.duration)
+
+    def _begin(self, fault: Fault, random: Random, violations: list[str]) -> str:
+        try:
+            return fault.begin(self._site, random)
+        except (gemelo.Error, StackError, OSError) as error:
+            violations.append(f"the fault could not be begun: {error}")
+            return ""
+
+    def _heal(self, fault: Fault) -> None:
+        """The hand that heals a device may come when its link is not back yet."""
+        end = time.monotonic() + READY
+        while time.monotonic() < end:
+            try:
+                return fault.heal(self._site)
+            except gemelo.Error:
+                self.person.pause(0.1)
+
+    def _end(self, motion: gemelo.Motion, begun_at: float) -> tuple[str, str]:
+        left = motion.plan.duration + TO_END - (time.monotonic() - begun_at)
+        try:
+            motion.wait(max(left, 1.0))
+        except gemelo.Aborted as error:
+            return error.status.name.lower(), str(error)
+        except gemelo.Lost as error:
+            return "lost", str(error)
+        except TimeoutError:
+            quietly_cancel(motion)
+            return "unknown", ""
+        return motion.status.name.lower(), ""
+
+    def _await_ready(self, healed: float, violations: list[str]) -> float:
+        try:
+            self._site.stack.wait_ready(READY)
+        except StackError as error:
+            violations.append(str(error).splitlines()[0])
+        return time.monotonic() - healed
+
+    def _judge(self, motion: gemelo.Motion, ended: str, fault: Fault) -> list[str]:
+        """Jumps, false successes and motion that nobody asked for."""
+        person, arm = self.person, self._site.arm.description
+        if not person.await_rest():
+            return ["the arm has not come to rest, or nothing is heard of it"]
+        at_rest, found = person.position, list[str]()
+        for segment in segments(person.states, person.late):
+            found += jumps(arm, segment)
+            found += [] if fault.trips else jerks(arm, segment)  # drivers that go off let the counters stop at once
+        if ended == "succeeded":
+            result = motion.result
+            if result.executed_steps != result.commanded_steps:
+                found.append(f"success with {result.executed_steps} steps executed of {result.commanded_steps}")
+            if not fault.slips:
+                found += misses(arm, motion.plan.trajectory.points[-1].positions, person.shaft())
+        person.pause(0.5)
+        return found + moved(arm, at_rest, person.position)
+
+
+def unexpected_hands(fault: Fault, hands: Sequence[str]) -> list[str]:
+    """What a person had to do although the fault does not ask for it."""
+    allowed = {"stop"}
+    if fault.boots or fault.trips or fault.slips:
+        allowed |= {"reference", "arm"}
+    if fault.trips or fault.slips:
+        allowed |= {"reset"}
+    return [f"a person had to {word}" for word in hands if word not in allowed]

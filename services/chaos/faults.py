@@ -1,0 +1,215 @@
+"""The table of faults: what each does to a site, how it is healed, and what a person may have to do afterwards."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from random import Random
+
+import psutil
+
+import gemelo
+from services.chaos.site import Site
+from services.stack.stack import StackError
+
+Begin = Callable[[Site, Random], str]  # does it; the words for what was chosen
+Heal = Callable[[Site], None]
+
+READY = 20.0  # [s] after the heal in which every process is ready again: ARCHITECTURE.md's table, on a busy machine
+FEW, MANY = 20, 200  # frames
+
+
+def nothing(site: Site) -> None:
+    """What heals by itself."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One row. `lasts` [s] from `begin` to `heal`."""
+
+    name: str
+    about: str
+    begin: Begin
+    lasts: tuple[float, float] = (0.0, 0.0)
+    heal: Heal = nothing
+    boots: bool = False  # the device starts anew: it must be referenced
+    trips: bool = False  # it ends in Fault or EStop, which a person leaves
+    slips: bool = False  # the shafts may have moved without their counters
+    mutes: bool = False  # records may be lost while it lasts: the logger or the router is away
+
+
+def killed(name: str) -> Begin:
+    def begin(site: Site, random: Random) -> str:
+        site.stack.kill(name)
+        return f"kill -9 {name}"
+
+    return begin
+
+
+def restarted(name: str) -> Begin:
+    def begin(site: Site, random: Random) -> str:
+        site.stack.kill(name, signal.SIGTERM)
+        return f"restart {name}"
+
+    return begin
+
+
+def frozen(name: str) -> Begin:
+    def begin(site: Site, random: Random) -> str:
+        site.stack.kill(name, signal.SIGSTOP)
+        return f"freeze {name}"
+
+    return begin
+
+
+def thawed(name: str) -> Heal:
+    def heal(site: Site) -> None:
+        with suppress(StackError, ProcessLookupError):
+            site.stack.kill(name, signal.SIGCONT)
+
+    return heal
+
+
+def injected(what: str, value: tuple[float, float] = (1.0, 1.0), on_joint: bool = False) -> Begin:
+    def begin(site: Site, random: Random) -> str:
+        target = random.choice(site.arm.joint_names) if on_joint else ""
+        amount = random.uniform(*value)
+        site.arm.device.inject(what, target, round(amount, 3))
+        return f"{what} {target} {amount:.3g}".replace("  ", " ")
+
+    return begin
+
+
+def released(what: str) -> Heal:
+    def heal(site: Site) -> None:
+        for target in site.arm.joint_names if what == "block" else ("",):
+            site.arm.device.inject(what, target, 0.0)
+
+    return heal
+
+
+def cut(site: Site, random: Random) -> str:
+    site.link.cut()
+    return "cut the link to the broker"
+
+
+def stalled(site: Site, random: Random) -> str:
+    site.link.is_stalled = True
+    return "stall the link to the broker"
+
+
+def slowed(site: Site, random: Random) -> str:
+    site.link.delay = random.uniform(0.02, 0.15)
+    return f"slow the link to the broker by {site.link.delay * 1e3:.0f} ms"
+
+
+def garbled(site: Site, random: Random) -> str:
+    site.link.garbling = random.uniform(0.01, 0.1)
+    return f"garble {site.link.garbling:.0%} of what passes the link to the broker"
+
+
+def healed(site: Site) -> None:
+    site.link.heal()
+
+
+def doubled_frames(site: Site, random: Random) -> str:
+    count = random.randint(FEW, MANY)
+    site.wire.repeat(random, count)
+    return f"say {count} frames again"
+
+
+def changed_frames(site: Site, random: Random) -> str:
+    count = random.randint(FEW, MANY)
+    site.wire.garble(random, count)
+    return f"say {count} frames with bytes changed"
+
+
+def frames_of_noise(site: Site, random: Random) -> str:
+    count = random.randint(FEW, MANY)
+    site.wire.noise(random, count)
+    return f"say {count} frames of random bytes"
+
+
+def noise_on_the_bus(site: Site, random: Random) -> str:
+    site.bus.noise(random)
+    return "random bytes on every key of the bus"
+
+
+def worker_killed(site: Site, random: Random) -> str:
+    children = psutil.Process(site.stack.pid("planner")).children(recursive=True)
+    if not children:
+        return "no worker of the planner to kill"
+    os.kill(random.choice(children).pid, signal.SIGKILL)
+    return "kill -9 a worker of the planner"
+
+
+def disk_full(site: Site, random: Random) -> str:
+    resource.prlimit(site.stack.pid("logger"), resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
+    return "no room on the logger's disk"
+
+
+def disk_freed(site: Site) -> None:
+    with suppress(StackError, ProcessLookupError):
+        unlimited = (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+        resource.prlimit(site.stack.pid("logger"), resource.RLIMIT_FSIZE, unlimited)
+
+
+def stopped(site: Site, random: Random) -> str:
+    site.arm.stop()
+    return "a person's stop"
+
+
+def held(site: Site, random: Random) -> str:
+    site.arm.hold()
+    return "a person's hold"
+
+
+def resumed(site: Site) -> None:
+    with suppress(gemelo.Error):
+        site.arm.resume()
+
+
+SHORT, LONG = (0.05, 0.6), (0.8, 3.0)  # [s] within what motion and clients bear, and beyond it
+BYSTANDERS = ("state_publisher", "planner", "visualizer")
+FAULTS: tuple[Fault, ...] = (
+    *(Fault(f"kill {name}", "kill -9", killed(name)) for name in (*BYSTANDERS, "stepper_gateway", "broker")),
+    Fault("kill router", "kill -9", killed("router"), mutes=True),
+    Fault("kill logger", "kill -9", killed("logger"), mutes=True),
+    Fault("kill virtual_esp32", "kill -9 of the device", killed("virtual_esp32"), boots=True),
+    Fault("kill planner worker", "kill -9 of a worker process", worker_killed),
+    *(Fault(f"restart {name}", "SIGTERM", restarted(name)) for name in (*BYSTANDERS, "stepper_gateway", "broker")),
+    Fault("restart router", "SIGTERM", restarted("router"), mutes=True),
+    Fault("restart logger", "SIGTERM", restarted("logger"), mutes=True),
+    *(
+        Fault(f"freeze {name} {length}", "SIGSTOP, then SIGCONT", frozen(name), lasts, thawed(name),
+              mutes=name in ("router", "logger"))
+        for name in ("stepper_gateway", "broker", "router", "virtual_esp32", "planner", "logger", "state_publisher")
+        for length, lasts in (("shortly", SHORT), ("long", LONG))
+    ),
+    Fault("cut link", "the link to the broker is cut", cut, SHORT, healed),
+    Fault("cut link long", "the link to the broker is cut", cut, LONG, healed),
+    Fault("stall link", "connections stay open, nothing passes", stalled, SHORT, healed),
+    Fault("stall link long", "connections stay open, nothing passes", stalled, LONG, healed),
+    Fault("slow link", "every piece is late", slowed, LONG, healed),
+    Fault("garble link", "bits change on the way", garbled, LONG, healed),
+    Fault("doubled frames", "frames of the wire are said again", doubled_frames),
+    Fault("changed frames", "frames of the wire are said with bytes changed", changed_frames),
+    Fault("noise on the wire", "random bytes on the broker's topics", frames_of_noise),
+    Fault("noise on the bus", "random bytes on every key", noise_on_the_bus),
+    Fault("device offline", "its network is away", injected("offline", (0.2, 3.0)), (0.2, 3.0)),
+    Fault("device frozen", "its path task hangs", injected("freeze", (0.05, 2.0)), (0.05, 2.0), trips=True),
+    Fault("device reboots", "it starts anew", injected("reboot"), boots=True),
+    Fault("clock drifts", "the device's clock is fast or slow", injected("drift", (-400.0, 400.0)), LONG,
+          lambda site: site.arm.device.inject("drift", value=0.0)),
+    Fault("e-stop", "pressed and released", injected("estop"), SHORT, released("estop"), trips=True, slips=True),
+    Fault("blocked joint", "its shaft is held fast", injected("block", on_joint=True), SHORT, released("block"),
+          slips=True),
+    Fault("slipping joint", "its shaft slips", injected("slip", (-400.0, 400.0), on_joint=True), slips=True),
+    Fault("disk full", "the logger cannot write", disk_full, LONG, disk_freed, mutes=True),
+    Fault("stop", "a person's stop", stopped),
+    Fault("hold", "a person's hold, and go on", held, SHORT, resumed),
+)  # fmt: skip

@@ -1,0 +1,91 @@
+"""What must hold whatever happens; pure functions of what was heard."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from schemas.device import DeviceState
+from services.arm.model.description import Arm
+
+SLOT = 0.001  # [s] of the device's path: a state may be one older than it says
+STEPS = 2.0  # by which two rounded positions may be off
+SHORTEST = 0.015  # [s] between two states of which an acceleration is computed
+AROUND = 50_000_000  # [ns] between what the device said of a late slot and the states that show it
+FREE = 1.3  # an acceleration computed from positions 20 ms apart may be above the limit by this factor
+
+
+def segments(states: Sequence[DeviceState], late: Sequence[int]) -> list[list[DeviceState]]:
+    """The states in pieces within which counters and clock go on: a boot or a reference begins a new one.
+
+    So does each of `late` [ns]: then the machine gave the virtual device no time for so long that its motors stood.
+    """
+    pieces: list[list[DeviceState]] = []
+    for state in states:
+        last = pieces[-1][-1] if pieces else None
+        is_late = last and any(last.stamp - AROUND <= stamp <= state.stamp + AROUND for stamp in late)
+        if last is None or is_late or (last.boot_id, last.referenced) != (state.boot_id, state.referenced):
+            pieces.append([])
+        elif state.device_time <= last.device_time:
+            continue  # said twice
+        pieces[-1].append(state)
+    return pieces
+
+
+def jumps(arm: Arm, states: Sequence[DeviceState]) -> list[str]:
+    """Every place where a joint went farther between two states of one segment than its velocity limit allows."""
+    found = []
+    for before, after in pairwise(states):
+        dt = (after.device_time - before.device_time) * 1e-6
+        for joint, old, new in zip(arm.joints, before.steps, after.steps, strict=True):
+            allowed = joint.velocity * abs(joint.steps.per_unit) * (dt + SLOT) + STEPS
+            if abs(new - old) > allowed:
+                found.append(f"{joint.name} went {new - old:+d} steps in {dt * 1e3:.1f} ms, allowed {allowed:.0f}")
+    return found
+
+
+def jerks(arm: Arm, states: Sequence[DeviceState]) -> list[str]:
+    """Every place where a joint's velocity changed faster over three states than its acceleration limit allows.
+
+    Velocities are differences of counters, so each is off by rounding to steps and by a slot of time; both are taken
+    off, and states that are not 15 ms apart or more are left out.
+    """
+    found = []
+    for first, second, third in zip(states, states[1:], states[2:], strict=False):
+        one = (second.device_time - first.device_time) * 1e-6
+        two = (third.device_time - second.device_time) * 1e-6
+        if min(one, two) < SHORTEST:
+            continue
+        for index, joint in enumerate(arm.joints):
+            before = (second.steps[index] - first.steps[index]) / one
+            after = (third.steps[index] - second.steps[index]) / two
+            unsure = (STEPS + max(abs(before), abs(after)) * SLOT) * (1.0 / one + 1.0 / two)
+            allowed = FREE * joint.acceleration * abs(joint.steps.per_unit) * (one + two) / 2.0 + unsure
+            if abs(after - before) > allowed:
+                found.append(f"{joint.name} changed by {after - before:+.0f} steps/s at once, allowed {allowed:.0f}")
+    return found
+
+
+def moved(arm: Arm, at_rest: Sequence[float], now: Sequence[float]) -> list[str]:
+    """Every joint that is elsewhere [rad] or [m] than where it rested, by more than rounding."""
+    return [
+        f"{joint.name} moved by itself from {old:.6f} to {new:.6f}"
+        for joint, old, new in zip(arm.joints, at_rest, now, strict=True)
+        if abs(new - old) > STEPS / joint.steps.per_unit
+    ]
+
+
+def misses(arm: Arm, goal: Sequence[float], shaft: Sequence[float]) -> list[str]:
+    """Every joint whose true shaft [rad] or [m] is not at the goal that was called reached."""
+    return [
+        f"{joint.name} was called at {wanted:.6f}, its shaft is at {true:.6f}"
+        for joint, wanted, true in zip(arm.joints, goal, shaft, strict=True)
+        if abs(true - wanted) > STEPS / joint.steps.per_unit
+    ]
+
+
+def missing_records(heard: Sequence[int], recorded: set[int], muted: Sequence[tuple[int, int]]) -> list[int]:
+    """Stamps [ns] that were heard and not recorded, outside of the times [ns] in which records may be lost."""
+    return [
+        stamp for stamp in heard if stamp not in recorded and not any(begin <= stamp <= end for begin, end in muted)
+    ]

@@ -1,0 +1,27 @@
+"""The options of `gemelo chaos` and `gemelo soak`, which import nothing: the command line shows them before all else."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from pathlib import Path
+
+BROKERS = ("amqtt", "mosquitto")
+
+
+def add_chaos_options(parser: ArgumentParser) -> None:
+    """How long, which faults, which chance."""
+    parser.add_argument("--minutes", type=float, default=10.0, help="how long")
+    parser.add_argument("--seed", type=int, default=None, help="of the order and of all chance; else a new one")
+    parser.add_argument("--episode", type=int, default=None, metavar="N", help="only this one of the seed")
+    parser.add_argument("--only", nargs="+", default=[], metavar="FAULT", help="only faults whose names contain this")
+    parser.add_argument("--broker", choices=BROKERS, default="mosquitto")
+    parser.add_argument("--out", type=Path, default=Path("out/chaos"), help="folder of the results")
+    parser.add_argument("--list", action="store_true", help="what there is")
+
+
+def add_soak_options(parser: ArgumentParser) -> None:
+    """How long, and which moves."""
+    parser.add_argument("--hours", type=float, default=1.0, help="how long")
+    parser.add_argument("--seed", type=int, default=1, help="of the moves")
+    parser.add_argument("--broker", choices=BROKERS, default="mosquitto")
+    parser.add_argument("--out", type=Path, default=Path("out/soak"), help="folder of the results")

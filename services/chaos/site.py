@@ -1,0 +1,130 @@
+"""The site: a stack of its own with a slow link before its broker, an arm on it, and strangers on both buses."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from contextlib import ExitStack
+from pathlib import Path
+from random import Random
+from types import TracebackType
+
+from paho.mqtt.client import Client, MQTTMessage
+from paho.mqtt.enums import CallbackAPIVersion
+
+import gemelo
+from schemas.topics import ACTIONS, TOPICS, Delivery
+from services.chaos.slow_link import SlowLink
+from services.runtime.actions.keys import feedback_topic, status_topic
+from services.runtime.bus.zenoh_bus import ZenohBus
+from services.stack.stack import Stack, free_ports
+
+KEPT = 200  # frames of the wire that can be said again
+TO_CONNECT = 30.0  # [s] for the arm to be there
+
+
+class Site:
+    """Starts on entering, stops on leaving; `out` gets recordings and logs."""
+
+    def __init__(self, out: Path, broker: str, seed: int) -> None:
+        self._port, self._broker_port = free_ports(2)
+        self.stack = Stack(
+            broker=broker,
+            out=out,
+            environment={
+                "GEMELO_MQTT_PORT": str(self._port),
+                "GEMELO_MQTT_LISTEN_PORT": str(self._broker_port),
+                "GEMELO_DEVICE": "virtual",
+                "GEMELO_WIRE": "mqtt",
+            },
+        )
+        self._seed = seed
+        self._closing = ExitStack()
+
+    def __enter__(self) -> Site:
+        with ExitStack() as closing:
+            self.link = SlowLink(self._port, self._broker_port, self._seed)
+            closing.callback(self.link.close)
+            closing.enter_context(self.stack)
+            os.environ.update(self.stack.deployment)  # where the arm is found
+            self.arm = closing.enter_context(gemelo.connect(name="chaos", timeout=TO_CONNECT))
+            self.wire = WireStranger(self._broker_port)
+            closing.callback(self.wire.close)
+            self.bus = BusStranger(int(self.stack.deployment["GEMELO_ROUTER_PORT"]), self.arm.name)
+            closing.callback(self.bus.close)
+            self._closing = closing.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._closing.close()
+
+
+class WireStranger:
+    """A client of the broker that hears every frame, and says old, changed or meaningless ones."""
+
+    def __init__(self, port: int) -> None:
+        self._heard: deque[tuple[str, bytes]] = deque(maxlen=KEPT)
+        self._client = Client(CallbackAPIVersion.VERSION2, client_id="chaos")
+        self._client.on_connect = lambda client, *_: client.subscribe("gemelo/v1/#", qos=0)
+        self._client.on_message = self._hear
+        self._client.reconnect_delay_set(1, 2)
+        self._client.connect("127.0.0.1", port)
+        self._client.loop_start()
+
+    def close(self) -> None:
+        """Leaves the broker."""
+        self._client.disconnect()
+        self._client.loop_stop()
+
+    def repeat(self, random: Random, count: int) -> None:
+        """Says `count` of the newest frames once more."""
+        self._say(self._some(random, count))
+
+    def garble(self, random: Random, count: int) -> None:
+        """Says `count` of the newest frames with some of their bytes changed."""
+        self._say([(topic, _changed(random, frame)) for topic, frame in self._some(random, count) if frame])
+
+    def noise(self, random: Random, count: int) -> None:
+        """Says `count` frames of random bytes on topics that are in use."""
+        self._say([(topic, random.randbytes(random.randrange(300))) for topic, _ in self._some(random, count)])
+
+    def _some(self, random: Random, count: int) -> list[tuple[str, bytes]]:
+        return [random.choice(self._heard) for _ in range(count) if self._heard]
+
+    def _say(self, frames: list[tuple[str, bytes]]) -> None:
+        for topic, frame in frames:
+            self._client.publish(topic, frame, qos=0)
+
+    def _hear(self, _client: Client, _data: object, message: MQTTMessage) -> None:
+        self._heard.append((message.topic, bytes(message.payload)))
+
+
+class BusStranger:
+    """A participant of the bus that puts what nobody can read on every key."""
+
+    def __init__(self, router_port: int, robot: str) -> None:
+        self._bus = ZenohBus("127.0.0.1", router_port, robot)
+        actions = [make(action) for action in ACTIONS for make in (feedback_topic, status_topic)]
+        self._keys: list[tuple[str, str, Delivery]] = [
+            (topic.key, topic.message.__name__, topic.delivery) for topic in (*TOPICS, *actions)
+        ]
+
+    def close(self) -> None:
+        """Leaves the bus."""
+        self._bus.close()
+
+    def noise(self, random: Random) -> None:
+        """Random bytes on every key, under its own schema's name or another."""
+        for key, schema, delivery in self._keys:
+            publication = self._bus.publish(key, random.choice((schema, "", "Nonsense")), delivery)
+            publication.put(random.randbytes(random.randrange(300)))
+            publication.close()
+
+
+def _changed(random: Random, frame: bytes) -> bytes:
+    changed = bytearray(frame)
+    for _ in range(random.randint(1, 4)):
+        changed[random.randrange(len(changed))] = random.randrange(256)
+    return bytes(changed)

@@ -1,0 +1,161 @@
+"""`gemelo soak`: moves for hours on a stack of its own, and whether any process grows meanwhile.
+
+Leaves out/soak/report.json. Exit code 0 only if every move succeeded and, after the warm-up, no process's memory grew
+by more than 1 MB an hour, nor its number of files, sockets and threads by more than a few.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from random import Random
+
+import msgspec
+import numpy as np
+import psutil
+
+import gemelo
+from schemas.deployment import DeviceKind
+from services.chaos.options import add_soak_options
+from services.chaos.person import Person
+from services.chaos.site import Site
+from services.runtime.deployment import load_deployment
+from services.stack.stack import StackError
+
+EVERY = 5.0  # [s] between two samples
+WARM_UP = 0.25  # of the time: caches fill, allocators settle
+STEEPEST = 1.0  # [MB/h] of resident memory
+FEW = 4  # files, sockets or threads that come and go
+TO_END = 10.0  # [s] beyond a move's own time
+FEWEST = 20  # samples after the warm-up below which a slope says nothing
+HOUR, MB = 3600.0, 1e6
+
+
+class Sample(msgspec.Struct, frozen=True):
+    """One process with its children at one time."""
+
+    at: float  # [s] since the beginning
+    memory: float  # [MB] resident
+    cpu: float  # [s] since the process began
+    files: int
+    sockets: int
+    threads: int
+
+
+class Growth(msgspec.Struct, frozen=True, kw_only=True):
+    """How a process has grown after the warm-up."""
+
+    process: str
+    cpu_percent: float  # of a core
+    memory: float  # [MB] at the end
+    memory_slope: float  # [MB/h] by least squares
+    files: int  # more at the end than after the warm-up
+    sockets: int
+    threads: int
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(prog="gemelo soak", description="moves for hours; does anything grow?")
+    add_soak_options(parser)
+    options = parser.parse_args()
+    if not 0.0 < options.hours < float("inf"):
+        sys.exit(f"soak: --hours {options.hours}: it must be above 0")
+    if load_deployment().device is DeviceKind.BOARD:
+        sys.exit('soak: this deployment drives a real board (device = "board"): soak is for virtual devices only')
+    try:
+        sys.exit(0 if run(options.hours * HOUR, options.seed, options.broker, options.out.resolve()) else 1)
+    except StackError as error:
+        sys.exit(f"soak: {error}")
+
+
+def run(seconds: float, seed: int, broker: str, out: Path) -> bool:
+    """Moves for `seconds` [s]; writes and prints the report; True if nothing grew and every move succeeded."""
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir(parents=True)
+    random, samples, failures, moves = Random(seed), dict[str, list[Sample]](), list[str](), 0
+    with Site(out, broker, seed) as site:
+        person, begun = Person(site.arm), time.monotonic()
+        due = begun
+        while (now := time.monotonic()) < begun + seconds:
+            try:
+                motion = person.start(random)
+                motion.wait(motion.plan.duration + TO_END)
+                moves += 1
+            except (gemelo.Error, TimeoutError) as error:
+                failures.append(str(error))
+                person.pause(1.0)
+            if now >= due:
+                due = now + EVERY
+                for name, pid in site.stack.pids().items():
+                    with suppress(psutil.Error):
+                        samples.setdefault(name, []).append(sample_of(pid, now - begun))
+    growths = [growth_of(name, kept) for name, kept in sorted(samples.items())]
+    found = [word for growth in growths for word in complaints(growth, len(samples[growth.process]))] + failures
+    report = {"seconds": seconds, "moves": moves, "processes": growths, "violations": found, "samples": samples}
+    (out / "report.json").write_bytes(msgspec.json.encode(report) + b"\n")
+    print(text_of(growths, moves, found))
+    return not found
+
+
+def sample_of(pid: int, at: float) -> Sample:
+    """The process `pid` and all that it has started, `at` [s]."""
+    process = psutil.Process(pid)
+    family = [process, *process.children(recursive=True)]
+    times = [each.cpu_times() for each in family]
+    return Sample(
+        at=at,
+        memory=sum(each.memory_info().rss for each in family) / MB,
+        cpu=sum(each.user + each.system for each in times),
+        files=sum(each.num_fds() for each in family),
+        sockets=sum(len(each.net_connections()) for each in family),
+        threads=sum(each.num_threads() for each in family),
+    )
+
+
+def growth_of(name: str, samples: Sequence[Sample]) -> Growth:
+    """The slope of the memory by least squares and the differences of the rest, after the warm-up."""
+    kept = samples[int(WARM_UP * len(samples)) :]
+    first, last = kept[0], kept[-1]
+    elapsed = max(last.at - first.at, 1e-9)
+    slope = (
+        float(np.polyfit([each.at for each in kept], [each.memory for each in kept], 1)[0]) if len(kept) > 1 else 0.0
+    )
+    return Growth(
+        process=name,
+        cpu_percent=100.0 * (last.cpu - first.cpu) / elapsed,
+        memory=last.memory,
+        memory_slope=slope * HOUR,
+        files=last.files - first.files,
+        sockets=last.sockets - first.sockets,
+        threads=last.threads - first.threads,
+    )
+
+
+def complaints(growth: Growth, count: int) -> list[str]:
+    """What of a process grew although it should not; nothing of a slope where there were few of `count` samples."""
+    found = []
+    if growth.memory_slope > STEEPEST and count * (1.0 - WARM_UP) >= FEWEST:
+        found.append(f"{growth.process}: {growth.memory_slope:+.1f} MB/h of memory, limit {STEEPEST:g}")
+    counts: Mapping[str, int] = {"files": growth.files, "sockets": growth.sockets, "threads": growth.threads}
+    return found + [f"{growth.process}: {more:+d} {what}" for what, more in counts.items() if more > FEW]
+
+
+def text_of(growths: Sequence[Growth], moves: int, found: Sequence[str]) -> str:
+    """A table, a line a process, and what was found."""
+    lines = [f"{'process':<16} CPU [%]  memory [MB]    [MB/h]  files  sockets  threads"]
+    lines += [
+        f"{each.process:<16} {each.cpu_percent:>7.1f}  {each.memory:>11.0f}  {each.memory_slope:>+8.2f}"
+        f"  {each.files:>+5d}  {each.sockets:>+7d}  {each.threads:>+7d}"
+        for each in growths
+    ]
+    return "\n".join([*lines, "", f"{moves} moves; {len(found)} complaints", *found])
+
+
+if __name__ == "__main__":
+    main()
