@@ -4,7 +4,7 @@
 MAKEFLAGS += --no-print-directory
 bin := .venv/bin
 # On every core at once; then the tests that start processes, a file on each core; then browsers, and what watches processes in time.
-side_by_side := $(addprefix tests/,arm bench demo firmware logger planner robot_import schemas stepper_gateway urdf visualizer)
+side_by_side := $(addprefix tests/,arm bench chaos demo firmware logger planner robot_import schemas stepper_gateway urdf visualizer)
 one_by_one := tests/panel tests/stack
 file_by_file := $(filter-out $(side_by_side) $(one_by_one),$(patsubst %/,%,$(wildcard tests/*/)))
 

@@ -1,4 +1,4 @@
-"""The options of `gemelo chaos` and `gemelo soak`, which import nothing: the command line shows them before all else."""
+"""The options of `gemelo chaos` and `gemelo soak`; imports nothing, so that the command line shows them at once."""
 
 from __future__ import annotations
 

@@ -1,0 +1,90 @@
+"""The order of faults, and the reports of what came of them."""
+
+from __future__ import annotations
+
+import itertools
+import json
+
+import msgspec
+
+from services.chaos.campaign import Episode, order, unexpected_hands
+from services.chaos.faults import FAULTS, Fault
+from services.chaos.main import chosen_faults, unfit
+from services.chaos.report import Report, page_of, rows_of, summary, text_of
+
+
+def fault(name: str) -> Fault:
+    (found,) = (each for each in FAULTS if each.name == name)
+    return found
+
+
+def episode(number: int, name: str, *violations: str) -> Episode:
+    return Episode(number=number, fault=name, chosen=name, ended="succeeded", to_ready=1.0, violations=violations)
+
+
+def report(*episodes: Episode) -> Report:
+    return Report(
+        seed=7, robot="rm1", broker="mosquitto", seconds=60.0, episodes=episodes, states_heard=10, states_lost=0
+    )
+
+
+def test_names_are_unique() -> None:
+    assert len({each.name for each in FAULTS}) == len(FAULTS)
+
+
+def test_a_seed_gives_the_same_faults_with_the_same_chance_again() -> None:
+    first, second = ([*itertools.islice(order(7), 60)] for _ in range(2))
+    assert [(number, each.name, chance.random()) for number, each, chance in first] == [
+        (number, each.name, chance.random()) for number, each, chance in second
+    ]
+    other = [each.name for _, each, _ in itertools.islice(order(8), 60)]
+    assert other != [each.name for _, each, _ in first]
+
+
+def test_one_episode_alone_has_the_chance_that_it_had_in_its_run() -> None:
+    whole = [chance.random() for _, _, chance in itertools.islice(order(3), 20)]
+    ((number, _, chance),) = itertools.islice(order(3), 13, 14)
+    assert (number, chance.random()) == (13, whole[13])
+
+
+def test_every_fault_comes_once_before_any_comes_twice() -> None:
+    names = [each.name for _, each, _ in itertools.islice(order(1), 2 * len(FAULTS))]
+    assert sorted(names[: len(FAULTS)]) == sorted(names[len(FAULTS) :]) == sorted(each.name for each in FAULTS)
+
+
+def test_a_person_may_only_do_what_the_fault_asks_for() -> None:
+    assert unexpected_hands(fault("stop"), ["stop"]) == []
+    assert unexpected_hands(fault("kill planner"), ["reference"]) == ["a person had to reference"]
+    assert unexpected_hands(fault("device reboots"), ["arm", "reference"]) == []
+    assert unexpected_hands(fault("device reboots"), ["reset"]) == ["a person had to reset"]
+    assert unexpected_hands(fault("e-stop"), ["reset", "arm", "reference"]) == []
+
+
+def test_a_run_is_good_only_if_nothing_was_violated() -> None:
+    assert report(episode(0, "stop")).is_good
+    assert not report(episode(0, "stop", "it jumped")).is_good
+    assert not msgspec.structs.replace(report(episode(0, "stop")), violations=("a recording cannot be read",)).is_good
+
+
+def test_the_reports_name_each_violation_and_the_command_that_repeats_it() -> None:
+    found = report(episode(0, "stop"), episode(1, "stop", "<b>jumped"), episode(2, "hold"))
+    assert [(row.fault, row.count, row.violations) for row in rows_of(found.episodes)] == [
+        ("hold", 1, 0),
+        ("stop", 2, 1),
+    ]
+    assert "3 faults in 60 s, seed 7: 1 faults and 0 checks violated" in summary(found)
+    assert "gemelo chaos --seed 7 --episode 1" in text_of(found)
+    page = page_of(found)
+    assert "&lt;b&gt;jumped" in page
+    assert "<b>jumped" not in page
+    assert page.count("<circle") == 3
+    assert json.loads(msgspec.json.encode(found))["episodes"][1]["violations"] == ["<b>jumped"]
+
+
+def test_what_cannot_be_run_is_said(monkeypatch) -> None:
+    assert "--minutes nan" in unfit(float("nan"), FAULTS, [])
+    assert chosen_faults(["router"])
+    assert "no fault is called nothing" in unfit(1.0, chosen_faults(["nothing"]), ["nothing"])
+    assert unfit(1.0, FAULTS, []) == ""
+    monkeypatch.setenv("GEMELO_DEVICE", "board")
+    assert "virtual devices only" in unfit(1.0, FAULTS, [])
