@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Generic, TypeVar
 
+from schemas.camera import CameraImage, CameraInfo, CameraStatus
+from schemas.detections import Detections
 from schemas.device import (
     CommandAck,
     CommandChunk,
@@ -166,6 +168,32 @@ TOPICS: tuple[Topic[Message], ...] = (
     SENSORS, DEVICE_SHAFT, GRIPPER_STATE,
     COMMANDS, COMMAND_ACKS, LOG, STATISTICS,
 )  # fmt: skip
+
+# One of each for every camera of the cell file, by the camera's name.
+
+
+def camera_image(camera: str) -> Topic[CameraImage]:
+    """The newest image of a camera."""
+    return Topic(f"camera/{camera}/image", CameraImage, LATEST, None, False, "camera", "what the camera sees")
+
+
+def camera_info(camera: str) -> Topic[CameraInfo]:
+    """What maps a camera's pixels to rays, and where it stands."""
+    return Topic(f"camera/{camera}/info", CameraInfo, LATCHED, None, False, "camera", "its lens and where it stands")
+
+
+def camera_status(camera: str) -> Topic[CameraStatus]:
+    """How a camera is; latched, and repeated once a second."""
+    return Topic(f"camera/{camera}/status", CameraStatus, LATCHED, None, True, "camera", "whether images come, or why")
+
+
+def camera_detections(camera: str) -> Topic[Detections]:
+    """What the detector has found in a camera's newest image."""
+    about = "things found in its image"
+    return Topic(f"camera/{camera}/detections", Detections, LATEST, None, True, "detector", about)
+
+
+CAMERA_TOPICS = (camera_image, camera_info, camera_status, camera_detections)
 
 PLAN = Request("plan", PlanRequest, PlanResponse, "planner", "a goal in, a verified trajectory or a refusal out")
 PLAN_CANCEL = Request("plan/cancel", PlanCancel, PlanCancelResult, "planner", "end a plan before its end")

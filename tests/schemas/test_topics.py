@@ -7,12 +7,13 @@ import re
 import pytest
 
 from schemas.message import Message
-from schemas.topics import ACTIONS, REQUESTS, TOPICS, Action, Delivery, Request, Topic
+from schemas.topics import ACTIONS, CAMERA_TOPICS, REQUESTS, TOPICS, Action, Delivery, Request, Topic
 from tests.schemas.samples import messages
 
-WRITERS = {"stepper_gateway", "state_publisher", "planner", "logger", "visualizer", "any"}
+WRITERS = {"stepper_gateway", "state_publisher", "planner", "logger", "visualizer", "camera", "detector", "any"}
 Row = Topic[Message] | Request[Message, Message] | Action[Message, Message, Message]
-ROWS: tuple[Row, ...] = (*TOPICS, *REQUESTS, *ACTIONS)
+OF_A_CAMERA: tuple[Topic[Message], ...] = tuple(of("webcam") for of in CAMERA_TOPICS)
+ROWS: tuple[Row, ...] = (*TOPICS, *OF_A_CAMERA, *REQUESTS, *ACTIONS)
 
 
 def test_no_key_stands_twice() -> None:
@@ -27,7 +28,7 @@ def test_every_row_has_a_plain_key_a_known_writer_and_a_sentence(row: Row) -> No
     assert row.about
 
 
-@pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.key)
+@pytest.mark.parametrize("topic", [*TOPICS, *OF_A_CAMERA], ids=lambda topic: topic.key)
 def test_only_what_may_be_dropped_has_a_rate(topic: Topic[Message]) -> None:
     assert topic.rate is None or topic.rate > 0.0
     assert topic.rate is None or topic.delivery is Delivery.LATEST

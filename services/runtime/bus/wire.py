@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
+from schemas.camera import CameraImage
 from schemas.frames import RobotDescription
 from schemas.message import BadMessage, Message, decode, encode
 from services.runtime.bus.interface import Arrival
@@ -11,7 +12,10 @@ from services.runtime.bus.interface import Arrival
 M = TypeVar("M", bound=Message)
 
 MAX_PAYLOAD = 512 * 1024  # [bytes] a trajectory of 6 joints and 2,000 points is half of this
-MAX_PAYLOAD_OF: dict[str, int] = {RobotDescription.__name__: 8 * 1024 * 1024}  # [bytes] URDF text
+MAX_PAYLOAD_OF: dict[str, int] = {  # [bytes]
+    RobotDescription.__name__: 8 * 1024 * 1024,  # URDF text
+    CameraImage.__name__: 8 * 1024 * 1024,  # 1920 x 1080 in rgb8 is 6.2 million
+}
 
 
 def schema_of(kind: type[Message]) -> str:

@@ -1,0 +1,38 @@
+"""Things that a detector has found in one image, each with its pose and how sure that is."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from schemas.frames import Transform
+from schemas.message import Message, Vector
+
+
+class DetectionKind(StrEnum):
+    """How a thing was found."""
+
+    TAG = "tag"
+    BOX = "box"
+    COLOUR = "colour"
+    ONNX = "onnx"
+
+
+class Detection(Message, frozen=True, kw_only=True):
+    """One thing in one image."""
+
+    name: str = ""  # of the thing in the cell file; of a tag that is no thing: "tag <id>"
+    kind: DetectionKind = DetectionKind.TAG
+    corners: tuple[Vector, ...] = ()  # (n, 2) [px] its outline in the image, in order, distorted as the image is
+    camera_from_thing: Transform = Transform()
+    base_from_thing: Transform = Transform()
+    is_located: bool = False  # False: where the camera stands is not known, so `base_from_thing` is not either
+    sigma: float = 0.0  # [m] standard deviation of its position
+    flip_ratio: float = 0.0  # reprojection error of the better over that of the other pose: 1 cannot be told apart
+
+
+class Detections(Message, frozen=True, kw_only=True):
+    """Everything that was found in one image; with no items nothing was."""
+
+    stamp: int = 0  # [ns] UNIX time of the image
+    camera: str = ""
+    items: tuple[Detection, ...] = ()
