@@ -1,0 +1,1 @@
+"""The cell: cameras, things and places around the arm."""

@@ -1,0 +1,1 @@
+"""Images of cameras, real and virtual."""

@@ -1,0 +1,1 @@
+"""A camera that renders the cell, with exact ground truth."""

@@ -1,0 +1,206 @@
+"""The image of solids in a camera: every sample's own ray, the nearest face along it, then what optics add. Pure.
+
+The ray of each sample is taken through the inverse of the lens distortion, so a straight edge is bent exactly as
+`cv2.projectPoints` bends it. On a ray (x, y, 1) the inverse depth of a plane is linear in x and y, and so is the side
+of every edge: a face needs no clipping, and the nearest of them is the greatest 1 / z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.camera import CameraInfo
+from services.arm.frames.transforms import Rigid, compose, inverse
+from services.camera.virtual.lens import Array, Lens, Samples, lens_of
+from services.camera.virtual.solids import Colour, Face, Solid
+
+Image = NDArray[np.uint8]
+
+NEAR = 0.005  # [m] nothing nearer than this is seen
+GREYS = 256  # the first colours of the palette, for textures
+LIGHT = np.array([0.3, 0.2, 0.93])  # the direction to the lamp, in the base
+AMBIENT = 0.55  # of the brightness of a face that the lamp does not reach
+
+
+@dataclass(frozen=True)
+class Optics:
+    """What a camera adds to the exact image."""
+
+    samples: int = 2  # along each side of a pixel
+    blur: float = 0.6  # [px] standard deviation
+    motion: tuple[float, float] = (0.0, 0.0)  # [px] right and down, during the exposure
+    brightness: float = 1.0
+    glare: tuple[tuple[float, float, float], ...] = ()  # reflections: column, row and standard deviation [px]
+    noise: float = 3.0  # standard deviation, of 255
+    background: Colour = (70, 74, 80)
+
+
+@dataclass(frozen=True, eq=False)
+class _Target:
+    """The samples that are drawn on: `nearness` 1 / z [1/m] and `index` into the palette, both (h s, w s)."""
+
+    lens: Lens
+    nearness: Samples
+    index: NDArray[np.uint16]
+    palette: list[Colour]
+
+
+def render(
+    solids: Sequence[Solid], camera: CameraInfo, base_from_camera: Rigid, optics: Optics = Optics(), seed: int = 0
+) -> Image:
+    """The image (height, width, 3) in red, green, blue; the same `seed` gives the same noise."""
+    lens = lens_of(camera, optics.samples)
+    grey: list[Colour] = [(level, level, level) for level in range(GREYS)]
+    target = _Target(
+        lens,
+        np.zeros(lens.x.shape, np.float32),
+        np.full(lens.x.shape, GREYS, np.uint16),
+        [*grey, optics.background],
+    )
+    camera_from_base = inverse(base_from_camera)
+    for solid in solids:
+        _draw(target, solid, camera_from_base)
+    image = np.array(target.palette, np.uint8)[target.index]
+    return expose(cv2.resize(image, (camera.width, camera.height), interpolation=cv2.INTER_AREA), optics, seed)
+
+
+def expose(image: Image, optics: Optics, seed: int = 0) -> Image:
+    """The exact `image` (h, w, 3) as the camera would give it: blurred, with glare, brightness and noise."""
+    if optics.blur > 0.0:
+        image = cv2.GaussianBlur(image, (0, 0), optics.blur)
+    if any(optics.motion):
+        image = cv2.filter2D(image, -1, _motion_kernel(optics.motion))
+    if optics.glare or optics.brightness != 1.0:
+        lit = image.astype(np.float32) * optics.brightness + _glare(image.shape[:2], optics)[..., None]
+        image = np.clip(lit, 0.0, 255.0).astype(np.uint8)
+    if optics.noise > 0.0:
+        image = _with_noise(image, optics.noise, seed)
+    return image
+
+
+def _draw(target: _Target, solid: Solid, camera_from_base: Rigid) -> None:
+    turn, shift = _matrix(compose(camera_from_base, solid.pose))
+    base_turn, _ = _matrix(solid.pose)
+    for face in solid.faces:
+        corners = face.corners @ turn.T + shift
+        normal = _normal(corners)
+        offset = float(normal @ corners[0])
+        if offset >= -1e-12:  # it looks away from the camera, or is seen edge on
+            continue
+        light = float(base_turn @ _normal(face.corners) @ LIGHT)
+        _fill(target, face, corners, normal / offset, AMBIENT + (1.0 - AMBIENT) * max(0.0, light))
+
+
+def _fill(target: _Target, face: Face, corners: Array, plane: Array, light: float) -> None:
+    """Draws a face whose points p have `plane` @ p = 1, in the optical frame."""
+    rows, columns = _window(target.lens, corners)
+    x, y = target.lens.x[rows, columns], target.lens.y[rows, columns]
+    if not x.size:
+        return
+    nearness = _linear(plane, x, y)
+    held = target.nearness[rows, columns]
+    seen = (nearness > held) & (nearness < 1.0 / NEAR)
+    for edge in -np.cross(corners, np.roll(corners, -1, axis=0)):
+        if not _is_inside_everywhere(edge, target.lens, rows, columns):
+            seen &= _linear(edge, x, y) >= 0.0
+    np.copyto(held, nearness, where=seen)
+    if face.texture is not None:
+        target.index[rows, columns][seen] = _texels(face.texture, corners, x[seen], y[seen], nearness[seen])
+        return
+    np.copyto(target.index[rows, columns], np.uint16(len(target.palette)), where=seen)
+    red, green, blue = face.colour
+    target.palette.append((int(red * light), int(green * light), int(blue * light)))
+
+
+def _window(lens: Lens, corners: Array) -> tuple[slice, slice]:
+    if corners[:, 2].min() < NEAR:
+        return slice(0, lens.x.shape[0]), slice(0, lens.x.shape[1])
+    flat = corners[:, :2] / corners[:, 2:]
+    return lens.window(flat.min(axis=0), flat.max(axis=0))
+
+
+def _is_inside_everywhere(edge: Array, lens: Lens, rows: slice, columns: slice) -> bool:
+    """True if every ray of the window is on the inner side: a linear function is least at a corner."""
+    x, y = lens.x_range[:, columns], lens.y_range[:, rows]
+    return bool(
+        min(edge[0] * x[0].min(), edge[0] * x[1].max())
+        + min(edge[1] * y[0].min(), edge[1] * y[1].max())
+        + edge[2] >= 0.0
+    )  # fmt: skip
+
+
+def _linear(factors: Array, x: Samples, y: Samples) -> Samples:
+    """factors @ (x, y, 1) for every ray."""
+    a, b, c = factors.astype(np.float32)
+    value: Samples = x * a
+    value += y * b
+    value += c
+    return value
+
+
+def _texels(texture: NDArray[np.uint8], corners: Array, x: Samples, y: Samples, nearness: Samples) -> NDArray[np.uint8]:
+    """The grey of each ray, where it pierces the parallelogram."""
+    rows, columns = texture.shape
+    down, right = corners[1] - corners[0], corners[3] - corners[0]
+    along = np.linalg.inv(np.stack((down, right, np.cross(down, right)), axis=1))[:2]
+    start = along @ corners[0]
+    row, column = ((_linear(line, x, y) / nearness - at) for line, at in zip(along, start, strict=True))
+    texels: NDArray[np.uint8] = texture[
+        np.clip((row * rows).astype(np.intp), 0, rows - 1),
+        np.clip((column * columns).astype(np.intp), 0, columns - 1),
+    ]
+    return texels
+
+
+def _normal(corners: Array) -> Array:
+    first, second, third = corners[0], corners[1], corners[2]
+    normal: Array = np.cross(second - first, third - first)
+    return normal / (float(np.linalg.norm(normal)) or 1.0)
+
+
+def _matrix(pose: Rigid) -> tuple[Array, Array]:
+    """Rotation (3, 3) and translation (3,) [m]."""
+    x, y, z, w = pose[1]
+    turn = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+    return turn, np.array(pose[0])
+
+
+def _motion_kernel(motion: tuple[float, float]) -> Samples:
+    """A line of `motion` [px], centred, of sum 1."""
+    steps = int(np.ceil(max(map(abs, motion))))
+    kernel = np.zeros((2 * steps + 1, 2 * steps + 1), np.float32)
+    for share in np.linspace(-0.5, 0.5, 16 * steps + 1):
+        column, row = (share * each + steps for each in motion)
+        i, j = int(row), int(column)
+        for di, dj in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            weight = (1 - abs(row - i - di)) * (1 - abs(column - j - dj))
+            if weight > 0.0:
+                kernel[i + di, j + dj] += weight
+    kernel /= kernel.sum()
+    return kernel
+
+
+def _glare(shape: tuple[int, ...], optics: Optics) -> Samples:
+    v, u = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
+    total: Samples = np.zeros(shape, np.float32)
+    for column, row, spread in optics.glare:
+        total += 255.0 * np.exp(-((u - column) ** 2 + (v - row) ** 2) / (2.0 * spread**2))
+    return total
+
+
+def _with_noise(image: Image, noise: float, seed: int) -> Image:
+    """OpenCV's generator is several times as fast as numpy's, and its seed is global to the process."""
+    cv2.setRNGSeed(seed)
+    grain = np.empty(image.shape, np.int16)
+    cv2.randn(grain, (0.0,) * 3, (noise,) * 3)
+    noisy: Image = cv2.add(image, grain, dtype=cv2.CV_8U)
+    return noisy
