@@ -29,10 +29,13 @@ class UnknownKey:
     hint: str
 
 
-def read_robot_data(path: Path, text: str) -> dict[str, object]:
-    """The tables of robot.toml, whose keys are known and whose numbers are finite; raises `DescriptionError`."""
+def read_robot_data(path: Path, text: str, kind: type[msgspec.Struct] = RobotFile) -> dict[str, object]:
+    """The tables of robot.toml, whose keys are known and whose numbers are finite; raises `DescriptionError`.
+
+    `kind` is the type of another file that is read as strictly.
+    """
     data = parse_toml(path, text)
-    for unknown in unknown_keys(data, text):
+    for unknown in unknown_keys(data, text, kind):
         raise DescriptionError(f"{path}, line {unknown.line}: unknown key `{dotted(unknown.path)}`{unknown.hint}")
     for key, value in not_finite(data):
         raise DescriptionError(f"{path}, line {line_of(key, text)}: `{dotted(key)}` is {value}: it must be finite")
@@ -66,9 +69,9 @@ def parse_toml(path: Path, text: str) -> dict[str, object]:
         raise DescriptionError(f"{path}: not TOML: {error}") from error
 
 
-def unknown_keys(data: dict[str, object], text: str) -> list[UnknownKey]:
+def unknown_keys(data: dict[str, object], text: str, kind: type[msgspec.Struct] = RobotFile) -> list[UnknownKey]:
     """Every key of `data` that the types do not have."""
-    return [UnknownKey(path, line_of(path, text), hint) for path, hint in _walk(data, RobotFile, ())]
+    return [UnknownKey(path, line_of(path, text), hint) for path, hint in _walk(data, kind, ())]
 
 
 def not_finite(data: object, path: Keys = ()) -> list[tuple[Keys, float]]:
@@ -107,7 +110,7 @@ def line_of(path: Keys, text: str) -> int:
     for number, line in enumerate(text.splitlines(), start=1):
         if table := re.match(r"\s*\[(\[?)\s*([\w.\-]+)\s*\]", line):
             header = _header(table[2], bool(table[1]), counts)
-            if tuple(header) == path:
+            if tuple(header[: len(path)]) == path:  # the table itself, or the first below it where it has no header
                 return number
         elif (key := re.match(r"\s*\"?([\w\-]+)\"?\s*=", line)) and (*header, key[1]) == path:
             return number
