@@ -118,6 +118,7 @@ class Deployment(DeploymentRecord, frozen=True, kw_only=True):
     """One deployment; every key can be overridden by GEMELO_<SECTION>_<KEY> in the environment."""
 
     robot: str = "urdf/rm1"
+    cell: str = ""  # cell.toml: cameras, things and places around the arm; empty: none
     router: RouterSection = RouterSection()
     device: DeviceKind = DeviceKind.VIRTUAL
     wire: Wire = Wire.MQTT  # how the gateway reaches the device

@@ -193,7 +193,13 @@ def camera_detections(camera: str) -> Topic[Detections]:
     return Topic(f"camera/{camera}/detections", Detections, LATEST, None, True, "detector", about)
 
 
-CAMERA_TOPICS = (camera_image, camera_info, camera_status, camera_detections)
+def camera_truth(camera: str) -> Topic[Detections]:
+    """Where the things of a virtual camera's cell are in truth, once a second: what a detector is judged by."""
+    about = "where a virtual camera has the things"
+    return Topic(f"camera/{camera}/truth", Detections, LATEST, None, True, "camera", about)
+
+
+CAMERA_TOPICS = (camera_image, camera_info, camera_status, camera_detections, camera_truth)
 
 PLAN = Request("plan", PlanRequest, PlanResponse, "planner", "a goal in, a verified trajectory or a refusal out")
 PLAN_CANCEL = Request("plan/cancel", PlanCancel, PlanCancelResult, "planner", "end a plan before its end")

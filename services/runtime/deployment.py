@@ -159,7 +159,8 @@ def _with_absolute_paths(deployment: Deployment, root: Path) -> Deployment:
     mqtt = _with_absolute(deployment.mqtt, MQTT_FILES, root)
     router = _with_absolute(deployment.router, ROUTER_FILES, root)
     robot = str(root / deployment.robot)
-    return msgspec.structs.replace(deployment, robot=robot, router=router, mqtt=mqtt, paths=paths)
+    cell = str(root / deployment.cell) if deployment.cell else ""
+    return msgspec.structs.replace(deployment, robot=robot, cell=cell, router=router, mqtt=mqtt, paths=paths)
 
 
 def _with_absolute(section: S, names: tuple[str, ...], root: Path) -> S:

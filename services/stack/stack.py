@@ -29,6 +29,7 @@ PROCESSES = (
     "visualizer",
     "viewer",
     "panel",
+    "camera",
 )
 POLL = 0.05  # [s]
 STOP = 20.0  # [s] for all to end by themselves
@@ -41,7 +42,8 @@ class StackError(Exception):
 class Stack:
     """Starts on entering, stops on leaving; every process can be looked at and killed by name.
 
-    `viewer="none"` leaves the viewer's process out, `panel` adds the operator's page.
+    `viewer="none"` leaves the viewer's process out, `panel` adds the operator's page; without GEMELO_CELL in
+    `environment` the cameras are left out, which would stand aside.
     `locked_for` names the device for which mosquitto gets TLS, users and an ACL; `lock` is their folder then.
     `environment` is added to what the stack gets.
     `command` starts it in another way, for example ("make", "up").
@@ -64,7 +66,9 @@ class Stack:
         self.folder = Path(tempfile.mkdtemp(prefix="gemelo-"))
         self.run = self.folder / "run"
         self.out = (out or self.folder / "out").resolve()
-        left_out = {name for name, wanted in (("viewer", viewer != "none"), ("panel", panel)) if not wanted}
+        has_cell = bool((environment or {}).get("GEMELO_CELL"))
+        chosen = (("viewer", viewer != "none"), ("panel", panel), ("camera", has_cell))
+        left_out = {name for name, wanted in chosen if not wanted}
         self.processes = tuple(processes or (name for name in PROCESSES if name not in left_out))
         self.ready_seconds = 0.0
         self._command = command

@@ -1,4 +1,4 @@
-"""The checks that `make up` runs before it starts a process: deployment file, the arm's files, broker, free ports."""
+"""The checks that `make up` runs before it starts a process: deployment, arm and cell files, broker, free ports."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 
 from schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
 from schemas.errors import ConfigurationError
+from services.arm.cell.cell_file import load_cell
 from services.arm.model.description import Arm, load_arm, require_motors
 from services.arm.model.virtual_drive import NO_MOTORS
 from services.mqtt.access import device_access, gateway_access
@@ -22,6 +23,8 @@ def start_problems(deployment: Deployment) -> list[str]:
         arm = load_arm(project_root() / deployment.robot)
         device = arm.device.name if deployment.device is DeviceKind.VIRTUAL else ""
         require_motors(arm, deployment.device)
+        if deployment.cell:
+            load_cell(Path(deployment.cell), arm)
     except ConfigurationError as error:
         found.append(str(error))
     found += broker_problems(deployment, device)

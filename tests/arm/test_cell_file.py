@@ -36,7 +36,7 @@ def test_the_sample_of_every_arm_loads(rm1_folder: Path, robot: str) -> None:
 
 
 FAULTS = [  # the change, how the line begins that must be named, the sentence
-    ("look_at = [0.24", "look_att = [0.24", "look_att", r"unknown key `camera\[0\].look_att`.*\"look_at\"\?"),
+    ("look_at = [0.27", "look_att = [0.27", "look_att", r"unknown key `camera\[0\].look_att`.*\"look_at\"\?"),
     ("distortion = [0", "distorsion = [0", "distorsion", r"unknown key `camera\[0\].source.distorsion`.*\"distor"),
     ("id = 50\nsize", "id = 50\nsise", "sise", r"unknown key `place\[1\].sise`; did you mean \"size\"\?"),
     ("[[place]]", "[[plaice]]", "[[plaice]]", r"unknown key `plaice`.*\"place\""),
@@ -50,7 +50,7 @@ FAULTS = [  # the change, how the line begins that must be named, the sentence
     ('name = "overhead"', 'name = "Over head"', "name", r".*camera\[0\].name"),
     ('name = "red_block"', 'name = "cup"', 'name = "cup"\nkind = "colour"', r'there are two \[\[thing\]\] "cup"'),
     ("fps = 5.0", 'parent = "efektor_link"', "parent", r'.*rm1 has no link "efektor_link".*"efector_link"'),
-    ("look_at = [0.24, 0.0, 0.0]", "look_at = [0.66, 0.0, 0.56]", "look_at", r'camera "overhead" looks at the point'),
+    ("look_at = [0.27, 0.0, 0.0]", "look_at = [0.54, 0.0, 0.48]", "look_at", r'camera "overhead" looks at the point'),
     ("0.0008, -0.0005, 0.02]", "0.0008]", "distortion", r".*distortion has 3 numbers: write k1, k2, p1, p2, k3"),
     ("id = 101", "id = 100", "id = 100\nsize = 0.04\nposition = [0.42, -", r".*\[\[tag\]\] 1: print another"),
     ("id = 101", "id = 587", "id = 587", r".*apriltag_36h11 has the tags 0 to 586, not 587"),
@@ -103,7 +103,7 @@ def test_a_real_camera_is_assumed_until_it_is_measured_and_a_virtual_one_is_exac
     virtual = load_cell(file, rm1)
     info = believed_info(virtual, virtual.camera("overhead"), rm1.base_frame)
     assert (info.is_calibrated, info.is_mounted, info.parent) == (True, True, "base_link")
-    assert info.intrinsics[0] == pytest.approx(320.0 / math.tan(0.525))
+    assert info.intrinsics[0] == pytest.approx(320.0 / math.tan(0.575))
     assert info.intrinsics[2] == 319.5
     edit(file, 'kind = "virtual"\n', 'kind = "v4l2"\ndevice = "/dev/video0"\n')
     for line in ("distortion = [0.08, -0.16, 0.0008, -0.0005, 0.02]\n", "blur = 0.6\n", "noise = 3.0\n"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import cv2
@@ -31,6 +31,10 @@ class Face:
     corners: Array
     colour: Colour = (128, 128, 128)
     texture: Texture | None = None
+
+    def moved(self, by: tuple[float, float, float]) -> Face:
+        """The same face `by` [m] from there."""
+        return replace(self, corners=self.corners + np.array(by))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,131 @@
+"""The cameras of one cell on the bus: a reader, a core and the publishers of each."""
+
+from __future__ import annotations
+
+import cv2
+
+from schemas.camera import CameraCondition
+from schemas.cell import CameraRecord, FileSource, FolderSource, V4l2Source, VirtualSource
+from schemas.topics import (
+    GRIPPER_STATE,
+    JOINT_STATES,
+    SCENE,
+    camera_image,
+    camera_info,
+    camera_status,
+    camera_truth,
+)
+from services.arm.cell.camera_model import believed_info, exact_info
+from services.arm.cell.cell_file import Cell
+from services.arm.model.description import Arm
+from services.camera.core import CameraCore
+from services.camera.reader import Reader
+from services.camera.sources.source import Frame, Source
+from services.camera.sources.stored import FolderOfImages, Video
+from services.camera.sources.v4l2 import V4l2Camera
+from services.camera.virtual.virtual_camera import VirtualCamera, true_detections
+from services.camera.virtual.world import World
+from services.runtime.node import Node
+
+REOPEN = 3_000_000_000  # [ns] between two attempts to wake a camera that gives the same image again and again
+
+
+class Cameras:
+    """Every camera of the cell, from the first image to the last."""
+
+    def __init__(self, node: Node, arm: Arm, cell: Cell) -> None:
+        """Starts a thread for each camera; raises `DescriptionError` where the arm cannot be drawn."""
+        cv2.setNumThreads(1)
+        self._world = _watched_world(node, arm, cell)
+        self._node, self._arm = node, arm
+        self._cameras = [_Camera(node, arm, cell, record, self._world) for record in cell.cameras]
+
+    def tell_about(self, cell: Cell) -> None:
+        """Publishes each camera's lens and pose as the cell knows them now."""
+        for record in cell.cameras:
+            info = believed_info(cell, record, self._arm.base_frame)
+            self._node.publisher(camera_info(record.name)).put(info)
+
+    def step(self, now: int) -> None:
+        for camera in self._cameras:
+            camera.step(now)
+        self._node.set_ready(True)
+
+    def close(self) -> None:
+        for camera in self._cameras:
+            camera.reader.stop()
+
+
+class _Camera:
+    """One camera between its thread and the bus."""
+
+    def __init__(self, node: Node, arm: Arm, cell: Cell, record: CameraRecord, world: World | None) -> None:
+        self._node, self._record, self._cell = node, record, cell
+        self._exact, self._world = exact_info(record, arm.base_frame), world
+        self._image = node.publisher(camera_image(record.name))
+        self._status = node.publisher(camera_status(record.name))
+        source = self._source(record, cell)
+        self._core = CameraCore(record.name, record.fps, source.is_live, node.now())
+        self._said, self._reopened = "", 0
+        self.reader = Reader(source, lambda: node.post(self._take), name=record.name)
+        self.reader.start()
+
+    def step(self, now: int) -> None:
+        status = self._core.step(now)
+        if status is not None:
+            self._status.put(status)
+            self._tell_truth()
+        self._log()
+        if self._core.condition is CameraCondition.FROZEN and now - self._reopened > REOPEN:
+            self._reopened = now
+            self.reader.reopen()
+
+    def _take(self) -> None:
+        now = self._node.now()
+        for event in self.reader.take():
+            if isinstance(event, Frame):
+                image = self._core.on_frame(event, now)
+                if image is not None:
+                    self._image.put(image)
+            else:
+                self._core.on_fault(event, now)
+
+    def _log(self) -> None:
+        """A change of condition, once."""
+        text = self._core.text or str(self._core.condition)
+        if self._core.condition is CameraCondition.STARTING or self._core.condition == self._said:
+            return
+        is_first, self._said = not self._said, self._core.condition
+        if self._core.text:
+            self._node.log.warning("%s", text)
+        else:
+            self._node.log.info('camera "%s": images come%s', self._record.name, "" if is_first else " again")
+
+    def _tell_truth(self) -> None:
+        if isinstance(self._record.source, VirtualSource) and self._world is not None:
+            things = {thing.name: thing for thing in self._cell.things}
+            truth = true_detections(self._world.snapshot(), self._exact, things)
+            self._node.publisher(camera_truth(self._record.name)).put(truth)
+
+    def _source(self, record: CameraRecord, cell: Cell) -> Source:
+        match record.source:
+            case V4l2Source():
+                return V4l2Camera(record, record.source)
+            case FolderSource():
+                return FolderOfImages(record, cell.path_of(record.source.path), record.source.loop)
+            case FileSource():
+                return Video(record, cell.path_of(record.source.path), record.source.loop)
+            case VirtualSource():
+                assert self._world is not None  # there is one for every cell with a virtual camera
+                return VirtualCamera(record, record.source, self._exact, self._world.snapshot)
+
+
+def _watched_world(node: Node, arm: Arm, cell: Cell) -> World | None:
+    """The world that virtual cameras look at, kept up to date; None where there is none of them."""
+    if not any(isinstance(record.source, VirtualSource) for record in cell.cameras):
+        return None
+    world = World(arm, cell)
+    node.subscribe(JOINT_STATES, world.on_joint_state)
+    node.subscribe(GRIPPER_STATE, world.on_gripper_state)
+    node.subscribe(SCENE, world.on_scene)
+    return world

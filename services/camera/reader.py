@@ -1,0 +1,85 @@
+"""The thread that reads one source: it keeps the newest image only, and opens again what has failed."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+from schemas.camera import CameraCondition
+from services.camera.sources.source import CameraFault, Frame, Source
+
+RETRY = 0.5  # [s] between two attempts to open
+
+Event = Frame | CameraFault
+
+
+class Reader:
+    """Reads until `stop`; `wake` is called from its thread when there is something to `take`, once until it is taken.
+
+    A reader that is slower than the camera loses all but the newest image, and no fault.
+    """
+
+    def __init__(self, source: Source, wake: Callable[[], None], name: str = "camera") -> None:
+        self._source, self._wake = source, wake
+        self._lock = threading.Lock()
+        self._faults: list[CameraFault] = []
+        self._frame: Frame | None = None
+        self._stop, self._anew = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self, timeout: float = 1.0) -> None:
+        """Ends it; a device that hangs is left behind after `timeout` [s]."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout)
+
+    def reopen(self) -> None:
+        """Closes and opens the source: for one that gives the same image again and again."""
+        self._anew.set()
+
+    def take(self) -> list[Event]:
+        """Faults since the last call, then the newest image that came after them."""
+        with self._lock:
+            events: list[Event] = [*self._faults]
+            if self._frame is not None:
+                events.append(self._frame)
+            self._faults, self._frame = [], None
+        return events
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            try:
+                self._source.open()
+                self._read_on()
+            except CameraFault as fault:
+                self._put(fault)
+                if fault.condition is CameraCondition.ENDED:
+                    self._stop.set()
+            finally:
+                self._source.close()
+            self._stop.wait(RETRY)
+
+    def _read_on(self) -> None:
+        due = time.monotonic()
+        self._anew.clear()
+        while not (self._stop.is_set() or self._anew.is_set()):
+            self._put(self._source.read())
+            due = max(due + self._source.period, time.monotonic() - self._source.period)
+            wait = due - time.monotonic()
+            if self._source.period and wait > 0.0:
+                self._stop.wait(wait)
+
+    def _put(self, event: Event) -> None:
+        with self._lock:
+            is_first = self._frame is None and not self._faults
+            if isinstance(event, CameraFault):
+                self._faults.append(event)
+                self._frame = None  # of before the fault
+            else:
+                self._frame = event
+        if is_first:
+            self._wake()

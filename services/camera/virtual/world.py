@@ -1,0 +1,228 @@
+"""What the virtual camera looks at: the table, fixed tags, things, the arm with its jaws, and the planning scene. Pure.
+
+It has a truth of its own: things stand where cell.toml puts them, move with the jaws that have closed on them, and fall
+onto the table when they open. What a detector believes (objects of the scene with a thing's name) is never drawn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from schemas.cell import Colour as ColourName
+from schemas.cell import ColourThing, TagPlace, TagRecord, TagThing, Thing
+from schemas.gripper import GripperState
+from schemas.joints import JointState
+from schemas.scene import PlanningScene
+from services.arm.cell.cell_file import Cell, grasp_width
+from services.arm.frames.transforms import (
+    IDENTITY,
+    Point,
+    Rigid,
+    compose,
+    from_axis_angle,
+    from_message,
+    from_rpy,
+    inverse,
+    rotate,
+)
+from services.arm.kinematics.chain import link_transforms
+from services.arm.model.description import Arm
+from services.arm.model.gripper import JAWS, jaw_edges, jaw_objects
+from services.camera.virtual.arm_solids import arm_solids, solid_of
+from services.camera.virtual.solids import Colour, Face, Solid, box, tag
+
+COLOURS: dict[ColourName, Colour] = {
+    ColourName.RED: (205, 35, 35),
+    ColourName.ORANGE: (235, 125, 20),
+    ColourName.YELLOW: (235, 210, 40),
+    ColourName.GREEN: (45, 150, 60),
+    ColourName.BLUE: (35, 80, 200),
+    ColourName.PURPLE: (130, 50, 160),
+}
+TABLE, WOOD, CARDBOARD, OBSTACLE, JAW = (158, 150, 138), (120, 86, 52), (186, 160, 120), (128, 134, 142), (40, 42, 46)
+TABLE_HALF = 1.5  # [m]
+SHEET = 1e-4  # [m] a printed tag is above what it lies on, so that it is drawn over it
+CAUGHT = 0.0015  # [m] of the opening more than a thing's width, at which it is held
+ALONG_JAW = 0.004  # [m] beyond the jaws within which they still catch a thing
+
+
+@dataclass(frozen=True)
+class Held:
+    """A thing between the jaws: its pose in the tool frame ([m], quaternion)."""
+
+    name: str
+    tool_from_thing: Rigid
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """Everything at one instant, poses in the base frame; two with equal `key` look the same."""
+
+    solids: tuple[Solid, ...]
+    links: Mapping[str, Rigid]
+    things: Mapping[str, Rigid]
+    stamp: int  # [ns] UNIX time of the joint state; 0 before the first
+    key: tuple[object, ...] = field(default=())
+
+
+class World:
+    """Takes what the bus says of the arm and the scene; `snapshot` may be called from another thread."""
+
+    def __init__(self, arm: Arm, cell: Cell) -> None:
+        """Raises `DescriptionError` where the arm's URDF cannot be read."""
+        self._arm, self._cell = arm, cell
+        self._links = arm_solids(arm)
+        self._parts = {thing.name: thing_faces(thing) for thing in cell.things}
+        self._fixed = fixed_solids(cell)
+        self._tags = [(each, tag(each.family, each.id, each.size).faces) for each in cell.tags]
+        self._joints = JointState(name=arm.joint_names, position=(0.0,) * len(arm.joints))
+        self._opening = arm.gripper.open if arm.gripper is not None else 0.0
+        self._scene = PlanningScene()
+        self._held: Held | None = None
+        self._things: dict[str, Rigid] = {
+            thing.name: (thing.position, from_rpy(0.0, 0.0, thing.yaw))
+            for thing in cell.things
+            if thing.position is not None
+        }
+
+    def on_joint_state(self, state: JointState) -> None:
+        """A state with other joints than the arm's is left out."""
+        if set(state.name) >= set(self._arm.joint_names) and len(state.position) == len(state.name):
+            self._joints = state
+
+    def on_scene(self, scene: PlanningScene) -> None:
+        self._scene = scene
+
+    def on_gripper_state(self, state: GripperState) -> None:
+        """Jaws that are as near as a thing is wide hold it; jaws that open wider let it fall onto the table."""
+        if not state.known or self._arm.gripper is None:
+            return
+        before, self._opening = self._opening, state.position
+        tool = self._link_poses()[self._arm.tool_frame]
+        if self._held is None:
+            self._held = self._caught(tool, before)
+        elif state.position > grasp_width(self._cell.thing(self._held.name)) + CAUGHT:
+            released = compose(tool, self._held.tool_from_thing)
+            self._things = {**self._things, self._held.name: self._fallen(self._held.name, released)}
+            self._held = None
+
+    def put(self, name: str, pose: Rigid) -> None:
+        """Sets a thing somewhere ([m], quaternion), as a hand would."""
+        self._cell.thing(name)
+        if self._held is not None and self._held.name == name:
+            self._held = None
+        self._things = {**self._things, name: pose}
+
+    def snapshot(self) -> Snapshot:
+        """What there is now."""
+        joints, scene, held, things, opening = self._joints, self._scene, self._held, self._things, self._opening
+        links = self._link_poses(joints)
+        if held is not None:
+            things = {**things, held.name: compose(links[self._arm.tool_frame], held.tool_from_thing)}
+        solids = [*self._fixed]
+        solids += [_at(solid, links[name]) for name, parts in self._links.items() for solid in parts if name in links]
+        solids += [Solid(faces, tag_pose(record, links)) for record, faces in self._tags]
+        solids += [Solid(self._parts[name], pose) for name, pose in things.items()]
+        solids += self._jaws(links, opening)
+        solids += self._obstacles(links, scene)
+        key = (joints.position, scene.version, scene.epoch, opening, tuple(things.items()))
+        return Snapshot(tuple(solids), links, things, joints.stamp, key)
+
+    def _link_poses(self, joints: JointState | None = None) -> dict[str, Rigid]:
+        """In the base frame."""
+        joints = self._joints if joints is None else joints
+        poses = link_transforms(self._arm.model, dict(zip(joints.name, joints.position, strict=True)))
+        base = poses[self._arm.base_frame]
+        if base == IDENTITY:
+            return poses
+        return {name: compose(inverse(base), pose) for name, pose in poses.items()}
+
+    def _jaws(self, links: Mapping[str, Rigid], opening: float) -> list[Solid]:
+        found = []
+        for each in jaw_objects(self._arm, opening):
+            pose = compose(links[each.frame], from_message(each.pose))
+            solid = solid_of(each.shape, JAW, pose)
+            found += [solid] if solid is not None else []
+        return found
+
+    def _obstacles(self, links: Mapping[str, Rigid], scene: PlanningScene) -> list[Solid]:
+        """The scene's objects, without what is drawn by itself: things, and the jaws."""
+        own = {*self._parts, *JAWS}
+        found = []
+        for each in scene.objects:
+            frame = links.get(each.frame, IDENTITY) if each.frame else IDENTITY
+            if each.name not in own:
+                solid = solid_of(each.shape, OBSTACLE, compose(frame, from_message(each.pose)), self._arm.folder)
+                found += [solid] if solid is not None else []
+        return found
+
+    def _caught(self, tool: Rigid, before: float) -> Held | None:
+        """The thing on which the jaws, `before` [m] apart, have just closed: they centre it."""
+        assert self._arm.gripper is not None
+        along, _, beyond = jaw_edges(self._arm.gripper)
+        for name, pose in self._things.items():
+            thing = self._cell.thing(name)
+            local = compose(inverse(tool), pose)
+            x, y, z = compose(local, (thing.grasp_offset, IDENTITY[1]))[0]
+            is_between = abs(x) <= along / 2.0 + ALONG_JAW and abs(y) <= self._arm.gripper.open / 2.0
+            is_reached = -ALONG_JAW <= z <= beyond + ALONG_JAW
+            if is_between and is_reached and self._opening <= grasp_width(thing) + CAUGHT < before:
+                (px, py, pz), turn = local
+                return Held(name, ((px, py - y, pz), turn))
+        return None
+
+    def _fallen(self, name: str, pose: Rigid) -> Rigid:
+        """Upright on the table, turned as it was about z."""
+        thing = self._cell.thing(name)
+        ahead = rotate(pose[1], (1.0, 0.0, 0.0))
+        position: Point = (pose[0][0], pose[0][1], (self._cell.table or 0.0) + height_of_frame(thing))
+        return position, from_axis_angle((0.0, 0.0, 1.0), math.atan2(ahead[1], ahead[0]))
+
+
+def tag_pose(record: TagRecord, links: Mapping[str, Rigid]) -> Rigid:
+    """In the base frame, as the poses of the `links` are."""
+    local: Rigid = (record.position, from_rpy(*record.rpy))
+    return compose(links[record.parent], local) if record.parent else local
+
+
+def height_of_frame(thing: Thing) -> float:
+    """[m] of the thing's frame above the table that it stands on."""
+    if isinstance(thing, TagThing):
+        return thing.box[2] if thing.box is not None else 0.0
+    return thing.box[2] / 2.0
+
+
+def thing_faces(thing: Thing) -> tuple[Face, ...]:
+    """The faces of a thing in its own frame."""
+    if isinstance(thing, TagThing):
+        printed = tag(thing.family, thing.id, thing.size).faces
+        if thing.box is None:
+            return printed
+        x, y, z = thing.box
+        body = box((x, y, z), CARDBOARD).faces
+        return (*printed, *(face.moved((0.0, 0.0, -z / 2.0 - SHEET)) for face in body))
+    return box(thing.box, COLOURS[thing.colour] if isinstance(thing, ColourThing) else WOOD).faces
+
+
+def fixed_solids(cell: Cell) -> tuple[Solid, ...]:
+    """The table, a little below its height so that what is printed lies on it, and the tags of places."""
+    found = []
+    if cell.table is not None:
+        h, z = TABLE_HALF, cell.table - SHEET
+        corners = np.array([[-h, -h, z], [h, -h, z], [h, h, z], [-h, h, z]])
+        found.append(Solid((Face(corners, TABLE),)))
+    places = [each for each in cell.places if isinstance(each, TagPlace)]
+    found += [
+        tag(each.family, each.id, each.size, (each.position, from_rpy(0.0, 0.0, each.yaw)))
+        for each in places
+        if each.position is not None
+    ]
+    return tuple(found)
+
+
+def _at(solid: Solid, pose: Rigid) -> Solid:
+    return Solid(solid.faces, compose(pose, solid.pose))
