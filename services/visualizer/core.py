@@ -16,6 +16,7 @@ from schemas.joints import JointState, StepErrors
 from schemas.planning import PlannedPath
 from services.visualizer.content import entities
 from services.visualizer.content.arm_poses import arm_poses
+from services.visualizer.content.cameras import CameraView
 from services.visualizer.content.event_log import EventLog, clamp_stamp
 from services.visualizer.content.panel import PanelInputs, is_lost, panel, shaft_errors
 from services.visualizer.content.preview import MOVING, PlanPreview
@@ -38,6 +39,7 @@ class Visualizer:
         """`load` reads the mesh files of the scene."""
         self.model = model
         self.scene = SceneView(model, load)
+        self.cameras = CameraView(model)
         self._preview = PlanPreview(model, self.scene.attached)
         self._tool = tool
         self._names = [joint.name for joint in model.moving]
@@ -104,13 +106,14 @@ class Visualizer:
         """Everything new; `now` in ns UNIX."""
         self._latest = now + AHEAD
         return [*self._measured(), *self._ghost(), *self._step_errors(), *self._shafts(), *self._planned(),
-                *self._preview.take(now), *self.scene.take(now), *self._device(now),
+                *self._preview.take(now), *self.scene.take(now), *self.cameras.take(now), *self._device(now),
                 *self.event_log.take(self._latest)]  # fmt: skip
 
     def restart(self) -> None:
         """Sends the latched content again to a new viewer."""
         self._path_is_new = self._path is not None
         self.scene.restart()
+        self.cameras.restart()
         self._preview.restart()
         self._shown, self._trail_end, self._panel_at = ("", ""), None, 0
 

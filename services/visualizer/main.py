@@ -22,7 +22,11 @@ from schemas.topics import (
     SCENE,
     SENSORS,
     STEP_ERRORS,
+    camera_detections,
+    camera_image,
+    camera_info,
 )
+from services.arm.cell.cell_file import load_cell
 from services.arm.model.description import load_arm
 from services.arm.model.gripper import jaw_objects, jaws_apart
 from services.runtime.application import service
@@ -41,7 +45,9 @@ BATCH_RATE = 10.0  # [Hz]
 def run(node: Node, deployment: Deployment) -> None:
     """Wait for the description, then show everything in batches."""
     root = project_root()
-    outputs = Outputs(deployment.viewer, root / deployment.robot, root, node.parameters(VisualizerParameters).value)
+    cameras = _cameras(deployment)
+    parameters = node.parameters(VisualizerParameters).value
+    outputs = Outputs(deployment.viewer, root / deployment.robot, root, parameters, cameras)
     visualizer: Visualizer | None = None
 
     def on_description(message: RobotDescription) -> None:
@@ -49,6 +55,7 @@ def run(node: Node, deployment: Deployment) -> None:
         if visualizer is None:
             try:
                 visualizer = _visualizer(node, message, (root, root / deployment.robot))
+                _watch(node, visualizer, cameras)
             except ValueError as error:
                 node.log.error(f"the description of {message.robot} cannot be drawn: {error}")
                 return
@@ -65,6 +72,21 @@ def run(node: Node, deployment: Deployment) -> None:
     node.subscribe(DESCRIPTION, on_description)
     node.spin(step, rate=BATCH_RATE)
     outputs.close()
+
+
+def _cameras(deployment: Deployment) -> tuple[str, ...]:
+    """The cameras of the cell file, by name; raises `DescriptionError` where it is wrong."""
+    if not deployment.cell:
+        return ()
+    cell = load_cell(Path(deployment.cell), load_arm(project_root() / deployment.robot))
+    return tuple(camera.name for camera in cell.cameras)
+
+
+def _watch(node: Node, core: Visualizer, cameras: tuple[str, ...]) -> None:
+    for name in cameras:
+        node.subscribe(camera_info(name), core.cameras.on_info)
+        node.subscribe(camera_image(name), core.cameras.on_image)
+        node.subscribe(camera_detections(name), core.cameras.on_detections)
 
 
 def _visualizer(node: Node, message: RobotDescription, folders: tuple[Path, ...]) -> Visualizer:

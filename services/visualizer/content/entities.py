@@ -30,6 +30,26 @@ def _escaped(letter: str) -> str:
     return f"\\{letter}" if letter.isascii() and letter.isprintable() else f"\\u{{{ord(letter):04X}}}"
 
 
+def camera_pose(link: str, camera: str) -> str:
+    """The optical frame of a camera that a link carries; `link` as in `VisualModel.paths`."""
+    return f"{MEASURED}/{link}/camera_{camera}"
+
+
+def camera_picture(camera: str) -> str:
+    """The images of a camera. Apart from the arm, so that the view of an image is the same wherever the camera is."""
+    return f"cameras/{camera}"
+
+
+def found_in(camera: str) -> str:
+    """Outlines of what was found in a camera's image."""
+    return f"{camera_picture(camera)}/found"
+
+
+def believed(camera: str) -> str:
+    """The places in the base of what a camera has found."""
+    return f"{WORLD}/found/{camera}"
+
+
 def position(joint: str) -> str:
     """Two series: commanded, executed."""
     return f"joints/{joint}/position"

@@ -20,6 +20,8 @@ IN_CONTACT = (235, 60, 60, 190)
 REFUSED_ARM = (210, 214, 222, 45)  # the arm where a plan was refused
 PLANNED = (90, 235, 225, 80)  # the arm as it would go
 LABEL = (255, 120, 110)
+FOUND = (120, 255, 120)  # what a detector has found
+FRUSTUM = (240, 200, 90)
 GRID = (140, 148, 160, 50)
 BACKGROUND = (22, 25, 30)
 

@@ -121,6 +121,53 @@ class TranslucentArm:
     color: Rgba
 
 
+@dataclass(frozen=True)
+class Picture:
+    """A JPEG that replaces the previous one."""
+
+    entity: str
+    time: int
+    jpeg: bytes
+
+
+@dataclass(frozen=True)
+class Frustum:
+    """What a camera sees: its pose in its parent entity, (3,) [m] and quaternion (4,) x y z w, and its lens.
+
+    `intrinsics` (9,) [px] is the matrix K row by row, for images of `size` [px].
+    """
+
+    entity: str
+    time: int
+    translation: Vector
+    rotation: Vector
+    intrinsics: Vector
+    size: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Outlines:
+    """Lines (n, 2) [px] in an image, each with its text; none takes the previous ones away."""
+
+    entity: str
+    time: int
+    strips: tuple[Array, ...]
+    texts: tuple[str, ...]
+
+
 Update: TypeAlias = (
-    Scalars | Poses | LineStrip | Panel | LogLines | State | Tint | SolidMesh | ClearEntity | Labels | TranslucentArm
+    Scalars
+    | Poses
+    | LineStrip
+    | Panel
+    | LogLines
+    | State
+    | Tint
+    | SolidMesh
+    | ClearEntity
+    | Labels
+    | TranslucentArm
+    | Picture
+    | Frustum
+    | Outlines
 )

@@ -14,10 +14,10 @@ TIMELINE = "time"
 JOINTS_PER_PAGE = 3  # rows of plots that stay readable
 
 
-def blueprint(model: VisualModel, window: float, trail: float) -> rrb.Blueprint:
-    """The layout for this arm; `window` and `trail` in [s]."""
+def blueprint(model: VisualModel, window: float, trail: float, cameras: tuple[str, ...] = ()) -> rrb.Blueprint:
+    """The layout for this arm and its cameras; `window` and `trail` in [s]."""
     scene = rrb.Vertical(
-        _scene(model, trail),
+        _scene_and_cameras(model, trail, cameras),
         rrb.Horizontal(_panel(), rrb.Vertical(_modes(window), _log(), row_shares=[5, 9]), column_shares=[11, 8]),
         row_shares=[17, 10],
         name="Twin",
@@ -30,6 +30,17 @@ def blueprint(model: VisualModel, window: float, trail: float) -> rrb.Blueprint:
         auto_views=False,
         auto_layout=False,
     )
+
+
+def _scene_and_cameras(model: VisualModel, trail: float, cameras: tuple[str, ...]) -> rrb.Spatial3DView | rrb.Container:
+    """The scene; beside it the images where there are cameras."""
+    views = [
+        rrb.Spatial2DView(origin=entities.camera_picture(name), name=f"Camera {name}: found things (green)")
+        for name in cameras
+    ]
+    if not views:
+        return _scene(model, trail)
+    return rrb.Horizontal(_scene(model, trail), rrb.Vertical(*views), column_shares=[3, 2])
 
 
 def _scene(model: VisualModel, trail: float) -> rrb.Spatial3DView:

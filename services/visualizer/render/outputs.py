@@ -27,9 +27,16 @@ class VisualizerParameters(msgspec.Struct, frozen=True, kw_only=True):
 class Outputs:
     """One stream per sink; a viewer that is new is told everything from the start."""
 
-    def __init__(self, viewer: ViewerSection, robot: Path, root: Path, parameters: VisualizerParameters) -> None:
+    def __init__(
+        self,
+        viewer: ViewerSection,
+        robot: Path,
+        root: Path,
+        parameters: VisualizerParameters,
+        cameras: tuple[str, ...] = (),
+    ) -> None:
         self._connection = None if viewer.mode is ViewerMode.NONE else ViewerConnection(viewer.host, viewer.port)
-        self._folder = robot
+        self._folder, self._cameras = robot, cameras
         self._parameters = parameters
         self._recording_path = root / parameters.recording_path if parameters.recording_path else None
         self._viewer: Sink | None = None
@@ -83,4 +90,5 @@ class Outputs:
         return rr.RecordingStream(APPLICATION, recording_id=f"{core.model.name}-live")
 
     def _sink(self, stream: rr.RecordingStream, core: Visualizer) -> Sink:
-        return Sink(stream, core.model, self._folder, self._parameters.window, self._parameters.trail)
+        window, trail = self._parameters.window, self._parameters.trail
+        return Sink(stream, core.model, self._folder, window, trail, self._cameras)

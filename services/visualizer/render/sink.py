@@ -11,10 +11,13 @@ import rerun as rr
 from services.visualizer.content import entities, palette
 from services.visualizer.content.updates import (
     ClearEntity,
+    Frustum,
     Labels,
     LineStrip,
     LogLines,
+    Outlines,
     Panel,
+    Picture,
     Poses,
     Scalars,
     SolidMesh,
@@ -30,6 +33,7 @@ from services.visualizer.model.visual_model import Visual, VisualJoint, VisualMo
 from services.visualizer.render.layout import TIMELINE, blueprint
 
 APPLICATION = "gemelo"
+FRUSTUM_LENGTH = 0.12  # [m] from the camera to the picture that is drawn in the scene
 GHOST_MARGIN = 0.0015  # [m] the ghost is a skin around the arm, or the two would flicker
 
 
@@ -37,14 +41,23 @@ class Sink:
     """A stream that has been told the static things, and takes updates."""
 
     def __init__(
-        self, stream: rr.RecordingStream, model: VisualModel, folder: Path, window: float, trail: float
+        self,
+        stream: rr.RecordingStream,
+        model: VisualModel,
+        folder: Path,
+        window: float,
+        trail: float,
+        cameras: tuple[str, ...] = (),
     ) -> None:
-        """`window` [s] of the plots and `trail` [s] of the tool's path; `folder` holds the robot's meshes."""
+        """`window` [s] of the plots and `trail` [s] of the tool's path; `folder` holds the robot's meshes.
+
+        `cameras` are those that have a view of their images.
+        """
         self._stream = stream
         self._model = model
         self._folder = folder  # of the robot: meshes stand relative to it
         self._send_static()
-        stream.send_blueprint(blueprint(model, window, trail))
+        stream.send_blueprint(blueprint(model, window, trail, cameras))
 
     def write(self, updates: list[Update]) -> None:
         """Send a batch."""
@@ -82,6 +95,13 @@ class Sink:
             case Labels(entity, time, points, texts):
                 dots = rr.Points3D(points, labels=texts, colors=[palette.LABEL], radii=[0.006], show_labels=True)
                 self._log(entity, time, dots)
+            case Picture(entity, time, jpeg):
+                self._log(entity, time, rr.EncodedImage(contents=jpeg, media_type="image/jpeg"))
+            case Frustum():
+                self._frustum(update)
+            case Outlines(entity, time, strips, texts):
+                lines = rr.LineStrips2D(strips, labels=texts, colors=[palette.FOUND], radii=[1.0], show_labels=True)
+                self._log(entity, time, lines)
             case TranslucentArm(root, time, touching, color):
                 self._translucent_arm(root, time, touching, color)
             case LogLines(entity, times, texts, levels):
@@ -108,6 +128,16 @@ class Sink:
             if drawn is not None:
                 pose = rr.Transform3D(translation=visual.translation, quaternion=visual.rotation)
                 self._log(entity, time, pose, drawn)
+
+    def _frustum(self, update: Frustum) -> None:
+        """The camera's pose on the arm or the table, and its lens; the images have a view of their own."""
+        lens = rr.Pinhole(
+            image_from_camera=np.array(update.intrinsics).reshape(3, 3), resolution=update.size,
+            camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=FRUSTUM_LENGTH, color=palette.FRUSTUM,
+        )  # fmt: skip
+        pose = rr.Transform3D(translation=update.translation, quaternion=update.rotation)
+        self._log(update.entity, update.time, pose)
+        self._log(f"{update.entity}/lens", update.time, lens)
 
     def _log(self, entity: str, time: int, *components: rr.AsComponents) -> None:
         self._stream.set_time(TIMELINE, timestamp=np.datetime64(time, "ns"))
