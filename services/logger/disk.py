@@ -23,6 +23,9 @@ class LoggerParameters(msgspec.Struct, frozen=True, kw_only=True):
     log_dir: Annotated[str, Meta(description="folder of the recordings; empty: <paths.out>/recordings")] = ""
     max_file_mb: Annotated[float, Meta(description="[MB] a larger file is followed by a new one", gt=0)] = 256.0
     max_age_minutes: Annotated[float, Meta(description="[min] an older file is followed by a new one", gt=0)] = 60.0
+    image_rate: Annotated[
+        float, Meta(description="images of each camera that are recorded [Hz]; 0: none", ge=0, le=60)
+    ] = 2.0
     keep_files: Annotated[int, Meta(description="how many recordings are kept; 0: all", ge=0)] = 48
 
 

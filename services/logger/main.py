@@ -7,9 +7,11 @@ from pathlib import Path
 from schemas.deployment import Deployment
 from schemas.message import Message
 from schemas.topics import Topic
+from services.arm.cell.cell_file import deployed_cell
 from services.logger.channels import recorded_topics
 from services.logger.core import Batch, Logger
 from services.logger.disk import LoggerParameters, RecordingWriter
+from services.logger.images import record_cameras
 from services.logger.origin import origin
 from services.runtime.application import service
 from services.runtime.deployment import project_root
@@ -26,6 +28,12 @@ def run(node: Node, deployment: Deployment) -> None:
     disk = RecordingWriter(node.robot, origin(node.robot, project_root()), node.log.warning)
     for topic in recorded_topics():
         _subscribe(node, logger, topic)
+    record_cameras(
+        node,
+        deployed_cell(deployment).camera_names,
+        lambda: parameters.value.image_rate,
+        lambda topic, message: logger.on_message(topic, message, node.now()),
+    )
     said = ""
 
     def write(now: int, batch: Batch) -> None:

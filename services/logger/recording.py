@@ -18,6 +18,8 @@ import msgspec
 from mcap.writer import CompressionType, Writer
 
 from schemas.frames import RobotDescription
+from schemas.message import Message
+from schemas.topics import Topic
 from services.logger.channels import MESSAGE_ENCODING, SCHEMA_ENCODING, channel_of, recorded_topics
 from services.logger.command_log import CommandRow, Row, header
 from services.logger.core import Entry
@@ -42,7 +44,9 @@ class Recording:
         self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
         self._writer.start(profile="gemelo")
         self._writer.add_metadata("gemelo", metadata)
-        self._channels = self._register()
+        self._channels: dict[str, int] = {}
+        for topic in recorded_topics():
+            self._register(topic)
 
     @property
     def size(self) -> int:
@@ -52,7 +56,7 @@ class Recording:
     def write(self, entries: Iterable[Entry]) -> None:
         """Add messages, and make them survive this process."""
         for entry in entries:
-            channel = self._channels[entry.topic.key]
+            channel = self._channels.get(entry.topic.key) or self._register(entry.topic)
             sequence = self._sequences[channel] = self._sequences.get(channel, -1) + 1
             self._writer.add_message(channel, entry.arrival, _encode(entry.message), entry.stamp, sequence)
         self._writer.flush()
@@ -95,15 +99,13 @@ class Recording:
         table.write(_csv([header(joints)]))
         return table
 
-    def _register(self) -> dict[str, int]:
-        channels = {}
-        for topic in recorded_topics():
-            channel = channel_of(topic)
-            schema = self._writer.register_schema(channel.schema_name, SCHEMA_ENCODING, channel.schema)
-            channels[channel.key] = self._writer.register_channel(
-                channel.key, MESSAGE_ENCODING, schema, channel.metadata
-            )
-        return channels
+    def _register(self, topic: Topic[Message]) -> int:
+        """The channel of a topic; those that are not in the table get one with their first message."""
+        channel = channel_of(topic)
+        schema = self._writer.register_schema(channel.schema_name, SCHEMA_ENCODING, channel.schema)
+        number: int = self._writer.register_channel(channel.key, MESSAGE_ENCODING, schema, channel.metadata)
+        self._channels[channel.key] = number
+        return number
 
 
 def _csv(rows: Iterable[Row]) -> str:

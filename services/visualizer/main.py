@@ -26,7 +26,7 @@ from schemas.topics import (
     camera_image,
     camera_info,
 )
-from services.arm.cell.cell_file import load_cell
+from services.arm.cell.cell_file import deployed_cell
 from services.arm.model.description import load_arm
 from services.arm.model.gripper import jaw_objects, jaws_apart
 from services.runtime.application import service
@@ -45,7 +45,7 @@ BATCH_RATE = 10.0  # [Hz]
 def run(node: Node, deployment: Deployment) -> None:
     """Wait for the description, then show everything in batches."""
     root = project_root()
-    cameras = _cameras(deployment)
+    cameras = deployed_cell(deployment).camera_names
     parameters = node.parameters(VisualizerParameters).value
     outputs = Outputs(deployment.viewer, root / deployment.robot, root, parameters, cameras)
     visualizer: Visualizer | None = None
@@ -72,14 +72,6 @@ def run(node: Node, deployment: Deployment) -> None:
     node.subscribe(DESCRIPTION, on_description)
     node.spin(step, rate=BATCH_RATE)
     outputs.close()
-
-
-def _cameras(deployment: Deployment) -> tuple[str, ...]:
-    """The cameras of the cell file, by name; raises `DescriptionError` where it is wrong."""
-    if not deployment.cell:
-        return ()
-    cell = load_cell(Path(deployment.cell), load_arm(project_root() / deployment.robot))
-    return tuple(camera.name for camera in cell.cameras)
 
 
 def _watch(node: Node, core: Visualizer, cameras: tuple[str, ...]) -> None:

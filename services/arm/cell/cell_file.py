@@ -24,9 +24,10 @@ from schemas.cell import (
     TagThing,
     Thing,
 )
+from schemas.deployment import Deployment
 from services.arm.cell.camera_file import CAMERA_FILE, load_measured
 from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.description import Arm
+from services.arm.model.description import Arm, load_arm
 from services.arm.model.robot_file import Keys, line_of, read_robot_data, read_text, where_of
 
 TAG_COUNTS = {
@@ -72,6 +73,10 @@ class Cell:
         return self._named(name, "place", self.places)
 
     @property
+    def camera_names(self) -> tuple[str, ...]:
+        return tuple(camera.name for camera in self.cameras)
+
+    @property
     def all_tags(self) -> tuple[Tagged, ...]:
         """Every record that has a tag."""
         things = [each for each in self.things if isinstance(each, TagThing)]
@@ -87,6 +92,13 @@ class Cell:
                 return each
         names = [each.name for each in among]
         raise DescriptionError(f'{self.path}: there is no [[{what}]] "{name}"{suggestion(name, names)}')
+
+
+def deployed_cell(deployment: Deployment) -> Cell:
+    """The cell of a deployment, an empty one where it names none; raises `DescriptionError`."""
+    if not deployment.cell:
+        return Cell(Path())
+    return load_cell(Path(deployment.cell), load_arm(Path(deployment.robot)))
 
 
 def load_cell(path: Path, arm: Arm) -> Cell:
