@@ -6,6 +6,7 @@ from services.cli.parser import Command
 
 GROUPS = {
     "broker": "the MQTT broker between gateway and board",
+    "camera": "the cameras of the cell file, and those that are plugged in",
     "device": "the controller board: how it is, what it is told, and its drivers",
     "link": "the wire to the controller board",
     "deploy": "several hosts: their files, services and certificates",
@@ -67,6 +68,10 @@ COMMANDS = (
     Command(("device", "update"), "a new firmware for a board, signed, over MQTT or its serial line",
             "device_update:run", "device_update:add_options",
             "gemelo device update firmware/.pio/build/esp32/firmware.bin"),
+    Command(("camera", "list"), "the cameras that are plugged in, and those of the cell file: source, rate, condition",
+            "camera:run_list", "camera:list_options", "gemelo camera list --json"),
+    Command(("camera", "view"), "what a camera sees now, on the terminal or as a file, with what was found in it",
+            "camera:run_view", "camera:view_options", "gemelo camera view overhead --save table.jpg", "camera:choices"),
     Command(("link", "bench"), "round trips over the wire to the device: median, p99, jitter, lost; nothing moves",
             "link_bench:run", "link_bench:add_options", "gemelo link bench --rate 25 --count 1000"),
     Command(("link", "ra"), "be the sketch: a publisher's ra/juntas moves this arm, within its limits, until Ctrl-C",
