@@ -8,9 +8,8 @@ from pathlib import Path
 
 import cv2
 import pytest
-from mcap.stream_reader import StreamReader
-
 from mcap.exceptions import McapError
+from mcap.stream_reader import StreamReader
 
 from services.stack.stack import Stack
 from tests.stack.gemelo import gemelo

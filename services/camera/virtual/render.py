@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -21,6 +22,7 @@ from services.camera.virtual.solids import Colour, Face, Solid
 
 Image = NDArray[np.uint8]
 
+EDGE_ON = 1e-12  # [m] from the camera to the plane of a face
 NEAR = 0.005  # [m] nothing nearer than this is seen
 GREYS = 256  # the first colours of the palette, for textures
 LIGHT = np.array([0.3, 0.2, 0.93])  # the direction to the lamp, in the base
@@ -65,8 +67,7 @@ def render(
     camera_from_base = inverse(base_from_camera)
     for solid in solids:
         _draw(target, solid, camera_from_base)
-    image = np.array(target.palette, np.uint8)[target.index]
-    return expose(cv2.resize(image, (camera.width, camera.height), interpolation=cv2.INTER_AREA), optics, seed)
+    return expose(_averaged(target, camera), optics, seed)
 
 
 def expose(image: Image, optics: Optics, seed: int = 0) -> Image:
@@ -83,17 +84,34 @@ def expose(image: Image, optics: Optics, seed: int = 0) -> Image:
     return image
 
 
+def _averaged(target: _Target, camera: CameraInfo) -> Image:
+    """(h, w, 3) the mean of the samples of each pixel. Four bytes a sample: numpy looks up words faster than rows."""
+    colours = np.zeros((len(target.palette), 4), np.uint8)
+    colours[:, :3] = target.palette
+    samples = colours.view(np.uint32)[:, 0].take(target.index).view(np.uint8).reshape(*target.index.shape, 4)
+    averaged: Image = cv2.resize(samples, (camera.width, camera.height), interpolation=cv2.INTER_AREA)[..., :3]
+    return np.ascontiguousarray(averaged)
+
+
 def _draw(target: _Target, solid: Solid, camera_from_base: Rigid) -> None:
     turn, shift = _matrix(compose(camera_from_base, solid.pose))
-    base_turn, _ = _matrix(solid.pose)
-    for face in solid.faces:
-        corners = face.corners @ turn.T + shift
-        normal = _normal(corners)
-        offset = float(normal @ corners[0])
-        if offset >= -1e-12:  # it looks away from the camera, or is seen edge on
-            continue
-        light = float(base_turn @ _normal(face.corners) @ LIGHT)
-        _fill(target, face, corners, normal / offset, AMBIENT + (1.0 - AMBIENT) * max(0.0, light))
+    first, normals = _planes(solid.faces)
+    turned = normals @ turn.T
+    offsets = np.einsum("ij,ij->i", turned, first @ turn.T + shift)
+    lights = normals @ (_matrix(solid.pose)[0].T @ LIGHT)
+    for number in np.flatnonzero(offsets < -EDGE_ON):  # the others look away from the camera, or are seen edge on
+        face = solid.faces[number]
+        plane = turned[number] / offsets[number]
+        _fill(target, face, face.corners @ turn.T + shift, plane, AMBIENT + (1.0 - AMBIENT) * max(0.0, lights[number]))
+
+
+@lru_cache(maxsize=1024)
+def _planes(faces: tuple[Face, ...]) -> tuple[Array, Array]:
+    """A corner of each face and its outward unit normal, both (f, 3), in the solid's frame."""
+    corners = np.array([face.corners[:3] for face in faces])
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return corners[:, 0], normals / np.where(lengths > 0.0, lengths, 1.0)
 
 
 def _fill(target: _Target, face: Face, corners: Array, plane: Array, light: float) -> None:
@@ -104,10 +122,11 @@ def _fill(target: _Target, face: Face, corners: Array, plane: Array, light: floa
         return
     nearness = _linear(plane, x, y)
     held = target.nearness[rows, columns]
-    seen = (nearness > held) & (nearness < 1.0 / NEAR)
-    for edge in -np.cross(corners, np.roll(corners, -1, axis=0)):
-        if not _is_inside_everywhere(edge, target.lens, rows, columns):
-            seen &= _linear(edge, x, y) >= 0.0
+    seen = nearness > held
+    if corners[:, 2].min() < NEAR:
+        seen &= nearness < 1.0 / NEAR
+    for edge in _edges_within(corners, target.lens, rows, columns):
+        seen &= _linear(edge, x, y) >= 0.0
     np.copyto(held, nearness, where=seen)
     if face.texture is not None:
         target.index[rows, columns][seen] = _texels(face.texture, corners, x[seen], y[seen], nearness[seen])
@@ -117,21 +136,27 @@ def _fill(target: _Target, face: Face, corners: Array, plane: Array, light: floa
     target.palette.append((int(red * light), int(green * light), int(blue * light)))
 
 
+def _edges_within(corners: Array, lens: Lens, rows: slice, columns: slice) -> Array:
+    """(n, 3) for each edge that passes through the window: e @ (x, y, 1) >= 0 on its inner side.
+
+    An edge with all of the window on its inner side need not be looked at: a linear function is least at a corner.
+    """
+    after = np.concatenate((corners[1:], corners[:1]))
+    edges = np.empty_like(corners)  # after x corners
+    for axis, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        edges[:, axis] = after[:, i] * corners[:, j] - after[:, j] * corners[:, i]
+    x, y = lens.x_range[:, columns], lens.y_range[:, rows]
+    least = np.minimum(edges[:, 0] * x[0].min(), edges[:, 0] * x[1].max()) + edges[:, 2]
+    least += np.minimum(edges[:, 1] * y[0].min(), edges[:, 1] * y[1].max())
+    within: Array = edges[least < 0.0]
+    return within
+
+
 def _window(lens: Lens, corners: Array) -> tuple[slice, slice]:
     if corners[:, 2].min() < NEAR:
         return slice(0, lens.x.shape[0]), slice(0, lens.x.shape[1])
     flat = corners[:, :2] / corners[:, 2:]
     return lens.window(flat.min(axis=0), flat.max(axis=0))
-
-
-def _is_inside_everywhere(edge: Array, lens: Lens, rows: slice, columns: slice) -> bool:
-    """True if every ray of the window is on the inner side: a linear function is least at a corner."""
-    x, y = lens.x_range[:, columns], lens.y_range[:, rows]
-    return bool(
-        min(edge[0] * x[0].min(), edge[0] * x[1].max())
-        + min(edge[1] * y[0].min(), edge[1] * y[1].max())
-        + edge[2] >= 0.0
-    )  # fmt: skip
 
 
 def _linear(factors: Array, x: Samples, y: Samples) -> Samples:
@@ -155,12 +180,6 @@ def _texels(texture: NDArray[np.uint8], corners: Array, x: Samples, y: Samples, 
         np.clip((column * columns).astype(np.intp), 0, columns - 1),
     ]
     return texels
-
-
-def _normal(corners: Array) -> Array:
-    first, second, third = corners[0], corners[1], corners[2]
-    normal: Array = np.cross(second - first, third - first)
-    return normal / (float(np.linalg.norm(normal)) or 1.0)
 
 
 def _matrix(pose: Rigid) -> tuple[Array, Array]:
