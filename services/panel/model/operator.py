@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import gemelo
+from services.arm.cell.cell_file import deployed_cell
+from services.panel.model.cameras import CameraPictures
 from services.panel.model.goal import GoalSolver
 from services.panel.model.jogging import Jogging
 from services.panel.model.live import LiveSliders
@@ -33,6 +35,7 @@ class Operator:
 
     def __init__(self, arm: gemelo.Arm) -> None:
         self.arm, self.bus = arm, Bus(arm)
+        self.cameras = CameraPictures(arm, deployed_cell(arm.deployment).camera_names)
         self.choice = MotionChoice()
         self.homing: dict[str, str] = {}  # by joint what it does, while the arm homes
         self._told: ToldProblem | None = None

@@ -15,7 +15,7 @@ from services.panel.model.availability import reasons
 from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
 from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, read_browser, script_html
-from services.panel.view.kit import Kit, Mirror, box, esc, set_if_new, without_event
+from services.panel.view.kit import Kit, Mirror, box, esc, picture, set_if_new, without_event
 from services.panel.view.tabs.device import DeviceTab
 from services.panel.view.tabs.jog import JogTab
 from services.panel.view.tabs.move import MoveTab
@@ -73,12 +73,20 @@ class Page:
         self._jog.refresh(readings)
         self._device.refresh(readings)
         self._scene.refresh(readings)
+        self._show_cameras()
         self._teach.refresh(readings)
         self._programs.refresh(readings)
         pose = self._world.tool_pose
         self._state.refresh(readings, self.browser, self.lag, (*pose.position, *pose.orientation))
         if readings.state is not None:
             self._shown_speed.show(round(100.0 * readings.state.speed))
+
+    def _show_cameras(self) -> None:
+        """The newest image of each camera, below the scene."""
+        for name, line in self._cameras.items():
+            address = self._operator.cameras.address(name)
+            if address:
+                set_if_new(line, "content", picture(address, name))
 
     def close(self) -> None:
         """Takes away what it has put into the scene."""
@@ -120,6 +128,7 @@ class Page:
             self._programs = ProgramsTab(kit)
         with tabs.add_tab(words("tab_scene")):
             self._scene = SceneTab(kit, self._world)
+            self._cameras = {name: kit.line() for name in self._operator.cameras.names}
         with tabs.add_tab(words("tab_state")):
             self._state = StateTab(kit)
             self._settings(look)
