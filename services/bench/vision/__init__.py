@@ -1,0 +1,1 @@
+"""What the eyes are measured on: images with exact ground truth, and the figures."""
