@@ -96,7 +96,7 @@ def _profiles(image: Array, points: Array, normals: Array, reach: Array) -> tupl
 
 
 def _divisor(contrast: Array) -> Array:
-    return np.where(np.abs(contrast) < 1.0, np.inf, contrast)
+    return np.asarray(np.where(np.abs(contrast) < 1.0, np.inf, contrast), dtype=np.float64)
 
 
 def _fit_steps(means: Array, along: Array) -> Array:
@@ -126,7 +126,7 @@ def ndtr(x: Array) -> Array:
     t = 1.0 / (1.0 + 0.2316419 * np.abs(x))
     series = t * (0.319381530 + t * (-0.356563782 + t * (1.781477937 + t * (-1.821255978 + t * 1.330274429))))
     tail = series * np.exp(-x * x / 2.0) / ROOT_TAU
-    return np.where(x >= 0.0, 1.0 - tail, tail)
+    return np.asarray(np.where(x >= 0.0, 1.0 - tail, tail), dtype=np.float64)
 
 
 def fit_lines(points: Array) -> Lines:

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from schemas.cell import TagFamily
 from services.vision.camera_model import CameraModel
 from services.vision.edges import LEAST_NOISE, Index, Lines, Steps, find_steps, fit_lines, measure_steps
 
@@ -21,15 +22,14 @@ Array = NDArray[np.float64]
 GreyImage = NDArray[np.uint8]
 Measure = Callable[[Array, Array, Array, Array], Steps]
 
-FAMILIES = {  # name: OpenCV's dictionary, modules from edge to edge
-    "36h11": (cv2.aruco.DICT_APRILTAG_36h11, 8),
-    "25h9": (cv2.aruco.DICT_APRILTAG_25h9, 7),
-    "16h5": (cv2.aruco.DICT_APRILTAG_16h5, 6),
-    "4x4": (cv2.aruco.DICT_4X4_50, 6),
-    "5x5": (cv2.aruco.DICT_5X5_100, 7),
-    "6x6": (cv2.aruco.DICT_6X6_250, 8),
+FAMILIES = {  # OpenCV's dictionary, modules from edge to edge
+    TagFamily.APRILTAG_36H11: (cv2.aruco.DICT_APRILTAG_36h11, 8),
+    TagFamily.APRILTAG_25H9: (cv2.aruco.DICT_APRILTAG_25h9, 7),
+    TagFamily.ARUCO_4X4_50: (cv2.aruco.DICT_4X4_50, 6),
+    TagFamily.ARUCO_5X5_100: (cv2.aruco.DICT_5X5_100, 7),
+    TagFamily.ARUCO_6X6_250: (cv2.aruco.DICT_6X6_250, 8),
 }
-DEFAULT_FAMILY = "36h11"
+DEFAULT_FAMILY = TagFamily.APRILTAG_36H11
 LEAST_CONTRAST = 12.0  # grey levels between a tag's border and the paper around it
 ROUNDS = (find_steps, measure_steps, measure_steps)
 LONGEST_REACH, SHORTEST_REACH = 3.0, 1.2  # [px] to either side of an edge
@@ -56,14 +56,16 @@ class Tag:
 
 
 @cache
-def finder(family: str) -> cv2.aruco.ArucoDetector:
-    """OpenCV's detector of a family, without any refinement; KeyError for an unknown one."""
+def finder(family: TagFamily) -> cv2.aruco.ArucoDetector:
+    """OpenCV's detector of a family, without any refinement."""
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
     return cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(FAMILIES[family][0]), parameters)
 
 
-def find_tags(image: GreyImage, model: CameraModel | None = None, family: str = DEFAULT_FAMILY) -> tuple[Tag, ...]:
+def find_tags(
+    image: GreyImage, model: CameraModel | None = None, family: TagFamily = DEFAULT_FAMILY
+) -> tuple[Tag, ...]:
     """All tags of `image` (h, w) by id, their corners refined; without a `model` the lens counts as ideal."""
     outlines, ids, _ = finder(family).detectMarkers(image)
     if not len(outlines):
@@ -140,7 +142,7 @@ def doubled(tags: Sequence[Tag]) -> tuple[int, ...]:
     return tuple(sorted({number for number in ids if ids.count(number) > 1}))
 
 
-def tag_modules(number: int, family: str = DEFAULT_FAMILY) -> NDArray[np.bool_]:
+def tag_modules(number: int, family: TagFamily = DEFAULT_FAMILY) -> NDArray[np.bool_]:
     """The modules (n, n) of a printed tag, rows from the top: True is white; the outer ring is black."""
     dictionary, count = FAMILIES[family]
     image = cv2.aruco.getPredefinedDictionary(dictionary).generateImageMarker(number, count)

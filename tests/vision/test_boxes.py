@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from services.bench.vision.images import Conditions, Surface, box_surfaces, looking_down, render
+from services.bench.vision.images import Conditions, Image, Surface, box_surfaces, looking_down, render
 from services.vision.boxes import colour_strength, coloured_regions, fit_box, region_centre
 from services.vision.rigid import Array, rigid
 from services.vision.tag_pose import flat
@@ -19,6 +19,12 @@ GREY = Conditions(background=np.array([150.0, 150.0, 150.0]))
 def standing(values: Array, height: float) -> Array:
     """plane_from_box (4, 4)."""
     return flat(values) @ rigid(np.zeros(3), np.array([0.0, 0.0, height / 2.0]))
+
+
+def picture(camera: Array, values: Array, size: tuple[float, ...]) -> Image:
+    """A red box on a grey table."""
+    faces = box_surfaces(camera @ standing(values, size[2]), size, RED)
+    return render(MODEL, faces, np.random.default_rng(1), GREY)
 
 
 def draws(count: int) -> list[tuple[Array, Array]]:
@@ -34,9 +40,7 @@ def test_a_cube_is_placed_within_half_a_millimetre_where_the_regions_middle_is_o
     size = (0.03, 0.03, 0.03)
     ours, naive, shares = [], [], []
     for camera, values in draws(16):
-        image = render(
-            MODEL, box_surfaces(camera @ standing(values, size[2]), size, RED), np.random.default_rng(1), GREY
-        )
+        image = picture(camera, values, size)
         strength = colour_strength(image, RED)
         (region,) = coloured_regions(strength)
         fit = fit_box(strength, region, MODEL, camera, size)
@@ -52,9 +56,7 @@ def test_a_cube_is_placed_within_half_a_millimetre_where_the_regions_middle_is_o
 def test_a_long_box_is_turned_as_it_lies() -> None:
     size = (0.06, 0.025, 0.02)
     for camera, values in draws(8):
-        image = render(
-            MODEL, box_surfaces(camera @ standing(values, size[2]), size, RED), np.random.default_rng(1), GREY
-        )
+        image = picture(camera, values, size)
         strength = colour_strength(image, RED)
         fit = fit_box(strength, coloured_regions(strength)[0], MODEL, camera, size)
         assert fit is not None
@@ -77,9 +79,7 @@ def test_a_finger_over_an_edge_does_not_move_the_box() -> None:
 
 def test_a_box_of_another_size_fits_badly_and_says_so() -> None:
     camera, values = looking_down(0.5, np.radians(55.0)), np.array([0.0, 0.0, 0.3])
-    image = render(
-        MODEL, box_surfaces(camera @ standing(values, 0.03), (0.03,) * 3, RED), np.random.default_rng(1), GREY
-    )
+    image = picture(camera, values, (0.03,) * 3)
     strength = colour_strength(image, RED)
     region = coloured_regions(strength)[0]
     right, wrong = (fit_box(strength, region, MODEL, camera, (edge,) * 3) for edge in (0.03, 0.034))
@@ -89,6 +89,6 @@ def test_a_box_of_another_size_fits_badly_and_says_so() -> None:
 
 
 def test_grey_is_no_colour() -> None:
-    with pytest.raises(ValueError, match="nearly grey.*put a tag on the thing"):
+    with pytest.raises(ValueError, match=r"nearly grey.*put a tag on the thing"):
         colour_strength(np.zeros((4, 4, 3), np.uint8), (120.0, 125.0, 118.0))
     assert cv2.countNonZero((colour_strength(np.full((4, 4, 3), 90, np.uint8), RED) > 0.01).astype(np.uint8)) == 0

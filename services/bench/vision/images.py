@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from schemas.cell import TagFamily
 from services.vision.camera_model import CameraModel
 from services.vision.rigid import Array, apply, rigid
 from services.vision.tags import DEFAULT_FAMILY, tag_modules
@@ -42,7 +43,7 @@ class Conditions:
 
 
 def tag_surface(
-    camera_from_tag: Array, size: float, number: int = 0, family: str = DEFAULT_FAMILY, margin: float = MARGIN
+    camera_from_tag: Array, size: float, number: int = 0, family: TagFamily = DEFAULT_FAMILY, margin: float = MARGIN
 ) -> Surface:
     """A tag whose black square has edges of `size` [m], on a white margin of `margin` modules."""
     modules = tag_modules(number, family)

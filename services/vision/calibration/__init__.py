@@ -1,0 +1,1 @@
+"""Measuring a camera: its lens, and where it stands; each refuses what its measurements cannot determine."""
