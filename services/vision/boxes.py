@@ -42,7 +42,7 @@ class BoxFit:
         return float(np.sqrt(self.covariance[0, 0] + self.covariance[1, 1]))
 
 
-def colour_strength(image: ColourImage, colour: Sequence[float]) -> Array:
+def colour_strength(image: ColourImage, colour: Sequence[float] | Array) -> Array:
     """How much of `colour` (red, green, blue; 0 to 255) each pixel of `image` (h, w, 3; red first) has: 1 is all of it.
 
     Grey has none. It is linear in the light, so a blurred edge stays where it is. ValueError for a grey `colour`.
