@@ -93,3 +93,13 @@ class GoalStatuses(Message, frozen=True, kw_only=True):
 
     stamp: int = 0  # [ns] UNIX time
     goals: tuple[GoalStatus, ...] = ()
+
+
+class GoalEnd(Message, frozen=True, kw_only=True):
+    """The end of a goal, with the action's own result message."""
+
+    stamp: int = 0  # [ns] UNIX time
+    goal_id: str = ""
+    client: str = ""
+    status: GoalStatusCode = GoalStatusCode.UNKNOWN
+    result: msgspec.Raw = NIL

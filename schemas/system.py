@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+import msgspec
+
+from schemas.actions import NIL
 from schemas.message import Message
 
 
@@ -112,8 +115,37 @@ class Parameters(Message, frozen=True, kw_only=True):
     parameters: tuple[Parameter, ...] = ()
 
 
+class ParameterChange(Message, frozen=True, kw_only=True):
+    """A parameter of a running node that was set, with its new value."""
+
+    stamp: int = 0  # [ns] UNIX time
+    node: str = ""
+    parameter: Parameter = Parameter()
+
+
 class SetParameter(Message, frozen=True, kw_only=True):
     """A new value for a parameter; a wrong name, type or range is refused."""
 
     name: str = ""
     value: ParameterValue = False
+
+
+class Exchange(Message, frozen=True, kw_only=True):
+    """A question and its answer, as the node that has answered publishes them."""
+
+    stamp: int = 0  # [ns] UNIX time of the answer
+    duration: float = 0.0  # [s] from the arrival of the question to its answer
+    clients: tuple[str, ...] = ()  # the sessions that asked: several where equal urgent questions were answered at once
+    question: msgspec.Raw = NIL  # the request's own message
+    answer: msgspec.Raw = NIL  # the response's own message; nil where there is a failure
+    failure: Failure | None = None
+
+
+class NodeRecord(Message, frozen=True, kw_only=True):
+    """A node as a recording keeps it: who it is, what it speaks, and its parameters."""
+
+    stamp: int = 0  # [ns] UNIX time
+    node: str = ""
+    info: NodeInfo = NodeInfo()
+    topics: tuple[TopicInterface, ...] = ()
+    parameters: tuple[Parameter, ...] = ()

@@ -57,7 +57,7 @@ from schemas.planning import (
     ValidityResponse,
 )
 from schemas.scene import Contacts, PlanningScene, SceneRequest, SceneResponse
-from schemas.system import LogRecord, NodeStatistics
+from schemas.system import LogRecord, NodeStatistics, ParameterChange
 
 M_co = TypeVar("M_co", bound=Message, covariant=True)
 Q_co = TypeVar("Q_co", bound=Message, covariant=True)
@@ -97,6 +97,7 @@ class Request(Generic[Q_co, R_co]):
     server: str
     about: str
     urgent: bool = False  # sent, read and handled before all that waits; equal ones that wait are handled once
+    recorded: bool = True  # its server publishes each question with its answer
 
 
 @dataclass(frozen=True)
@@ -160,13 +161,16 @@ LOG = Topic("log", LogRecord, EVERY, None, True, ANY, "the log of every node")
 STATISTICS = Topic(
     "statistics", NodeStatistics, EVERY, None, True, ANY, "loop rate, losses and CPU of every node, 1 Hz"
 )
+PARAMETER_CHANGES = Topic(
+    "parameters", ParameterChange, EVERY, None, True, ANY, "every parameter of a running node that is set"
+)
 
 TOPICS: tuple[Topic[Message], ...] = (
     DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, JOINT_TARGETS, FRAMES, STATIC_FRAMES, PLANNED_PATH,
     PLAN_PROGRESS,
     SCENE, CONTACTS, JOG, JOG_STATUS, DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, DEVICE_CONFIGURATION,
     SENSORS, DEVICE_SHAFT, GRIPPER_STATE,
-    COMMANDS, COMMAND_ACKS, LOG, STATISTICS,
+    COMMANDS, COMMAND_ACKS, LOG, STATISTICS, PARAMETER_CHANGES,
 )  # fmt: skip
 
 # One of each for every camera of the cell file, by the camera's name.

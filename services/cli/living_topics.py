@@ -5,30 +5,21 @@ from __future__ import annotations
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from typing import Any
 
-import msgspec
-
 from schemas.errors import ConfigurationError
-from schemas.message import Message
-from schemas.system import Empty, Interfaces, NodeStatistics, TopicInterface, TopicStatistics
-from schemas.topics import STATISTICS, TOPICS, Delivery, Request, Topic
+from schemas.system import Empty, NodeStatistics, TopicInterface, TopicStatistics
+from schemas.topics import STATISTICS, TOPICS, Topic
 from services.cli.errors import unknown
 from services.cli.node import TIMEOUT, information_of, living
 from services.cli.session import Session, connect
+from services.recordings.table import living_topic
 from services.runtime.deployment import load_deployment
+from services.runtime.endpoints import interfaces_request
 from services.runtime.errors import NoAnswer, Refused
 
 COUNTED_WITHIN = 1.3  # [s] every node tells its counters once a second
 KNOWN = {topic.key: topic for topic in TOPICS}
-
-
-@dataclass(frozen=True)
-class LivingTopic(Topic[Any]):
-    """A topic of which only its node has the message's class."""
-
-    fields: dict[str, str] = field(default_factory=dict)  # their types by their names, as the class has them
 
 
 def known_topic(name: str) -> Topic[Any] | None:
@@ -102,21 +93,12 @@ def other_topics(session: Session) -> list[Topic[Any]]:
     for name in living(session):
         for each in _interfaces(session, name):
             if each.key not in KNOWN and not each.key.startswith("@"):
-                found.setdefault(each.key, _topic(each))
+                found.setdefault(each.key, living_topic(each))
     return [found[key] for key in sorted(found)]
 
 
 def _interfaces(session: Session, name: str) -> tuple[TopicInterface, ...]:
-    request = Request(f"@node/{name}/interfaces", Empty, Interfaces, name, "")
     try:
-        return session.node.call(request, Empty(), timeout=TIMEOUT).topics
+        return session.node.call(interfaces_request(name), Empty(), timeout=TIMEOUT).topics
     except (NoAnswer, Refused):  # it has just ended, or is older
         return ()
-
-
-def _topic(told: TopicInterface) -> Topic[Any]:
-    """With a message whose fields take whatever comes."""
-    fields = [(name, Any, None) for name, _ in told.fields]
-    kind = msgspec.defstruct(told.message, fields, bases=(Message,), frozen=True, kw_only=True)
-    delivery = Delivery(told.delivery) if told.delivery in {each.value for each in Delivery} else Delivery.EVERY
-    return LivingTopic(told.key, kind, delivery, told.rate, told.recorded, told.writer, told.about, dict(told.fields))

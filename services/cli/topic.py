@@ -13,11 +13,12 @@ from schemas.message import Message
 from schemas.topics import TOPICS, Topic
 from services.cli.errors import CommandError, ExitCode, unknown
 from services.cli.field_path import FieldPath, leaves
-from services.cli.living_topics import LivingTopic, all_topics, connected, ends, known_topic
+from services.cli.living_topics import all_topics, connected, ends, known_topic
 from services.cli.messages import dump, fields_of, message_of
 from services.cli.parser import Choices, Options, Parser, positive_integer, positive_number
 from services.cli.session import Session, connect
 from services.cli.text_table import table
+from services.recordings.table import LivingTopic
 
 if TYPE_CHECKING:
     from gemelo import Robot

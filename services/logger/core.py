@@ -4,30 +4,15 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from dataclasses import dataclass, field
+from typing import Any
 
 from schemas.device import CommandAck, CommandChunk
-from schemas.frames import RobotDescription
 from schemas.message import Message
 from schemas.topics import Delivery, Topic
 from services.logger.command_log import CommandLog, CommandRow
+from services.recordings.channels import Entry
 
 MAX_WAITING = 10_000  # messages held while the disk refuses: about half a minute of full motion
-LAST_STAMP = 2**63 - 1  # [ns] readers take times as signed 64 bits
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One message to be written; `arrival` in ns UNIX."""
-
-    topic: Topic[Message]
-    message: Message
-    arrival: int
-
-    @property
-    def stamp(self) -> int:
-        """The message's own time in [ns] UNIX; its arrival where it has none that makes sense."""
-        stamp = getattr(self.message, "stamp", 0)
-        return stamp if 0 < stamp <= LAST_STAMP else self.arrival
 
 
 @dataclass(frozen=True)
@@ -65,26 +50,23 @@ class Logger:
 
     def __init__(self, max_waiting: int = MAX_WAITING) -> None:
         self.commands = CommandLog()
-        self.description: RobotDescription | None = None
         self._waiting: deque[Entry] = deque()
         self._lines: deque[CommandRow] = deque()
         self._max_waiting = max_waiting
-        self._latched: dict[str, Entry] = {}
+        self._latched: dict[tuple[str, str], Entry] = {}  # by key, and by node where each says one of its own
         self._dropped: Counter[str] = Counter()
 
-    def on_message(self, topic: Topic[Message], message: Message, now: int) -> None:
+    def on_message(self, topic: Topic[Any], message: Message, now: int) -> None:
         """Take one message that arrived at `now` [ns] UNIX."""
         entry = Entry(topic, message, now)
         self._keep(entry)
         if topic.delivery is Delivery.LATCHED:
-            self._latched[topic.key] = entry
+            self._latched[topic.key, getattr(message, "node", "")] = entry
         match message:
             case CommandChunk():
                 self.commands.on_chunk(message, now)
             case CommandAck():
                 self.commands.on_ack(message)
-            case RobotDescription():
-                self.description = message
 
     def step(self, now: int) -> Batch:
         """Everything that waits; what could not be written comes back by `give_back`."""

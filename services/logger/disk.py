@@ -37,7 +37,7 @@ class RecordingWriter:
     """Writes the logger's batches; an error of the disk is reported and retried, never raised."""
 
     robot: str
-    metadata: dict[str, str]
+    metadata: dict[str, dict[str, str]]  # by the name of its record
     warn: Callable[[str], None]  # a warning for a person
     recording: Recording | None = field(default=None, init=False)
     problem: str = field(default="", init=False)  # why nothing can be written at present
@@ -51,7 +51,7 @@ class RecordingWriter:
             return
         try:
             recording = self._open_recording(logger, batch, folder, parameters, now)
-            self._write(recording, logger, batch)
+            self._write(recording, batch)
         except OSError as error:
             logger.give_back(batch)
             self._give_up(error, folder, now)
@@ -86,9 +86,7 @@ class RecordingWriter:
         return moved or is_due(recording.size, age, parameters.max_file_mb, parameters.max_age_minutes)
 
     @staticmethod
-    def _write(recording: Recording, logger: Logger, batch: Batch) -> None:
-        if logger.description is not None:
-            recording.describe(logger.description)
+    def _write(recording: Recording, batch: Batch) -> None:
         if batch.entries:
             recording.write(batch.entries)
         if batch.lines:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from schemas.deployment import Deployment
 from schemas.message import Message
 from schemas.topics import Topic
 from services.arm.cell.cell_file import deployed_cell
-from services.logger.channels import recorded_topics
 from services.logger.core import Batch, Logger
 from services.logger.disk import LoggerParameters, RecordingWriter
 from services.logger.images import record_cameras
-from services.logger.origin import origin
+from services.recordings.origin import metadata_of
+from services.recordings.subscriptions import Subscriptions
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
@@ -25,15 +26,13 @@ def run(node: Node, deployment: Deployment) -> None:
     """Collect between writes; the disk's problem shows in the readiness and in the log."""
     parameters = node.parameters(LoggerParameters)
     logger = Logger()
-    disk = RecordingWriter(node.robot, origin(node.robot, project_root()), node.log.warning)
-    for topic in recorded_topics():
-        _subscribe(node, logger, topic)
-    record_cameras(
-        node,
-        deployed_cell(deployment).camera_names,
-        lambda: parameters.value.image_rate,
-        lambda topic, message: logger.on_message(topic, message, node.now()),
-    )
+    disk = RecordingWriter(node.robot, metadata_of(node.robot, deployment, project_root()), node.log.warning)
+
+    def on_message(topic: Topic[Any], message: Message) -> None:
+        logger.on_message(topic, message, node.now())
+
+    Subscriptions(node, on_message)
+    record_cameras(node, deployed_cell(deployment).camera_names, lambda: parameters.value.image_rate, on_message)
     said = ""
 
     def write(now: int, batch: Batch) -> None:
@@ -55,10 +54,6 @@ def run(node: Node, deployment: Deployment) -> None:
     now = node.now()
     write(now, logger.finish(now))
     disk.close()
-
-
-def _subscribe(node: Node, logger: Logger, topic: Topic[Message]) -> None:
-    node.subscribe(topic, lambda message: logger.on_message(topic, message, node.now()), own=True)
 
 
 def _folder(deployment: Deployment, parameters: LoggerParameters) -> Path:

@@ -10,13 +10,22 @@ from typing import Any
 
 import msgspec
 
-from schemas.system import Interfaces, NodeInfo, NodeStatistics, TopicInterface, TopicStatistics
-from schemas.topics import Topic
+from schemas.system import Empty, Interfaces, NodeInfo, NodeStatistics, TopicInterface, TopicStatistics
+from schemas.topics import Request, Topic
 from services.runtime.actions.server import ActionServer
 from services.runtime.bus.identity import Identity
 from services.runtime.loop.loop import LoopFigures
 from services.runtime.requests.server import RequestServer
 from services.runtime.topics import Publisher, Subscription
+
+
+def info_request(node: str) -> Request[Empty, NodeInfo]:
+    return Request(f"@node/{node}/info", Empty, NodeInfo, node, "who this node is", recorded=False)
+
+
+def interfaces_request(node: str) -> Request[Empty, Interfaces]:
+    about = "the messages of its topics"
+    return Request(f"@node/{node}/interfaces", Empty, Interfaces, node, about, recorded=False)
 
 
 @dataclass
@@ -39,7 +48,7 @@ class NodeEndpoints:
             pid=os.getpid(),
             version=version("gemelo"),
             started=identity.started,
-            publishes=tuple(sorted(self.publishers)),
+            publishes=tuple(sorted(key for key in self.publishers if not key.startswith("@"))),
             subscribes=tuple(sorted({each.topic.key for each in self.subscriptions})),
             serves=tuple(sorted(each.request.key for each in self.servers if not each.request.key.startswith("@"))),
             actions=tuple(each.action.key for each in self.actions),

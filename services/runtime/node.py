@@ -14,8 +14,15 @@ import msgspec
 
 from schemas.deployment import Deployment
 from schemas.message import Message
-from schemas.system import Empty, Interfaces, NodeInfo, Parameter, ParameterValue, SetParameter, TopicStatistics
-from schemas.topics import LOG, STATISTICS, Action, Request, Topic
+from schemas.system import (
+    NodeInfo,
+    Parameter,
+    ParameterChange,
+    ParameterValue,
+    SetParameter,
+    TopicStatistics,
+)
+from schemas.topics import LOG, PARAMETER_CHANGES, STATISTICS, Action, Request, Topic
 from services.runtime.actions.client import ActionClient
 from services.runtime.actions.server import ActionServer, OnCancel, OnGoal
 from services.runtime.bus import identity
@@ -23,7 +30,7 @@ from services.runtime.bus.connection import connect
 from services.runtime.bus.interface import Bus, Declaration
 from services.runtime.client_watch import ClientWatch
 from services.runtime.deployment import load_deployment, project_root, robot_name
-from services.runtime.endpoints import LoopStatistics, NodeEndpoints
+from services.runtime.endpoints import LoopStatistics, NodeEndpoints, info_request, interfaces_request
 from services.runtime.loop.loop import Loop
 from services.runtime.loop.task_queue import Worker
 from services.runtime.parameters import ParameterRegistry, ParameterSet
@@ -31,6 +38,7 @@ from services.runtime.process.logs import BusHandler, line_logger
 from services.runtime.process.readiness import Readiness
 from services.runtime.process.shutdown import ShutdownRequest, stop_on_signals
 from services.runtime.requests import client as requests
+from services.runtime.requests.exchanges import exchange_topic
 from services.runtime.requests.limits import RequestRates
 from services.runtime.requests.server import Pending, RequestServer, UrgentServer
 from services.runtime.topics import Latest, Publisher, Subscription
@@ -173,7 +181,7 @@ class Node:
 
     def set_parameter(self, name: str, value: ParameterValue) -> Parameter:
         """As the request that sets it; raises `Refused`."""
-        return self._parameters.set(SetParameter(name=name, value=value))
+        return self._set_parameter(SetParameter(name=name, value=value))
 
     def info(self) -> NodeInfo:
         """The node's identity and endpoints."""
@@ -272,11 +280,12 @@ class Node:
     ) -> RequestServer[Q, R]:
         server: RequestServer[Q, R]
         warn, rates = self.log.warning, self._rates
+        tell = self.publisher(exchange_topic(request)).put if request.recorded else None
         if request.urgent:
-            server = UrgentServer(self._bus, self._loop.tasks.put_first, request, handler, warn, rates)
+            server = UrgentServer(self._bus, self._loop.tasks.put_first, request, handler, warn, rates, tell)
         else:
             put = self._worker.put if worker else self._loop.tasks.put
-            server = RequestServer(self._bus, put, request, handler, warn, rates)
+            server = RequestServer(self._bus, put, request, handler, warn, rates, tell)
         self._endpoints.servers.append(server)
         return server
 
@@ -285,12 +294,16 @@ class Node:
         return self._bus.watch_alive(key, lambda is_there: self.post(lambda: on_change(is_there)))
 
     def _serve_about_itself(self) -> None:
-        about = Request(f"@node/{self.name}/info", Empty, NodeInfo, self.name, "who this node is")
-        self.serve(about, lambda question: self.info())
-        spoken = Request(f"@node/{self.name}/interfaces", Empty, Interfaces, self.name, "the messages of its topics")
-        self.serve(spoken, lambda question: self._endpoints.interfaces())
+        self.serve(info_request(self.name), lambda question: self.info())
+        self.serve(interfaces_request(self.name), lambda question: self._endpoints.interfaces())
         self.serve(self._parameters.list_request, self._parameters.listed)
-        self.serve(self._parameters.set_request, self._parameters.set)
+        self.serve(self._parameters.set_request, self._set_parameter)
+
+    def _set_parameter(self, wanted: SetParameter) -> Parameter:
+        parameter = self._parameters.set(wanted)
+        change = ParameterChange(stamp=self.now(), node=self.name, parameter=parameter)
+        self.publisher(PARAMETER_CHANGES).put(change)
+        return parameter
 
     def _beat(self) -> None:
         if self._readiness is not None:

@@ -110,6 +110,11 @@ def _python_type(described: Any) -> type:
     return kinds.get(type(described), object)
 
 
+def parameters_request(node: str) -> Request[Empty, Parameters]:
+    key = f"@node/{node}/parameters/list"
+    return Request(key, Empty, Parameters, node, "all parameters of the node", recorded=False)
+
+
 class ParameterRegistry:
     """All parameters of a node; the command line overrides the deployment file, and that the defaults."""
 
@@ -123,9 +128,9 @@ class ParameterRegistry:
         self._node, self._from_file, self._from_command_line = node, from_file, from_command_line
         self._log = log
         self._sets: list[ParameterSet[Any]] = []
-        keys = f"@node/{node}/parameters"
-        self.list_request = Request(f"{keys}/list", Empty, Parameters, node, "all parameters of the node")
-        self.set_request = Request(f"{keys}/set", SetParameter, Parameter, node, "a new value for one of them")
+        self.list_request = parameters_request(node)
+        key, about = f"@node/{node}/parameters/set", "a new value for one of them"
+        self.set_request = Request(key, SetParameter, Parameter, node, about, recorded=False)
 
     def declare(self, kind: type[P]) -> ParameterSet[P]:
         """Raises `Refused` where a value given cannot be."""

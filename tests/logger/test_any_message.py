@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from schemas.message import Message, decode, encode
 from schemas.topics import TOPICS
-from services.logger.core import Entry, Logger
+from services.logger.core import Logger
 from services.logger.recording import Recording
+from services.recordings.channels import Entry
 from services.visualizer.core import Visualizer
 from services.visualizer.model.urdf import parse_urdf
 

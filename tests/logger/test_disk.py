@@ -36,7 +36,8 @@ class Rig:
 
     def topics(self, path):
         with path.open("rb") as file:
-            return [channel.topic for _, channel, _ in make_reader(file).iter_messages()]
+            topics = [channel.topic for _, channel, _ in make_reader(file).iter_messages()]
+        return [topic for topic in topics if not topic.startswith("foxglove/")]
 
     def recordings(self):
         return sorted(self.folder.glob("*.mcap"))

@@ -19,12 +19,30 @@ from mcap.records import Channel
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
-from schemas.device import DeviceEvent
+from schemas.actions import GoalStatusCode
+from schemas.device import DeviceCommandResponse, DeviceEvent, DeviceStopRequest
 from schemas.frames import RobotDescription
+from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult
 from schemas.joints import JointState
+from schemas.message import Message
+from schemas.planning import PlanCode, PlanRequest, PlanResponse
 from schemas.system import LogRecord, Parameter, SetParameter
-from schemas.topics import COMMAND_ACKS, COMMANDS, DESCRIPTION, DEVICE_EVENTS, JOINT_STATES, LOG, Request
+from schemas.topics import (
+    COMMAND_ACKS,
+    COMMANDS,
+    DESCRIPTION,
+    DEVICE_EVENTS,
+    DEVICE_STOP,
+    GRIPPER_COMMAND,
+    JOINT_STATES,
+    LOG,
+    PLAN,
+    Delivery,
+    Request,
+    Topic,
+)
 from services.logger.main import run
+from services.runtime.actions import accept
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.deployment import load_deployment
 from services.runtime.errors import Refused
@@ -106,6 +124,85 @@ def test_what_is_said_on_the_bus_is_in_the_files(deployment, tmp_path, chunk, ac
     assert len(rows) == 200
     assert {row["ack_code"] for row in rows} == {"0"}
     assert table.stem == mcap.stem
+
+
+class Torque(Message, frozen=True, kw_only=True):
+    """A message of a user's own."""
+
+    stamp: int = 0
+    value: float = 0.0  # [N m]
+    history: tuple[float, ...] = ()
+
+
+TORQUE = Topic("gripper/torque", Torque, Delivery.EVERY, None, True, "torque_sensor", "a user's own topic")
+WEIGH = Request("gripper/weigh", Torque, Torque, "torque_sensor", "a user's own request")
+
+
+class SensorParameters(msgspec.Struct, frozen=True, kw_only=True):
+    gain: float = 1.0
+
+
+@contextmanager
+def spinning(node):
+    thread = threading.Thread(target=node.spin)
+    thread.start()
+    try:
+        yield node
+    finally:
+        node.stop()
+        thread.join(5.0)
+
+
+def test_goals_requests_parameters_and_a_users_topic_are_recorded_as_what_they_are(deployment, tmp_path):
+    """Read with the MCAP library alone: every message by its fields, none as bytes inside of another."""
+    network = MemoryNetwork()
+    with (
+        running(deployment, network) as logger,
+        Node("planner", deployment, bus=MemoryBus(network)) as planner,
+        Node("stepper_gateway", deployment, bus=MemoryBus(network)) as gateway,
+        Node("torque_sensor", deployment, bus=MemoryBus(network)) as sensor,
+        Node("client", deployment, bus=MemoryBus(network)) as client,
+    ):
+        planner.serve(PLAN, lambda question: PlanResponse(code=PlanCode.SUCCESS))
+        gateway.serve(DEVICE_STOP, lambda question: DeviceCommandResponse(accepted=True))
+        action = gateway.serve_action(GRIPPER_COMMAND, lambda goal_id, goal: accept(), lambda goal_id: "")
+        sensor.serve(WEIGH, lambda question: Torque(value=question.value + 1.0))
+        sensor.parameters(SensorParameters)
+        torque = sensor.publisher(TORQUE)
+        with spinning(planner), spinning(gateway), spinning(sensor):
+            client.call(PLAN, PlanRequest(velocity_scaling=0.25))
+            client.call(DEVICE_STOP, DeviceStopRequest())
+            handle = client.action(GRIPPER_COMMAND).send(GripperCommandGoal(position=0.02))
+            gateway.post(lambda: action.feedback(handle.goal_id, GripperCommandFeedback(position=0.03)))
+            gateway.post(lambda: action.finish(handle.goal_id, GoalStatusCode.SUCCEEDED, GripperCommandResult()))
+            sensor.set_parameter("gain", 2.5)
+            wait_for(lambda: {"gripper/torque", "@request/gripper/weigh"} <= set(logger.info().subscribes))
+            torque.put(Torque(stamp=7, value=0.5, history=(0.25, 0.5)))
+            client.call(WEIGH, Torque(value=3.0))
+    (mcap,) = recordings(tmp_path, ".mcap")
+    said = {}
+    for topic, message in messages(mcap):
+        said.setdefault(topic, []).append(message)
+    assert said["@request/plan"][0]["question"]["velocity_scaling"] == 0.25
+    assert said["@request/plan"][0]["answer"]["code"] == PlanCode.SUCCESS
+    assert said["@request/device/stop"][0]["answer"]["accepted"] is True
+    assert said["@request/gripper_command/goal"][0]["question"]["goal"]["position"] == 0.02
+    assert said["gripper_command/feedback"][0]["feedback"]["position"] == 0.03
+    assert said["gripper_command/ended"][0]["status"] == GoalStatusCode.SUCCEEDED
+    assert said["parameters"][0]["parameter"]["value"] == 2.5
+    assert said["gripper/torque"] == [{"stamp": 7, "value": 0.5, "history": [0.25, 0.5]}]
+    assert said["@request/gripper/weigh"][0]["question"]["value"] == 3.0
+    assert said["@request/gripper/weigh"][0]["answer"]["value"] == 4.0
+    nodes = {record["node"]: record for record in said["nodes"]}
+    assert nodes["torque_sensor"]["parameters"][0]["name"] == "gain"
+    assert nodes["torque_sensor"]["info"]["version"]
+    with mcap.open("rb") as file:
+        summary = make_reader(file).get_summary()
+        kept = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+    schemas = {each.topic: json.loads(summary.schemas[each.schema_id].data) for each in summary.channels.values()}
+    assert schemas["gripper/torque"]["properties"]["value"]["type"] == "number"
+    assert json.loads(kept["deployment"]["json"])["router"]["port"] == deployment.router.port
+    assert kept["gemelo"]["ruckig"]
 
 
 def test_logging_is_switched_off_and_on_while_it_runs(deployment, tmp_path):

@@ -18,10 +18,11 @@ from mcap.stream_reader import StreamReader
 from schemas.frames import FrameTransform, FrameTransforms, RobotDescription
 from schemas.joints import JointState
 from schemas.topics import DESCRIPTION, FRAMES, JOINT_STATES, TOPICS
-from services.logger.channels import recorded_topics, schema_of
 from services.logger.command_log import CommandRow
-from services.logger.core import Entry
 from services.logger.recording import Recording
+from services.recordings import foxglove
+from services.recordings.channels import Entry, schema_of
+from services.recordings.table import recorded_topics
 
 START = 1_795_000_000_000_000_000
 
@@ -32,7 +33,7 @@ def joint_state(index):
 
 @pytest.fixture
 def recording(tmp_path):
-    recording = Recording(tmp_path, "test", START, {"robot": "rm1"})
+    recording = Recording(tmp_path, "test", START, {"gemelo": {"robot": "rm1"}})
     yield recording
     recording.abandon()
 
@@ -69,12 +70,15 @@ def test_every_recorded_topic_has_a_channel(recording):
     recording.close()
     with recording.path.open("rb") as file:
         summary = make_reader(file).get_summary()
-    assert {channel.topic for channel in summary.channels.values()} == {topic.key for topic in recorded_topics()}
+    shown = {channel.key for channel in foxglove.channels()}
+    assert {channel.topic for channel in summary.channels.values()} == {
+        topic.key for topic in recorded_topics()
+    } | shown
 
 
 def test_the_robots_files_and_the_origin_are_kept_beside_the_data(recording):
-    recording.describe(RobotDescription(robot="rm1", urdf="<robot/>", srdf="<s/>", robot_toml="name='rm1'"))
-    recording.describe(RobotDescription(robot="rm1", urdf="<robot/>", srdf="<s/>", robot_toml="name='rm1'"))
+    description = RobotDescription(robot="rm1", urdf="<robot/>", srdf="<s/>", robot_toml="name='rm1'")
+    recording.write([Entry(DESCRIPTION, description, START), Entry(DESCRIPTION, description, START + 1)])
     recording.close()
     with recording.path.open("rb") as file:
         kept = [(record.name, record.metadata) for record in make_reader(file).iter_metadata()]
@@ -102,8 +106,8 @@ from pathlib import Path
 from schemas.joints import JointState
 from schemas.topics import JOINT_STATES
 from services.logger.command_log import CommandRow
-from services.logger.core import Entry
 from services.logger.recording import Recording
+from services.recordings.channels import Entry
 recording = Recording(Path(sys.argv[1]), "killed", 1, {})
 count = 0
 while True:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from schemas.actions import (
     CancelRequest,
     CancelResponse,
+    GoalEnd,
     GoalFeedback,
     GoalRequest,
     GoalResponse,
@@ -29,14 +30,21 @@ def cancel_request(action: AnyAction) -> Request[CancelRequest, CancelResponse]:
 
 
 def result_request(action: AnyAction) -> Request[ResultRequest, ResultResponse]:
-    return Request(f"{action.key}/result", ResultRequest, ResultResponse, action.server, "how a goal ended")
+    """Not recorded: clients ask again and again, and `ended_topic` says the same once."""
+    key = f"{action.key}/result"
+    return Request(key, ResultRequest, ResultResponse, action.server, "how a goal ended", recorded=False)
 
 
 def feedback_topic(action: AnyAction) -> Topic[GoalFeedback]:
     """EVERY: several goals share the key, and the newest of one must not push out another's."""
-    return Topic(f"{action.key}/feedback", GoalFeedback, Delivery.EVERY, None, False, action.server, "how goals stand")
+    return Topic(f"{action.key}/feedback", GoalFeedback, Delivery.EVERY, None, True, action.server, "how goals stand")
 
 
 def status_topic(action: AnyAction) -> Topic[GoalStatuses]:
     """Latched, and repeated by the server's loop as its sign of life."""
-    return Topic(f"{action.key}/status", GoalStatuses, Delivery.LATCHED, 4.0, False, action.server, "all goals")
+    return Topic(f"{action.key}/status", GoalStatuses, Delivery.LATCHED, 4.0, True, action.server, "all goals")
+
+
+def ended_topic(action: AnyAction) -> Topic[GoalEnd]:
+    """The result of each goal, once, also of those that no client asks for."""
+    return Topic(f"{action.key}/ended", GoalEnd, Delivery.EVERY, None, True, action.server, "how each goal ended")

@@ -12,6 +12,7 @@ import msgspec
 from schemas.actions import (
     CancelRequest,
     CancelResponse,
+    GoalEnd,
     GoalFeedback,
     GoalRequest,
     GoalResponse,
@@ -77,6 +78,7 @@ class ActionServer(Generic[G, F, R]):
         self._cancelled_early: dict[str, float] = {}  # by goal that has not come yet: [s] monotonic
         self._feedback: Publisher[GoalFeedback] = publisher(keys.feedback_topic(action))
         self._status: Publisher[GoalStatuses] = publisher(keys.status_topic(action))
+        self._ended: Publisher[GoalEnd] = publisher(keys.ended_topic(action))
         self._goal_requests = serve(keys.goal_request(action), self._answer_goal)
         serve(keys.cancel_request(action), self._answer_cancel)
         serve(keys.result_request(action), self._goals.answer_result)
@@ -97,9 +99,12 @@ class ActionServer(Generic[G, F, R]):
         goal = self._goals[goal_id]
         if goal.status.is_terminal:
             raise ValueError(f"goal {goal_id} has ended already, as {goal.status.name}")
-        goal.end(status, msgspec.Raw(encode(result)))
+        raw = msgspec.Raw(encode(result))
+        goal.end(status, raw)
         self._clients.forget(goal_id)
         self._publish_status()
+        end = GoalEnd(stamp=time.time_ns(), goal_id=goal_id, client=goal.client, status=status, result=raw)
+        self._ended.put(end)
 
     def refuse_waiting(self, reason: str) -> None:
         """Refuses the goals that have arrived by now and were not looked at yet."""

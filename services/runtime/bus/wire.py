@@ -7,6 +7,7 @@ from typing import TypeVar
 from schemas.camera import CameraImage
 from schemas.frames import RobotDescription
 from schemas.message import BadMessage, Message, decode, encode
+from schemas.system import Exchange
 from services.runtime.bus.interface import Arrival
 
 M = TypeVar("M", bound=Message)
@@ -15,6 +16,7 @@ MAX_PAYLOAD = 512 * 1024  # [bytes] a trajectory of 6 joints and 2,000 points is
 MAX_PAYLOAD_OF: dict[str, int] = {  # [bytes]
     RobotDescription.__name__: 8 * 1024 * 1024,  # URDF text
     CameraImage.__name__: 8 * 1024 * 1024,  # 1920 x 1080 in rgb8 is 6.2 million
+    Exchange.__name__: 2 * MAX_PAYLOAD + 64 * 1024,  # a question, its answer, and who asked
 }
 
 

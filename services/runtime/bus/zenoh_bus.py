@@ -17,6 +17,7 @@ import zenoh.ext as zx
 from zenoh.handlers import Callback
 
 from schemas.deployment import RouterSection
+from schemas.system import Exchange
 from schemas.topics import Delivery
 from services.runtime.bus.interface import Arrival, BusReply, Query
 from services.runtime.bus.zenoh_config import client_config
@@ -35,6 +36,7 @@ from services.runtime.bus.zenoh_declarations import (
 from services.runtime.errors import BusError
 
 CACHE = 1024  # messages of an EVERY key that survive while the router is away
+CACHE_OF = {Exchange.__name__: 64}  # messages; a plan's answer is some 50 kB
 HEARTBEAT = 0.5  # [s] after which a reader notices that it misses the last message
 CLOSE_TIMEOUT = 1.0  # [s]
 TO_ANSWER = 1.0  # [s] for a writer to say what it wrote last; one that is frozen is gone after the lease of 1 s
@@ -100,7 +102,7 @@ class ZenohBus:
             encoding=encoding,
             congestion_control=zenoh.CongestionControl.BLOCK,
             reliability=zenoh.Reliability.RELIABLE,
-            cache=zx.CacheConfig(max_samples=1 if latched else CACHE),
+            cache=zx.CacheConfig(max_samples=1 if latched else CACHE_OF.get(schema, CACHE)),
             sample_miss_detection=zx.MissDetectionConfig(heartbeat=HEARTBEAT, sporadic_heartbeat=None),
             publisher_detection=latched,
         )

@@ -9,8 +9,11 @@ import traceback
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
-from schemas.message import BadMessage, Message
-from schemas.system import Failure, TopicStatistics
+import msgspec
+
+from schemas.actions import NIL
+from schemas.message import BadMessage, Message, encode
+from schemas.system import Exchange, Failure, TopicStatistics
 from schemas.topics import Request
 from services.runtime.bus.interface import Arrival, Bus, Query
 from services.runtime.bus.wire import from_arrival, schema_of, to_payload
@@ -26,6 +29,35 @@ R_contra = TypeVar("R_contra", bound=Message, contravariant=True)
 MAX_UNANSWERED = 1024  # callers of one urgent server that are answered together; the rest hears so at once
 REPEAT = 0.005  # [s] chosen: in a flood of stops the gateway is free for other work between two of them
 MAX_TAKEN = 64  # questions whose last time is kept
+MAX_TOLD = 64  # callers that are named with an answer
+
+Tell = Callable[[Exchange], None]
+
+
+class AnswerReport:
+    """Publishes a question with its answer, after who asked has got it: nothing waits for a recording."""
+
+    def __init__(self, tell: Tell, question: bytes, arrived: float) -> None:
+        """`question` as it came, and readable; it `arrived` at [s] monotonic."""
+        self._tell, self._question, self._arrived = tell, question, arrived
+
+    def answered(self, clients: tuple[str, ...], answer: bytes) -> None:
+        self._put(clients, msgspec.Raw(answer), None)
+
+    def refused(self, clients: tuple[str, ...], failure: Failure) -> None:
+        self._put(clients, NIL, failure)
+
+    def _put(self, clients: tuple[str, ...], answer: msgspec.Raw, failure: Failure | None) -> None:
+        self._tell(
+            Exchange(
+                stamp=time.time_ns(),
+                duration=time.monotonic() - self._arrived,
+                clients=clients[:MAX_TOLD],
+                question=msgspec.Raw(self._question),
+                answer=answer,
+                failure=failure,
+            )
+        )
 
 
 class Pending(Protocol[R_contra]):
@@ -41,8 +73,8 @@ class Pending(Protocol[R_contra]):
 class PendingQuery(Generic[R]):
     """One request."""
 
-    def __init__(self, query: Query) -> None:
-        self._query = query
+    def __init__(self, query: Query, report: AnswerReport | None = None) -> None:
+        self._query, self._report = query, report
         self._is_answered = False
 
     def reply(self, response: R) -> None:
@@ -50,38 +82,59 @@ class PendingQuery(Generic[R]):
         if not self._is_answered:
             self._is_answered = True
             self._query.reply(schema_of(type(response)), payload)
+            if self._report is not None:
+                self._report.answered((self._query.client,), payload)
 
     def refuse(self, kind: str, message: str) -> None:
         if not self._is_answered:
             self._is_answered = True
-            self._query.fail(schema_of(Failure), to_payload(Failure(kind=kind, message=message)))
+            failure = Failure(kind=kind, message=message)
+            self._query.fail(schema_of(Failure), to_payload(failure))
+            if self._report is not None:
+                self._report.refused((self._query.client,), failure)
 
 
 class PendingGroup(Generic[R]):
     """Equal requests of any number of callers, answered together."""
 
-    def __init__(self, client: str, on_answered: Callable[[int], None]) -> None:
+    def __init__(self, client: str, on_answered: Callable[[int], None], report: AnswerReport | None) -> None:
         self.client = client  # the first
+        self._report = report
         self.is_queued = False  # for the event loop
         self.is_new = True  # no timer will queue it
         self._queries: list[PendingQuery[R]] = []
+        self._askers: list[str] = []
         self._on_answered = on_answered
 
     def join(self, query: Query) -> None:
         self._queries.append(PendingQuery(query))
+        self._askers.append(query.client)
 
     def reply(self, response: R) -> None:
         for query in self._take():
             query.reply(response)
+        if report := self._take_report():
+            report.answered(self._clients(), to_payload(response))
 
     def refuse(self, kind: str, message: str) -> None:
         for query in self._take():
             query.refuse(kind, message)
+        if report := self._take_report():
+            report.refused(self._clients(), Failure(kind=kind, message=message))
 
     def _take(self) -> list[PendingQuery[R]]:
         queries, self._queries = self._queries, []
         self._on_answered(len(queries))
         return queries
+
+    def _take_report(self) -> AnswerReport | None:
+        """Once: only the first answer counts."""
+        report, self._report = self._report, None
+        return report
+
+    def _clients(self) -> tuple[str, ...]:
+        """Who asked, each once; also whose question was carried out without an answer."""
+        return tuple(dict.fromkeys((self.client, *self._askers)))
 
 
 class RequestServer(Generic[Q, R]):
@@ -95,10 +148,11 @@ class RequestServer(Generic[Q, R]):
         handler: Callable[[Q, Pending[R]], None],
         warn: Warn,
         rates: RequestRates,
+        tell: Tell | None = None,
     ) -> None:
-        """`rates` are those of the node, which all its servers share."""
+        """`rates` are those of the node, which all its servers share; `tell` is told every question and answer."""
         self.request = request
-        self._put = put
+        self._put, self._tell = put, tell
         self._handler, self._warn, self._rates = handler, warn, rates
         self._received, self._refused, self._dropped, self._bad = 0, 0, 0, 0
         self._waiting = WaitingRequests(request.key)
@@ -143,12 +197,18 @@ class RequestServer(Generic[Q, R]):
 
     def _take(self, query: Query, arrived: float) -> None:
         self._waiting.leave(query.client)
-        if arrived <= self._void_before:
-            return PendingQuery[R](query).refuse("void", f"{self.request.key}: {self._void_reason}")
         question = self._question(query)
-        if question is not None:
+        if question is None:
+            return
+        pending = PendingQuery[R](query, self._report(query.arrival.payload, arrived))
+        if arrived <= self._void_before:
+            pending.refuse("void", f"{self.request.key}: {self._void_reason}")
+        else:
             self._received += 1
-            self._handle(question, PendingQuery[R](query))
+            self._handle(question, pending)
+
+    def _report(self, question: bytes, arrived: float) -> AnswerReport | None:
+        return AnswerReport(self._tell, question, arrived) if self._tell is not None else None
 
     def _question(self, query: Query) -> Q | None:
         """The decoded question; None where it cannot be decoded, after a refusal was sent."""
@@ -187,13 +247,14 @@ class UrgentServer(RequestServer[Q, R]):
         handler: Callable[[Q, Pending[R]], None],
         warn: Warn,
         rates: RequestRates,
+        tell: Tell | None = None,
     ) -> None:
         self._groups: dict[Q, PendingGroup[R]] = {}
         self._unanswered = 0
         self._taken: dict[Q, float] = {}  # [s] monotonic, when it was handled last
         self._last: tuple[Arrival, Q] | None = None  # a request that repeats it need not be decoded again
         self._lock = threading.Lock()
-        super().__init__(bus, put, request, handler, warn, rates)
+        super().__init__(bus, put, request, handler, warn, rates, tell)
 
     def _on_query(self, query: Query) -> None:
         arrival = query.arrival
@@ -214,7 +275,8 @@ class UrgentServer(RequestServer[Q, R]):
             if group is None:
                 if refusal := self._waiting.refusal(query.client):
                     return refusal
-                group = self._groups[question] = PendingGroup(query.client, self._answered)
+                report = self._report(encode(question), time.monotonic())
+                group = self._groups[question] = PendingGroup(query.client, self._answered, report)
             self._queue(question, group, is_answered)
             self._received += 1
             if not is_answered:

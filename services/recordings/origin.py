@@ -1,4 +1,4 @@
-"""The metadata of a recording: software versions, machine and commit."""
+"""The metadata of a recording: software versions, machine, commit and deployment."""
 
 from __future__ import annotations
 
@@ -6,17 +6,31 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+import msgspec
+
+from schemas.deployment import Deployment
+from services.recordings.mcap_file import DEPLOYMENT, METADATA
+
+PACKAGES = {  # by the name in the record
+    "gemelo": "gemelo", "mcap": "mcap", "zenoh": "eclipse-zenoh", "msgspec": "msgspec", "numpy": "numpy",
+    "ruckig": "ruckig", "pinocchio": "pin", "coal": "coal", "ompl": "ompl", "rerun": "rerun-sdk",
+}  # fmt: skip
+
+
+def metadata_of(robot: str, deployment: Deployment, root: Path) -> dict[str, dict[str, str]]:
+    """The records that every file begins with; passwords are in files of their own, so none is in a deployment."""
+    text = msgspec.json.encode(deployment).decode()
+    return {METADATA: origin(robot, root), DEPLOYMENT: {"json": text}}
+
 
 def origin(robot: str, root: Path) -> dict[str, str]:
     """Versions, host and, in a git checkout at `root`, the commit."""
     said = {
         "robot": robot,
-        "gemelo": _version("gemelo"),
         "python": platform.python_version(),
-        "mcap": _version("mcap"),
-        "zenoh": _version("eclipse-zenoh"),
         "system": platform.platform(),
         "commit": commit(root),
+        **{name: _version(package) for name, package in PACKAGES.items()},
     }
     return {key: value for key, value in said.items() if value}
 

@@ -8,17 +8,34 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import TypeAlias, cast
+from typing import Any, TypeAlias, cast
 
 import msgspec
 
 from schemas.message import Message
-from schemas.topics import TOPICS, Topic
+from schemas.topics import Topic
+from services.recordings.table import described
 
 MESSAGE_ENCODING = "json"
 SCHEMA_ENCODING = "jsonschema"
+LAST_STAMP = 2**63 - 1  # [ns] readers take times as signed 64 bits
 
 Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | None"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One message to be written; `arrival` in ns UNIX."""
+
+    topic: Topic[Any]
+    message: Message
+    arrival: int
+
+    @property
+    def stamp(self) -> int:
+        """The message's own time in [ns] UNIX; its arrival where it has none that makes sense."""
+        stamp = getattr(self.message, "stamp", 0)
+        return stamp if isinstance(stamp, int) and 0 < stamp <= LAST_STAMP else self.arrival
 
 
 @dataclass(frozen=True)
@@ -31,24 +48,19 @@ class Channel:
     metadata: dict[str, str]
 
 
-def schema_of(kind: type[Message]) -> bytes:
+def schema_of(kind: type[msgspec.Struct]) -> bytes:
     """JSON Schema of `kind` with every `$ref` replaced by what it refers to, as MCAP readers want it."""
     schema = cast("dict[str, Json]", msgspec.json.schema(kind))
     definitions = cast("dict[str, Json]", schema.pop("$defs", {}))
     return json.dumps(_inlined(schema, definitions), separators=(",", ":")).encode()
 
 
-def channel_of(topic: Topic[Message]) -> Channel:
+def channel_of(topic: Topic[Any]) -> Channel:
     """The channel that a topic is recorded on."""
     metadata = {"delivery": topic.delivery.value, "writer": topic.writer, "about": topic.about}
     if topic.rate is not None:
         metadata["rate_hz"] = f"{topic.rate:g}"
-    return Channel(topic.key, topic.message.__name__, schema_of(topic.message), metadata)
-
-
-def recorded_topics() -> tuple[Topic[Message], ...]:
-    """The rows of the table that are recorded."""
-    return tuple(topic for topic in TOPICS if topic.recorded)
+    return Channel(topic.key, topic.message.__name__, schema_of(described(topic)), metadata)
 
 
 def _inlined(node: Json, definitions: dict[str, Json]) -> Json:

@@ -1,0 +1,81 @@
+"""The living nodes of a robot as a recording keeps them: found by their statistics, and asked what they speak."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from msgspec.structs import replace
+
+from schemas.message import Message
+from schemas.system import Empty, Interfaces, NodeInfo, NodeRecord, NodeStatistics, Parameters
+from schemas.topics import STATISTICS, Request
+from services.runtime.endpoints import info_request, interfaces_request
+from services.runtime.errors import NoAnswer, Refused
+from services.runtime.node import Node
+from services.runtime.parameters import parameters_request
+from services.runtime.requests.client import PendingCall
+
+PERIOD = 5.0  # [s] between two questions to a node: it may have got a new topic
+TIMEOUT = 2.0  # [s]
+MAX_NODES = 256  # that are asked; more would be no robot's
+
+
+@dataclass
+class _Asked:
+    """One node that is being asked, until all three answers are there."""
+
+    name: str
+    answers: dict[str, Message] = field(default_factory=dict)
+
+    def record(self, stamp: int) -> NodeRecord | None:
+        info, spoken, set_to = (self.answers.get(key) for key in ("NodeInfo", "Interfaces", "Parameters"))
+        if isinstance(info, NodeInfo) and isinstance(spoken, Interfaces) and isinstance(set_to, Parameters):
+            return NodeRecord(
+                stamp=stamp, node=self.name, info=info, topics=spoken.topics, parameters=set_to.parameters
+            )
+        return None
+
+
+class Census:
+    """Calls `on_record(record)`, in the thread of logic, for every new node and for each that has changed."""
+
+    def __init__(self, node: Node, on_record: Callable[[NodeRecord], None]) -> None:
+        self._node, self._on_record = node, on_record
+        self._asked_at: dict[str, float] = {}  # [s] monotonic
+        self._known: dict[str, NodeRecord] = {}
+        node.subscribe(STATISTICS, self._on_statistics)
+
+    def _on_statistics(self, message: NodeStatistics) -> None:
+        now = self._node.monotonic()
+        is_new = message.node not in self._asked_at
+        if is_new and len(self._asked_at) >= MAX_NODES:
+            return
+        if is_new or now - self._asked_at[message.node] > PERIOD:
+            self._asked_at[message.node] = now
+            self._ask(_Asked(message.node))
+
+    def _ask(self, asked: _Asked) -> None:
+        try:
+            for request in (info_request, interfaces_request, parameters_request):
+                self._ask_one(asked, request(asked.name))
+        except NoAnswer:  # it has just ended
+            return
+
+    def _ask_one(self, asked: _Asked, request: Request[Empty, Any]) -> None:
+        def on_answer() -> None:
+            self._node.post(lambda: self._take(asked, pending))
+
+        pending = self._node.ask(request, Empty(), TIMEOUT, on_answer)
+
+    def _take(self, asked: _Asked, pending: PendingCall[Empty, Any]) -> None:
+        try:
+            answer = pending.response()
+        except (NoAnswer, Refused):
+            return
+        asked.answers[type(answer).__name__] = answer
+        record = asked.record(self._node.now())
+        if record is not None and record != replace(self._known.get(asked.name, NodeRecord()), stamp=record.stamp):
+            self._known[asked.name] = record
+            self._on_record(record)
