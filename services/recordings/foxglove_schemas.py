@@ -7,8 +7,11 @@ the published schemas do not require (identifiers of messages, lineage) are left
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Any
 
 import msgspec
+
+Empty = tuple[Any, ...]  # of primitives that are never drawn here
 
 
 class Record(msgspec.Struct, frozen=True, kw_only=True):
@@ -141,14 +144,14 @@ class SceneEntity(Record, frozen=True):
     lifetime: Duration = Duration()
     frame_locked: bool = True
     metadata: tuple[KeyValuePair, ...] = ()
-    arrows: tuple[KeyValuePair, ...] = ()  # none is ever drawn
+    arrows: Empty = ()
     cubes: tuple[CubePrimitive, ...] = ()
     spheres: tuple[SpherePrimitive, ...] = ()
     cylinders: tuple[CylinderPrimitive, ...] = ()
-    lines: tuple[KeyValuePair, ...] = ()
+    lines: Empty = ()
     triangles: tuple[TriangleListPrimitive, ...] = ()
-    texts: tuple[KeyValuePair, ...] = ()
-    models: tuple[KeyValuePair, ...] = ()
+    texts: Empty = ()
+    models: Empty = ()
 
 
 class SceneUpdate(Record, frozen=True):

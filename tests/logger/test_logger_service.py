@@ -153,6 +153,10 @@ def spinning(node):
         thread.join(5.0)
 
 
+def heard(node, key):
+    return sum(each.received for each in node.statistics() if each.key == key)
+
+
 def test_goals_requests_parameters_and_a_users_topic_are_recorded_as_what_they_are(deployment, tmp_path):
     """Read with the MCAP library alone: every message by its fields, none as bytes inside of another."""
     network = MemoryNetwork()
@@ -179,6 +183,7 @@ def test_goals_requests_parameters_and_a_users_topic_are_recorded_as_what_they_a
             wait_for(lambda: {"gripper/torque", "@request/gripper/weigh"} <= set(logger.info().subscribes))
             torque.put(Torque(stamp=7, value=0.5, history=(0.25, 0.5)))
             client.call(WEIGH, Torque(value=3.0))
+            wait_for(lambda: heard(logger, "gripper/torque") and heard(logger, "@request/gripper/weigh"))
     (mcap,) = recordings(tmp_path, ".mcap")
     said = {}
     for topic, message in messages(mcap):
