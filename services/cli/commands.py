@@ -123,6 +123,8 @@ COMMANDS = (
     Command(("request", "list"), "all requests: message, answer, server", "request:run_list"),
     Command(("request", "call"), "ask, and print the answer as YAML",
             "request:run_call", "request:call_options", choices="request:choices"),
+    Command(("request", "echo"), "print each question with its answer, whoever asks, until Ctrl-C",
+            "request:run_echo", "request:echo_options", "gemelo request echo plan --once", "request:choices"),
     Command(("action", "list"), "all actions: goal, feedback, result, server", "action:run_list"),
     Command(("action", "info"), "one action and the fields of its messages",
             "action:run_info", "action:action_option", choices="action:choices"),

@@ -1,16 +1,21 @@
-"""`gemelo request`: the table of requests, and calling one."""
+"""`gemelo request`: the table of requests, calling one, and watching what is asked and answered."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from schemas.message import Message
-from schemas.topics import REQUESTS, Request
+from schemas.topics import ACTIONS, REQUESTS, Request
 from services.cli.errors import ExitCode, unknown
+from services.cli.field_path import FieldPath
 from services.cli.messages import dump, message_of
-from services.cli.parser import Choices, Options, Parser
+from services.cli.node import information_of, living
+from services.cli.parser import Choices, Options, Parser, positive_integer
 from services.cli.session import Session, connect
 from services.cli.text_table import table
+from services.cli.topic import echo, json_line, yaml_document
+from services.recordings.table import exchanges_of, goal_request_of
+from services.runtime.actions import keys
 
 if TYPE_CHECKING:
     from gemelo import Robot
@@ -38,6 +43,23 @@ def run_call(options: Options) -> ExitCode:
         return call(session, request, message)
 
 
+def echo_options(parser: Parser) -> None:
+    """Adds request, count and --json."""
+    parser.add_argument("request", metavar="REQUEST", help="a key of `gemelo request list`, or of a living node's own")
+    count = parser.add_mutually_exclusive_group()
+    count.add_argument("--once", dest="count", action="store_const", const=1, help="the first one only")
+    count.add_argument("-n", "--count", type=positive_integer, metavar="N", help="end after N answers")
+    parser.add_argument("--json", action="store_true", help="a JSON value per line")
+
+
+def run_echo(options: Options) -> ExitCode:
+    """Prints each question with its answer, until Ctrl-C."""
+    form = json_line if options.json else yaml_document
+    with connect() as session:
+        exchanges = exchanges_of(asked_on(session, options.request))
+        return echo(session, exchanges, FieldPath(exchanges.message, ""), form, options.count)
+
+
 def choices(robot: Robot | None) -> Choices:
     """The requests."""
     return {"": [request.key for request in REQUESTS]}
@@ -55,6 +77,21 @@ def request_of(name: str) -> Request[Message, Message]:
         if request.key == name.strip("/"):
             return request
     raise unknown("request", name, [request.key for request in REQUESTS])
+
+
+def asked_on(session: Session, name: str) -> Request[Any, Any]:
+    """The request of that key, of our table or of a living node; raises `CommandError` with the nearest key."""
+    key = name.strip("/")
+    for request in REQUESTS:
+        if request.key == key:
+            return request
+    others = {each: node for node in living(session) for each in information_of(session, node).serves}
+    if key not in others:
+        raise unknown("request", name, [*(request.key for request in REQUESTS), *others])
+    for action in ACTIONS:
+        if key == keys.goal_request(action).key:
+            return goal_request_of(action)
+    return Request(key, Message, Message, others[key], "")
 
 
 def call(session: Session, request: Request[Message, Message], message: Message) -> ExitCode:

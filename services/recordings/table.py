@@ -49,15 +49,19 @@ def exchanges_of(request: Request[Any, Any]) -> Topic[Any]:
 
 def action_topics(action: Action[Any, Any, Any]) -> tuple[Topic[Any], ...]:
     """The goals, cancels, feedback, results and statuses of an action."""
-    asked: Request[Any, Any] = keys.goal_request(action)
-    goal = _typed_message(GoalRequest, goal=_known(action.goal))
     return (
-        exchanges_of(replace(asked, request=goal)),
+        exchanges_of(goal_request_of(action)),
         exchanges_of(keys.cancel_request(action)),
         _typed(keys.feedback_topic(action), feedback=_known(action.feedback)),
         _typed(keys.ended_topic(action), result=_known(action.result)),
         keys.status_topic(action),
     )
+
+
+def goal_request_of(action: Action[Any, Any, Any]) -> Request[Any, Any]:
+    """The request that brings a goal, with the goal as the action's own message."""
+    request: Request[Any, Any] = keys.goal_request(action)
+    return replace(request, request=_typed_message(GoalRequest, goal=_known(action.goal)))
 
 
 def topics_of_node(record: NodeRecord) -> tuple[Topic[Any], ...]:

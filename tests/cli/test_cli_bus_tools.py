@@ -7,8 +7,10 @@ import io
 import json
 import math
 import re
+import threading
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -20,16 +22,18 @@ from hypothesis import strategies as st
 from msgspec import Meta
 
 import gemelo
+from schemas.device import DeviceStopRequest, StopKind
 from schemas.frames import FrameTransform, FrameTransforms, Transform
 from schemas.joints import JointState
 from schemas.message import Message
 from schemas.system import NodeStatistics, TopicStatistics
-from schemas.topics import FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, STATIC_FRAMES, Delivery, Topic
+from schemas.topics import DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, STATIC_FRAMES, Delivery, Topic
 from services.arm.frames.transforms import from_rpy, to_rpy
-from services.cli import action_watch, interface, living_topics, node_parameters, tf, top, topic, topic_rates
+from services.cli import action_watch, interface, living_topics, node_parameters, request, tf, top, topic, topic_rates
 from services.cli.errors import CommandError, ExitCode
 from services.cli.field_path import FieldPath, leaves
 from services.cli.main import run
+from services.recordings.table import exchanges_of
 from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
 from tests.runtime.support import spinning
@@ -336,3 +340,37 @@ def test_a_goal_is_followed_to_its_result(session, connected, stack, planner, ca
     assert f"goal {motion.goal_id} of" in said
     assert "SUCCEEDED" in said
     assert "executed_steps: [933, -50, 113]" in said
+
+
+@contextmanager
+def asking(deployment, network, question) -> Iterator[None]:
+    """A client that asks the same again and again."""
+    with Node("client", deployment, robot="rm1", bus=MemoryBus(network)) as client:
+        done = threading.Event()
+
+        def ask() -> None:
+            while not done.wait(0.02):
+                client.call(DEVICE_STOP, question)
+
+        thread = threading.Thread(target=ask)
+        thread.start()
+        yield
+        done.set()
+        thread.join(5.0)
+
+
+def test_a_request_is_watched_with_its_question_and_its_answer(session, stack, deployment, network, capsys):
+    """Zenoh shows a request to nobody but its server, which therefore says it again as a topic."""
+    exchanges = exchanges_of(request.asked_on(session, "device/stop"))
+    with asking(deployment, network, DeviceStopRequest(kind=StopKind.HOLD)):
+        path = FieldPath(exchanges.message, "")
+        assert topic.echo(session, exchanges, path, topic.yaml_document, 1) is ExitCode.OK
+    said = yaml.safe_load(capsys.readouterr().out.partition("---")[0])
+    assert said["question"] == {"kind": "hold"}
+    assert said["answer"]["accepted"] is True
+    assert said["failure"] is None
+
+
+def test_a_request_of_nobody_is_answered_with_the_nearest_of_all(session, stack):
+    with pytest.raises(CommandError, match='did you mean "device/stop"'):
+        request.asked_on(session, "device/stp")
