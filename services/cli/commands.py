@@ -5,6 +5,7 @@ from __future__ import annotations
 from services.cli.parser import Command
 
 GROUPS = {
+    "bag": "recordings: writing one, what is in it, playing, exporting and repairing it",
     "broker": "the MQTT broker between gateway and board",
     "camera": "the cameras of the cell file, and those that are plugged in",
     "device": "the controller board: how it is, what it is told, and its drivers",
@@ -136,6 +137,17 @@ COMMANDS = (
     Command(("action", "echo"), "follow the goals of an action: status, feedback, result; until Ctrl-C",
             "action_watch:run_echo", "action_watch:echo_options", "gemelo action echo follow_joint_trajectory -n 1",
             "action:choices"),
+    Command(("bag", "record"), "record chosen topics into a file of your own, until Ctrl-C",
+            "bag_record:run", "bag_record:add_options", "gemelo bag record joint_states 'device/*' -o test --max-mb 99",
+            "topic:choices"),
+    Command(("bag", "info"), "what is in a recording: times, topics, rates, versions",
+            "bag:run_info", "bag:info_options", "gemelo bag info out/recordings/20261121T013306.250Z_rm1.mcap"),
+    Command(("bag", "play"), "play a recording as a shadow robot, for the viewer and every tool",
+            "bag_play:run", "bag_play:add_options", "gemelo bag play test.mcap --rate 0.5 --start 12 --loop"),
+    Command(("bag", "export"), "write a recording as CSV, Parquet or a file of Rerun",
+            "bag:run_export", "bag:export_options", "gemelo bag export test.mcap joint_states --to parquet"),
+    Command(("bag", "repair"), "write what is readable of a recording that was cut off, and say what is lost",
+            "bag:run_repair", "bag:repair_options", "gemelo bag repair test.mcap"),
     Command(("scene", "add"), "put an object around the arm, or in its hand",
             "scene:add", "scene:add_options"),
     Command(("scene", "remove"), "take an object away",

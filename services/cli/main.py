@@ -5,13 +5,17 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from services.cli.commands import COMMANDS, GROUPS
-from services.cli.errors import CommandError, ExitCode
+from services.cli.errors import CommandError, ExitCode, unknown, usage
 from services.cli.parser import Options, build
 
 ABOUT = "The twin's command line: move the arm, and see everything that is said about it."
-EPILOG = "The deployment is deploy/local.toml, or the file that $GEMELO_CONFIG names."
+EPILOG = (
+    "The deployment is deploy/local.toml, or the file that $GEMELO_CONFIG names. `gemelo --robot NAME COMMAND` is for\n"
+    "another arm of urdf/, or for a recording that is played."
+)
 
 
 def parse(arguments: Sequence[str]) -> Options:
@@ -19,10 +23,33 @@ def parse(arguments: Sequence[str]) -> Options:
     return build(COMMANDS, GROUPS, ABOUT, EPILOG, arguments).parse_args(arguments)
 
 
+def with_robot(arguments: list[str]) -> list[str]:
+    """Without `--robot NAME` before the command, which chooses the robot for this process; as $GEMELO_ROBOT does."""
+    if arguments[:1] != ["--robot"]:
+        return arguments
+    if len(arguments) < 2:
+        raise usage("--robot NAME: the name of an arm in urdf/, of a recording that is played, or its folder")
+    os.environ["GEMELO_ROBOT"] = robot_folder(arguments[1])
+    return arguments[2:]
+
+
+def robot_folder(name: str) -> str:
+    """The folder of an arm, or of a shadow that `gemelo bag play` has made; raises `CommandError` for neither."""
+    from services.runtime.deployment import load_deployment, project_root
+
+    root, out = project_root(), Path(load_deployment().paths.out)
+    for folder in (root / "urdf" / name, out / "shadows" / name, Path(name)):
+        if (folder / "robot.toml").is_file():
+            return str(folder.resolve())
+    known = [path.parent.name for where in (root / "urdf", out / "shadows") for path in where.glob("*/robot.toml")]
+    raise unknown("robot", name, sorted(known))
+
+
 def run(arguments: Sequence[str] | None = None) -> ExitCode:
     """Runs one command line, by default that of the process; prints every failure as one sentence on stderr."""
-    options = parse(sys.argv[1:] if arguments is None else arguments)
+    given = list(sys.argv[1:] if arguments is None else arguments)
     try:
+        options = parse(with_robot(given))
         code: ExitCode = options.command.load("run")(options)
         sys.stdout.flush()
         return code

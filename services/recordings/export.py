@@ -1,0 +1,93 @@
+"""A recording as CSV, as Parquet, or as a file of Rerun."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from services.recordings.reader import RecordingReader
+from services.recordings.rerun_file import write_rerun
+from services.recordings.series import Series, series_of
+
+Written = tuple[Path, int]  # a file, and its rows
+
+
+class NothingToExport(ValueError):
+    """Patterns that match no topic of a recording; the sentence names those that it has."""
+
+
+def export(file: Path, form: str, patterns: Sequence[str], output: Path | None) -> Iterator[Written]:
+    """Writes the topics that match, all without patterns; raises `BadRecording`, `NothingToExport`, OSError."""
+    reader = RecordingReader(file)
+    topics = chosen(topics_in(reader), patterns)
+    series = series_of(reader, topics)
+    yield from FORMS[form](reader, series, output or file.with_suffix(SUFFIXES.get(form, "")))
+
+
+def topics_in(reader: RecordingReader) -> list[str]:
+    """The topics that have a message."""
+    return sorted({row.channel.topic for row in reader.rows() if not row.is_derived})
+
+
+def chosen(topics: Sequence[str], patterns: Sequence[str]) -> set[str]:
+    """The topics that match one of `patterns`, all where there is none; raises `NothingToExport` for one of no use."""
+    for pattern in patterns:
+        if not any(fnmatchcase(topic, pattern) for topic in topics):
+            raise NothingToExport(f'no topic matches "{pattern}": there is {", ".join(topics) or "none"}')
+    return {topic for topic in topics if not patterns or any(fnmatchcase(topic, pattern) for pattern in patterns)}
+
+
+def file_name(topic: str) -> str:
+    """A topic as the name of a file: `device/state` is device.state."""
+    return topic.lstrip("@").replace("/", ".")
+
+
+def _csv(reader: RecordingReader, series: dict[str, Series], folder: Path) -> Iterator[Written]:
+    folder.mkdir(parents=True, exist_ok=True)
+    for each in series.values():
+        path = folder / f"{file_name(each.topic)}.csv"
+        with path.open("x", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, list(each.columns), restval="", lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(each.rows)
+        yield path, len(each.rows)
+
+
+def _parquet(reader: RecordingReader, series: dict[str, Series], folder: Path) -> Iterator[Written]:
+    import pyarrow  # slow to load; it comes with rerun-sdk
+    import pyarrow.parquet
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for each in series.values():
+        path = folder / f"{file_name(each.topic)}.parquet"
+        columns = {name: pyarrow.array(_column(each, name)) for name in each.columns}
+        with path.open("xb") as file:
+            pyarrow.parquet.write_table(pyarrow.table(columns), file)
+        yield path, len(each.rows)
+
+
+def _column(series: Series, name: str) -> list[object]:
+    """The cells of one column, of one type: numbers as floats where any is one, else words where any is one."""
+    column = [row.get(name) for row in series.rows]
+    kinds = {type(cell) for cell in column if cell is not None}
+    if len(kinds) <= 1:
+        return list(column)
+    cast: Callable[[object], object] = float if kinds <= {int, float} else str  # type: ignore[assignment]
+    return [None if cell is None else cast(cell) for cell in column]
+
+
+def _rerun(reader: RecordingReader, series: dict[str, Series], file: Path) -> Iterator[Written]:
+    with file.open("xb"):  # the name is free, and the disk takes it
+        pass
+    write_rerun(reader, series, file)
+    yield file, 0
+
+
+FORMS: dict[str, Callable[[RecordingReader, dict[str, Series], Path], Iterator[Written]]] = {
+    "csv": _csv,
+    "parquet": _parquet,
+    "rerun": _rerun,
+}
+SUFFIXES = {"rerun": ".rrd"}

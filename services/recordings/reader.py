@@ -1,0 +1,157 @@
+"""A recording that is read from its beginning to its end, or to where it was cut off.
+
+Only complete chunks are read, each checked by its CRC. So a file that a power failure has cut off reads like any
+other, and says where it ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+from mcap.exceptions import McapError
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
+
+MAGIC = b"\x89MCAP0\r\n"
+NO_SCHEMA = Schema(id=0, name="", encoding="", data=b"")
+LARGEST_RECORD = 256 * 1024 * 1024  # [B] a length above it is of a damaged file
+
+
+class BadRecording(ValueError):
+    """A file that is no recording; one sentence with the file, what it is, and what would do."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One message as it stands in the file."""
+
+    channel: Channel
+    schema: Schema
+    message: Message
+
+    @property
+    def is_derived(self) -> bool:
+        """True for what Foxglove shows: the same is in another channel."""
+        return "derived" in self.channel.metadata
+
+
+@dataclass
+class Damage:
+    """What of a file cannot be read; all zero and empty where it is whole."""
+
+    problem: str = ""  # at the first place
+    chunks: int = 0  # complete ones that do not agree with their CRC
+    at: int = 0  # [B] where the complete records end
+    lost: int = 0  # [B] behind that
+
+    @property
+    def is_any(self) -> bool:
+        return bool(self.problem)
+
+
+@dataclass
+class RecordingReader:
+    """Reads one file, any number of times; raises `BadRecording` where it is none."""
+
+    path: Path
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    damage: Damage = field(default_factory=Damage)
+
+    def __post_init__(self) -> None:
+        self.path = Path(self.path)
+        require_recording(self.path)
+
+    def rows(self, is_chosen: Callable[[str], bool] = lambda topic: True) -> Iterator[Row]:
+        """The messages of the chosen topics in the order of the file; afterwards `damage` is known."""
+        for record in self.records():
+            if isinstance(record, Message):
+                channel = self.channels[record.channel_id]
+                if is_chosen(channel.topic):
+                    yield Row(channel, self.schemas.get(channel.schema_id, NO_SCHEMA), record)
+
+    def records(self) -> Iterator[Any]:
+        """Every complete record of data, those of chunks one by one; afterwards `damage` is known."""
+        self.damage = Damage()
+        with self.path.open("rb") as file:
+            yield from self._records(file)
+
+    def read_metadata(self) -> dict[str, dict[str, str]]:
+        """Versions, deployment and the robot's files: those that come before the first hundred messages at least."""
+        for number, _ in enumerate(self.rows()):
+            if number >= 100:
+                break
+        return self.metadata
+
+    def _records(self, file: IO[bytes]) -> Iterator[Any]:
+        """Complete records; those of chunks one by one."""
+        size = self.path.stat().st_size
+        records = iter(StreamReader(file, emit_chunks=True, record_size_limit=LARGEST_RECORD).records)
+        while True:
+            self.damage.at = file.tell()
+            try:
+                record = next(records, None)
+            except (McapError, ValueError, EOFError, OSError, KeyError, IndexError, MemoryError) as error:
+                self._damaged(f"it ends in the middle of a record ({type(error).__name__})")
+                self.damage.lost = size - self.damage.at
+                return
+            if record is None:
+                return
+            yield from self._unpacked(record)
+            if isinstance(record, DataEnd):
+                return  # what follows is the index, which repeats
+
+    def _unpacked(self, record: Any) -> Iterator[Any]:
+        for each in self._chunk(record) if isinstance(record, Chunk) else (record,):
+            match each:
+                case Channel():
+                    self.channels[each.id] = each
+                case Schema():
+                    self.schemas[each.id] = each
+                case Metadata():
+                    self.metadata[each.name] = dict(each.metadata)
+                case Message() if each.channel_id not in self.channels:
+                    self._damaged(f"a message is of channel {each.channel_id}, which is not described")
+                    continue
+            if isinstance(each, Channel | Schema | Metadata | Message | Attachment):
+                yield each
+
+    def _chunk(self, chunk: Chunk) -> list[Any]:
+        try:
+            return list(breakup_chunk(chunk, validate_crc=True))
+        except Exception as error:  # zstd, lz4, struct and CRC have errors of their own
+            self.damage.chunks += 1
+            self._damaged(f"a chunk is damaged ({type(error).__name__})")
+            return []
+
+    def _damaged(self, problem: str) -> None:
+        self.damage.problem = self.damage.problem or problem
+
+
+def require_recording(path: Path) -> None:
+    """Raises `BadRecording` with one sentence where `path` is no MCAP."""
+    if path.is_dir():
+        raise BadRecording(f'"{path}" is a folder: name one file in it{_newest(path)}')
+    if not path.exists():
+        raise BadRecording(f'there is no file "{path}"{_newest(path.parent)}')
+    try:
+        with path.open("rb") as file:
+            begin = file.read(len(MAGIC))
+    except OSError as error:
+        raise BadRecording(f'"{path}" cannot be read: {error.strerror or error}') from error
+    if not begin:
+        raise BadRecording(f'"{path}" is empty: it was cut off before anything was written; nothing can be saved of it')
+    if begin != MAGIC:
+        raise BadRecording(
+            f'"{path}" is no MCAP recording: it begins with {begin!r}; recordings are the files that end with .mcap'
+        )
+
+
+def _newest(folder: Path) -> str:
+    """The newest recording there, as a remedy."""
+    found = sorted(folder.glob("*.mcap")) if folder.is_dir() else []
+    return f", as {found[-1]}" if found else "; recordings are in <out>/recordings"
