@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, TypeAlias, cast
 
 import msgspec
@@ -48,6 +49,7 @@ class Channel:
     metadata: dict[str, str]
 
 
+@cache
 def schema_of(kind: type[msgspec.Struct]) -> bytes:
     """JSON Schema of `kind` with every `$ref` replaced by what it refers to, as MCAP readers want it."""
     schema = cast("dict[str, Json]", msgspec.json.schema(kind))

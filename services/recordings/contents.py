@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
-from mcap.exceptions import McapError
 from mcap.reader import make_reader
 
-from services.recordings.reader import Damage, RecordingReader
+from services.recordings.reader import UNREADABLE, Damage, RecordingReader
 
 
 class TopicContents(msgspec.Struct, frozen=True, kw_only=True):
@@ -81,7 +80,7 @@ def _from_index(reader: RecordingReader) -> _Counted | None:
                 return None
             reader.channels, reader.schemas = dict(summary.channels), dict(summary.schemas)
             reader.metadata = {each.name: dict(each.metadata) for each in indexed.iter_metadata()}
-    except (McapError, ValueError, EOFError, OSError, KeyError):
+    except UNREADABLE:
         return None
     found = summary.statistics
     return _Counted(found.message_start_time, found.message_end_time, dict(found.channel_message_counts))

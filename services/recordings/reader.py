@@ -6,8 +6,10 @@ other, and says where it ends.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from os import SEEK_END
 from pathlib import Path
 from typing import IO, Any
 
@@ -16,6 +18,7 @@ from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Metadata,
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 MAGIC = b"\x89MCAP0\r\n"
+UNREADABLE = (McapError, struct.error, ValueError, EOFError, OSError, KeyError, IndexError, MemoryError)
 NO_SCHEMA = Schema(id=0, name="", encoding="", data=b"")
 LARGEST_RECORD = 256 * 1024 * 1024  # [B] a length above it is of a damaged file
 
@@ -95,15 +98,19 @@ class RecordingReader:
             self.damage.at = file.tell()
             try:
                 record = next(records, None)
-            except (McapError, ValueError, EOFError, OSError, KeyError, IndexError, MemoryError) as error:
-                self._damaged(f"it ends in the middle of a record ({type(error).__name__})")
+            except UNREADABLE as error:
                 self.damage.lost = size - self.damage.at
+                where = "in the middle of a record" if self.damage.lost else "before its index"
+                self._damaged(f"it ends {where} ({type(error).__name__})")
                 return
             if record is None:
                 return
             yield from self._unpacked(record)
-            if isinstance(record, DataEnd):
-                return  # what follows is the index, which repeats
+            if isinstance(record, DataEnd):  # what follows is the index, which repeats
+                file.seek(-len(MAGIC), SEEK_END)
+                if file.read() != MAGIC:
+                    self._damaged("it ends in the middle of its index")
+                return
 
     def _unpacked(self, record: Any) -> Iterator[Any]:
         for each in self._chunk(record) if isinstance(record, Chunk) else (record,):
