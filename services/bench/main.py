@@ -91,6 +91,8 @@ FIGURES = {
     "panel_lag_ms": Row("panel:panel_lag_ms", "ms", True),
     "stop_key_ms": Row("panel:stop_key_ms", "ms", True),
     "goal_drag_hz": Row("panel:goal_drag_hz", "1/s", True),
+    "record_cpu_percent": Row("recording:record_cpu_percent", "% of one core", True),
+    "record_mb_per_hour": Row("recording:record_mb_per_hour", "MB/h", True),
     "ready_s": Row("stack:ready_s", "s", True),
 }
 
