@@ -34,6 +34,7 @@ from schemas.device import (
 from schemas.frames import FrameTransforms, RobotDescription
 from schemas.gripper import GripperCommandFeedback, GripperCommandGoal, GripperCommandResult, GripperState
 from schemas.joints import JointState, JointTargets, StepErrors
+from schemas.ledger import StepLedger, StoppingDistance
 from schemas.message import Message
 from schemas.motion import (
     FollowJointTrajectoryFeedback,
@@ -123,6 +124,12 @@ JOINT_COMMANDS = Topic(
     "joint_commands", JointState, LATEST, 50.0, True, GATEWAY, "what the path asks for at the same instant"
 )
 STEP_ERRORS = Topic("step_errors", StepErrors, LATEST, 50.0, True, GATEWAY, "commanded minus executed, in steps")
+STEP_LEDGER = Topic(
+    "step_ledger", StepLedger, LATEST, 5.0, True, GATEWAY, "verified steps, and the confidence that none is lost"
+)
+STOPPING_DISTANCE = Topic(
+    "stopping_distance", StoppingDistance, LATEST, 10.0, True, GATEWAY, "how far the tool goes if all is lost now"
+)
 JOINT_TARGETS = Topic(
     "joint_targets", JointTargets, LATEST, None, True, ANY, "streamed targets from a slider or script"
 )
@@ -169,7 +176,7 @@ TOPICS: tuple[Topic[Message], ...] = (
     DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, JOINT_TARGETS, FRAMES, STATIC_FRAMES, PLANNED_PATH,
     PLAN_PROGRESS,
     SCENE, CONTACTS, JOG, JOG_STATUS, DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, DEVICE_CONFIGURATION,
-    SENSORS, DEVICE_SHAFT, GRIPPER_STATE,
+    SENSORS, DEVICE_SHAFT, GRIPPER_STATE, STEP_LEDGER, STOPPING_DISTANCE,
     COMMANDS, COMMAND_ACKS, LOG, STATISTICS, PARAMETER_CHANGES,
 )  # fmt: skip
 

@@ -10,6 +10,9 @@ from services.stepper_gateway.device.injection_handler import InjectionHandler
 from services.stepper_gateway.device.sensors import SensorRelay
 from services.stepper_gateway.goals.goal_executor import GoalExecutor
 from services.stepper_gateway.gripper.gripper_executor import GripperExecutor
+from services.stepper_gateway.ledger.record import LedgerRecord
+from services.stepper_gateway.ledger.step_ledger import Ledger
+from services.stepper_gateway.ledger.stopping_watch import StoppingWatch
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.motion_controller import MotionController
 from services.stepper_gateway.motion.target_follower import TargetFollower
@@ -20,13 +23,17 @@ from services.stepper_gateway.parameters import GatewayParameters
 class Components:
     """Everything that moves the arm, or speaks for it, with one device."""
 
-    def __init__(self, arm: Arm, session_id: int, parameters: GatewayParameters) -> None:
+    def __init__(
+        self, arm: Arm, session_id: int, parameters: GatewayParameters, kept: LedgerRecord | None = None
+    ) -> None:
         self.out = Outbox()
         self.device = GatewayDevice(arm, session_id, parameters, self.out)
         self.controller = MotionController(self.device, session_id)
         self.goals = GoalExecutor(self.device, self.controller)
         self.streaming = TargetFollower(self.device, self.controller)
-        self.command_handler = CommandHandler(self.device, self.controller)
+        self.ledger = Ledger(self.device, kept)
+        self.stopping = StoppingWatch(self.device, self.controller)
+        self.command_handler = CommandHandler(self.device, self.controller, self.ledger.on_reference)
         self.gripper = GripperExecutor(self.device, self.command_handler)
         self.sensors = SensorRelay(self.device)
         self.injections = InjectionHandler(self.device)

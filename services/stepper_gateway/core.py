@@ -20,6 +20,7 @@ from services.stepper_gateway.device.command_arguments import STOPS, kind_of
 from services.stepper_gateway.device.frame_handler import FrameHandler
 from services.stepper_gateway.device.gateway_device import status_of
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
+from services.stepper_gateway.ledger.record import LedgerRecord
 from services.stepper_gateway.links.frames import BadFrame, Command, Heartbeat, Sync, encode
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.moment import Moment
@@ -40,8 +41,15 @@ PAUSES = (  # commands that leave goals and targets as they are
 class GatewayCore:
     """One arm, one device."""
 
-    def __init__(self, arm: Arm, session_id: int, parameters: GatewayParameters | None = None) -> None:
-        self._components = Components(arm, session_id, parameters or GatewayParameters())
+    def __init__(
+        self,
+        arm: Arm,
+        session_id: int,
+        parameters: GatewayParameters | None = None,
+        kept: LedgerRecord | None = None,
+    ) -> None:
+        """`kept`: the step ledger of the gateway before, None where there is none."""
+        self._components = Components(arm, session_id, parameters or GatewayParameters(), kept)
         self._frame_handler = FrameHandler(self._components)
         self.device, self.controller = self._components.device, self._components.controller
         self.bad_frames = 0
@@ -171,8 +179,14 @@ class GatewayCore:
         self._components.echoes.step(moment)
         self._components.sensors.step(unreachable_reason, moment)
         self._components.gripper.step(moment)
+        self._components.ledger.step(moment)
         self.controller.pump(moment)
+        self._components.stopping.step(moment)
         return self._finish(moment)
+
+    def ledger_record(self) -> LedgerRecord | None:
+        """The step ledger as it is to be kept when the gateway ends; None while no device is known."""
+        return self._components.ledger.record()
 
     def _make_way_for(self, kind: DeviceCommandKind, moment: Moment) -> None:
         """A person's command comes before goals and targets."""

@@ -15,6 +15,7 @@ from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.stepper_gateway.core import GatewayCore
+from services.stepper_gateway.ledger.ledger_file import LedgerFile, read_ledger
 from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.shell import Shell
@@ -32,11 +33,16 @@ def run(node: Node, deployment: Deployment) -> None:
     arm = load_arm(project_root() / deployment.robot)
     require_motors(arm, deployment.device)
     parameters = node.parameters(GatewayParameters)
-    core = GatewayCore(arm, secrets.randbelow(2**31 - 1) + 1, parameters.value)
-    shell = Shell(node, core, parameters)
-    with closing(open_device(deployment, arm, shell.wake)) as link:
+    file = LedgerFile(project_root() / deployment.paths.run, arm.name, node.log.warning)
+    kept, trouble = read_ledger(file.path)
+    if trouble:
+        node.log.warning(trouble)
+    core = GatewayCore(arm, secrets.randbelow(2**31 - 1) + 1, parameters.value, kept)
+    shell = Shell(node, core, parameters, file)
+    with closing(file), closing(open_device(deployment, arm, shell.wake)) as link:
         shell.use(link)
         node.spin(shell.step, rate=RATE)
+        file.keep(core.ledger_record())
 
 
 def open_device(deployment: Deployment, arm: Arm, wake: Callable[[], None]) -> Link:

@@ -12,6 +12,7 @@ from schemas.message import Message
 from schemas.motion import FollowJointTrajectoryFeedback, FollowJointTrajectoryResult
 from schemas.system import LogLevel
 from schemas.topics import Topic
+from services.stepper_gateway.ledger.record import LedgerRecord
 from services.stepper_gateway.links.link import Kind
 
 Response = DeviceCommandResponse | ConfigureResponse | InjectResponse | EchoResponse
@@ -91,6 +92,13 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
+class KeepLedger:
+    """The step ledger, to be kept over a restart."""
+
+    record: LedgerRecord
+
+
+@dataclass(frozen=True, slots=True)
 class LogLine:
     """A line for people."""
 
@@ -108,6 +116,7 @@ Output = (
     | GripperProgress
     | GripperFinished
     | Answer
+    | KeepLedger
     | LogLine
 )
 

@@ -40,6 +40,7 @@ from services.runtime.node import Node
 from services.runtime.parameters import ParameterSet
 from services.runtime.requests.server import Pending
 from services.stepper_gateway.core import GatewayCore
+from services.stepper_gateway.ledger.ledger_file import LedgerFile
 from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import (
@@ -50,6 +51,7 @@ from services.stepper_gateway.outputs import (
     GripperExecuting,
     GripperFinished,
     GripperProgress,
+    KeepLedger,
     LogLine,
     Output,
     Publish,
@@ -67,8 +69,10 @@ Gripper = ActionServer[GripperCommandGoal, GripperCommandFeedback, GripperComman
 class Shell:
     """Everything here runs in the thread of logic, but `wake`."""
 
-    def __init__(self, node: Node, core: GatewayCore, parameters: ParameterSet[GatewayParameters]) -> None:
-        self._node, self._core, self._parameters = node, core, parameters
+    def __init__(
+        self, node: Node, core: GatewayCore, parameters: ParameterSet[GatewayParameters], ledger: LedgerFile
+    ) -> None:
+        self._node, self._core, self._parameters, self._ledger = node, core, parameters, ledger
         self._link: Link | None = None
         self._is_woken = threading.Event()
         self._callers: dict[int, Pending[Any]] = {}  # by ticket: who waits for the device's answer
@@ -185,5 +189,7 @@ class Shell:
                     self._gripper.finish(goal_id, status, gripped)
                 case Answer(ticket, response):
                     self._callers.pop(ticket).reply(response)
+                case KeepLedger(record):
+                    self._ledger.keep(record)
                 case LogLine(level, text):
                     self._node.log.log(level, "%s", text)

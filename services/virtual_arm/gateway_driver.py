@@ -38,6 +38,7 @@ from services.arm.model.description import Arm
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.device.command_arguments import KINDS
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
+from services.stepper_gateway.ledger.record import LedgerRecord
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import (
@@ -47,6 +48,7 @@ from services.stepper_gateway.outputs import (
     GoalProgress,
     GripperFinished,
     GripperProgress,
+    KeepLedger,
     LogLine,
     Output,
     Publish,
@@ -77,6 +79,7 @@ class GatewayDriver(ABC):
         self.pressed: dict[int, InjectResponse] = {}
         self.echoed: dict[int, EchoResponse] = {}
         self.log: list[str] = []
+        self.kept: list[LedgerRecord] = []  # of the step ledger
         self._on_message = on_message
 
     @property
@@ -93,8 +96,8 @@ class GatewayDriver(ABC):
         """Lets `seconds` [s] pass; returns True as soon as `until` holds, or at the end if there is none."""
 
     def start_core(self, arm: Arm, session_id: int, parameters: GatewayParameters | None = None) -> None:
-        """The gateway's process starts, perhaps again; its link is not up yet."""
-        self.core = GatewayCore(arm, session_id, parameters)
+        """The gateway's process starts, perhaps again, with the ledger that it kept last; its link is not up yet."""
+        self.core = GatewayCore(arm, session_id, parameters, self.kept[-1] if self.kept else None)
 
     @property
     def reason_not_ready(self) -> str:
@@ -226,6 +229,8 @@ class GatewayDriver(ABC):
                     self.pressed[ticket] = response
                 case Answer(ticket, EchoResponse() as response):
                     self.echoed[ticket] = response
+                case KeepLedger(record):
+                    self.kept.append(record)
                 case LogLine(_, text):
                     self.log.append(text)
 

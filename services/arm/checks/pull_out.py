@@ -10,6 +10,7 @@ from services.arm.checks.findings import Finding, error, warning
 from services.arm.errors import DescriptionError
 from services.arm.model.description import ROBOT_FILE
 from services.arm.motors.speed import speed_limits
+from services.arm.motors.torque import torque_at
 
 
 def check_pull_out(robot: RobotFile) -> list[Finding]:
@@ -22,17 +23,6 @@ def check_pull_out(robot: RobotFile) -> list[Finding]:
             wrong = _shape(curve, subject)
             findings += wrong or _demand(drive, curve, subject)
     return findings
-
-
-def torque_at(curve: PullOut, rate: float) -> float:
-    """[N m] at `rate` [steps/s], straight between the points and 0 beyond the last."""
-    points = list(zip(curve.speed, curve.torque, strict=True))
-    if rate <= points[0][0]:
-        return points[0][1]
-    for (low, first), (high, second) in pairwise(points):
-        if rate <= high:
-            return first + (second - first) * (rate - low) / (high - low)
-    return 0.0
 
 
 def _shape(curve: PullOut, subject: str) -> list[Finding]:

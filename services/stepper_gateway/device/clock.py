@@ -97,6 +97,11 @@ class ClockSync:
         """[s] of the latest exchange."""
         return self._exchanges[-1].round_trip * 1e-6 if self._exchanges else 0.0
 
+    @property
+    def longest_round_trip(self) -> float:
+        """[s] of the exchanges that are kept, the last half minute's."""
+        return max((exchange.round_trip for exchange in self._exchanges), default=0.0) * 1e-6
+
     def device_time(self, monotonic: float) -> int:
         """[us] of the device's clock at an instant of ours [s]."""
         at, offset, drift = self._line

@@ -41,14 +41,15 @@ TRUSTING = (  # commands that would move or mean something else with another con
     DeviceCommandKind.OUTPUT,
 )
 OnAnswer = Callable[[DeviceCommandResponse, Moment], None]
+OnReference = Callable[[int, tuple[int, ...], int, Moment], None]  # mask, [1/256 step], device time [us]
 AT_REST = (DeviceCommandKind.REFERENCE, DeviceCommandKind.DISARM, DeviceCommandKind.HOME)  # steps count anew after them
 
 
 class CommandHandler:
     """Takes commands, has them sent until the device answers, and hands the answers out."""
 
-    def __init__(self, device: GatewayDevice, controller: MotionController) -> None:
-        self._device, self._controller = device, controller
+    def __init__(self, device: GatewayDevice, controller: MotionController, on_reference: OnReference) -> None:
+        self._device, self._controller, self._on_reference = device, controller, on_reference
         self._own_tickets = itertools.count(-1, -1)  # of the gateway's own commands that it wants to hear of
         self._listeners: dict[int, OnAnswer] = {}  # by such a ticket
         self._heard: list[tuple[OnAnswer, DeviceCommandResponse]] = []
@@ -98,7 +99,7 @@ class CommandHandler:
             return self._insist(command, Code(reply.code), moment)
         accepted = reply.code in (Code.OK, Code.DUPLICATE)
         if accepted and is_present:
-            self._note(command, reply)
+            self._note(command, reply, moment)
             if not command.is_stop and command.tickets:
                 command.answer, command.answered = reply, moment.monotonic
                 return self.tell_shown(moment)
@@ -175,7 +176,7 @@ class CommandHandler:
             return f"a goal is being carried out: cancel it or run `gemelo stop` before {kind.name}"
         return self._device.configuration.mismatch_reason() if kind in TRUSTING else ""
 
-    def _note(self, command: PendingCommand, reply: CommandReply) -> None:
+    def _note(self, command: PendingCommand, reply: CommandReply, moment: Moment) -> None:
         match command.kind:
             case DeviceCommandKind.STOP:
                 self._controller.stop_answered(reply.t_us)
@@ -183,6 +184,9 @@ class CommandHandler:
                 self._controller.hold_answered(reply.mode == DeviceMode.HOLD, reply.t_us)
             case kind if kind in AT_REST:
                 self._controller.transmission.forget()
+                if kind == DeviceCommandKind.REFERENCE:
+                    given = command.arguments
+                    self._on_reference(given.argument, given.positions, reply.t_us, moment)
 
     def _complaint(self, command: PendingCommand, reply: CommandReply) -> str:
         remedy = REMEDIES.get(reply.code)

@@ -96,6 +96,7 @@ class FrameHandler:
 
     def _on_event(self, event: EventReport, moment: Moment) -> None:
         publish_event(event, self._device, moment)
+        self._components.ledger.on_event(event, moment)
         if event.event in STOPPED:
             self._on_stopped(event, moment)
         self._components.injections.on_event(event)
@@ -128,6 +129,7 @@ class FrameHandler:
         controller.on_state(state, arrival)
         point = controller.commanded(state)
         self._publish(state, point, moment)
+        self._components.ledger.on_state(state, point, moment)
         self._components.gripper.on_state(state, moment)
         if state.mode == DeviceMode.HOLD and controller.is_followed(state) and not controller.is_held:
             self._components.streaming.interrupt()

@@ -216,6 +216,11 @@ class DeviceSession:
         is_wanted = self.status is None or self._doubted is not None
         return self._tells_status and is_wanted and self.boot_id != 0 and self.is_fresh(moment, ASK_STATUS)
 
+    @property
+    def last_beat(self) -> float:
+        """[s] monotonic, when the last heartbeat was sent."""
+        return self._beat
+
     def is_fresh(self, moment: Moment, timeout: float) -> bool:
         """True if a state has arrived within `timeout` seconds."""
         return self.link_up and moment.monotonic - self.state_arrival <= timeout

@@ -48,6 +48,11 @@ class CommandedPath:
         first = max(0, bisect_right(self._times, from_us) - 1)
         return self._knots[first : bisect_right(self._times, to_us)]
 
+    def upcoming(self, from_us: int) -> list[tuple[int, Knot]]:
+        """Stream times [us] and knots, from the one at or before `from_us` to the last."""
+        first = max(0, bisect_right(self._times, from_us) - 1)
+        return list(zip(self._times[first:], self._knots[first:], strict=True))
+
     def at(self, time_us: int) -> PathPoint:
         """The commanded path [steps] at `time_us` [us] of the stream, held at its ends."""
         index = bisect_right(self._times, time_us) - 1

@@ -1,0 +1,1 @@
+"""What the gateway knows of lost steps: verified counts, confidence, tool error, stopping distance."""
