@@ -44,7 +44,9 @@ void Machine::begin(DeviceConfig& config, const Identity& identity, const Sink& 
 }
 
 void Machine::begin_inputs() {
-    limits_ = 0;
+    limits_ = homes_ = seen_ = 0;
+    for (uint8_t j = 0; j < config_->joints; ++j)
+        if (config_->joint[j].homing.input != kNone) homes_ |= 1u << config_->joint[j].homing.input;
     for (uint8_t i = 0; i < config_->inputs; ++i) {
         const InputRole role = config_->input[i].role;
         if (role == InputRole::LimitLower || role == InputRole::LimitUpper) limits_ |= 1u << i;
@@ -140,6 +142,7 @@ void Machine::watch_ticks(uint64_t slot_start_us) {
 }
 
 void Machine::finish_slot() {
+    watch_switches();
     const Point& point = present();
     switch (mode_) {
         case Mode::Fault:

@@ -123,6 +123,8 @@ class Machine {
     void watch_homing();
     void finish_homing();
     void note_homed();
+    void watch_switches();
+    void note_passed(uint32_t risen);
     void stop_homing(const char* cause);
     void watch_following();
     void advance_ramps(Point* point);
@@ -188,6 +190,8 @@ class Machine {
     uint16_t referenced_ = 0;      // bit j: the place of joint j is known
     uint16_t was_referenced_ = 0;  // when homing began
     uint32_t limits_ = 0;          // bit i: input i is a limit switch
+    uint32_t homes_ = 0;           // the same: a switch that a joint homes with
+    uint32_t seen_ = 0;            // the inputs that were active at the end of the slot before
     uint16_t outputs_ = 0;
     uint16_t speed_permil_ = 1000;
     bool is_armed_ = false;

@@ -86,6 +86,29 @@ void Machine::note_homed() {
     }
 }
 
+// A home switch that a motion passes on its way, in the direction of homing: where its closing was latched says what
+// the joint's count is off by. Nothing is corrected.
+void Machine::watch_switches() {
+    const uint32_t active = stepper_.active_inputs();
+    const uint32_t risen = active & homes_ & ~seen_;
+    seen_ = active;
+    if (risen != 0 && (mode_ == Mode::Run || mode_ == Mode::Hold)) note_passed(risen);
+}
+
+void Machine::note_passed(uint32_t risen) {
+    const Point& before = points_[(stepper_.latched_number() + kPoints - 1) % kPoints];
+    for (uint8_t j = 0; j < rules_.joints; ++j) {
+        const HomingConfig& homing = config_->joint[j].homing;
+        if (homing.input == kNone || ((risen >> homing.input) & 1) == 0) continue;
+        const int64_t by_q20 = present().position_q20[j] - before.position_q20[j];
+        if (homing.direction > 0 ? by_q20 <= 0 : by_q20 >= 0) continue;
+        const int32_t off = ((homing.position_q8 + 128) >> 8) - stepper_.closed_at(homing.input);
+        char detail[kDetailSize];
+        Phrase(detail, sizeof detail).add(config_->joint[j].name).add(": ").add_signed(off).add(" steps off");
+        event("passed", detail);
+    }
+}
+
 void Machine::finish_homing() {
     is_stopping_ = false;
     homing_.stop();

@@ -17,7 +17,7 @@ from schemas.message import Vector
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.topics import STOPPING_DISTANCE
 from services.arm.kinematics.tool_jacobian import ToolJacobian
-from services.arm.model.description import Arm
+from services.arm.model.description import Arm, Joint
 from services.bench.figures import Figure, NotMeasured, quantile, rounded
 from services.bench.scenes import rm1
 from services.virtual_arm.gateway_driver import asked
@@ -120,9 +120,13 @@ def _point(start: Vector, end: Vector, u: float, duration: float) -> TrajectoryP
     )
 
 
+def random_place(joint: Joint, rng: random.Random, share: float = 0.9) -> float:
+    """A position [rad] or [m] within the middle `share` of the joint's limits."""
+    return joint.lower + (joint.upper - joint.lower) * (0.5 + share * rng.uniform(-0.5, 0.5))
+
+
 def _place(arm: Arm, rng: random.Random) -> Vector:
-    """A random configuration within the middle nine tenths of the limits; [rad] or [m]."""
-    return tuple(joint.lower + (joint.upper - joint.lower) * rng.uniform(0.05, 0.95) for joint in arm.joints)
+    return tuple(random_place(joint, rng) for joint in arm.joints)
 
 
 def _lose_all(rig: VirtualArm, rng: random.Random) -> Hold:

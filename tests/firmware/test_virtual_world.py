@@ -6,6 +6,7 @@ import random
 
 import pytest
 from bench_firmware import Bench
+from msgspec.structs import replace
 
 from firmware.bindings.injection import InjectRefused
 from schemas.device import DeviceCommandKind, DeviceMode, InjectKind
@@ -95,6 +96,43 @@ def test_homing_proves_steps_that_were_lost(rm1: Arm, slip: int):
     assert abs(off[2] - slip) <= 1
     for counted, true in zip(bench.device.steps, bench.device.shaft, strict=True):
         assert abs(counted - true) <= 1
+
+
+def passable() -> DeviceConfig:
+    """Six joints whose home switches, 14,500 steps from zero, lie within their limits."""
+    config = six_joints()
+    return replace(
+        config, joints=tuple(replace(joint, lower_q8=-16_000 * 256, upper_q8=16_000 * 256) for joint in config.joints)
+    )
+
+
+@pytest.mark.parametrize("slip", [0, 50, -50])
+def test_a_home_switch_that_a_motion_passes_proves_steps_that_were_lost_and_corrects_nothing(slip: int):
+    bench = Bench(passable())
+    bench.device.slip(0, slip)
+    assert bench.move((-15_200, 15_200, 0, 0, 0, 0), 5.0) == OK
+    bench.run(5500)
+    assert bench.device.mode == DeviceMode.IDLE
+    found = dict(str(detail).removesuffix(" steps off").split(": ") for detail in bench.details("passed"))
+    assert sorted(found) == ["J1", "J2"]
+    assert abs(int(found["J1"]) - slip) <= 1
+    assert abs(int(found["J2"])) <= 1
+    assert bench.device.steps[:2] == (-15_200, 15_200)
+    assert bench.move((0, 0, 0, 0, 0, 0), 5.0) == OK  # off the switches: no closing
+    bench.run(5500)
+    assert len(bench.details("passed")) == 2
+
+
+def test_a_home_switch_that_a_hand_presses_is_not_passed():
+    bench = Bench(passable())
+    bench.press(InjectKind.SWITCH, "home_1", 1)
+    bench.run(100)
+    bench.press(InjectKind.SWITCH, "home_1", -1)
+    assert bench.move((2000, 2000, 0, 0, 0, 0), 2.0) == OK  # J1 homes downwards
+    bench.run(1000)
+    bench.press(InjectKind.SWITCH, "home_1", 1)
+    bench.run(1500)
+    assert bench.details("passed") == []
 
 
 def test_a_motor_that_is_asked_for_more_than_it_has_loses_cycles_and_only_the_shaft_knows(rm1: Arm):

@@ -23,9 +23,10 @@ from msgspec import Struct
 
 from schemas.ledger import VerifiedBy
 
-HALF = 0.5  # load at which half of all motors would lose steps; chosen low: supply, driver and gravity take their part
-STEEPNESS = 3.5  # chosen: one motor in 25 fails at 0.2 of its stated torque, one in 280 at 0.1
-PROOF = 0.9  # of a load that a verification has proven, that counts on another day
+HALF = 0.35  # load at which half of all motors would lose steps: less than stated, and the rotor's swing takes its part
+STEEPNESS = 3.5  # chosen: one motor in 8 fails at 0.2 of its stated torque, one in 80 at 0.1
+PROOF = 0.7  # of a load that a verification has proven: near pull-out a motor loses steps in one motion, not in all
+CLEAN = 3  # verifications without a loss, after one with a loss, until that is forgotten: losses can cancel out
 TURNS = 100_000.0  # [rev] of the motor shaft after which 1/e is left
 AGE = 30.0 * 86_400.0  # [s] after which 1/e is left
 BASE = {  # confidence at the moment of the verification
@@ -52,6 +53,7 @@ class Evidence(Struct, frozen=True, kw_only=True):
     incidents: float = 0.0  # their sum
     proven: float = 0.0  # the largest load after which a verification has found no step lost
     refuted: float = 0.0  # the smallest load after which one has found steps lost; 0: none
+    suspicion: int = 0  # verifications without a loss that are still to come until `refuted` is forgotten
     lost: int = 0  # [steps] found by a switch that was passed, and not corrected
 
 
@@ -89,14 +91,10 @@ def after_verification(
     `cycle` [steps] each: less than half a one is the switch's own spread. A homing corrects the counter, a switch that
     is passed does not. A loss revokes what was proven before: the motor or its load has changed.
     """
-    proven, refuted = evidence.proven, evidence.refuted
     is_off = off is not None and abs(off) >= 0.5 * cycle
+    proven, refuted, suspicion = evidence.proven, evidence.refuted, evidence.suspicion
     if off is not None and evidence.verified_by in MEASURED:
-        if is_off:
-            proven, refuted = 0.0, min(refuted or evidence.load, evidence.load)
-        else:
-            proven = max(proven, evidence.load)
-            refuted = refuted if refuted > proven else 0.0  # what seemed too weak has followed: it was no weakness
+        proven, refuted, suspicion = _learned(evidence, is_off)
     return Evidence(
         verified_by=by,
         verified_at=now,
@@ -104,5 +102,16 @@ def after_verification(
         found_off=off or 0,
         proven=proven,
         refuted=refuted,
+        suspicion=suspicion,
         lost=off or 0 if is_off and by is VerifiedBy.SWITCH else 0,
     )
+
+
+def _learned(evidence: Evidence, is_off: bool) -> tuple[float, float, int]:
+    """`proven`, `refuted` and `suspicion` after a verification that found steps lost, or none."""
+    load = evidence.load
+    if is_off:
+        return 0.0, min(evidence.refuted or load, load), CLEAN
+    if evidence.suspicion > 1:
+        return 0.0, evidence.refuted, evidence.suspicion - 1
+    return max(evidence.proven, load), 0.0 if evidence.suspicion else evidence.refuted, 0
