@@ -17,6 +17,7 @@ SECTIONS = (  # title, names
     ("The arm", ("Arm",)),
     ("Where to and how", ("Target", "ToolGoal")),
     ("Plans and motions", ("Plan", "Motion", "Configurations", "HomingProgress", "HomingReport", "Gripped")),
+    ("The step ledger", ("Ledger", "JointLedger", "Verification")),
     ("The scene", ("Scene", "load_mesh")),
     ("The device", ("Device",)),
     ("Errors", ("Error", "BadArgument", "Refused", "Aborted", "Canceled", "Lost", "Interrupted")),

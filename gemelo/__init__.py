@@ -26,12 +26,14 @@ if TYPE_CHECKING:
     from gemelo.errors import Aborted, BadArgument, Canceled, Error, Interrupted, Lost, Refused
     from gemelo.gripping import Gripped
     from gemelo.homing_report import HomingProgress, HomingReport
+    from gemelo.ledger import JointLedger, Ledger
     from gemelo.motion import Motion
     from gemelo.planning import Configurations, Plan
     from gemelo.robot_files import Robot, load_robot
     from gemelo.scene import Scene
     from gemelo.scene_files import load_mesh
     from gemelo.units import Pose, deg, mm
+    from gemelo.verification import Verification
     from schemas import topics
     from schemas.actions import GoalStatusCode
     from schemas.device import DeviceMode, StopKind
@@ -51,6 +53,8 @@ __all__ = [
     "HomingProgress",
     "HomingReport",
     "Interrupted",
+    "JointLedger",
+    "Ledger",
     "Lost",
     "Motion",
     "Node",
@@ -62,6 +66,7 @@ __all__ = [
     "StopKind",
     "Target",
     "ToolGoal",
+    "Verification",
     "connect",
     "deg",
     "load_mesh",
@@ -80,12 +85,14 @@ MODULES = {
     "gemelo.errors": ("Aborted", "BadArgument", "Canceled", "Error", "Interrupted", "Lost", "Refused"),
     "gemelo.gripping": ("Gripped",),
     "gemelo.homing_report": ("HomingProgress", "HomingReport"),
+    "gemelo.ledger": ("JointLedger", "Ledger"),
     "gemelo.motion": ("Motion",),
     "gemelo.planning": ("Configurations", "Plan"),
     "gemelo.robot_files": ("Robot", "load_robot"),
     "gemelo.scene": ("Scene",),
     "gemelo.scene_files": ("load_mesh",),
     "gemelo.units": ("Pose", "deg", "mm"),
+    "gemelo.verification": ("Verification",),
     "schemas.actions": ("GoalStatusCode",),
     "schemas.device": ("DeviceMode", "StopKind"),
     "services.runtime.node": ("Node",),

@@ -14,6 +14,7 @@ from gemelo.gripping import Gripped, Gripping, OnGripping
 from gemelo.homing import OnHoming, home
 from gemelo.homing_report import HomingReport
 from gemelo.jog import Jogging, Streaming, jog_command
+from gemelo.ledger import Ledger, Requirement, read_ledger
 from gemelo.motion import Motion, Motions, OnMotion
 from gemelo.planning import (
     Configurations,
@@ -28,12 +29,22 @@ from gemelo.scene import Scene
 from gemelo.session import Session
 from gemelo.targets import as_target, ik_request, joint_state, request_of
 from gemelo.units import Pose
+from gemelo.verification import OnVerifying, Verification, verify
 from schemas.deployment import Deployment
 from schemas.device import OutputCommand, ResumeCommand, SpeedCommand, StopKind
 from schemas.gripper import GripperState
 from schemas.joints import JointState
+from schemas.ledger import StoppingDistance
 from schemas.planning import IkRequest, JogCommand, JogStatus, PlanRequest
-from schemas.topics import DEVICE_STATUS, GRIPPER_STATE, JOINT_STATES, SENSORS, STEP_ERRORS
+from schemas.topics import (
+    DEVICE_STATUS,
+    GRIPPER_STATE,
+    JOINT_STATES,
+    SENSORS,
+    STEP_ERRORS,
+    STEP_LEDGER,
+    STOPPING_DISTANCE,
+)
 from services.arm.errors import suggestion
 from services.arm.model.description import Arm as Description
 from services.runtime.node import Node
@@ -50,7 +61,8 @@ class Arm:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._frames, self._motions = Frames(session), Motions(session)
+        self._requirement = Requirement(session)
+        self._frames, self._motions = Frames(session), Motions(session, self._requirement.check)
         self._jogging, self._streaming = Jogging(session), Streaming(session)
         self._scene, self._device = Scene(session), Device(session)
         self._gripping = Gripping(session, self._scene)
@@ -220,6 +232,38 @@ class Arm:
             return {}
         errors = self._session.newest(STEP_ERRORS)
         return dict(zip(errors.name, errors.error, strict=True))
+
+    @property
+    def ledger(self) -> Ledger:
+        """How sure it is that no joint has lost a step, and what that means at the tool: docs/ledger.md.
+
+        >>> arm.ledger.open_loop, sorted(arm.ledger.joints) == sorted(arm.joint_names)
+        (False, True)
+        """
+        return read_ledger(self._session.newest(STEP_LEDGER))
+
+    @property
+    def stopping_distance(self) -> StoppingDistance:
+        """How far [m] and how long [s] the tool goes on at most if gateway, network or broker are lost now.
+
+        >>> arm.stopping_distance.is_known, arm.stopping_distance.distance
+        (True, 0.0)
+        """
+        return self._session.newest(STOPPING_DISTANCE)
+
+    def require(self, *, confidence: float = 0.95) -> None:
+        """Refuses below this confidence that no step is lost: now, and from now on before every motion of this `Arm`.
+
+        Raises `Refused` with the joint in doubt, value, limit and remedy. 0 ends it; `home` and `verify` are exempt.
+
+        >>> try:
+        ...     arm.require(confidence=1.0)
+        ... except gemelo.Refused as refused:
+        ...     print(refused.check, refused.limit, refused.value < 1.0, refused.remedy)
+        confidence 1.0 True arm.verify()
+        >>> arm.require(confidence=0.0)
+        """
+        self._requirement.require(confidence)
 
     @property
     def sensors(self) -> dict[str, float]:
@@ -478,6 +522,19 @@ class Arm:
         """
         return home(self._session, joints, self.device.command, on_progress, on_cancel)
 
+    def verify(self, *joints: str, on_progress: OnVerifying | None = None) -> Verification:
+        """Verifies the joints by their switches, all that have one if none is named, on the shortest trip.
+
+        A home switch within the joint's limits is passed in a planned motion, and the arm returns; where it is a limit
+        switch, lies beyond the limits, was not seen, or where steps were lost, the joint homes. Raises `Refused` where
+        no switch can verify any of them; `on_progress` is called with a sentence for each part of the trip.
+
+        >>> arm.verify("efector_joint").homed
+        ('efector_joint',)
+        """
+        with self._requirement.suspended():
+            return verify(self, joints, lambda plan: self._motions.run(plan, False, None, None), on_progress)
+
     def reference(self, joints: Joints | None = None) -> None:
         """Declares where the joints stand, [rad] or [m] by name; the others are at robot.toml's reference position.
 
@@ -514,6 +571,7 @@ class Arm:
             command = jog_command(self.description, joints, twist, frame)
         elif joints is not None or twist is not None or frame:
             raise BadArgument("jog by a command, or by joints= or twist=: not both")
+        self._requirement.check()
         if duration is None:
             return self._jogging.say(command)
         return self._jogging.hold(command, duration, on_progress)
@@ -536,6 +594,7 @@ class Arm:
         >>> for step in range(20):
         ...     arm.stream({"brazo_joint": arm.joints["brazo_joint"] + 0.002})
         """
+        self._requirement.check()
         self._streaming.say(joints)
 
     def grip(

@@ -250,8 +250,9 @@ class Motion:
 class Motions:
     """All motions of one connection: sends them, and cancels those that are attached when it closes."""
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, session: Session, check: Callable[[], None]) -> None:
+        """`check` raises `Refused` where nothing may move."""
+        self._session, self._check = session, check
         self._client: Client | None = None
         self._started: list[Motion] = []
 
@@ -267,6 +268,7 @@ class Motions:
         return self._start(Motion(self._session, plan, detached), after)
 
     def _start(self, motion: Motion, after: Motion | None = None) -> Motion:
+        self._check()
         client = self._client = self._client or self._session.node.action(FOLLOW_JOINT_TRAJECTORY)
         plan = motion.plan
         self._started = [each for each in self._started if not each.is_over] + [motion]

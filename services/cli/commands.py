@@ -36,6 +36,8 @@ COMMANDS = (
             "device:reference_choices"),
     Command(("home",), "let the joints find their switches; Ctrl-C stops them",
             "home:run", "home:add_options", "gemelo home brazo_joint", "home:choices"),
+    Command(("verify",), "verify the joints by their switches on the shortest trip: passed where possible, else homed",
+            "verify:run", "verify:add_options", "gemelo verify brazo_joint", "home:choices"),
     Command(("output",), "switch an output of the device",
             "device:run_output", "device:output_options", "gemelo output avanzar on", "device:output_choices"),
     Command(("grip",), "open or close the gripper, or say how it is; Ctrl-C lets it stay where it is",

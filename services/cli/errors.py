@@ -78,6 +78,8 @@ COMMAND_OF = (  # methods of `gemelo` that its sentences name, and the commands 
     (r"arm\.device\.arm\(\)", "`gemelo device arm`"),
     (r"arm\.device\.reset\(\)", "`gemelo reset`"),
     (r"arm\.home\(\)", "`gemelo home`"),
+    (r"arm\.verify\(\)", "`gemelo verify`"),
+    (r"arm\.reference\(\{\.\.\.\}\)", "`gemelo reference --joints NAME=...`"),
     (r"arm\.stop\(\)", "`gemelo stop`"),
     (r'arm\.reference\(\{"(\w+)": \.\.\.\}\)', r"`gemelo reference --joints \1=...`"),
     (r"arm\.reference\(\)", "`gemelo reference`"),

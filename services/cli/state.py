@@ -9,7 +9,17 @@ import msgspec
 
 from schemas.device import DeviceState, DeviceStatus
 from schemas.joints import JointState, StepErrors
-from schemas.topics import DEVICE_STATE, DEVICE_STATUS, FRAMES, JOINT_STATES, STATIC_FRAMES, STEP_ERRORS
+from schemas.ledger import StepLedger, StoppingDistance
+from schemas.topics import (
+    DEVICE_STATE,
+    DEVICE_STATUS,
+    FRAMES,
+    JOINT_STATES,
+    STATIC_FRAMES,
+    STEP_ERRORS,
+    STEP_LEDGER,
+    STOPPING_DISTANCE,
+)
 from services.arm.frames.frame_buffer import FrameBuffer, FrameError
 from services.cli.device_snapshot import OPEN_LOOP
 from services.cli.errors import CommandError, ExitCode
@@ -47,6 +57,9 @@ class JointLine(msgspec.Struct, frozen=True):
     commanded_steps: float | None = None
     executed_steps: int | None = None
     error_steps: float | None = None
+    confidence: float | None = None  # 0 to 1: that no step is lost
+    verified_by: str = ""
+    verified_at: int = 0  # [ns] UNIX time; 0: never
 
 
 class Snapshot(msgspec.Struct, frozen=True):
@@ -64,6 +77,8 @@ class Snapshot(msgspec.Struct, frozen=True):
     buffered: float | None  # [s]
     round_trip: float | None  # [s]
     open_loop: bool = False  # the positions are what was sent: what was executed is not known
+    ledger: StepLedger | None = None
+    stopping: StoppingDistance | None = None
 
 
 def snapshot(
@@ -73,6 +88,8 @@ def snapshot(
     device: DeviceState | None,
     status: DeviceStatus | None,
     tool: tuple[float, ...] | None,
+    ledger: StepLedger | None = None,
+    stopping: StoppingDistance | None = None,
 ) -> Snapshot:
     """The `Snapshot` of the messages received so far, None for one that was not; `tool` is (3,) [m] in the base
     frame."""
@@ -86,10 +103,15 @@ def snapshot(
     if is_open_loop and device is not None:
         commanded = dict(zip(device.name, map(float, device.steps), strict=False))
         executed, error = {}, {}
+    verified = {} if ledger is None else dict(
+        zip(ledger.name, zip(ledger.confidence, map(str, ledger.verified_by), ledger.verified_at, strict=False),
+            strict=False)
+    )  # fmt: skip
     lines = tuple(
         JointLine(
             joint.name, joint.unit, position.get(joint.name), velocity.get(joint.name),
             commanded.get(joint.name), executed.get(joint.name), error.get(joint.name),
+            *verified.get(joint.name, ()),
         )
         for joint in arm.joints
     )  # fmt: skip
@@ -106,13 +128,15 @@ def snapshot(
         buffered=device.buffered if device else None,
         round_trip=device.round_trip if device else None,
         open_loop=is_open_loop,
+        ledger=ledger,
+        stopping=stopping,
     )
 
 
 def text_of(view: Snapshot) -> str:
     """The snapshot as a table and three lines."""
     headings = ("joint", "position", "unit", "velocity [unit/s]", "commanded [steps]", "executed [steps]",
-                "error [steps]")  # fmt: skip
+                "error [steps]", "sure", "verified by")  # fmt: skip
     rows = [_row(line) for line in view.joints]
     tool = (
         "unknown" if view.tool is None else "x {:z.2f}  y {:z.2f}  z {:z.2f} mm".format(*(v * 1e3 for v in view.tool))
@@ -126,7 +150,38 @@ def text_of(view: Snapshot) -> str:
     if view.online and view.reason:
         device += f"; {view.reason}"
     sent = f"\n\n{OPEN_LOOP}" if view.open_loop else ""
-    return f"{table(headings, rows)}{sent}\n\ntool {view.tool_frame}: {tool}\ndevice {device}\nlink   {link}"
+    known = "".join(f"\n{line}" for line in (ledger_text(view.ledger), stopping_text(view.stopping)) if line)
+    return f"{table(headings, rows)}{sent}\n\ntool {view.tool_frame}: {tool}{known}\ndevice {device}\nlink   {link}"
+
+
+def ledger_text(ledger: StepLedger | None) -> str:
+    """What the step ledger means at the tool; empty before the first."""
+    if ledger is None:
+        return ""
+    if ledger.open_loop or not any(ledger.confidence):
+        return f"ledger the tool's error is not known: {ledger.reason}"
+    lost = f"known {1e3 * ledger.tool_error:.2f} mm, " if any(ledger.lost) else ""
+    return (
+        f"ledger tool error {lost}at most {1e3 * ledger.tool_bound:.2f} mm ({ledger.level:.0%}); "
+        f"{_percent(ledger.arm_confidence)} sure that no step is lost; {ledger.reason}"
+    )
+
+
+def stopping_text(stopping: StoppingDistance | None) -> str:
+    """How far the tool goes if all is lost now; empty before the first word of it."""
+    if stopping is None:
+        return ""
+    if not stopping.is_known:
+        return f"stop   not known how far it goes if all is lost now: {stopping.reason}"
+    return (
+        f"stop   {1e3 * stopping.distance:.1f} mm in {stopping.duration:.2f} s at most if all is lost now "
+        f"(noticed after {stopping.reaction:.2f} s)"
+    )
+
+
+def _percent(share: float | None) -> str:
+    """Rounded down: what is not reached must not read as if it were."""
+    return "-" if share is None else f"{int(share * 1000.0) / 10.0:g} %"
 
 
 def _row(line: JointLine) -> tuple[str, ...]:
@@ -134,6 +189,7 @@ def _row(line: JointLine) -> tuple[str, ...]:
     return (
         line.name, _number(line.position, factor, 3), shown, _number(line.velocity, factor, 3),
         _number(line.commanded_steps, 1.0, 2), _number(line.executed_steps, 1.0, 0), _number(line.error_steps, 1.0, 2),
+        _percent(line.confidence), line.verified_by or "-",
     )  # fmt: skip
 
 
@@ -152,6 +208,7 @@ class StateView:
         self._errors = node.latest(STEP_ERRORS)
         self._device = node.latest(DEVICE_STATE)
         self._status = node.latest(DEVICE_STATUS)
+        self._ledger, self._stopping = node.latest(STEP_LEDGER), node.latest(STOPPING_DISTANCE)
         node.subscribe(FRAMES, self.frames.insert_all)
         node.subscribe(STATIC_FRAMES, lambda message: self.frames.insert_all(message, is_static=True))
 
@@ -160,6 +217,7 @@ class StateView:
         """True if every message has been received."""
         status = self._status.message
         parts: list[object] = [self._states.message, self._device.message, status]
+        parts += [self._ledger.message, self._stopping.message]
         if status is not None and not status.open_loop:  # else there are no step errors
             parts.append(self._errors.message)
         return None not in parts and self.tool() is not None
@@ -185,6 +243,8 @@ class StateView:
             self._device.message,
             self._status.message,
             self.tool(),
+            self._ledger.message,
+            self._stopping.message,
         )
 
 

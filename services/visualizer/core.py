@@ -13,6 +13,7 @@ import numpy as np
 
 from schemas.device import DeviceState, DeviceStatus, SensorReadings, ShaftPositions
 from schemas.joints import JointState, StepErrors
+from schemas.ledger import StepLedger, StoppingDistance
 from schemas.planning import PlannedPath
 from services.visualizer.content import entities
 from services.visualizer.content.arm_poses import arm_poses
@@ -96,6 +97,14 @@ class Visualizer:
             if is_lost(error) is not is_lost(before.get(name, 0)):
                 text = f"{name}: its shaft is {error:+d} steps from its counter"
                 self.event_log.add(message.stamp, text, "ERROR" if is_lost(error) else "INFO")
+
+    def on_step_ledger(self, message: StepLedger) -> None:
+        """How sure it is that no step is lost."""
+        self._panel_inputs = replace(self._panel_inputs, ledger=message)
+
+    def on_stopping_distance(self, message: StoppingDistance) -> None:
+        """How far the tool goes if all is lost now."""
+        self._panel_inputs = replace(self._panel_inputs, stopping=message)
 
     def on_planned_path(self, message: PlannedPath) -> None:
         """The planned path of the tool."""

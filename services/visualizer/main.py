@@ -22,6 +22,8 @@ from schemas.topics import (
     SCENE,
     SENSORS,
     STEP_ERRORS,
+    STEP_LEDGER,
+    STOPPING_DISTANCE,
     camera_detections,
     camera_image,
     camera_info,
@@ -97,6 +99,8 @@ def _visualizer(node: Node, message: RobotDescription, folders: tuple[Path, ...]
     node.subscribe(DEVICE_EVENTS, core.event_log.on_event)
     node.subscribe(SENSORS, core.on_sensors)
     node.subscribe(DEVICE_SHAFT, core.on_shaft, batch=1 / BATCH_RATE)
+    node.subscribe(STEP_LEDGER, core.on_step_ledger)
+    node.subscribe(STOPPING_DISTANCE, core.on_stopping_distance)
     node.subscribe(PLANNED_PATH, core.on_planned_path)
     node.subscribe(SCENE, core.scene.on_scene)
     arm = load_arm(folders[-1])

@@ -10,6 +10,7 @@ import gemelo
 from gemelo.device import fault_of
 from schemas.device import DeviceState, DeviceStatus
 from schemas.gripper import GripperState
+from schemas.ledger import StepLedger, StoppingDistance
 from schemas.planning import JogStatus, PlannedPath
 from schemas.scene import Contacts, PlanningScene, SceneObject
 from schemas.system import LogRecord
@@ -32,6 +33,8 @@ class Readings:
     sensors: Mapping[str, float]
     fault: str
     gripper: GripperState | None
+    ledger: StepLedger | None
+    stopping: StoppingDistance | None
 
     @property
     def is_live(self) -> bool:
@@ -54,6 +57,7 @@ class Bus:
         self._scene, self._contacts = node.latest(topics.SCENE), node.latest(topics.CONTACTS)
         self._path, self._jog = node.latest(topics.PLANNED_PATH), node.latest(topics.JOG_STATUS)
         self._gripper = node.latest(topics.GRIPPER_STATE)
+        self._ledger, self._stopping = node.latest(topics.STEP_LEDGER), node.latest(topics.STOPPING_DISTANCE)
         self._log: deque[LogRecord] = deque(maxlen=LOG_LINES)
         node.subscribe(topics.LOG, self._log.append)
 
@@ -74,6 +78,8 @@ class Bus:
             else {},
             fault=fault_of(self._arm.description, state) if state is not None else "",
             gripper=self._gripper.message if not self._gripper.is_stale else None,
+            ledger=self._ledger.message if not self._ledger.is_stale else None,
+            stopping=self._stopping.message if not self._stopping.is_stale else None,
         )
 
     @property

@@ -197,6 +197,11 @@ ENGLISH: dict[str, str] = {
     # state
     "measured": "measured",
     "steps_off": "step error",
+    "sure": "sure",
+    "tool_error": "Tool error",
+    "tool_error_is": "{known}, at most {bound} ({level} sure)",
+    "stopping": "If all is lost now",
+    "stopping_is": "it still goes {way}, for {time} at most",
     "steps": "Steps",
     "commanded": "commanded",
     "executed": "executed",

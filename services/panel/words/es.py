@@ -197,6 +197,11 @@ SPANISH: dict[str, str] = {
     # state
     "measured": "medido",
     "steps_off": "error en pasos",
+    "sure": "certeza",
+    "tool_error": "Error de la herramienta",
+    "tool_error_is": "{known}, a lo más {bound} (certeza {level})",
+    "stopping": "Si ahora se pierde todo",
+    "stopping_is": "aún avanza {way}, a lo más {time}",
     "steps": "Pasos",
     "commanded": "pedidos",
     "executed": "dados",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from schemas.device import DeviceMode, DeviceState, DeviceStatus, SensorReadings, ShaftPositions
 from schemas.device_faults import explain
 from schemas.joints import JointState, StepErrors
+from schemas.ledger import StepLedger, StoppingDistance
 
 STALE = 1_000_000_000  # [ns] after which a state is no longer called present
 LOST = 1  # [steps] between counter and shaft that a motor under load may be off
@@ -24,6 +25,8 @@ class PanelInputs:
     joints: JointState | None = None
     sensors: SensorReadings | None = None
     shaft: ShaftPositions | None = None
+    ledger: StepLedger | None = None
+    stopping: StoppingDistance | None = None
     prismatic: frozenset[str] = frozenset()
 
 
@@ -35,6 +38,8 @@ def panel(inputs: PanelInputs, now: int) -> str:
         _lost(inputs),
         _device(inputs, now),
         _table(inputs),
+        _ledger(inputs),
+        _stopping(inputs),
         _numbers(inputs),
     )
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -133,6 +138,33 @@ def _table(inputs: PanelInputs) -> str:
     ]
     head = "| joint | position | steps commanded | executed | error | worst |\n|---|---|---|---|---|---|"
     return "\n".join([head, *rows])
+
+
+def _ledger(inputs: PanelInputs) -> str:
+    """How sure it is that no step is lost, and what that is at the tool."""
+    ledger = inputs.ledger
+    if ledger is None or ledger.open_loop:
+        return ""
+    if not any(ledger.confidence):
+        return f"**tool error not known**: {ledger.reason}"
+    sure = ", ".join(f"{name} {_percent(c)}" for name, c in zip(ledger.name, ledger.confidence, strict=False))
+    return (
+        f"tool error {1e3 * ledger.tool_error:.2f} mm, at most {1e3 * ledger.tool_bound:.2f} mm ({ledger.level:.0%}) · "
+        f"**{_percent(ledger.arm_confidence)} sure** that no step is lost: {sure}"
+    )
+
+
+def _stopping(inputs: PanelInputs) -> str:
+    """How far it goes if all is lost now."""
+    stopping = inputs.stopping
+    if stopping is None or not stopping.is_known:
+        return ""
+    return f"stops within {1e3 * stopping.distance:.0f} mm and {stopping.duration:.2f} s if all is lost now"
+
+
+def _percent(share: float) -> str:
+    """Rounded down."""
+    return f"{int(share * 1000.0) / 10.0:g} %"
 
 
 def _position(inputs: PanelInputs, name: str, value: float | None) -> str:

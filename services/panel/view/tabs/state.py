@@ -7,6 +7,7 @@ from math import degrees
 import numpy as np
 from viser.transforms import SO3
 
+from schemas.ledger import StepLedger
 from services.panel.model.readings import Readings
 from services.panel.model.units import text_of
 from services.panel.view.browser import Browser
@@ -25,12 +26,14 @@ class StateTab:
     def refresh(self, readings: Readings, browser: Browser | None, lag: float, tool: tuple[float, ...]) -> None:
         """`lag` [s] of this browser; `tool`: x, y, z [m] and quaternion of the measured tool."""
         words = self._kit.words
-        header = ("", *(esc(words(key)) for key in ("measured", "steps_off")))
+        header = ("", *(esc(words(key)) for key in ("measured", "steps_off", "sure")))
+        sure = confidences(readings.ledger)
         rows = [
             (
                 esc(joint.name),
                 esc(text_of(joint, readings.joints[joint.name])),
                 f"{readings.step_errors.get(joint.name, 0.0):+.2f}",
+                sure.get(joint.name, "-"),
             )
             for joint in self._operator.arm.description.joints
             if joint.name in readings.joints
@@ -65,7 +68,27 @@ class StateTab:
             (esc(words("tool")), f"{x:.1f}, {y:.1f}, {z:.1f} mm"),
             (esc(words("turned")), f"{roll:.1f}°, {pitch:.1f}°, {yaw:.1f}°"),
         ]
+        rows += [(esc(words(key)), esc(words(f"{key}_is", **values))) for key, values in certainty(readings).items()]
         rows += [(esc(name), f"{value:.4g}") for name, value in readings.sensors.items()]
         if browser is not None:
             rows.append((esc(words("browser")), f"{browser.rate:.0f} fps, {1000 * lag:.0f} ms"))
         return rows
+
+
+def confidences(ledger: StepLedger | None) -> dict[str, str]:
+    """How sure it is of each joint that it has lost no step, in per cent, rounded down."""
+    if ledger is None:
+        return {}
+    return {name: f"{int(1000.0 * c) / 10.0:g} %" for name, c in zip(ledger.name, ledger.confidence, strict=False)}
+
+
+def certainty(readings: Readings) -> dict[str, dict[str, str]]:
+    """The values of the rows about the tool's error and its stopping distance; without those that are not known."""
+    rows: dict[str, dict[str, str]] = {}
+    ledger, stopping = readings.ledger, readings.stopping
+    if ledger is not None and any(ledger.confidence):
+        bound, known = f"{1e3 * ledger.tool_bound:.1f} mm", f"{1e3 * ledger.tool_error:.1f} mm"
+        rows["tool_error"] = {"known": known, "bound": bound, "level": f"{ledger.level:.0%}"}
+    if stopping is not None and stopping.is_known:
+        rows["stopping"] = {"way": f"{1e3 * stopping.distance:.0f} mm", "time": f"{stopping.duration:.2f} s"}
+    return rows
