@@ -52,7 +52,7 @@ class Seen(NamedTuple):
     is_lost: bool  # a joint has lost steps
 
 
-def ledger_calibration() -> Figure:
+def ledger() -> Figure:
     """Share [%] of the states called 95 % sure in which no joint had lost a step."""
     seen = simulate(QUICK, POPULATIONS["uniform 0.15 to 1.2"], SEED)
     sure = [one for one in seen if one.confidence >= LEVEL]

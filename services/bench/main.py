@@ -67,7 +67,7 @@ FIGURES = {
     "clock_sync_error_us": Row("virtual_time:clock_sync_error_us", "us"),
     "hold_reaction_ms": Row("virtual_time:hold_reaction_ms", "ms"),
     "stopping_distance": Row("stopping:stopping_distance", "said / true"),
-    "ledger": Row("ledger:ledger_calibration", "% of sure states"),
+    "ledger": Row("ledger:ledger", "% of sure states"),
     "gripper_reaction_ms": Row("gripper:gripper_reaction_ms", "ms"),
     "max_step_rate_hz": Row("pulses:max_step_rate_hz", "steps/s"),
     "parse_mb_per_s": Row("firmware_cost:parse_mb_per_s", "MB/s"),

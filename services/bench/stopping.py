@@ -74,7 +74,7 @@ def lost_in_motion(seed: int) -> Hold:
     wire = Wire(delay=rng.uniform(0.0003, 0.01), jitter=rng.uniform(0.0, 0.008), is_ordered=True, spared=())
     start = _place(arm, rng)
     rig = VirtualArm(wire, seed=seed, start=start, arm=arm, phase_us=rng.randrange(0, 20_000, 1000)).ready()
-    rig.run(rng.uniform(0.0, 1.0))
+    rig.run(rng.uniform(0.0, 0.2))
     duration = _set_off(rig, rng)
     rig.run(rng.uniform(0.0, max(0.1, duration)))
     told = len(rig.messages(STOPPING_DISTANCE))

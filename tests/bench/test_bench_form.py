@@ -19,7 +19,7 @@ ISSUE = (
     "max_step_rate_hz", "step_time_error_us", "parse_mb_per_s", "clock_sync_error_us", "hold_reaction_ms",
     "gripper_reaction_ms", "estop_reaction_ticks", "seed_move_percent",
     "ik_ms", "ik_success", "plan_success", "plan_python_ms", "path_length_ratio", "duration_ratio",
-    "collision_checks_per_s", "state_check_us", "lin_ms", "jog_tick_us",
+    "collision_checks_per_s", "state_check_us", "lin_ms", "jog_tick_us", "ledger", "stopping_distance",
 )  # fmt: skip
 
 

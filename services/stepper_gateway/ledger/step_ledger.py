@@ -71,7 +71,7 @@ class Ledger:
             return
         self._meet((status.virtual, status.config_crc32), state)
         self._point = point
-        self._is_moving = state.mode is DeviceMode.HOMING or any(abs(rate) >= 1.0 for rate in state.velocity)
+        self._is_moving = state.mode == DeviceMode.HOMING or any(abs(rate) >= 1.0 for rate in state.velocity)
         for index, row in enumerate(self._rows):
             self._account(row, Sample(state.t_us, state.steps[index], state.velocity[index]))
             if state.t_us >= row.verified_us:
@@ -213,7 +213,7 @@ class Ledger:
     def _refer(self, row: JointRow, is_referenced: bool, state: State) -> None:
         """A joint whose place the device does not know is not verified; while it homes, what was known still counts."""
         row.is_referenced = is_referenced
-        if not is_referenced and state.mode is not DeviceMode.HOMING:
+        if not is_referenced and state.mode != DeviceMode.HOMING:
             row.evidence = replace(row.evidence, verified_by=VerifiedBy.NOTHING)
 
     def _on_switch(self, event: EventReport, moment: Moment) -> None:

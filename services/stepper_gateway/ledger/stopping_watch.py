@@ -72,15 +72,15 @@ class StoppingWatch:
         is_under_way = stream is not None and not stream.is_abandoned and not stream.is_finished
         if stream is not None and stream.id != self._stream_id:
             self._stream_id, self._began = stream.id, moment.monotonic + longest
-        if state.mode is DeviceMode.HOMING:
+        if state.mode == DeviceMode.HOMING:
             return self._of_ramps(state, max(0.0, silence + self._timeout - moment.monotonic) + SLOTS)
         if is_under_way and stream is not None and not stream.has_started:
             self._began = moment.monotonic + longest  # its first knots may still be on their way
         reaction = max(0.0, max(silence, self._began) + self._timeout - moment.monotonic) + SLOTS
         is_played = stream is not None and state.stream == stream.id and state.mode in (DeviceMode.RUN, DeviceMode.HOLD)
         if stream is not None and (is_played or is_under_way):
-            return self._on_path(stream, state, moment, reaction if state.mode is not DeviceMode.HOLD else SLOTS)
-        if state.mode is DeviceMode.RUN or any(abs(rate) >= STILL for rate in state.velocity):
+            return self._on_path(stream, state, moment, reaction if state.mode != DeviceMode.HOLD else SLOTS)
+        if state.mode == DeviceMode.RUN or any(abs(rate) >= STILL for rate in state.velocity):
             return None, 0.0
         return Stop(0.0, 0.0), 0.0
 
@@ -95,7 +95,7 @@ class StoppingWatch:
             path[0] = path[0]._replace(dt=path[0].dt * left, length=path[0].length * left,
                                        gains=tuple(gain * left for gain in path[0].gains))  # fmt: skip
         scale = state.time_scale if state.stream == stream.id else 0.0
-        is_held = state.mode is DeviceMode.HOLD
+        is_held = state.mode == DeviceMode.HOLD
         top = scale if is_held else max(scale, state.speed)
         stop = stop_on(path, self._limits, scale * scale, top, reaction, ends=stream.is_complete)
         if not is_held and scale < top - 0.02:  # slower than it may be: less far, but perhaps for longer
