@@ -33,6 +33,7 @@ MOST_CAREFUL = 1.3  # the goal: said distance / true one, in the median
 NEAR = 0.001  # [m] distances below it say nothing about care: a step of the arm is as long
 LONGEST = 6.0  # [s] that any stop takes
 SMOOTH = 0.02  # [s] between points of a move
+STEP = 2000  # [us] between two places of the way
 
 
 class Hold(NamedTuple):
@@ -73,7 +74,9 @@ def lost_in_motion(seed: int) -> Hold:
     rng, arm = random.Random(seed), rm1()
     wire = Wire(delay=rng.uniform(0.0003, 0.01), jitter=rng.uniform(0.0, 0.008), is_ordered=True, spared=())
     start = _place(arm, rng)
-    rig = VirtualArm(wire, seed=seed, start=start, arm=arm, phase_us=rng.randrange(0, 20_000, 1000)).ready()
+    rig = VirtualArm(
+        wire, seed=seed, start=start, arm=arm, phase_us=rng.randrange(0, 20_000, STEP), step_us=STEP
+    ).ready()
     rig.run(rng.uniform(0.0, 0.2))
     duration = _set_off(rig, rng)
     rig.run(rng.uniform(0.0, max(0.1, duration)))
@@ -154,7 +157,7 @@ def _way(rig: VirtualArm, since: int, began: float) -> tuple[float, float]:
         jacobian.tool([scale.to_position(count) for scale, count in zip(scales, row, strict=True)]) for row in rows
     ]
     moved = [index for index, (a, b) in enumerate(pairwise(rows), 1) if a != b]
-    return sum(math.dist(a, b) for a, b in pairwise(places)), 0.001 * (moved[-1] if moved else 0)
+    return sum(math.dist(a, b) for a, b in pairwise(places)), 1e-6 * STEP * (moved[-1] if moved else 0)
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 
 import pytest
@@ -45,6 +46,16 @@ def test_six_joints_go_from_state_to_state_and_lose_no_step(parol6):
         assert not jumps(parol6.arm, parol6.seen)
     assert len(worst) > 100
     assert max(worst) <= 0.5 + 1e-9
+
+
+def test_the_switches_are_passed_and_verify_all_joints_without_homing(parol6):
+    plan = parol6.node.call(PLAN, PlanRequest(goal=NamedGoal(name="ready")), timeout=5.0)
+    assert parol6.send(plan).wait(plan.duration + 10.0).status is GoalStatusCode.SUCCEEDED
+    report = json.loads(gemelo(parol6.stack, "verify", "joint_1", "joint_4", "joint_6", "--json"))
+    assert sorted(report["passed"]) == ["joint_1", "joint_4", "joint_6"]
+    assert (report["homed"], report["without_switch"]) == ([], [])
+    said = gemelo(parol6.stack, "state")
+    assert said.count(" switch") == 3
 
 
 def test_the_tool_is_jogged_on_a_line_and_turned_and_stops_without_a_jump(parol6):

@@ -21,6 +21,7 @@ from services.stepper_gateway.motion.stream import Stream
 
 PERIOD = 1.0 / (STOPPING_DISTANCE.rate or 10.0)  # [s]
 SLOTS = 0.004  # [s] that the device prepares ahead, and a slot for each of its decisions
+JITTER = 1.5  # chosen: times the longest round trip of late, that the device's last heartbeat may have taken one way
 STILL = 1.0  # [steps/s]
 MOST_PLACES = 512  # places of the tool that are remembered: the device's queue is shorter
 
@@ -68,7 +69,7 @@ class StoppingWatch:
 
     def _stop(self, state: State, moment: Moment, longest: float) -> tuple[Stop | None, float]:
         """The stop, and the time [s] until it begins."""
-        stream, silence = self._controller.stream, self._device.session.last_beat + longest
+        stream, silence = self._controller.stream, self._device.session.last_beat + JITTER * longest
         is_under_way = stream is not None and not stream.is_abandoned and not stream.is_finished
         if stream is not None and stream.id != self._stream_id:
             self._stream_id, self._began = stream.id, moment.monotonic + longest
@@ -100,7 +101,8 @@ class StoppingWatch:
         stop = stop_on(path, self._limits, scale * scale, top, reaction, ends=stream.is_complete)
         if not is_held and scale < top - 0.02:  # slower than it may be: less far, but perhaps for longer
             stop = stop._replace(duration=max(stop.duration, reaction + self._longest_braking(path)))
-        return stop, min(reaction, stop.duration)
+        reaction = min(reaction, stop.duration)
+        return stop._replace(duration=stop.duration + SLOTS), reaction
 
     def _segment(self, first: tuple[int, Knot], second: tuple[int, Knot]) -> Segment:
         (start, a), (end, b) = first, second
