@@ -30,7 +30,7 @@ OnHoming = Callable[[HomingProgress], object]
 
 
 class Homing:
-    """The homing of some joints: takes events and states from the moment on at which the device has agreed. Pure."""
+    """The homing of some joints: takes events and states from before the command on. Pure."""
 
     def __init__(self, arm: Description, joints: Sequence[Joint]) -> None:
         self.joints = tuple(joints)
@@ -108,15 +108,11 @@ def home(
     homing = Homing(session.description, homing_joints(session.description, names))
     _require_ready(session)
     events = session.node.subscribe(DEVICE_EVENTS, homing.on_event)
+    states = session.node.subscribe(DEVICE_STATE, homing.on_state)
     try:
-        name = tuple(joint.name for joint in homing.joints)
-        command(HomeCommand(name=name))
-        states = session.node.subscribe(DEVICE_STATE, homing.on_state)
-        try:
-            return _follow(session, homing, command, on_progress, on_cancel)
-        finally:
-            states.close()
+        return _follow(session, homing, command, on_progress, on_cancel)
     finally:
+        states.close()
         events.close()
         session.changed()
 
@@ -172,7 +168,7 @@ def _follow(
     on_progress: OnHoming | None,
     on_cancel: Callable[[], object] | None,
 ) -> HomingReport:
-    """The report if all are home; `Aborted` or `Interrupted` with it if not."""
+    """Begins it; the report if all are home; `Aborted` or `Interrupted` with it if not."""
     node = session.node
     began = node.monotonic()
     told = HomingProgress(homing.phases, {}, 0.0)
@@ -187,8 +183,9 @@ def _follow(
     watch = Watch(session, homing)
     is_interrupted = False
     try:
+        command(HomeCommand(name=tuple(joint.name for joint in homing.joints)))
         session.wait_for(lambda: homing.is_over or bool(watch.trouble()), None, tell)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt:  # also while the answer is on its way: the device may have begun
         is_interrupted = True
         command(StopKind.STOP)
         if on_cancel is not None:

@@ -13,6 +13,7 @@ from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
 import gemelo
+from schemas.deployment import RouterSection
 from schemas.topics import ACTIONS, TOPICS, Delivery
 from services.chaos.slow_link import SlowLink
 from services.runtime.actions.keys import feedback_topic, status_topic
@@ -105,7 +106,7 @@ class BusStranger:
     """A participant of the bus that puts what nobody can read on every key."""
 
     def __init__(self, router_port: int, robot: str) -> None:
-        self._bus = ZenohBus("127.0.0.1", router_port, robot)
+        self._bus = ZenohBus(RouterSection(port=router_port), robot)
         actions = [make(action) for action in ACTIONS for make in (feedback_topic, status_topic)]
         self._keys: list[tuple[str, str, Delivery]] = [
             (topic.key, topic.message.__name__, topic.delivery) for topic in (*TOPICS, *actions)

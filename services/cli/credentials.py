@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 
 from services.cli.errors import usage
-from services.mqtt.access import AccessError, require_private
+from services.credentials.private_files import AccessError, require_private
 
 WIFI_PASSWORD, MQTT_PASSWORD = "GEMELO_WIFI_PASSWORD", "GEMELO_MQTT_PASSWORD"
 MQTT_DEVICE_PASSWORD = "GEMELO_MQTT_DEVICE_PASSWORD"  # wins over the other, which is the gateway's too

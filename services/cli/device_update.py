@@ -12,7 +12,8 @@ from services.cli.parser import Options, Parser, positive_integer
 from services.cli.provision import BAUD, open_line
 from services.cli.terminal import LiveBlock
 from services.cli.update_transfer import BoardStatus, SerialWire, Transfer, Wire, await_status, mqtt_wire
-from services.mqtt.access import AccessError, gateway_access, require_private
+from services.credentials.private_files import AccessError, require_private
+from services.mqtt.access import gateway_access
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.firmware_update import ImageHeader, NoImage, read_header
 from services.runtime.signatures import SignatureError, make_key, sign

@@ -9,6 +9,7 @@ import time
 import pytest
 
 import gemelo
+from schemas.device import HomeCommand
 from schemas.planning import PlanProgress
 from services.stack.stack import Stack
 from tests.gemelo.scripts import ended, said, script
@@ -232,6 +233,26 @@ def test_waiting_in_a_handler_is_refused_instead_of_hanging(arm: gemelo.Arm) -> 
     while not said and time.monotonic() < end:
         time.sleep(0.01)
     assert "cannot be called where messages are handled" in said[0]
+
+
+def test_ctrl_c_while_the_answer_to_a_homing_is_on_its_way_stops_it(
+    arm: gemelo.Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = type(arm.device).command
+
+    def interrupted(device: gemelo.Device, wanted: object, what: str = "") -> object:
+        answer = command(device, wanted, what)  # type: ignore[arg-type]
+        if isinstance(wanted, HomeCommand):
+            raise KeyboardInterrupt
+        return answer
+
+    monkeypatch.setattr(type(arm.device), "command", interrupted)
+    with pytest.raises(gemelo.Interrupted) as stopped:
+        arm.home("efector_joint")
+    assert stopped.value.homing is not None
+    assert stopped.value.homing.homed == ()
+    assert "stopped" in stopped.value.homing.reason
+    assert arm.device.mode is gemelo.DeviceMode.UNREFERENCED
 
 
 def test_another_arm_than_the_twin_s_is_named(twin: Stack) -> None:
