@@ -28,10 +28,12 @@ if TYPE_CHECKING:
     from gemelo.homing_report import HomingProgress, HomingReport
     from gemelo.ledger import JointLedger, Ledger
     from gemelo.motion import Motion
+    from gemelo.picking import Picked
     from gemelo.planning import Configurations, Plan
     from gemelo.robot_files import Robot, load_robot
     from gemelo.scene import Scene
     from gemelo.scene_files import load_mesh
+    from gemelo.seeing import Seen
     from gemelo.units import Pose, deg, mm
     from gemelo.verification import Verification
     from schemas import topics
@@ -58,11 +60,13 @@ __all__ = [
     "Lost",
     "Motion",
     "Node",
+    "Picked",
     "Plan",
     "Pose",
     "Refused",
     "Robot",
     "Scene",
+    "Seen",
     "StopKind",
     "Target",
     "ToolGoal",
@@ -87,10 +91,12 @@ MODULES = {
     "gemelo.homing_report": ("HomingProgress", "HomingReport"),
     "gemelo.ledger": ("JointLedger", "Ledger"),
     "gemelo.motion": ("Motion",),
+    "gemelo.picking": ("Picked",),
     "gemelo.planning": ("Configurations", "Plan"),
     "gemelo.robot_files": ("Robot", "load_robot"),
     "gemelo.scene": ("Scene",),
     "gemelo.scene_files": ("load_mesh",),
+    "gemelo.seeing": ("Seen",),
     "gemelo.units": ("Pose", "deg", "mm"),
     "gemelo.verification": ("Verification",),
     "schemas.actions": ("GoalStatusCode",),

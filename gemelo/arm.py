@@ -16,6 +16,7 @@ from gemelo.homing_report import HomingReport
 from gemelo.jog import Jogging, Streaming, jog_command
 from gemelo.ledger import Ledger, Requirement, read_ledger
 from gemelo.motion import Motion, Motions, OnMotion
+from gemelo.picking import OnPicking, Picked, pick
 from gemelo.planning import (
     Configurations,
     OnPlanProgress,
@@ -26,6 +27,7 @@ from gemelo.planning import (
     require_valid,
 )
 from gemelo.scene import Scene
+from gemelo.seeing import Eyes, Seen
 from gemelo.session import Session
 from gemelo.targets import as_target, ik_request, joint_state, request_of
 from gemelo.units import Pose
@@ -65,7 +67,7 @@ class Arm:
         self._frames, self._motions = Frames(session), Motions(session, self._requirement.check)
         self._jogging, self._streaming = Jogging(session), Streaming(session)
         self._scene, self._device = Scene(session), Device(session)
-        self._gripping = Gripping(session, self._scene)
+        self._gripping, self._eyes = Gripping(session, self._scene), Eyes(session, self._scene)
 
     def __enter__(self) -> Self:
         return self
@@ -683,6 +685,40 @@ class Arm:
             raise BadArgument(f'{self.name} has no output "{name}"{suggestion(name, known)}')
         self.device.command(OutputCommand(output=name, on=on), f"output {name}")
 
+    # What it sees
+
+    def detect(self, name: str = "", *, camera: str = "", scene: bool = False) -> tuple[Seen, ...]:
+        """The things and places of cell.toml that cameras see, by name: all, or the one of that `name`.
+
+        The arm must stand. Five images are taken, and their median. `camera`: only that one looks. `scene`: what is
+        sure enough becomes a box of the planning scene, with three standard deviations around it. Raises `Refused`
+        where the twin has no cell, the thing is not seen, or an image cannot be trusted.
+
+        >>> try:
+        ...     arm.detect("cup")
+        ... except gemelo.Refused as refused:
+        ...     print(refused.check)
+        cell
+        """
+        return self._eyes.detect(name, camera, scene)
+
+    def pick(self, name: str, *, to: str, camera: str = "", on_progress: OnPicking | None = None) -> Picked:
+        """Takes the thing `name` of cell.toml from where a camera sees it to the place `to`.
+
+        From above, straight down, with the thing attached while it is carried; a gripper that closes on nothing is
+        tried twice. `on_progress` is called with a sentence for each part. Raises `Refused` before anything has moved:
+        not seen, seen twice, not known well enough, out of reach, too wide or too flat for the jaws; and `Aborted`
+        with the thing where it is then.
+
+        >>> try:
+        ...     arm.pick("cup", to="bin")
+        ... except gemelo.Refused as refused:
+        ...     print(refused.check)
+        cell
+        """
+        with_words = on_progress if on_progress is not None else _silent
+        return pick(self, self._eyes, name, to, camera, with_words)
+
     # What could be
 
     def ik(
@@ -737,6 +773,10 @@ class Arm:
         ['base_link']
         """
         return find_poses(self._session, joints, tuple(links) or self.description.model.link_names)
+
+
+def _silent(text: str) -> None:
+    """Nobody wants to hear it."""
 
 
 def _with_speed(target: Target, speed: float | None) -> Target:

@@ -36,3 +36,4 @@ class Detections(Message, frozen=True, kw_only=True):
     stamp: int = 0  # [ns] UNIX time of the image
     camera: str = ""
     items: tuple[Detection, ...] = ()
+    doubt: str = ""  # why places in the base frame are not to be trusted; empty: nothing speaks against them

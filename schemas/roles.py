@@ -12,6 +12,7 @@ from schemas.message import Message
 from schemas.topics import (
     ACTIONS,
     ANY,
+    CAMERA_TOPICS,
     CONTACTS,
     DESCRIPTION,
     DEVICE_COMMAND,
@@ -32,6 +33,7 @@ from schemas.topics import (
     JOINT_STATES,
     JOINT_TARGETS,
     LOG,
+    PARAMETER_CHANGES,
     PLAN,
     PLAN_CANCEL,
     PLANNED_PATH,
@@ -42,10 +44,15 @@ from schemas.topics import (
     STATE_VALIDITY,
     STATISTICS,
     STEP_ERRORS,
+    STEP_LEDGER,
+    STOPPING_DISTANCE,
     TOPICS,
     Action,
     Request,
     Topic,
+    camera_detections,
+    camera_image,
+    camera_info,
 )
 
 AnyTopic = Topic[Message]
@@ -66,11 +73,16 @@ class Role:
     acts: tuple[AnyAction, ...] = ()  # sends, follows and cancels goals
     watches: tuple[AnyAction, ...] = ()  # hears how goals stand
     sets_parameters: bool = False
+    hears_requests: bool = False  # the questions of others, each with its answer, and how every goal went
 
 
-BY_EVERY_NODE: tuple[AnyTopic, ...] = (LOG, STATISTICS)
+BY_EVERY_NODE: tuple[AnyTopic, ...] = (LOG, STATISTICS, PARAMETER_CHANGES)
 BY_HAND: tuple[AnyTopic, ...] = (JOG, JOINT_TARGETS)
-RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
+EACH_CAMERA = "*"  # in a key: the name of any camera
+OF_CAMERAS: tuple[AnyTopic, ...] = tuple(make(EACH_CAMERA) for make in CAMERA_TOPICS)
+SEEN: tuple[AnyTopic, ...] = tuple(make(EACH_CAMERA) for make in (camera_image, camera_info, camera_detections))
+EVERYTHING: tuple[AnyTopic, ...] = (*TOPICS, *OF_CAMERAS)
+RECORDED = tuple(topic for topic in TOPICS if topic.recorded) + OF_CAMERAS
 STOPS: tuple[AnyRequest, ...] = (DEVICE_STOP,)  # whoever may connect may stop the arm
 LOOKS: tuple[AnyRequest, ...] = (IK, FK, STATE_VALIDITY)  # answers that change nothing
 MOVES: tuple[AnyRequest, ...] = (PLAN, PLAN_CANCEL, SCENE_EDIT, DEVICE_COMMAND)
@@ -82,25 +94,30 @@ ROLES: tuple[Role, ...] = (
         writes=(JOINT_TARGETS,), reads=(JOINT_STATES, GRIPPER_STATE, DEVICE_STATUS, JOG), asks=STOPS,
     ),
     Role("state_publisher", "joint states to frames", "state_publisher", reads=(JOINT_STATES,), asks=STOPS),
-    Role("logger", "everything recorded to files", "logger", reads=RECORDED, asks=STOPS),
+    Role("logger", "everything recorded to files", "logger", reads=RECORDED, asks=STOPS, hears_requests=True),
     Role(
         "visualizer", "everything that is seen to Rerun", "visualizer",
         reads=(DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, DEVICE_STATE, DEVICE_STATUS, DEVICE_EVENTS,
-               SENSORS, DEVICE_SHAFT, PLANNED_PATH, SCENE, GRIPPER_STATE, CONTACTS, LOG),
+               SENSORS, DEVICE_SHAFT, PLANNED_PATH, SCENE, GRIPPER_STATE, CONTACTS, STEP_LEDGER, STOPPING_DISTANCE,
+               LOG, *SEEN),
         asks=STOPS,
     ),
     Role(
+        "camera", "the images of all cameras", "camera", reads=(JOINT_STATES, GRIPPER_STATE, SCENE), asks=STOPS,
+    ),
+    Role("detector", "what is in the images", "detector", reads=(JOINT_STATES, *SEEN[:2]), asks=STOPS),
+    Role(
         "panel", "the operator's page", "panel",
-        writes=BY_HAND, reads=TOPICS, asks=(*STOPS, *LOOKS, *MOVES, DEVICE_CONFIGURE, DEVICE_INJECT), acts=ACTIONS,
+        writes=BY_HAND, reads=EVERYTHING, asks=(*STOPS, *LOOKS, *MOVES, DEVICE_CONFIGURE, DEVICE_INJECT), acts=ACTIONS,
     ),
     Role(
         "operator", "a person who moves the arm and sets parameters",
-        writes=BY_HAND, reads=TOPICS, asks=REQUESTS, acts=ACTIONS, sets_parameters=True,
+        writes=BY_HAND, reads=EVERYTHING, asks=REQUESTS, acts=ACTIONS, sets_parameters=True, hears_requests=True,
     ),
-    Role("viewer", "a person who only looks, and may stop", reads=TOPICS, asks=(*STOPS, *LOOKS), watches=ACTIONS),
+    Role("viewer", "a person who only looks, and may stop", reads=EVERYTHING, asks=(*STOPS, *LOOKS), watches=ACTIONS),
     Role(
         "script", "a program that moves the arm",
-        writes=BY_HAND, reads=TOPICS, asks=(*STOPS, *LOOKS, *MOVES, DEVICE_ECHO), acts=ACTIONS,
+        writes=BY_HAND, reads=EVERYTHING, asks=(*STOPS, *LOOKS, *MOVES, DEVICE_ECHO), acts=ACTIONS,
     ),
 )  # fmt: skip
 
@@ -113,8 +130,8 @@ def role(name: str) -> Role:
 
 
 def written_by(role: Role) -> tuple[AnyTopic, ...]:
-    """The topics that a role may publish."""
-    own = tuple(topic for topic in TOPICS if topic.writer != ANY and topic.writer == role.node)
+    """The topics that a role may publish; in those of cameras `EACH_CAMERA` stands for the camera."""
+    own = tuple(topic for topic in EVERYTHING if topic.writer != ANY and topic.writer == role.node)
     return (*own, *role.writes, *BY_EVERY_NODE)
 
 

@@ -60,6 +60,8 @@ FIGURES = {
     "box_mm": Row("vision.figures:box_mm", "mm"),
     "image_to_pose_ms": Row("vision.figures:image_to_pose_ms", "ms"),
     "mount_mm": Row("vision.figures:mount_mm", "mm"),
+    "pick_mm": Row("picks:pick_mm", "mm", takes_count=True),
+    "pick_success": Row("picks:pick_success", "%", takes_count=True),
     "lost_of_45000_at_25hz": Row("virtual_time:lost_of_45000_at_25hz", "chunks"),
     "seed_move_percent": Row("seed_move:seed_move_percent", "%"),
     "ra_remainder_steps": Row("old_dialects:ra_remainder_steps", "steps"),

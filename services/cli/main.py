@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from services.cli.commands import COMMANDS, GROUPS
@@ -65,8 +67,14 @@ def run(arguments: Sequence[str] | None = None) -> ExitCode:
 
 
 def main() -> None:
-    """The console script."""
-    sys.exit(run())
+    """The console script. It ends without Python's own finalization, which aborts the process ("FATAL: exception not
+    rethrown") where a thread of a library or of a node calls into it at that moment, as after Ctrl-C."""
+    code = run()
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):  # the reader has gone
+            stream.flush()
+    os._exit(code)
 
 
 if __name__ == "__main__":

@@ -35,6 +35,8 @@ SERVICES = {
         Service("visualizer", "everything to Rerun", "2G", ("view",)),
         Service("viewer", "the Rerun viewer", "6G", ("view",)),
         Service("panel", "the operator's page", "2G", ("panel",)),
+        Service("camera", "the images of all cameras", "1G", ("eyes",)),
+        Service("detector", "what is in the images", "1G", ("eyes",)),
     )
 }
 OF_A_ROBOT = tuple(name for name in SERVICES if name not in (ROUTER, BROKER))

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from schemas.roles import ROLES, SERVICES, Role, carried_out_by, served_by, written_by
+from schemas.topics import ACTIONS, REQUESTS, Request
 from services.runtime.actions import keys
 from services.runtime.bus.identity import ALIVE
+from services.runtime.requests.exchanges import exchange_topic
 
 ADVANCED = "@adv/**"  # below an EVERY or LATCHED key: Zenoh's heartbeat, cache and token of its writer
 ABOUT = ("info", "interfaces", "parameters/list")  # what every node answers about itself
@@ -21,6 +23,7 @@ TOKENS = (f"{ALIVE}/*", "@id/*/*")
 IN, OUT = ("ingress",), ("egress",)
 
 Rule = dict[str, object]
+AnyRequest = Request[Any, Any]
 
 
 class Keyed(Protocol):
@@ -46,9 +49,11 @@ def permissions(role: Role) -> Permissions:
     goals = {action: (keys.goal_request(action), keys.cancel_request(action), keys.result_request(action))
              for action in (*carried_out, *role.acts)}  # fmt: skip
     about = {f"@node/*/{each}" for each in (*ABOUT, *((SET,) if role.sets_parameters else ()))}
+    exchanged = (*served_by(role), *(request for action in carried_out for request in goals[action]))
+    heard = _keys(_exchanges(REQUESTS, ACTIONS)) if role.hears_requests else frozenset()
     return Permissions(
-        publishes=_keys(written_by(role)) | _keys(_told_of(carried_out)),
-        subscribes=_keys(role.reads) | _keys(_told_of(followed)),
+        publishes=_keys(written_by(role)) | _keys(_told_of(carried_out)) | _keys(_exchanges(exchanged, carried_out)),
+        subscribes=_keys(role.reads) | _keys(_told_of(followed)) | heard,
         serves=_keys(served_by(role))
         | _keys(request for action in carried_out for request in goals[action])
         | {f"@node/{name}/{each}" for name in [role.node or "*"] for each in (*ABOUT, SET)},
@@ -110,6 +115,18 @@ def _told_of(actions: Iterable[keys.AnyAction]) -> Iterator[Keyed]:
     for action in actions:
         yield keys.feedback_topic(action)
         yield keys.status_topic(action)
+
+
+def _exchanges(requests: Iterable[AnyRequest], actions: Iterable[keys.AnyAction]) -> Iterator[Keyed]:
+    """What the servers of requests and actions say of what they were asked, and how it ended."""
+    for request in requests:
+        if request.recorded:
+            yield exchange_topic(request)
+    for action in actions:
+        yield exchange_topic(keys.goal_request(action))
+        yield exchange_topic(keys.cancel_request(action))
+        yield keys.ended_topic(action)
+        yield from _told_of([action])
 
 
 def _advanced(wanted: Iterable[str]) -> frozenset[str]:

@@ -30,6 +30,7 @@ PROCESSES = (
     "viewer",
     "panel",
     "camera",
+    "detector",
 )
 POLL = 0.05  # [s]
 STOP = 20.0  # [s] for all to end by themselves
@@ -67,7 +68,7 @@ class Stack:
         self.run = self.folder / "run"
         self.out = (out or self.folder / "out").resolve()
         has_cell = bool((environment or {}).get("GEMELO_CELL"))
-        chosen = (("viewer", viewer != "none"), ("panel", panel), ("camera", has_cell))
+        chosen = (("viewer", viewer != "none"), ("panel", panel), ("camera", has_cell), ("detector", has_cell))
         left_out = {name for name, wanted in chosen if not wanted}
         self.processes = tuple(processes or (name for name in PROCESSES if name not in left_out))
         self.ready_seconds = 0.0

@@ -54,7 +54,8 @@ def colour_strength(image: ColourImage, colour: Sequence[float] | Array) -> Arra
             f"{np.ptp(wanted):.0f}, at least {LEAST_COLOUR:.0f}): put a tag on the thing"
         )
     direction = wanted - wanted.mean()
-    return np.asarray(image @ (direction / (direction @ wanted)))
+    weights = direction / (direction @ wanted)
+    return np.asarray(cv2.transform(image.astype(np.float32), weights[None].astype(np.float32)), dtype=np.float64)
 
 
 def coloured_regions(strength: Array) -> list[NDArray[np.bool_]]:

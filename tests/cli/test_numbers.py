@@ -237,5 +237,7 @@ def test_no_option_but_these_takes_a_bare_number():
     assert bare == {
         "move --quat", "move --axis", "move --along", "move --free-axis", "move --seed", "ik --quaternion",
         "ik --axis", "ik --along", "ik --free-axis", "topic pub --rate", "tf echo --rate", "link bench --rate",
-        "grip --max-effort", "scene add --scale", "scene resize --scale",
+        "grip --max-effort", "scene add --scale", "scene resize --scale", "bag record --duration",
+        "bag record --max-minutes", "bag record --max-mb", "deploy keys --renew-within",
+        "chaos --seed", "chaos --minutes", "chaos --episode", "soak --seed", "soak --hours",
     }  # fmt: skip

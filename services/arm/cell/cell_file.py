@@ -200,6 +200,13 @@ def grasp_width(thing: Thing) -> float:
     return thing.size
 
 
+def height_of_frame(thing: Thing) -> float:
+    """[m] of the thing's frame above the table that it stands on."""
+    if isinstance(thing, TagThing):
+        return thing.box[2] if thing.box is not None else 0.0
+    return thing.box[2] / 2.0
+
+
 def _nearest_line(keys: Keys, text: str) -> int:
     """The line of a key; of the table that it belongs to where it is not written."""
     while keys:

@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from schemas.cell import Colour as ColourName
 from schemas.cell import ColourThing, TagPlace, TagRecord, TagThing, Thing
 from schemas.gripper import GripperState
 from schemas.joints import JointState
 from schemas.scene import PlanningScene
-from services.arm.cell.cell_file import Cell, grasp_width
+from services.arm.cell.cell_file import Cell, grasp_width, height_of_frame
+from services.arm.cell.colours import RGB
 from services.arm.frames.transforms import (
     IDENTITY,
     Point,
@@ -33,16 +33,8 @@ from services.arm.kinematics.chain import link_transforms
 from services.arm.model.description import Arm
 from services.arm.model.gripper import JAWS, jaw_edges, jaw_objects
 from services.camera.virtual.arm_solids import arm_solids, solid_of
-from services.camera.virtual.solids import Colour, Face, Solid, box, tag
+from services.camera.virtual.solids import Face, Solid, box, tag
 
-COLOURS: dict[ColourName, Colour] = {
-    ColourName.RED: (205, 35, 35),
-    ColourName.ORANGE: (235, 125, 20),
-    ColourName.YELLOW: (235, 210, 40),
-    ColourName.GREEN: (45, 150, 60),
-    ColourName.BLUE: (35, 80, 200),
-    ColourName.PURPLE: (130, 50, 160),
-}
 TABLE, WOOD, CARDBOARD, OBSTACLE, JAW = (158, 150, 138), (120, 86, 52), (186, 160, 120), (128, 134, 142), (40, 42, 46)
 TABLE_HALF = 1.5  # [m]
 SHEET = 1e-4  # [m] a printed tag is above what it lies on, so that it is drawn over it
@@ -189,13 +181,6 @@ def tag_pose(record: TagRecord, links: Mapping[str, Rigid]) -> Rigid:
     return compose(links[record.parent], local) if record.parent else local
 
 
-def height_of_frame(thing: Thing) -> float:
-    """[m] of the thing's frame above the table that it stands on."""
-    if isinstance(thing, TagThing):
-        return thing.box[2] if thing.box is not None else 0.0
-    return thing.box[2] / 2.0
-
-
 def thing_faces(thing: Thing) -> tuple[Face, ...]:
     """The faces of a thing in its own frame."""
     if isinstance(thing, TagThing):
@@ -205,7 +190,7 @@ def thing_faces(thing: Thing) -> tuple[Face, ...]:
         x, y, z = thing.box
         body = box((x, y, z), CARDBOARD).faces
         return (*printed, *(face.moved((0.0, 0.0, -z / 2.0 - SHEET)) for face in body))
-    return box(thing.box, COLOURS[thing.colour] if isinstance(thing, ColourThing) else WOOD).faces
+    return box(thing.box, RGB[thing.colour] if isinstance(thing, ColourThing) else WOOD).faces
 
 
 def fixed_solids(cell: Cell) -> tuple[Solid, ...]:

@@ -1,0 +1,272 @@
+"""From a thing that a camera sees to a place: approach, grip, carry, let go. Every motion is planned and verified."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from gemelo.errors import Aborted, BadArgument, Refused
+from gemelo.seeing import Eyes, Seen, add_to_scene, body_of
+from gemelo.targets import FULL
+from gemelo.units import Point, Pose
+from schemas.cell import Place, PosePlace, Thing
+from schemas.robot import Gripper
+from services.arm.errors import DescriptionError
+from services.arm.frames.transforms import IDENTITY, Quaternion, Rigid, compose, from_axis_angle, rotate
+from services.arm.model.gripper import jaw_edges
+
+if TYPE_CHECKING:
+    from gemelo.arm import Arm
+
+APPROACH = 0.04  # [m] the straight way down to a thing, and up with it
+GAP = 0.003  # [m] between the thing's top and the tool, and between the jaws' tips and the table
+OVERLAP = 0.004  # [m] of the jaws' length that must be beside the thing
+SLOW = 0.05  # [m/s] down and up
+BESIDE = 0.001  # [m] that the open jaws must have in all beside the thing
+MOST_TURN = math.radians(35.0)  # that closing jaws may turn a thing by: beyond it a square one jams
+ATTEMPTS = 2
+DOWN = (0.0, 0.0, -1.0)
+SOLUTIONS = 8  # configurations of a tool pose that are considered
+
+OnPicking = Callable[[str], object]
+
+
+class Picked(NamedTuple):
+    """A thing that was taken and put down.
+
+    >>> picked = gemelo.Picked("cup", "bin", gemelo.Pose((0.2, 0.1, 0.04)), 0.0001, 0.1, 1, 12.5)
+    >>> print(picked)
+    cup is at bin: seen +-0.1 mm, turned 6 deg by the jaws, 12.5 s
+    """
+
+    name: str
+    place: str
+    seen: Pose  # in the base frame, as it was seen before it was taken
+    sigma: float  # [m] standard deviation of that
+    turned: float  # [rad] by the jaws, as they closed
+    attempts: int
+    took: float  # [s]
+
+    def __str__(self) -> str:
+        """One line for a person."""
+        turned = f", turned {math.degrees(self.turned):.0f} deg by the jaws" if abs(self.turned) > 0.01 else ""
+        again = "" if self.attempts == 1 else f", at attempt {self.attempts}"
+        return f"{self.name} is at {self.place}: seen +-{1e3 * self.sigma:.1f} mm{turned}{again}, {self.took:.1f} s"
+
+
+@dataclass(frozen=True)
+class Way:
+    """How to come to a point from above."""
+
+    above: Mapping[str, float]  # joint values at the tool's pose `APPROACH` above
+    turned: float  # [rad] from the thing's nearest side to the jaws
+
+
+def pick(arm: Arm, eyes: Eyes, name: str, to: str, camera: str, tell: OnPicking) -> Picked:
+    """Takes the thing `name` to the place `to`; raises what `Arm.pick` raises."""
+    began = arm.node.monotonic()
+    thing, place, gripper = _named(arm, eyes, name, to)
+    for attempt in range(1, ATTEMPTS + 1):
+        seen = eyes.one(name, camera)
+        tell(str(seen))
+        lift = _lift(thing, gripper, seen)
+        grasp = _grasp_point(thing, seen)
+        way = _way_to(arm, thing, seen, (grasp[0], grasp[1], grasp[2] + lift), gripper)
+        spot = _spot(eyes, place, camera)
+        tell(f"{to}: {1e3 * spot[0]:.1f} {1e3 * spot[1]:.1f} {1e3 * spot[2]:.1f} mm")
+        release = _configuration_above(arm, (spot[0], spot[1], spot[2] + lift), _yaw_at(arm, place, seen, way))
+        add_to_scene(arm.scene, thing, seen)
+        try:
+            if _take(arm, thing, seen, way, tell):
+                _put(arm, name, release, tell)
+                took = arm.node.monotonic() - began
+                return Picked(name, to, seen.pose, seen.sigma, way.turned, attempt, took)
+        finally:
+            if name in arm.scene.objects and not arm.scene.objects[name].attached:
+                arm.scene.remove(name)
+        tell("the jaws have closed on nothing")
+    raise Aborted(f"{name} was not gripped: the jaws closed on nothing, {ATTEMPTS} times; where is it? `gemelo detect`")
+
+
+def _named(arm: Arm, eyes: Eyes, name: str, to: str) -> tuple[Thing, Place, Gripper]:
+    cell = eyes.cell()
+    gripper = arm.description.gripper
+    if gripper is None:
+        raise Refused(f"{arm.name} has no gripper: write a [gripper] into its robot.toml", check="gripper")
+    try:
+        return cell.thing(name), cell.place(to), gripper
+    except DescriptionError as error:
+        raise BadArgument(str(error)) from error
+
+
+def _grasp_point(thing: Thing, seen: Seen) -> Point:
+    """Where [m] the point between the jaws is to come."""
+    return compose((seen.pose.position, seen.pose.orientation), (thing.grasp_offset, IDENTITY[1]))[0]
+
+
+def _lift(thing: Thing, gripper: Gripper, seen: Seen) -> float:
+    """[m] of the tool above the grasp point; raises `Refused` where the jaws do not reach beside the thing."""
+    (_, _, height), center = body_of(thing)
+    middle = compose((seen.pose.position, seen.pose.orientation), center)[0][2]
+    top, bottom, grasp = middle + height / 2.0, middle - height / 2.0, _grasp_point(thing, seen)[2]
+    beyond = jaw_edges(gripper)[2]
+    tool = max(grasp + beyond / 2.0, top + GAP, bottom + GAP + beyond)
+    beside = top - (tool - beyond)
+    if beside < OVERLAP:
+        raise Refused(
+            f"{thing.name} is {1e3 * height:.0f} mm high: the jaws, {1e3 * beyond:.0f} mm long, would be beside "
+            f"{1e3 * max(beside, 0.0):.1f} mm of it (at least {1e3 * OVERLAP:g})",
+            check="grasp", subject=thing.name, value=beside, limit=OVERLAP,
+        )  # fmt: skip
+    return tool - grasp
+
+
+def _way_to(arm: Arm, thing: Thing, seen: Seen, tool: Point, gripper: Gripper) -> Way:
+    """The configuration above the thing at which the jaws turn it least; raises `Refused`."""
+    size, center = body_of(thing)
+    body = compose((seen.pose.position, seen.pose.orientation), center)
+    above = (tool[0], tool[1], tool[2] + APPROACH)
+    ways = []
+    for joints in _configurations_above(arm, above, body, size, gripper):
+        pose = arm.fk(joints)
+        turned, side = _turn_between(pose, body, size)
+        ways.append((turned, side, joints))
+    ways.sort(key=lambda each: abs(each[0]))
+    turned, side, joints = ways[0]
+    other = size[1] if side == size[0] else size[0]
+    width = side * math.cos(turned) + other * abs(math.sin(turned))
+    if width + BESIDE > gripper.open or abs(turned) > MOST_TURN:
+        raise Refused(
+            f"{thing.name} stands {math.degrees(abs(turned)):.0f} deg turned between the jaws, {1e3 * width:.1f} mm "
+            f"wide there, and they open to {1e3 * gripper.open:g} mm: turn it",
+            check="grasp", subject=thing.name, value=width, limit=gripper.open,
+        )  # fmt: skip
+    return Way(joints, turned)
+
+
+def _configurations_above(
+    arm: Arm, above: Point, body: Rigid, size: Point, gripper: Gripper
+) -> list[Mapping[str, float]]:
+    """With the jaws along the thing's sides where the arm can turn its tool, else as they come; raises `Refused`."""
+    if len(arm.joint_names) < FULL:
+        return list(arm.ik(position=above, solutions=SOLUTIONS))
+    yaw = _yaw(body[1])
+    refused: Refused | None = None
+    found: list[Mapping[str, float]] = []
+    for quarter in range(4):
+        side = size[1] if quarter % 2 == 0 else size[0]
+        if side + BESIDE > gripper.open:
+            continue
+        try:
+            turn = _looking_down(yaw + quarter * math.pi / 2.0)
+            found += arm.ik(pose=Pose(above, turn), solutions=2)
+        except Refused as error:
+            refused = refused or error
+    if not found:
+        raise refused or Refused("no side of it is narrower than the open jaws", check="grasp")
+    return found
+
+
+def _configuration_above(arm: Arm, tool: Point, yaw: float | None) -> Mapping[str, float]:
+    above = (tool[0], tool[1], tool[2] + APPROACH)
+    if len(arm.joint_names) < FULL:
+        return arm.ik(position=above)[0]
+    if yaw is not None:
+        return arm.ik(pose=Pose(above, _looking_down(yaw)))[0]
+    return arm.ik(position=above, along=DOWN)[0]
+
+
+def _yaw_at(arm: Arm, place: Place, seen: Seen, way: Way) -> float | None:
+    """[rad] of the jaws at a place where the thing's turn matters; None where it does not."""
+    if not isinstance(place, PosePlace) or place.yaw is None:
+        return None
+    if len(arm.joint_names) < FULL:
+        raise Refused(
+            f"{arm.name} cannot turn its tool, and {place.name} asks for a turn: leave out its yaw", check="orientation"
+        )
+    return place.yaw + _yaw(arm.fk(way.above).orientation) - _yaw(seen.pose.orientation)
+
+
+def _turn_between(tool: Pose, body: Rigid, size: Point) -> tuple[float, float]:
+    """[rad] from the thing's nearest side to the way of the jaws, and the edge [m] that is then between them."""
+    x, y, _ = rotate(tool.orientation, (0.0, 1.0, 0.0))
+    off = math.atan2(y, x) - _yaw(body[1])  # from the thing's x to the way of the jaws
+    quarters = round(off / (math.pi / 2.0))
+    return off - quarters * math.pi / 2.0, size[0] if quarters % 2 == 0 else size[1]
+
+
+def _spot(eyes: Eyes, place: Place, camera: str) -> Point:
+    """Where [m] the point between the jaws lets go; a tag that marks it is looked for."""
+    if isinstance(place, PosePlace):
+        return place.position
+    seen = eyes.one(place.name, camera)
+    return compose((seen.pose.position, seen.pose.orientation), (place.offset, IDENTITY[1]))[0]
+
+
+def _take(arm: Arm, thing: Thing, seen: Seen, way: Way, tell: OnPicking) -> bool:
+    """True if the jaws have closed on something; the tool is above again in either case."""
+    arm.grip("open")
+    tell("above it")
+    arm.move(joints=way.above)
+    with _touching(arm, thing.name):
+        arm.line(offset=(0.0, 0.0, -APPROACH), speed=SLOW)
+        _turn_with_the_jaws(arm, thing, seen, way)
+        gripped = arm.grip("close")
+        tell(f"gripper: {gripped}")
+        arm.line(offset=(0.0, 0.0, APPROACH), speed=SLOW)
+    if gripped.held != thing.name:
+        arm.grip("open")
+        return False
+    return True
+
+
+def _turn_with_the_jaws(arm: Arm, thing: Thing, seen: Seen, way: Way) -> None:
+    """What closing jaws do to a thing that stands askew between them."""
+    _, center = body_of(thing)
+    pose = (seen.pose.position, from_axis_angle((0.0, 0.0, 1.0), _yaw(seen.pose.orientation) + way.turned))
+    grasp = _grasp_point(thing, seen)
+    local = compose(pose, (thing.grasp_offset, IDENTITY[1]))[0]
+    shifted: Point = (pose[0][0] + grasp[0] - local[0], pose[0][1] + grasp[1] - local[1], pose[0][2])
+    at, turn = compose((shifted, pose[1]), center)
+    arm.scene.move(thing.name, at, turn)
+
+
+def _put(arm: Arm, name: str, release: Mapping[str, float], tell: OnPicking) -> None:
+    """Carries it, lets it go, and rises; what fails with the thing between the jaws says so."""
+    try:
+        tell("carrying it")
+        arm.move(joints=release)
+        with _touching(arm, name):
+            arm.line(offset=(0.0, 0.0, -APPROACH), speed=SLOW)
+            tell(f"gripper: {arm.grip('open')}")
+            arm.line(offset=(0.0, 0.0, APPROACH), speed=SLOW)
+    except Refused as refused:
+        held = arm.scene.objects.get(name)
+        if held is None or not held.attached:
+            raise
+        raise Aborted(f"{name} was picked and is still between the jaws: {refused}") from refused
+
+
+@contextmanager
+def _touching(arm: Arm, name: str) -> Iterator[None]:
+    """The thing may touch what it stands on, and the jaws, until the block ends."""
+    arm.scene.allow(name, "*")
+    try:
+        yield
+    finally:
+        arm.scene.disallow(name, "*")
+
+
+def _looking_down(yaw: float) -> Quaternion:
+    """A tool whose z looks down, and whose jaws move along `yaw` [rad] + 90 degrees of the base."""
+    half_turn = from_axis_angle((1.0, 0.0, 0.0), math.pi)
+    return compose((IDENTITY[0], from_axis_angle((0.0, 0.0, 1.0), yaw)), (IDENTITY[0], half_turn))[1]
+
+
+def _yaw(turn: Quaternion) -> float:
+    """[rad] of the frame's x axis about the base's z."""
+    x, y, _ = rotate(turn, (1.0, 0.0, 0.0))
+    return math.atan2(y, x)

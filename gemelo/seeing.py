@@ -1,0 +1,232 @@
+"""Things that cameras see: several images of an arm that stands, and the median of what was found in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any, NamedTuple
+
+from gemelo.errors import BadArgument, Error, Refused
+from gemelo.scene import Scene
+from gemelo.session import Session
+from gemelo.units import Point, Pose
+from schemas.camera import CameraCondition, CameraStatus
+from schemas.cell import TagThing, Thing
+from schemas.detections import Detection, Detections
+from schemas.topics import JOINT_STATES, camera_detections, camera_status
+from services.arm.cell.cell_file import Cell, load_cell
+from services.arm.errors import DescriptionError
+from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message
+from services.runtime.topics import Subscription
+
+IMAGES = 5  # of which the median is taken
+ENOUGH = 3  # of them that must show a thing
+PATIENCE = 3.0  # [s] for the first image, beside the time that `IMAGES` of them take
+TO_REST = 1.0  # [s] that an arm which is just arriving may take
+AT_REST = 1e-3  # [rad/s] or [m/s]
+OLDEST = 0.5  # [s] that an image may be old
+UNCERTAIN = 0.002  # [m] standard deviation from which on a thing is not gripped
+FLIPPED = 0.6  # ratio of the two poses' errors from which on they cannot be told apart
+SHEET = 0.002  # [m] thickness of a tag without a body
+
+
+class Seen(NamedTuple):
+    """A thing that cameras see, in the arm's base frame; its frame is the middle of a box, or a tag's.
+
+    >>> seen = gemelo.Seen("cup", gemelo.Pose((0.26, 0.16, 0.04)), 0.0001, "tag", "overhead", 0, "")
+    >>> print(seen)
+    cup (tag): 260.0 160.0 40.0 mm, +-0.10 mm by overhead
+    """
+
+    name: str  # in cell.toml
+    pose: Pose
+    sigma: float  # [m] standard deviation of its position
+    kind: str  # "tag", "colour" or "box"
+    camera: str
+    stamp: int  # [ns UNIX] of the newest image that shows it
+    trouble: str  # why it cannot be picked as it is seen; empty if it can
+
+    def __str__(self) -> str:
+        """One line for a person."""
+        x, y, z = (1e3 * value for value in self.pose.position)
+        where = f"{self.name} ({self.kind}): {x:.1f} {y:.1f} {z:.1f} mm, +-{1e3 * self.sigma:.2f} mm by {self.camera}"
+        return where + (f": {self.trouble}" if self.trouble else "")
+
+
+class Eyes:
+    """The cameras of one connection."""
+
+    def __init__(self, session: Session, scene: Scene) -> None:
+        self._session, self._scene = session, scene
+
+    def cell(self) -> Cell:
+        """What stands around the arm, by the deployment's cell.toml; raises `Refused` without one, `Error` if wrong."""
+        path = self._session.deployment.cell
+        if not path:
+            raise Refused(
+                "the twin has no cell file: urdf/rm1/cell.toml is a sample; start it with "
+                "GEMELO_CELL=urdf/rm1/cell.toml make up",
+                check="cell",
+            )
+        try:
+            return load_cell(Path(path), self._session.description)
+        except DescriptionError as error:
+            raise Error(str(error)) from error
+
+    def detect(self, name: str, camera: str, in_scene: bool) -> tuple[Seen, ...]:
+        """What is seen of `name`, or of all things and places; raises `Refused`, `BadArgument`, `Error` or `Lost`."""
+        cell = self.cell()
+        known = [each.name for each in (*cell.things, *cell.places)]
+        if name and name not in known:
+            raise BadArgument(f'{cell.path} has no thing or place "{name}": it has {", ".join(known) or "none"}')
+        cameras = cell.camera_names if not camera else (_known_camera(cell, camera),)
+        if not cameras:
+            raise Refused(f"{cell.path} has no [[camera]]", check="camera")
+        self._require_rest()
+        found: dict[str, Seen] = {}
+        for each in cameras:
+            for seen in combined(self._images(cell, each), known):
+                other = found.get(seen.name)
+                if other is None or (seen.trouble == "", -seen.sigma) > (other.trouble == "", -other.sigma):
+                    found[seen.name] = seen
+        if name and name not in found:
+            others = f"; it sees {', '.join(sorted(found))}" if found else ", and nothing else"
+            raise Refused(
+                f"{name} is not seen by {' or '.join(cameras)}{others}: is it in the image, lit, and not behind the "
+                "arm? `gemelo camera view`",
+                check="detection", subject=name,
+            )  # fmt: skip
+        if in_scene:
+            self._put_into_scene(cell, [seen for seen in found.values() if not name or seen.name == name])
+        return tuple(seen for _, seen in sorted(found.items()) if not name or seen.name == name)
+
+    def one(self, name: str, camera: str = "") -> Seen:
+        """The thing of that name, as it can be picked; raises `Refused` with the reason where it cannot."""
+        (seen,) = self.detect(name, camera, False)
+        if seen.trouble:
+            raise Refused(f"{name}: {seen.trouble}", check="detection", subject=name)
+        return seen
+
+    def _require_rest(self) -> None:
+        def is_at_rest() -> bool:
+            state = self._session.latest(JOINT_STATES).message
+            return state is not None and all(abs(speed) < AT_REST for speed in state.velocity)
+
+        self._session.newest(JOINT_STATES)
+        if not self._session.wait_for(is_at_rest, TO_REST):
+            raise Refused("the arm moves: images of it are blurred; wait until it stands", check="moving")
+
+    def _images(self, cell: Cell, camera: str) -> list[Detections]:
+        """What was found in the next images of a camera; raises `Refused` where none come, or they are old."""
+        heard: list[Detections] = []
+        status: list[CameraStatus] = []
+        begin = self._session.node.now()
+        late: list[int] = []  # [ns] ages of images from before
+
+        def on_found(message: Detections) -> None:
+            with self._session.news:
+                if message.stamp >= begin:
+                    heard.append(message)
+                else:
+                    late.append(self._session.node.now() - message.stamp)
+                self._session.news.notify_all()
+
+        subscriptions: list[Subscription[Any]] = [
+            self._session.node.subscribe(camera_detections(camera), on_found),
+            self._session.node.subscribe(camera_status(camera), status.append),
+        ]
+        patience = PATIENCE + IMAGES / cell.camera(camera).fps
+        try:
+            self._session.wait_for(lambda: len(heard) >= IMAGES, patience)
+        finally:
+            for each in subscriptions:
+                each.close()
+        if len(heard) < ENOUGH:
+            raise Refused(_why_none(camera, status, late, patience), check="camera", subject=camera)
+        doubt = heard[-1].doubt
+        if doubt:
+            raise Refused(f'camera "{camera}": {doubt}', check="camera", subject=camera)
+        return heard
+
+    def _put_into_scene(self, cell: Cell, seen: Iterable[Seen]) -> None:
+        for each in seen:
+            thing = next((thing for thing in cell.things if thing.name == each.name), None)
+            if thing is not None and not each.trouble:
+                add_to_scene(self._scene, thing, each)
+
+
+def add_to_scene(scene: Scene, thing: Thing, seen: Seen) -> None:
+    """The thing as a box where it is seen, with three standard deviations around it."""
+    size, center = body_of(thing)
+    at, turn = compose((seen.pose.position, seen.pose.orientation), center)
+    scene.add_box(thing.name, size, at=at, orientation=turn, padding=3.0 * seen.sigma)
+
+
+def body_of(thing: Thing) -> tuple[Point, Rigid]:
+    """The edges (3,) [m] of a thing's body, and where its middle is in the thing's frame."""
+    if not isinstance(thing, TagThing):
+        return thing.box, IDENTITY
+    size = thing.box if thing.box is not None else (thing.size, thing.size, SHEET)
+    return size, ((0.0, 0.0, -size[2] / 2.0), IDENTITY[1])
+
+
+def combined(images: Sequence[Detections], known: Iterable[str]) -> list[Seen]:
+    """The median of what several images of one camera show, of those names."""
+    found = []
+    for name in known:
+        shown = [[item for item in image.items if item.name == name] for image in images]
+        once = [(image.stamp, items[0]) for image, items in zip(images, shown, strict=True) if len(items) == 1]
+        twice = sum(len(items) > 1 for items in shown)
+        if twice >= ENOUGH:
+            items = next(items for items in shown if len(items) > 1)
+            trouble = f"it is seen {len(items)} times: take the others away, or give each a tag of its own"
+            found.append(_seen([(images[-1].stamp, items[0])], images[-1].camera, trouble))
+        elif len(once) >= ENOUGH:
+            found.append(_seen(once, images[-1].camera, ""))
+    return found
+
+
+def _seen(once: Sequence[tuple[int, Detection]], camera: str, trouble: str) -> Seen:
+    """The median position, with the turn of the image that is nearest to it."""
+    places = [item.base_from_thing.translation for _, item in once]
+    middle: Point = (median(p[0] for p in places), median(p[1] for p in places), median(p[2] for p in places))
+    item = min((item for _, item in once), key=lambda item: _apart(item.base_from_thing.translation, middle))
+    spread = (sum(_apart(place, middle) ** 2 for place in places) / len(places)) ** 0.5
+    sigma = max(median(item.sigma for _, item in once), spread)
+    _, turn = from_message(item.base_from_thing)
+    return Seen(
+        name=item.name, pose=Pose(middle, turn), sigma=sigma, kind=str(item.kind), camera=camera,
+        stamp=max(stamp for stamp, _ in once), trouble=trouble or _trouble(item, camera, sigma),
+    )  # fmt: skip
+
+
+def _trouble(item: Detection, camera: str, sigma: float) -> str:
+    if not item.is_located:
+        return f"it is not known where the camera {camera} stands: measure it, and write it into camera.toml"
+    if item.flip_ratio > FLIPPED:
+        return f"its tag may be tilted one way or the other ({item.flip_ratio:.2f} of 1): look at it from aside"
+    if sigma > UNCERTAIN:
+        return f"it is known to +-{1e3 * sigma:.1f} mm only (limit {1e3 * UNCERTAIN:g}): bring the camera nearer"
+    return ""
+
+
+def _apart(first: Sequence[float], second: Sequence[float]) -> float:
+    return float(sum((a - b) ** 2 for a, b in zip(first, second, strict=True)) ** 0.5)
+
+
+def _why_none(camera: str, status: Sequence[CameraStatus], late: Sequence[int], patience: float) -> str:
+    if status and status[-1].text:
+        return status[-1].text
+    if late and min(late) > OLDEST * 1e9:
+        return f'the images of camera "{camera}" are {min(late) / 1e9:.1f} s old: do the clocks of the hosts agree?'
+    if status and status[-1].condition is CameraCondition.STREAMING:
+        return f"nothing is heard of the detector for {patience:.1f} s: is the process `detector` running?"
+    return f'no image of camera "{camera}" within {patience:.1f} s: `gemelo camera list`'
+
+
+def _known_camera(cell: Cell, name: str) -> str:
+    try:
+        return cell.camera(name).name
+    except DescriptionError as error:
+        raise BadArgument(str(error)) from error

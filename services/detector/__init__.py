@@ -1,0 +1,1 @@
+"""What the cameras see, as things with poses."""

@@ -1,0 +1,231 @@
+"""What is in one image of a camera: tags, coloured things and boxes of the cell, each with its pose. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.camera import CameraInfo
+from schemas.cell import BoxThing, Colour, ColourThing, TagRecord, TagThing
+from schemas.detections import Detection, DetectionKind, Detections
+from schemas.frames import Transform
+from services.arm.cell.cell_file import Cell, Tagged, height_of_frame
+from services.arm.cell.colours import RGB, nearest_colour
+from services.arm.frames.transforms import from_rpy
+from services.vision.boxes import BoxFit, ColourImage, colour_strength, coloured_regions, fit_box, raised
+from services.vision.camera_model import CameraModel, model_of
+from services.vision.rigid import Array, from_transform, inverse, to_transform
+from services.vision.tag_pose import plane_pose, tag_pose
+from services.vision.tags import Tag, find_tags
+
+Mask = NDArray[np.bool_]
+
+# Tuning constants: chosen, where a line does not say measured.
+FLAT = 0.003  # [m] a tag so near to the height at which it would lie is taken to lie there
+LEVEL = np.radians(8.0)  # and so little tilted
+MOVED = 0.003  # [m] a fixed tag that is seen so far away from its place says that the camera was moved
+LARGEST_ERROR = 0.7  # [px] RMS of an outline that is a box; measured: 0.1 to 0.3 for boxes, above 1 for what is none
+LIKE_AREA = (0.75, 1.35)  # of a region to that of the box which was fitted to it
+STANDS_OUT = 28.0  # grey levels from the table's colour
+LARGEST_SHARE = 0.08  # of the image that a box may take: what is larger is the arm
+
+
+@dataclass(frozen=True)
+class View:
+    """One image with all that is known of it."""
+
+    image: ColourImage  # (h, w, 3) red first
+    model: CameraModel
+    base_from_camera: Array | None  # (4, 4); None where it is not known
+    mount_error: float  # [m] of `base_from_camera`, as it was measured
+
+    def plane(self, height: float) -> Array | None:
+        """camera_from_plane (4, 4) of the plane `height` [m] above the base; None if that is not known."""
+        if self.base_from_camera is None:
+            return None
+        return raised(inverse(self.base_from_camera), height)
+
+
+class Detector:
+    """Finds the things of one cell."""
+
+    def __init__(self, cell: Cell) -> None:
+        self._cell = cell
+        self._tagged = {(each.family, each.id): each for each in cell.all_tags}
+        self._coloured: dict[Colour, list[ColourThing]] = {}
+        for thing in cell.things:
+            if isinstance(thing, ColourThing):
+                self._coloured.setdefault(thing.colour, []).append(thing)
+        self._boxes = [thing for thing in cell.things if isinstance(thing, BoxThing)]
+
+    def look(self, image: ColourImage, info: CameraInfo, base_from_camera: Array | None, stamp: int) -> Detections:
+        """Everything in `image` (h, w, 3; red first), taken at `stamp` [ns UNIX] from there.
+
+        ValueError where `info` is no camera's, or of another size than the image.
+        """
+        model, image = model_of(info), np.ascontiguousarray(image)
+        if image.shape[:2] != (info.height, info.width):
+            size = f"{image.shape[1]} x {image.shape[0]}"
+            raise ValueError(f'camera "{info.name}": its image is {size}, not {info.width} x {info.height} pixels')
+        known = self._cell.measured.get(info.name)
+        error = known.mount.held_out if known is not None and known.mount is not None else 0.0
+        view = View(image, model, base_from_camera, error)
+        tags = list(self._tags(view))
+        items = [item for _, item in tags]
+        if base_from_camera is not None and self._cell.table is not None:
+            items += self._colours(view)
+            items += self._standing_out(view, items)
+        return Detections(stamp=stamp, camera=info.name, items=tuple(items), doubt=self._doubt(tags))
+
+    def _tags(self, view: View) -> Iterator[tuple[Tagged, Detection]]:
+        grey = np.asarray(cv2.cvtColor(view.image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
+        for family in sorted({family for family, _ in self._tagged}):
+            for tag in find_tags(grey, view.model, family):
+                record = self._tagged.get((family, tag.id))
+                if record is not None:
+                    yield record, self._tag_item(view, tag, record)
+
+    def _tag_item(self, view: View, tag: Tag, record: Tagged) -> Detection:
+        """By the plane that it lies on where it lies on one, else in space; the table's normal tells the two apart."""
+        normal = self._normal(view, record)
+        solved = tag_pose(tag, view.model, record.size, normal)
+        pose, sigma = solved.camera_from_tag, solved.sigma
+        plane = self._plane_of(view, record)
+        if plane is not None and _lies_on(plane, pose, sigma):
+            pose, covariance = plane_pose(tag, view.model, record.size, plane)
+            sigma = float(np.sqrt(covariance[0, 0] + covariance[1, 1]))
+        return Detection(
+            name=_name_of(record),
+            kind=DetectionKind.TAG,
+            corners=_rows(tag.corners),
+            camera_from_thing=to_transform(pose),
+            base_from_thing=_in_base(view, pose),
+            is_located=view.base_from_camera is not None,
+            sigma=float(np.hypot(sigma, view.mount_error)),
+            flip_ratio=0.0 if normal is not None else solved.flip_ratio,
+        )
+
+    def _normal(self, view: View, record: Tagged) -> Array | None:
+        """The direction (3,) of the camera frame to which the tag's z is nearest; None where nothing is known of it."""
+        if view.base_from_camera is None or (isinstance(record, TagRecord) and record.parent):
+            return None
+        turn = from_transform(Transform(rotation=from_rpy(*record.rpy))) if isinstance(record, TagRecord) else np.eye(4)
+        return np.asarray(inverse(view.base_from_camera)[:3, :3] @ turn[:3, 2])
+
+    def _plane_of(self, view: View, record: Tagged) -> Array | None:
+        """camera_from_plane of where it would lie; None for a tag that need not lie."""
+        table = self._cell.table
+        if isinstance(record, TagRecord):
+            is_flat = not record.parent and record.rpy[:2] == (0.0, 0.0)
+            return view.plane(record.position[2]) if is_flat else None
+        if table is None:
+            return None
+        return view.plane(table + (height_of_frame(record) if isinstance(record, TagThing) else 0.0))
+
+    def _doubt(self, tags: Sequence[tuple[Tagged, Detection]]) -> str:
+        """Why the camera is not believed to stand where it stood: the fixed tag that is farthest from its place."""
+        off = {}
+        for record, item in tags:
+            if isinstance(record, TagRecord) and not record.parent and item.is_located:
+                apart = np.subtract(item.base_from_thing.translation, record.position)
+                off[record.id] = float(np.linalg.norm(apart)) - 3.0 * item.sigma
+        if not off or max(off.values()) < MOVED:
+            return ""
+        worst = max(off, key=lambda number: off[number])
+        return (
+            f"the fixed tag {worst} is seen {1e3 * off[worst]:.0f} mm away from its place: the camera or the tag was "
+            "moved; put it back, or measure anew where the camera stands"
+        )
+
+    def _colours(self, view: View) -> Iterator[Detection]:
+        for colour, things in self._coloured.items():
+            strength = colour_strength(view.image, RGB[colour])
+            for region in coloured_regions(strength):
+                if nearest_colour(np.median(view.image[region], axis=0)) is colour:
+                    best = self._best_box(view, strength, region, things)
+                    if best is not None:
+                        yield self._box_item(view, *best, DetectionKind.COLOUR)
+
+    def _standing_out(self, view: View, found: Sequence[Detection]) -> Iterator[Detection]:
+        """Boxes by nothing but that they have another colour than the table."""
+        if not self._boxes:
+            return
+        image = view.image.astype(np.float64)
+        table = np.median(image.reshape(-1, 3), axis=0)
+        away = np.linalg.norm(image - table, axis=2)
+        mask = (cv2.medianBlur(np.clip(away, 0.0, 255.0).astype(np.uint8), 3) > STANDS_OUT).astype(np.uint8)
+        count, labels, statistics, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+        for label in range(1, count):
+            area = int(statistics[label, cv2.CC_STAT_AREA])
+            region = labels == label
+            if area < 100 or area > LARGEST_SHARE * mask.size or _is_known(region, found):
+                continue
+            direction = np.median(image[region], axis=0) - table
+            strength = np.asarray((image - table) @ direction / (direction @ direction))
+            best = self._best_box(view, strength, region, self._boxes)
+            if best is not None:
+                yield self._box_item(view, *best, DetectionKind.BOX)
+
+    def _best_box(
+        self, view: View, strength: Array, region: Mask, things: Sequence[ColourThing | BoxThing]
+    ) -> tuple[ColourThing | BoxThing, BoxFit] | None:
+        """The thing whose outline is the region's, and where it stands; None where it is that of none of them."""
+        assert self._cell.table is not None
+        plane = view.plane(self._cell.table)
+        assert plane is not None
+        fits = [(thing, fit_box(strength, region, view.model, plane, thing.box)) for thing in things]
+        good = [(thing, fit) for thing, fit in fits if fit is not None and _is_box(fit, region)]
+        return min(good, key=lambda each: each[1].error) if good else None
+
+    def _box_item(self, view: View, thing: ColourThing | BoxThing, fit: BoxFit, kind: DetectionKind) -> Detection:
+        assert self._cell.table is not None
+        plane = view.plane(self._cell.table)
+        assert plane is not None
+        pose = plane @ fit.plane_from_box
+        return Detection(
+            name=thing.name,
+            kind=kind,
+            corners=_rows(fit.outline),
+            camera_from_thing=to_transform(pose),
+            base_from_thing=_in_base(view, pose),
+            is_located=True,
+            sigma=float(np.hypot(fit.sigma, view.mount_error)),
+        )
+
+
+def _name_of(record: Tagged) -> str:
+    return f"tag {record.id}" if isinstance(record, TagRecord) else record.name
+
+
+def _lies_on(plane: Array, pose: Array, sigma: float) -> bool:
+    """True if the tag at `pose` may lie on the plane: as far as can be told in space."""
+    local = inverse(plane) @ pose
+    tilt = float(np.arccos(np.clip(local[2, 2], -1.0, 1.0)))
+    return abs(float(local[2, 3])) < FLAT + 3.0 * sigma and tilt < LEVEL
+
+
+def _in_base(view: View, pose: Array) -> Transform:
+    return Transform() if view.base_from_camera is None else to_transform(view.base_from_camera @ pose)
+
+
+def _is_box(fit: BoxFit, region: Mask) -> bool:
+    """True if the region is as large as the box that was fitted to it, and its outline as straight."""
+    area = float(cv2.contourArea(fit.outline.astype(np.float32)))
+    return fit.error < LARGEST_ERROR and LIKE_AREA[0] < float(region.sum()) / max(area, 1.0) < LIKE_AREA[1]
+
+
+def _is_known(region: Mask, found: Sequence[Detection]) -> bool:
+    """True if the middle of something that was found already lies in the region."""
+    for item in found:
+        column, row = np.rint(np.mean(item.corners, axis=0)).astype(int)
+        if 0 <= row < region.shape[0] and 0 <= column < region.shape[1] and region[row, column]:
+            return True
+    return False
+
+
+def _rows(points: Array) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(float(value) for value in row) for row in points)

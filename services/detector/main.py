@@ -1,0 +1,126 @@
+"""`gemelo-detector`: what is in the images of every camera of the cell file; without one it stands aside."""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from schemas.camera import CameraImage, CameraInfo
+from schemas.cell import OnnxThing
+from schemas.deployment import Deployment
+from schemas.joints import JointState
+from schemas.topics import JOINT_STATES, camera_detections, camera_image, camera_info
+from services.arm.cell.cell_file import Cell, load_cell
+from services.arm.frames.transforms import compose, inverse, to_message
+from services.arm.kinematics.chain import link_transforms
+from services.arm.model.description import Arm, load_arm
+from services.runtime.application import service
+from services.runtime.deployment import project_root
+from services.runtime.node import Node
+from services.runtime.process.priority import step_behind
+
+if TYPE_CHECKING:
+    from services.detector.core import Detector
+    from services.vision.rigid import Array
+
+RATE = 1.0  # [Hz] of its own step, which does nothing: images wake it
+SAME_TIME = 40_000_000  # [ns] between an image and the joint state that says where its camera was
+
+
+def run(node: Node, deployment: Deployment) -> None:
+    """Look at every image until the node is stopped."""
+    arm = load_arm(project_root() / deployment.robot)
+    cell = load_cell(Path(deployment.cell), arm) if deployment.cell else Cell(Path())
+    if not cell.cameras:
+        node.log.info("there is no camera in the cell: this process stands aside")
+    for thing in cell.things:
+        if isinstance(thing, OnnxThing):
+            node.log.warning('thing "%s": the models of users are not looked for yet; give it a tag', thing.name)
+    if cell.cameras:
+        import cv2
+
+        from services.detector.core import Detector  # OpenCV: 60 MB that only a cell with cameras is worth
+
+        cv2.setNumThreads(1)
+        places = Places(arm)
+        node.subscribe(JOINT_STATES, places.on_joint_state)
+        for camera in cell.cameras:
+            Watch(node, camera.name, Detector(cell), places)
+    node.spin(lambda now: node.set_ready(True), rate=RATE)
+
+
+class Places:
+    """Where the frames that carry cameras were at a moment."""
+
+    def __init__(self, arm: Arm) -> None:
+        self._arm = arm
+        self._states: deque[JointState] = deque(maxlen=64)  # 1.3 s of them
+
+    def on_joint_state(self, state: JointState) -> None:
+        self._states.append(state)
+
+    def base_from_camera(self, info: CameraInfo, stamp: int) -> Array | None:
+        """(4, 4) at `stamp` [ns UNIX]; None where the camera was never mounted, or the arm's state is not known."""
+        from services.vision.rigid import from_transform
+
+        if not info.is_mounted:
+            return None
+        local = from_transform(info.parent_from_camera)
+        if info.parent == self._arm.base_frame:
+            return local
+        state = min(self._states, key=lambda each: abs(each.stamp - stamp), default=None)
+        if state is None or abs(state.stamp - stamp) > SAME_TIME or len(state.position) != len(state.name):
+            return None
+        links = link_transforms(self._arm.model, dict(zip(state.name, state.position, strict=True)))
+        if info.parent not in links:
+            return None
+        carrier = compose(inverse(links[self._arm.base_frame]), links[info.parent])
+        return from_transform(to_message(carrier)) @ local
+
+
+class Watch:
+    """One camera between the bus and the detector."""
+
+    def __init__(self, node: Node, name: str, detector: Detector, places: Places) -> None:
+        self._node, self._name, self._detector, self._places = node, name, detector, places
+        self._info: CameraInfo | None = None
+        self._found = node.publisher(camera_detections(name))
+        self._said = ""
+        node.subscribe(camera_info(name), self._on_info)
+        node.subscribe(camera_image(name), self._on_image)
+
+    def _on_info(self, info: CameraInfo) -> None:
+        self._info = info
+
+    def _on_image(self, image: CameraImage) -> None:
+        import cv2
+
+        from services.detector.images import NoPicture, decoded
+
+        if self._info is None:
+            return
+        try:
+            where = self._places.base_from_camera(self._info, image.stamp)
+            found = self._detector.look(decoded(image), self._info, where, image.stamp)
+        except (NoPicture, ValueError, cv2.error) as error:
+            self._say(str(error).strip().replace("\n", " "))
+            return
+        self._say(found.doubt)
+        self._found.put(found)
+
+    def _say(self, text: str) -> None:
+        """What is wrong, once."""
+        if text and text != self._said:
+            self._node.log.warning('camera "%s": %s', self._name, text)
+        self._said = text
+
+
+def main() -> None:
+    """Console script `gemelo-detector`."""
+    step_behind()
+    service("detector", run)
+
+
+if __name__ == "__main__":
+    main()
