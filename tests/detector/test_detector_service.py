@@ -1,0 +1,146 @@
+"""The process: images in, things out; and what it does with an image that is none."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from schemas.camera import CameraImage, CameraInfo
+from schemas.cell import VirtualSource
+from schemas.deployment import Deployment
+from schemas.detections import Detections
+from schemas.joints import JointState
+from schemas.system import LogRecord
+from schemas.topics import LOG, camera_detections, camera_image, camera_info
+from services.arm.cell.camera_model import believed_info
+from services.arm.cell.cell_file import Cell, load_cell
+from services.arm.frames.transforms import compose, from_rpy, inverse, to_message
+from services.arm.kinematics.chain import link_transforms
+from services.arm.model.description import Arm, load_arm
+from services.camera.sources.source import encoded
+from services.camera.virtual.virtual_camera import VirtualCamera
+from services.camera.virtual.world import World
+from services.detector.images import NoPicture, decoded
+from services.detector.main import Places, run
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.deployment import load_deployment
+from services.runtime.node import Node
+from tests.runtime.support import hear
+
+
+@pytest.fixture
+def arm(rm1_folder: Path) -> Arm:
+    return load_arm(rm1_folder)
+
+
+@pytest.fixture
+def cell(arm: Arm) -> Cell:
+    return load_cell(arm.folder / "cell.toml", arm)
+
+
+@pytest.fixture
+def deployment(cell: Cell, tmp_path: Path) -> Deployment:
+    return load_deployment(environ={"GEMELO_PATHS_RUN": str(tmp_path / "run"), "GEMELO_CELL": str(cell.path)})
+
+
+@contextmanager
+def running(deployment: Deployment) -> Iterator[Node]:
+    """The detector's process as a thread, and a node that stands for the camera's."""
+    network = MemoryNetwork()
+    with (
+        Node("detector", deployment, bus=MemoryBus(network)) as node,
+        Node("camera", deployment, bus=MemoryBus(network)) as camera,
+    ):
+        thread = threading.Thread(target=run, args=(node, deployment))
+        thread.start()
+        try:
+            yield camera
+        finally:
+            node.stop()
+            thread.join(10.0)
+
+
+def picture(arm: Arm, cell: Cell) -> tuple[bytes, CameraInfo]:
+    """The sample cell as its camera sees it, with the arm aside."""
+    record, world = cell.camera("overhead"), World(arm, cell)
+    world.on_joint_state(JointState(stamp=1, name=arm.joint_names, position=arm.named_states["folded"]))
+    assert isinstance(record.source, VirtualSource)
+    info = believed_info(cell, record, arm.base_frame)
+    image = VirtualCamera(record, record.source, info, world.snapshot).image(world.snapshot())
+    return encoded(np.ascontiguousarray(image[..., ::-1])), info
+
+
+def test_an_image_becomes_the_things_in_it_and_none_becomes_a_sentence(
+    arm: Arm, cell: Cell, deployment: Deployment
+) -> None:
+    data, info = picture(arm, cell)
+    with running(deployment) as camera:
+        found: list[Detections] = []
+        log: list[LogRecord] = []
+        camera.subscribe(camera_detections("overhead"), found.append)
+        camera.subscribe(LOG, log.append)
+        image, lens = camera.publisher(camera_image("overhead")), camera.publisher(camera_info("overhead"))
+        lens.put(info)
+
+        def put(stamp: int, payload: bytes, **fields: object) -> None:
+            values = {"camera": "overhead", "width": 640, "height": 480, "data": payload} | fields
+            image.put(CameraImage(stamp=stamp, **values))  # type: ignore[arg-type]
+
+        def put_and_hear() -> bool:
+            put(5, data)
+            return hear(camera, lambda: found, 0.3)
+
+        assert any(put_and_hear() for _ in range(30))
+        assert found[0].stamp == 5
+        assert {"cup", "red_block", "blue_block", "tray"} <= {item.name for item in found[0].items}
+        put(6, b"no picture")
+        assert hear(camera, lambda: any("no JPEG" in record.text for record in log))
+        put(7, bytes(30), encoding="rgb8", width=4, height=4)
+        assert hear(camera, lambda: any("4 x 4 pixels" in record.text for record in log))
+        found.clear()
+        put(8, data)
+        assert hear(camera, lambda: found and found[-1].stamp == 8)
+
+
+def test_without_a_cell_it_stands_aside(tmp_path: Path) -> None:
+    deployment = load_deployment(environ={"GEMELO_PATHS_RUN": str(tmp_path / "run")})
+    with running(deployment) as camera:
+        ready = tmp_path / "run"
+        assert hear(camera, lambda: any("detector" in path.name for path in ready.rglob("*")))
+
+
+def test_a_camera_on_a_link_is_where_the_link_was_when_it_took_the_image(arm: Arm) -> None:
+    local = ((0.02, 0.0, 0.03), from_rpy(0.1, 0.2, 0.3))
+    info = CameraInfo(
+        name="hand", parent=arm.tool_frame, parent_from_camera=to_message(local), is_mounted=True, width=4, height=4
+    )
+    places = Places(arm)
+    for step in range(10):
+        position = tuple(value + 0.01 * step for value in arm.named_states["home"])
+        places.on_joint_state(JointState(stamp=step * 20_000_000, name=arm.joint_names, position=position))
+    at = tuple(value + 0.03 for value in arm.named_states["home"])
+    links = link_transforms(arm.model, dict(zip(arm.joint_names, at, strict=True)))
+    expected = compose(compose(inverse(links[arm.base_frame]), links[arm.tool_frame]), local)
+    found = places.base_from_camera(info, 3 * 20_000_000 + 1)
+    assert found is not None
+    assert found[:3, 3] == pytest.approx(expected[0])
+    assert places.base_from_camera(info, 10**12) is None  # nobody knows where it was
+    assert places.base_from_camera(CameraInfo(name="new", parent=arm.base_frame), 0) is None  # never measured
+
+
+@pytest.mark.parametrize("image", [CameraImage(), CameraImage(encoding="bmp", data=b"x")])
+def test_what_is_no_image_is_refused(image: CameraImage) -> None:
+    with pytest.raises(NoPicture):
+        decoded(image)
+
+
+def test_grey_and_coloured_rows_are_read() -> None:
+    grey = decoded(CameraImage(encoding="mono8", width=2, height=1, data=b"\x01\x02"))
+    assert grey[0, 1].tolist() == [2, 2, 2]
+    rgb = decoded(CameraImage(encoding="rgb8", width=1, height=1, data=b"\x01\x02\x03"))
+    assert rgb[0, 0].tolist() == [1, 2, 3]

@@ -1,0 +1,68 @@
+"""Things of a cell that are seen, taken and put down by both arms, as a person does it; and what is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+
+import gemelo
+from schemas.topics import camera_truth
+from services.bench.picks import FLOOR, PROCESSES, picks
+from services.cli.errors import ExitCode
+from services.stack.stack import Stack
+from tests.stack import gemelo as command
+
+BIN = (0.1, 0.3)  # [m] of rm1's sample cell
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory):
+    environment = {"GEMELO_CELL": "urdf/rm1/cell.toml"}
+    with Stack(out=tmp_path_factory.mktemp("out"), processes=PROCESSES, environment=environment) as running:
+        running.wait_ready(30.0)
+        yield running
+
+
+def test_a_person_detects_and_picks_what_the_sample_cell_has(stack, monkeypatch):
+    for name, value in stack.deployment.items():
+        monkeypatch.setenv(name, value)
+    command.gemelo(stack, "reference")
+    command.gemelo(stack, "move", "--named", "ready")
+    seen = {each["name"]: each for each in json.loads(command.gemelo(stack, "detect", "--json"))}
+    assert {"cup", "red_block", "blue_block", "tray"} <= set(seen)
+    assert math.dist(seen["cup"]["pose"]["position"], (0.26, 0.16, 0.04)) < 1e-3
+    command.gemelo(stack, "detect", "red_block", "--scene")
+    assert "red_block" in command.gemelo(stack, "scene", "list")
+    assert "cup is at bin" in command.gemelo(stack, "pick", "cup", "--to", "bin")
+    assert "no [[thing]]" in command.gemelo(stack, "pick", "cap", "--to", "bin", code=ExitCode.FAILED)
+    with gemelo.connect() as arm:
+        truth = arm.node.latest(camera_truth("overhead"))
+
+        def is_there() -> bool:
+            items = () if truth.message is None else truth.message.items
+            places = [item.base_from_thing.translation for item in items if item.name == "cup"]
+            return any(math.dist(place[:2], BIN) < FLOOR["rm1"] + 0.5e-3 for place in places)
+
+        assert arm.wait_for(is_there, 3.0)
+        assert "cup" not in arm.scene.objects
+        arm.start(named="left")
+        with pytest.raises(gemelo.Refused) as refused:
+            arm.detect("cup")
+        assert refused.value.check == "moving"
+        arm.stop()
+        arm.wait_for(lambda: not any(arm.velocities.values()), 3.0)
+        stack.kill("camera")
+        with pytest.raises(gemelo.Refused) as refused:
+            arm.pick("red_block", to="bin")
+        assert refused.value.check == "camera"
+
+
+@pytest.mark.parametrize("robot", ["rm1", "parol6"])
+def test_things_at_random_places_among_obstacles_are_picked_or_refused_with_a_reason(robot):
+    trials = picks(robot, 4, 1)
+    for trial in trials:
+        assert (trial.off is not None and trial.off < FLOOR[robot] + 0.5e-3) or len(trial.reason) > 20, trial
+        assert not trial.reason.startswith("aborted"), trial
+    assert sum(trial.off is not None for trial in trials) >= 2, trials
