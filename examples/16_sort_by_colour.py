@@ -1,6 +1,6 @@
-"""Takes every coloured thing that a camera sees to the bin, and everything else to the tray.
+"""Takes what is red to the bin and every other coloured thing to the tray, as a camera sees them.
 
-Needs a cell: GEMELO_CELL=urdf/rm1/cell.toml make up
+Needs a table: GEMELO_CELL=urdf/rm1/cell.toml make up (or the cell.toml of your arm)
 """
 
 import gemelo
@@ -8,10 +8,10 @@ import gemelo
 with gemelo.connect() as arm:
     arm.move(named="ready")
     for seen in arm.detect():
-        if seen.kind == "tag" and seen.name == "tray":
+        if seen.kind != "colour":
             continue
         try:
-            print(arm.pick(seen.name, to="bin" if seen.kind == "colour" else "tray"), flush=True)
+            print(arm.pick(seen.name, to="bin" if "red" in seen.name else "tray"), flush=True)
         except gemelo.Refused as refused:
             print(refused, flush=True)
         arm.move(named="ready")  # out of the camera's way
