@@ -75,7 +75,7 @@ bool UpdateReceiver::carry_out(const Frame& frame, Refusal* refusal) {
             give_up();
             return true;
     }
-    return false;
+    return refuse(refusal, "there is no such step of an update");
 }
 
 // A transfer that was cut off goes on where it ended, whoever sends the same image.

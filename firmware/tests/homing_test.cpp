@@ -114,6 +114,21 @@ TEST(Homing, TellsHowManyStepsWereLost) {
     expect_home(wired);
 }
 
+TEST(Homing, AMotionThatPassesAHomeSwitchTellsHowManyStepsWereLostAndCorrectsNothing) {
+    Wired wired(wired_joints(), {0, 0}, true);
+    wired.run_ms(5);
+    wired.shaft[0] -= 37;  // the motor slips
+    ASSERT_EQ(wired.follow(-5200, 0), Code::Ok);
+    wired.run_ms(4000);
+    EXPECT_EQ(wired.count_events("\"passed\""), 1);
+    EXPECT_EQ(wired.count_events("\"q1: -37 steps off\""), 1);
+    EXPECT_EQ(wired.steps(0), -5200);
+    ASSERT_EQ(wired.follow(0, 0), Code::Ok);
+    wired.run_ms(4000);
+    EXPECT_EQ(wired.count_events("\"passed\""), 1) << "the way back opens it";
+    EXPECT_EQ(wired.shaft[0], -37);
+}
+
 TEST(Homing, OfSomeJointsLeavesTheOthersUnreferenced) {
     Wired wired(wired_joints(), {100, 200});
     wired.run_ms(5);

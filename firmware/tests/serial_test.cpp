@@ -239,6 +239,18 @@ TEST(SerialPort, SaysItsStateWhereTheLastSignOfLifeCameFromAndEventsOnBoth) {
         EXPECT_TRUE(line.port.carries(both) && line.port.leaves_to_mqtt(both));
 }
 
+TEST(SerialPort, AnswersAPieceOfAnUpdateInAFrame) {
+    Line line;
+    EXPECT_EQ(line.port.understood(), 0u);
+    line.hear(packet(rig::build_update(UpdateStep::Begin, 5, 0, rig::build_update_begin(10000, 1))));
+    EXPECT_EQ(line.on_serial.back(), Output::UpdateAck);
+    EXPECT_EQ(line.port.understood(), 1u);
+    const std::vector<Piece> said = cut(line.wire);
+    ASSERT_FALSE(said.empty());
+    EXPECT_EQ(said.back().bytes[2], static_cast<uint8_t>(FrameType::UpdateAck));
+    EXPECT_TRUE(line.on_mqtt.empty());
+}
+
 TEST(SerialPort, AnswersALineOfTextAsItIs) {
     Line line;
     line.hear(packet(rig::build_sync(1)));

@@ -31,6 +31,7 @@ class Episode(msgspec.Struct, frozen=True, kw_only=True):
     to_end: float = 0.0  # [s] from the fault to the client's knowledge
     to_ready: float = 0.0  # [s] from the heal until every process is ready
     hands: tuple[str, ...] = ()  # what a person had to do
+    was_late: bool = False  # the machine gave the virtual device no time: whether its shaft arrived was not judged
     violations: tuple[str, ...] = ()
 
 
@@ -63,6 +64,7 @@ class Campaign:
         if unready := person.make_ready(READY, reference=False):
             violations.append(f"not ready to move: {unready}")
         person.forget()
+        late_before = len(person.late)
         motion = self._start(random, violations)
         if motion is None:
             return Episode(number=number, fault=fault.name, chosen="", ended="not begun", violations=tuple(violations))
@@ -79,14 +81,15 @@ class Campaign:
         to_ready = self._await_ready(healed, violations)
         if fault.mutes:
             self.muted.append((begun - int(MUTED * 1e9), time.time_ns() + int(MUTED * 1e9)))
-        violations += self._judge(motion, ended, fault)
+        violations += self._judge(motion, ended, fault, late_before)
+        was_late = len(person.late) > late_before  # a shaft that stops from full speed has lost steps
         person.hands.clear()
-        if unready := person.make_ready(READY, reference=fault.slips):
+        if unready := person.make_ready(READY, reference=fault.slips or was_late):
             violations.append(f"not ready to move again: {unready}")
-        violations += unexpected_hands(fault, person.hands)
+        violations += unexpected_hands(fault, person.hands, was_late)
         return Episode(
             number=number, fault=fault.name, chosen=chosen, ended=ended, reason=reason, to_end=to_end,
-            to_ready=to_ready, hands=tuple(person.hands), violations=tuple(violations),
+            to_ready=to_ready, hands=tuple(person.hands), was_late=was_late, violations=tuple(violations),
         )  # fmt: skip
 
     def _start(self, random: Random, violations: list[str]) -> gemelo.Motion | None:
@@ -140,8 +143,12 @@ class Campaign:
             violations.append(str(error).splitlines()[0])
         return time.monotonic() - healed
 
-    def _judge(self, motion: gemelo.Motion, ended: str, fault: Fault) -> list[str]:
-        """Jumps, false successes and motion that nobody asked for."""
+    def _judge(self, motion: gemelo.Motion, ended: str, fault: Fault, late_before: int) -> list[str]:
+        """Jumps, false successes and motion that nobody asked for.
+
+        Where the machine gave the virtual device no time while it moved, its motors stopped from full speed and lost
+        steps, as real ones would: the device has said so, and the shaft is not held against the goal.
+        """
         person, arm = self.person, self._site.arm.description
         if not person.await_rest():
             return ["the arm has not come to rest, or nothing is heard of it"]
@@ -153,17 +160,19 @@ class Campaign:
             result = motion.result
             if result.executed_steps != result.commanded_steps:
                 found.append(f"success with {result.executed_steps} steps executed of {result.commanded_steps}")
-            if not fault.slips:
+            if not fault.slips and len(person.late) == late_before:
                 found += misses(arm, motion.plan.trajectory.points[-1].positions, person.shaft())
         person.pause(0.5)
         return found + moved(arm, at_rest, person.position)
 
 
-def unexpected_hands(fault: Fault, hands: Sequence[str]) -> list[str]:
+def unexpected_hands(fault: Fault, hands: Sequence[str], was_late: bool = False) -> list[str]:
     """What a person had to do although the fault does not ask for it."""
     allowed = {"stop"}
     if fault.boots or fault.trips or fault.slips:
         allowed |= {"reference", "arm"}
     if fault.trips or fault.slips:
         allowed |= {"reset"}
+    if was_late:
+        allowed |= {"reference"}
     return [f"a person had to {word}" for word in hands if word not in allowed]

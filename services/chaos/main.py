@@ -105,6 +105,7 @@ def line_of(episode: Episode) -> str:
     """One line about an episode that has just ended."""
     violated = f"; VIOLATED: {'; '.join(episode.violations)}" if episode.violations else ""
     hands = f"; by hand: {', '.join(episode.hands)}" if episode.hands else ""
+    hands += "; the machine was late" if episode.was_late else ""
     return f"{episode.number:>4} {episode.chosen or episode.fault}: {episode.ended}{hands}{violated}"
 
 

@@ -55,6 +55,7 @@ def test_every_fault_comes_once_before_any_comes_twice() -> None:
 def test_a_person_may_only_do_what_the_fault_asks_for() -> None:
     assert unexpected_hands(fault("stop"), ["stop"]) == []
     assert unexpected_hands(fault("kill planner"), ["reference"]) == ["a person had to reference"]
+    assert unexpected_hands(fault("kill planner"), ["reference"], was_late=True) == []
     assert unexpected_hands(fault("device reboots"), ["arm", "reference"]) == []
     assert unexpected_hands(fault("device reboots"), ["reset"]) == ["a person had to reset"]
     assert unexpected_hands(fault("e-stop"), ["reset", "arm", "reference"]) == []
