@@ -25,6 +25,7 @@ ENOUGH = 3  # of them that must show a thing
 PATIENCE = 3.0  # [s] for the first image, beside the time that `IMAGES` of them take
 TO_REST = 1.0  # [s] that an arm which is just arriving may take
 AT_REST = 1e-3  # [rad/s] or [m/s]
+STILL = 1e-3  # [rad] or [m] that it may be elsewhere after the images
 OLDEST = 0.5  # [s] that an image may be old
 UNCERTAIN = 0.002  # [m] standard deviation from which on a thing is not gripped
 FLIPPED = 0.6  # ratio of the two poses' errors from which on they cannot be told apart
@@ -83,13 +84,16 @@ class Eyes:
         cameras = cell.camera_names if not camera else (_known_camera(cell, camera),)
         if not cameras:
             raise Refused(f"{cell.path} has no [[camera]]", check="camera")
-        self._require_rest()
+        stood = self._require_rest()
         found: dict[str, Seen] = {}
         for each in cameras:
             for seen in combined(self._images(cell, each), known):
                 other = found.get(seen.name)
                 if other is None or (seen.trouble == "", -seen.sigma) > (other.trouble == "", -other.sigma):
                     found[seen.name] = seen
+        moved = max(abs(a - b) for a, b in zip(stood, self._require_rest(), strict=True))
+        if moved > STILL:
+            raise _moving()
         if name and name not in found:
             others = f"; it sees {', '.join(sorted(found))}" if found else ", and nothing else"
             raise Refused(
@@ -108,14 +112,17 @@ class Eyes:
             raise Refused(f"{name}: {seen.trouble}", check="detection", subject=name)
         return seen
 
-    def _require_rest(self) -> None:
+    def _require_rest(self) -> tuple[float, ...]:
+        """Where the joints stand [rad] or [m]; raises `Refused` where they do not."""
+
         def is_at_rest() -> bool:
             state = self._session.latest(JOINT_STATES).message
             return state is not None and all(abs(speed) < AT_REST for speed in state.velocity)
 
         self._session.newest(JOINT_STATES)
         if not self._session.wait_for(is_at_rest, TO_REST):
-            raise Refused("the arm moves: images of it are blurred; wait until it stands", check="moving")
+            raise _moving()
+        return self._session.newest(JOINT_STATES).position
 
     def _images(self, cell: Cell, camera: str) -> list[Detections]:
         """What was found in the next images of a camera; raises `Refused` where none come, or they are old."""
@@ -209,6 +216,10 @@ def _trouble(item: Detection, camera: str, sigma: float) -> str:
     if sigma > UNCERTAIN:
         return f"it is known to +-{1e3 * sigma:.1f} mm only (limit {1e3 * UNCERTAIN:g}): bring the camera nearer"
     return ""
+
+
+def _moving() -> Refused:
+    return Refused("the arm moves: images of it are blurred; wait until it stands", check="moving")
 
 
 def _apart(first: Sequence[float], second: Sequence[float]) -> float:

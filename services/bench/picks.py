@@ -25,8 +25,8 @@ from services.stack.stack import Stack
 
 PROCESSES = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner", "camera", "detector")
 CAMERA = "overhead"
-PLACES, POSTS = 12, 2
-APART = 0.075  # [m] between the middles of two places
+PLACES, POSTS = 5, 1
+APART = 0.06  # [m] between the middles of two places
 LET_GO = 0.03  # [m] above the table
 POST = (0.025, 0.025, 0.1)  # [m]
 TO_SETTLE = 1.5  # [s] after which the camera has told where things are now
@@ -66,11 +66,10 @@ def draw_cell(robot: str, seed: int, folder: Path) -> tuple[Path, list[tuple[flo
     while len(spots) < 4 + PLACES + POSTS:
         radius, angle = draw.uniform(table.near, table.far), draw.uniform(-table.spread, table.spread)
         spot = radius * math.cos(angle), radius * math.sin(angle)
-        is_free = all(math.dist(spot, other) > APART for other in spots)
-        if is_free:
+        if all(math.dist(spot, other) > APART for other in spots):
             spots.append(spot)
-        elif draw.random() < 0.005:
-            spots.clear()  # no room is left
+        elif draw.random() < 0.02:
+            spots.clear()  # no room is left: begin anew
     sample = (project_root() / "urdf" / robot / "cell.toml").read_text("utf-8")
     camera = sample[sample.index("[[camera]]") : sample.index("[[tag]]")]
     text = ["table = 0.0\n", camera]

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+from msgspec import Meta
 
 from schemas.camera import CameraImage, CameraInfo
 from schemas.cell import OnnxThing
@@ -25,7 +29,16 @@ if TYPE_CHECKING:
     from services.vision.rigid import Array
 
 RATE = 1.0  # [Hz] of its own step, which does nothing: images wake it
+SLACK = 0.02  # [s] that an image may come too early
 SAME_TIME = 40_000_000  # [ns] between an image and the joint state that says where its camera was
+
+
+class DetectorParameters(msgspec.Struct, frozen=True, kw_only=True):
+    """How much of the machine it takes."""
+
+    rate: Annotated[float, Meta(description="images of each camera that are looked at, at most [Hz]", gt=0, le=60)] = (
+        4.0
+    )
 
 
 def run(node: Node, deployment: Deployment) -> None:
@@ -43,10 +56,10 @@ def run(node: Node, deployment: Deployment) -> None:
         from services.detector.core import Detector  # OpenCV: 60 MB that only a cell with cameras is worth
 
         cv2.setNumThreads(1)
-        places = Places(arm)
+        places, parameters = Places(arm), node.parameters(DetectorParameters)
         node.subscribe(JOINT_STATES, places.on_joint_state)
         for camera in cell.cameras:
-            Watch(node, camera.name, Detector(cell), places)
+            Watch(node, camera.name, Detector(cell), places, lambda: parameters.value.rate)
     node.spin(lambda now: node.set_ready(True), rate=RATE)
 
 
@@ -82,8 +95,10 @@ class Places:
 class Watch:
     """One camera between the bus and the detector."""
 
-    def __init__(self, node: Node, name: str, detector: Detector, places: Places) -> None:
+    def __init__(self, node: Node, name: str, detector: Detector, places: Places, rate: Callable[[], float]) -> None:
+        """`rate()` [Hz]: more images than that are left out."""
         self._node, self._name, self._detector, self._places = node, name, detector, places
+        self._rate, self._due = rate, 0.0  # [s] monotonic
         self._info: CameraInfo | None = None
         self._found = node.publisher(camera_detections(name))
         self._said = ""
@@ -98,8 +113,10 @@ class Watch:
 
         from services.detector.images import NoPicture, decoded
 
-        if self._info is None:
+        now = self._node.monotonic()
+        if self._info is None or now < self._due - SLACK:
             return
+        self._due = max(self._due, now - SLACK) + 1.0 / self._rate()
         try:
             where = self._places.base_from_camera(self._info, image.stamp)
             found = self._detector.look(decoded(image), self._info, where, image.stamp)

@@ -15,7 +15,7 @@ from services.runtime.node import Node
 from services.runtime.topics import Subscription
 
 MAX_OTHERS = 512  # topics besides those of the table: what a node tells of itself is not to be trusted for more
-TOGETHER = 0.02  # [s] messages are handled at once: of a LATEST topic too none is left out while a file is written
+ALL = 0.0  # [s] of a LATEST topic too no message is left out while a file is written
 
 OnMessage = Callable[[Topic[Any], Message], None]
 
@@ -39,7 +39,7 @@ class Subscriptions:
         return tuple(self._others)
 
     def _subscribe(self, topic: Topic[Any]) -> Subscription[Any]:
-        return self._node.subscribe(topic, lambda message: self._on_message(topic, message), own=True, batch=TOGETHER)
+        return self._node.subscribe(topic, lambda message: self._on_message(topic, message), own=True, batch=ALL)
 
     def _on_record(self, record: NodeRecord) -> None:
         if self._is_chosen(NODES.key):

@@ -115,8 +115,8 @@ class Node:
     ) -> Subscription[M]:
         """`on_message(message)` runs in the thread of logic; `own`: also for what this node publishes.
 
-        With `batch` all messages, of a LATEST topic too, are queued and handled together once per `batch`:
-        cheaper for a node that displays or records them. `batch` is in [s].
+        With `batch` all messages, of a LATEST topic too, are queued and handled together once per `batch` [s]:
+        cheaper for a node that displays them. With 0 none is left out either, and each is handled as it comes.
         """
         subscription = Subscription(self._bus, self._loop, topic, on_message, self.log.warning, own, batch)
         self._endpoints.subscriptions.append(subscription)

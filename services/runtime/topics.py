@@ -54,7 +54,7 @@ class Subscription(Generic[M]):
         own: bool,
         batch: float | None,
     ) -> None:
-        """With `batch` [s] the messages are handled together, once in this time."""
+        """With `batch` [s] the messages are handled together, once in this time; with 0 each as it comes, but all."""
         self.topic = topic
         self._handler, self._warn = handler, warn
         self._received, self._bad, self._lost_said = 0, 0, False
@@ -63,11 +63,11 @@ class Subscription(Generic[M]):
         self._declaration = bus.subscribe(topic.key, topic.delivery, self._queue.on_arrival, self._queue.on_miss, own)
 
     def _queue_for(self, batch: float | None) -> ArrivalQueue:
-        if batch is not None:
+        if batch:
             queue = EveryQueue(None, self._handle)
             self._loop.every(batch, queue.deliver_all)
             return queue
-        latest = self.topic.delivery is Delivery.LATEST
+        latest = self.topic.delivery is Delivery.LATEST and batch is None
         return (LatestQueue if latest else EveryQueue)(self._loop.tasks, self._handle)
 
     @property

@@ -15,6 +15,7 @@ from schemas.camera import CameraInfo
 
 Array = NDArray[np.float64]
 
+SETTLED = 1e-12  # of a ray, below which a step changes nothing any more
 ITERATIONS = 20  # of the inverse distortion; 8 suffice for lenses of 90 degrees
 
 
@@ -52,7 +53,10 @@ class CameraModel:
             return seen
         rays = seen.copy()
         for _ in range(ITERATIONS):
-            rays += seen - self._distorted(rays)
+            change = seen - self._distorted(rays)
+            rays += change
+            if np.abs(change).max(initial=0.0) < SETTLED:
+                break
         return rays
 
     def ideal(self, pixels: Array) -> Array:
@@ -70,13 +74,10 @@ class CameraModel:
         x, y = rays[..., 0], rays[..., 1]
         r2 = x * x + y * y
         radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        return np.stack(
-            (
-                x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-                y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-            ),
-            axis=-1,
-        )
+        distorted = np.empty(np.shape(rays))
+        distorted[..., 0] = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+        distorted[..., 1] = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+        return distorted
 
 
 def model_of(info: CameraInfo) -> CameraModel:

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.vision.camera_model import CameraModel
-from services.vision.rigid import Array, angle_between, apply, from_opencv, rigid, skew, step
+from services.vision.rigid import Array, angle_between, apply, from_opencv, rigid, step
 from services.vision.tags import Tag
 
 ROUNDS = 10
+SETTLED = 1e-8  # [m] and [rad] below which a step changes nothing any more
 SAME = np.radians(1.0)  # [rad] between two solutions that are one
 
 
@@ -69,12 +70,16 @@ def residuals(points: Array, ideal: Array, model: CameraModel, pose: Array) -> A
 def jacobian(points: Array, model: CameraModel, pose: Array) -> Array:
     """(2 n, 6) of `residuals` by a small turn about the thing's origin and a step, both in the camera frame."""
     placed = apply(pose, points)
-    rows = []
-    for x, y, z in placed:
-        by_point = np.array([[1.0 / z, 0.0, -x / z**2], [0.0, 1.0 / z, -y / z**2]]) * model.focal[:, None]
-        arm = np.array([x, y, z]) - pose[:3, 3]
-        rows.append(by_point @ np.hstack((-skew(arm), np.eye(3))))
-    return np.vstack(rows)
+    x, y, z = placed.T
+    by_point = np.zeros((len(placed), 2, 3))
+    by_point[:, 0, 0], by_point[:, 1, 1] = model.focal[0] / z, model.focal[1] / z
+    by_point[:, 0, 2], by_point[:, 1, 2] = -model.focal[0] * x / z**2, -model.focal[1] * y / z**2
+    a, b, c = (placed - pose[:3, 3]).T
+    nothing = np.zeros(len(placed))
+    by_turn = np.array([[nothing, c, -b], [-c, nothing, a], [b, -a, nothing]]).transpose(
+        2, 0, 1
+    )  # minus the cross product
+    return np.concatenate((by_point @ by_turn, by_point), axis=2).reshape(-1, 6)
 
 
 def moved(pose: Array, change: Array) -> Array:
@@ -127,7 +132,10 @@ def plane_pose(tag: Tag, model: CameraModel, size: float, camera_from_plane: Arr
     for _ in range(ROUNDS):
         pose = camera_from_plane @ flat(values)
         slope = jacobian(corners, model, pose) @ flat_motions(camera_from_plane)
-        values = values - np.linalg.lstsq(slope, residuals(corners, tag.ideal, model, pose), rcond=None)[0]
+        change = np.linalg.lstsq(slope, residuals(corners, tag.ideal, model, pose), rcond=None)[0]
+        values = values - change
+        if np.abs(change).max() < SETTLED:
+            break
     pose = camera_from_plane @ flat(values)
     slope = jacobian(corners, model, pose) @ flat_motions(camera_from_plane)
     return pose, np.asarray(np.linalg.inv(slope.T @ slope) * tag.sigma**2, dtype=np.float64)

@@ -85,6 +85,19 @@ def test_a_batch_keeps_every_message_of_a_latest_topic_and_hands_them_over_toget
     assert len(heard) == 100
 
 
+def test_a_reader_that_keeps_all_misses_nothing_of_a_latest_topic_while_it_is_busy(buses: Buses) -> None:
+    heard: list[int] = []
+    reader, writer = buses.node("reader"), buses.node("writer")
+    subscription = reader.subscribe(JOINT_STATES, lambda message: heard.append(message.stamp), batch=0.0)
+    buses.settle()
+    for stamp in range(1, 201):  # the reader does something else
+        writer.publisher(JOINT_STATES).put(JointState(stamp=stamp))
+        time.sleep(0.0005)
+    assert hear(reader, lambda: len(heard) == 200)
+    assert heard == list(range(1, 201))
+    assert subscription.statistics.dropped == 0
+
+
 def test_every_keeps_order_through_a_node(buses: Buses) -> None:
     heard: list[int] = []
     reader, writer = buses.node("reader"), buses.node("writer")
