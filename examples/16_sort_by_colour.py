@@ -1,6 +1,6 @@
 """Takes what is red to the bin and every other coloured thing to the tray, as a camera sees them.
 
-Needs a table: GEMELO_CELL=urdf/rm1/cell.toml make up (or the cell.toml of your arm)
+Needs a table: GEMELO_CELL=urdf/ARM/cell.toml make up
 """
 
 import gemelo
