@@ -1,0 +1,113 @@
+"""The images of one camera for the commands that measure it: from the bus, or from a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import msgspec
+import numpy as np
+
+from schemas.camera import CameraImage, CameraInfo
+from schemas.cell import CameraRecord, MeasuredCamera
+from schemas.topics import camera_image, camera_info
+from services.arm.cell.camera_file import CAMERA_FILE, write_measured
+from services.arm.cell.cell_file import Cell, deployed_cell
+from services.arm.errors import DescriptionError
+from services.cli.errors import CommandError, unknown, usage
+from services.cli.session import Session
+from services.runtime.deployment import load_deployment
+from services.vision.tags import GreyImage
+
+PATIENCE = 3.0  # [s] for the next image
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp")
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The camera that is measured."""
+
+    cell: Cell
+    record: CameraRecord
+
+    @property
+    def name(self) -> str:
+        return self.record.name
+
+    @property
+    def measured(self) -> MeasuredCamera:
+        """What was measured of it until now."""
+        return self.cell.measured.get(self.name, MeasuredCamera(name=self.name))
+
+    def write(self, **found: object) -> Path:
+        """Adds to camera.toml what was found; the other cameras stay as they are."""
+        known = {**self.cell.measured, self.name: msgspec.structs.replace(self.measured, **found)}
+        path = self.cell.path.with_name(CAMERA_FILE)
+        write_measured(path, [known[name] for name in self.cell.camera_names if name in known])
+        return path
+
+
+def subject(name: str) -> Subject:
+    """The camera of the deployment's cell; its first one without a name. Raises `CommandError`."""
+    deployment = load_deployment()
+    try:
+        cell = deployed_cell(deployment)
+    except DescriptionError as error:
+        raise usage(str(error)) from error
+    if not cell.cameras:
+        raise usage("there is no camera: the deployment's cell file (urdf/rm1/cell.toml is a sample) has no [[camera]]")
+    chosen = name or cell.cameras[0].name
+    if chosen not in cell.camera_names:
+        raise unknown("camera", chosen, cell.camera_names)
+    return Subject(cell, cell.camera(chosen))
+
+
+def from_folder(path: Path, size: tuple[int, int]) -> Iterator[GreyImage]:
+    """The images of a folder by name; raises `CommandError` for one that is none, or of another size [px]."""
+    files = sorted(each for each in path.glob("*") if each.suffix.lower() in SUFFIXES)
+    if not files:
+        raise usage(f"--images {path}: there is no image in that folder ({', '.join(SUFFIXES)})")
+    for file in files:
+        image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
+        if image is None:
+            raise usage(f"{file} is no image")
+        if image.shape != size[::-1]:
+            found = f"{image.shape[1]} x {image.shape[0]}"
+            raise usage(f"{file} has {found} pixels, and the camera {size[0]} x {size[1]}: take it at that size")
+        yield np.asarray(image, dtype=np.uint8)
+
+
+def from_bus(session: Session, name: str) -> Iterator[GreyImage]:
+    """The newest image, again and again; raises `CommandError` where none comes."""
+    newest: list[CameraImage] = []
+    subscription = session.node.subscribe(camera_image(name), newest.append)
+    try:
+        while True:
+            deadline = session.node.monotonic() + PATIENCE
+            while not newest and session.node.monotonic() < deadline:
+                session.node.wait(0.02)
+            if not newest:
+                raise CommandError(f'no image of camera "{name}" within {PATIENCE:g} s: `gemelo camera list`')
+            message, newest[:] = newest[-1], []
+            image = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_GRAYSCALE)
+            if image is not None:
+                yield np.asarray(image, dtype=np.uint8)
+    finally:
+        subscription.close()
+
+
+def info_of(session: Session, name: str) -> CameraInfo:
+    """What is known of the camera's lens; raises `CommandError` where nobody tells it."""
+    heard: list[CameraInfo] = []
+    subscription = session.node.subscribe(camera_info(name), heard.append)
+    deadline = session.node.monotonic() + PATIENCE
+    while not heard and session.node.monotonic() < deadline:
+        session.node.wait(0.02)
+    subscription.close()
+    if not heard:
+        raise CommandError(
+            f'nothing is heard of camera "{name}": is the process `camera` running? `gemelo camera list`'
+        )
+    return heard[-1]

@@ -1,0 +1,215 @@
+"""`gemelo camera print | calibrate | mount`: pages that are read back, a lens from images, a place from touches."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from gemelo.units import Pose
+from schemas.cell import VirtualSource
+from schemas.joints import JointState
+from services.arm.cell.camera_file import CAMERA_FILE
+from services.arm.cell.camera_model import believed_info, exact_info
+from services.arm.cell.cell_file import load_cell
+from services.arm.frames.transforms import from_rpy
+from services.arm.model.description import Arm
+from services.bench.vision import images
+from services.bench.vision.images import Surface, render
+from services.camera.virtual.virtual_camera import VirtualCamera
+from services.camera.virtual.world import World
+from services.cli import camera_mount
+from services.cli.camera_boards import CHESS_BOARD, TAG_BOARD
+from services.cli.errors import ExitCode
+from services.cli.main import run
+from services.vision.boards import picture
+from services.vision.camera_model import model_of
+from services.vision.pages import BAR, POINT, page_of
+from services.vision.rigid import apply, from_transform, inverse, rigid, turn
+
+BOARD_AT = np.array([0.28, -0.02, 0.0])  # [m] of the board with tags on the table
+CELL = """
+table = 0.0
+[[camera]]
+name = "overhead"
+size = [640, 480]
+position = [0.54, 0.0, 0.48]
+look_at = [0.27, 0.0, 0.0]
+field_of_view = 1.15
+[camera.source]
+kind = "virtual"
+distortion = [0.08, -0.16, 0.0008, -0.0005, 0.02]
+"""
+
+
+@pytest.fixture
+def cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cell with the board with tags on its table."""
+    tags = [
+        f"[[tag]]\nid = {number}\nsize = {TAG_BOARD.tag}\nposition = {(BOARD_AT + centre).tolist()}\n"
+        for number, centre in TAG_BOARD.centres().items()
+    ]
+    path = tmp_path / "cell.toml"
+    path.write_text(CELL + "\n".join(tags))
+    monkeypatch.setenv("GEMELO_CELL", str(path))
+    return path
+
+
+def squares_of(page: bytes) -> list[tuple[float, float, float, float]]:
+    """[m] left, lower edge, width, height of every rectangle of a page."""
+    found = re.findall(r"([\d.]+) ([\d.]+) ([\d.]+) ([\d.]+) re f", page.decode("ascii"))
+    return [tuple(float(value) * POINT for value in each) for each in found]  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("name", ["chess", "tags"])
+def test_a_printed_board_is_found_on_its_page_at_its_size(name: str, tmp_path: Path) -> None:
+    assert run(["camera", "print", name, "--to", str(tmp_path / "board.pdf")]) is ExitCode.OK
+    page = (tmp_path / "board.pdf").read_bytes()
+    rectangles = squares_of(page)
+    dots = 8000.0  # a metre
+    image = np.full((round(0.3 * dots), round(0.3 * dots)), 255, np.uint8)
+    for x, y, width, height in rectangles:
+        top, bottom = round((0.3 - y - height) * dots), round((0.3 - y) * dots)
+        image[top:bottom, round(x * dots) : round((x + width) * dots)] = 0
+    board = CHESS_BOARD if name == "chess" else TAG_BOARD
+    found = board.find(image)
+    assert found is not None
+    assert len(found.points) == (35 if name == "chess" else 36)
+    span = np.ptp(found.points, axis=0)[:2], np.ptp(found.pixels, axis=0) / dots
+    assert span[1] == pytest.approx(span[0], rel=2e-3)
+    bars = [width for _, _, width, height in rectangles if height < 0.001 < width]
+    assert bars == [pytest.approx(BAR, abs=1e-5)]
+    assert page.count(b"endobj") == 5
+    begin = int(page.split(b"startxref\n")[1].split(b"\n")[0])
+    assert page[begin:].startswith(b"xref")
+
+
+def test_a_board_that_does_not_fit_the_page_is_refused_with_both_sizes() -> None:
+    with pytest.raises(ValueError, match="the board is 300 x 200 mm, and a4 has room for 281 x 174 mm"):
+        page_of([], (0.3, 0.2), "", "a4")
+
+
+def test_a_bar_that_cannot_be_is_refused(cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["camera", "calibrate", "--bar", "10mm", "--images", str(tmp_path)]) is ExitCode.USAGE
+    assert "the bar of 100 mm was measured as 10 mm" in capsys.readouterr().err
+
+
+def write_shots(folder: Path, info_path: Path, arm: Arm, tilt: float, count: int) -> None:
+    """Images of the chess board at random places before the cell's camera."""
+    record = load_cell(info_path, arm).camera("overhead")
+    model = model_of(exact_info(record, arm.base_frame))
+    random = np.random.default_rng(3)
+    texture = picture(CHESS_BOARD.squares(), CHESS_BOARD.size, 0.0125, 4000.0).astype(float) * 0.85 + 20.0
+    size = tuple(edge + 0.025 for edge in CHESS_BOARD.size)
+    for number in range(count):
+        facing = turn(np.array([np.pi, 0.0, 0.0])) @ turn(np.append(random.uniform(-tilt, tilt, 2), 0.0))
+        place = np.array([random.uniform(-0.09, 0.09), random.uniform(-0.06, 0.06), random.uniform(0.3, 0.45)])
+        image = render(model, [Surface(rigid(facing, place), size, texture)], random)  # type: ignore[arg-type]
+        cv2.imwrite(str(folder / f"{number:02d}.png"), image)
+
+
+def test_tilted_shots_give_the_lens_and_flat_ones_are_refused(
+    cell: Path,
+    rm1: Arm,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    flat, tilted = tmp_path / "flat", tmp_path / "tilted"
+    monkeypatch.setattr(images, "SAMPLES", 3)  # as fine as the noise lets matter
+    for folder, tilt, count in ((flat, 0.05, 9), (tilted, 0.6, 14)):
+        folder.mkdir()
+        write_shots(folder, cell, rm1, tilt, count)
+    assert run(["camera", "calibrate", "overhead", "--images", str(flat)]) is ExitCode.FAILED
+    assert "the focal length is known to" in capsys.readouterr().err
+    assert not cell.with_name(CAMERA_FILE).exists()
+    assert run(["camera", "calibrate", "overhead", "--images", str(tilted)]) is ExitCode.OK
+    record = load_cell(cell, rm1).camera("overhead")
+    exact = exact_info(record, rm1.base_frame)
+    found = believed_info(load_cell(cell, rm1), record, rm1.base_frame)
+    assert found.intrinsics[0] == pytest.approx(exact.intrinsics[0], rel=5e-3)
+    assert found.date
+    pixel = np.array([[30.0, 40.0], [600.0, 440.0], [320.0, 240.0]])
+    assert np.abs(model_of(found).rays(pixel) - model_of(exact).rays(pixel)).max() < 4e-3
+
+
+@dataclass
+class Hand:
+    """An arm whose tip is where a person has led it."""
+
+    tips: Iterator[np.ndarray]
+    jaw: float
+
+    def pose(self) -> Pose:
+        x, y, z = next(self.tips)
+        return Pose((x, y, z + self.jaw), from_rpy(np.pi, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(("off", "code"), [(0.0003, ExitCode.OK), (0.02, ExitCode.FAILED)])
+def test_touched_tags_tell_where_the_camera_stands_and_bad_ones_write_nothing(
+    cell: Path,
+    rm1: Arm,
+    off: float,
+    code: ExitCode,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    known = load_cell(cell, rm1)
+    record, world = known.camera("overhead"), World(rm1, known)
+    world.on_joint_state(JointState(stamp=1, name=rm1.joint_names, position=rm1.named_states["folded"]))
+    assert isinstance(record.source, VirtualSource)
+    exact = exact_info(record, rm1.base_frame)
+    image = VirtualCamera(record, record.source, exact, world.snapshot).image(world.snapshot())
+    grey = cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY)
+    random = np.random.default_rng(1)
+    chosen = [200, 208, 202, 206]
+    tips = [BOARD_AT + TAG_BOARD.centres()[number] + random.normal(0.0, off, 3) for number in chosen]
+    gripper = rm1.gripper
+    assert gripper is not None
+    assert gripper.jaw is not None
+    hand = Hand(iter(tips), gripper.jaw[2])
+
+    @contextmanager
+    def connected(robot: object) -> Iterator[Hand]:
+        yield hand
+
+    for name in ("connect", "connect_arm"):
+        monkeypatch.setattr(camera_mount, name, connected)
+    monkeypatch.setattr(camera_mount, "from_bus", lambda session, name: iter([grey]))
+    monkeypatch.setattr(camera_mount, "info_of", lambda session, name: exact)
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n" * 5))
+    assert run(["camera", "mount", "overhead"]) is code
+    said = capsys.readouterr()
+    assert [int(each) for each in re.findall(r"middle of tag (\d+)", said.out)] == chosen
+    if code is not ExitCode.OK:
+        assert "nothing was written" in said.err
+        assert not cell.with_name(CAMERA_FILE).exists()
+        return
+    found = believed_info(load_cell(cell, rm1), record, rm1.base_frame)
+    assert found.is_mounted
+    points = np.array([[0.2, -0.15, 0.0], [0.35, 0.15, 0.0], [0.3, 0.0, 0.05]])
+    ours, truth = from_transform(found.parent_from_camera), from_transform(exact.parent_from_camera)
+    seen = apply(inverse(truth), points)
+    assert np.linalg.norm(apply(ours, seen) - points, axis=1).max() < 1.5e-3
+
+
+def test_with_nobody_at_the_keyboard_nothing_is_measured(
+    cell: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    @contextmanager
+    def connected(robot: object) -> Iterator[None]:
+        yield None
+
+    monkeypatch.setattr(camera_mount, "connect_arm", connected)
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    assert run(["camera", "mount", "overhead"]) is ExitCode.FAILED
+    assert "nobody to touch the board" in capsys.readouterr().err
+    assert run(["camera", "mount", "overhead", "--points", "3"]) is ExitCode.USAGE
+    assert run(["camera", "mount", "elsewhere"]) is ExitCode.USAGE
