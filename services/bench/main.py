@@ -97,6 +97,8 @@ FIGURES = {
     "goal_drag_hz": Row("panel:goal_drag_hz", "1/s", True),
     "record_cpu_percent": Row("recording:record_cpu_percent", "% of one core", True),
     "record_mb_per_hour": Row("recording:record_mb_per_hour", "MB/h", True),
+    "blackbox_ms": Row("recording:blackbox_ms", "ms", True),
+    "blackbox_cpu_percent": Row("recording:blackbox_cpu_percent", "% of one core", True),
     "ready_s": Row("stack:ready_s", "s", True),
 }
 

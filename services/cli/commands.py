@@ -6,6 +6,7 @@ from services.cli.parser import Command
 
 GROUPS = {
     "bag": "recordings: writing one, what is in it, playing, exporting and repairing it",
+    "blackbox": "the minutes saved at faults, emergency stops, aborts and crashes: what happened, and why",
     "broker": "the MQTT broker between gateway and board",
     "camera": "the cameras of the cell file, and those that are plugged in",
     "device": "the controller board: how it is, what it is told, and its drivers",
@@ -149,6 +150,12 @@ COMMANDS = (
     Command(("action", "echo"), "follow the goals of an action: status, feedback, result; until Ctrl-C",
             "action_watch:run_echo", "action_watch:echo_options", "gemelo action echo follow_joint_trajectory -n 1",
             "action:choices"),
+    Command(("blackbox", "list"), "the minutes that were saved, the newest first: when, and what happened",
+            "blackbox:run_list", "blackbox:list_options", "gemelo blackbox list"),
+    Command(("blackbox", "show"), "what happened, what led to it, the margins at that moment, what followed",
+            "blackbox:run_show", "blackbox:show_options", "gemelo blackbox show 1"),
+    Command(("blackbox", "open"), "see that moment in the viewer",
+            "blackbox:run_open", "blackbox:open_options", "gemelo blackbox open 1"),
     Command(("bag", "record"), "record chosen topics into a file of your own, until Ctrl-C",
             "bag_record:run", "bag_record:add_options", "gemelo bag record joint_states 'device/*' -o test --max-mb 99",
             "topic:choices"),

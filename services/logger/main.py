@@ -1,4 +1,4 @@
-"""`gemelo-logger`: every recorded topic to MCAP and every command to CSV, for as long as there is a disk."""
+"""`gemelo-logger`: every recorded topic to MCAP, every command to CSV, and the black box, while there is a disk."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ from schemas.deployment import Deployment
 from schemas.message import Message
 from schemas.topics import Topic
 from services.arm.cell.cell_file import deployed_cell
+from services.logger.black_box import BlackBox, BlackBoxWriter
 from services.logger.core import Batch, Logger
 from services.logger.disk import LoggerParameters, RecordingWriter
 from services.logger.images import record_cameras
+from services.recordings.channels import Entry
+from services.recordings.incidents import FOLDER, Incident
 from services.recordings.origin import metadata_of
 from services.recordings.subscriptions import Subscriptions
 from services.runtime.application import service
@@ -26,10 +29,14 @@ def run(node: Node, deployment: Deployment) -> None:
     """Collect between writes; the disk's problem shows in the readiness and in the log."""
     parameters = node.parameters(LoggerParameters)
     logger = Logger()
-    disk = RecordingWriter(node.robot, metadata_of(node.robot, deployment, project_root()), node.log.warning)
+    metadata = metadata_of(node.robot, deployment, project_root())
+    disk = RecordingWriter(node.robot, metadata, node.log.warning)
+    black_box, saver = BlackBox(), BlackBoxWriter(node.robot, metadata, node.log.warning)
 
     def on_message(topic: Topic[Any], message: Message) -> None:
-        logger.on_message(topic, message, node.now())
+        now = node.now()
+        logger.on_message(topic, message, now)
+        black_box.on_message(topic, message, now)
 
     Subscriptions(node, on_message)
     record_cameras(node, deployed_cell(deployment).camera_names, lambda: parameters.value.image_rate, on_message)
@@ -46,14 +53,22 @@ def run(node: Node, deployment: Deployment) -> None:
             said = logger.losses.sentence
             node.log.warning(said)
 
+    def save(told: tuple[Incident, tuple[Entry, ...]] | None) -> None:
+        keep = parameters.value.keep_black_boxes
+        if told is not None and keep:
+            saver.save(*told, project_root() / deployment.paths.out / FOLDER, keep)
+
     def step(now: int) -> None:
         write(now, logger.step(now))
+        save(black_box.step(now))
         node.set_ready(not disk.problem, disk.problem)
 
     node.spin(step, rate=WRITE_RATE)
     now = node.now()
+    save(black_box.finish(now))
     write(now, logger.finish(now))
     disk.close()
+    saver.wait()
 
 
 def _folder(deployment: Deployment, parameters: LoggerParameters) -> Path:

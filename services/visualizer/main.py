@@ -7,35 +7,15 @@ from pathlib import Path
 from schemas.deployment import Deployment
 from schemas.frames import RobotDescription
 from schemas.scene import MeshShape
-from schemas.topics import (
-    CONTACTS,
-    DESCRIPTION,
-    DEVICE_EVENTS,
-    DEVICE_SHAFT,
-    DEVICE_STATE,
-    DEVICE_STATUS,
-    GRIPPER_STATE,
-    JOINT_COMMANDS,
-    JOINT_STATES,
-    LOG,
-    PLANNED_PATH,
-    SCENE,
-    SENSORS,
-    STEP_ERRORS,
-    STEP_LEDGER,
-    STOPPING_DISTANCE,
-    camera_detections,
-    camera_image,
-    camera_info,
-)
+from schemas.topics import DESCRIPTION, LOG
 from services.arm.cell.cell_file import deployed_cell
 from services.arm.model.description import load_arm
-from services.arm.model.gripper import jaw_objects, jaws_apart
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.runtime.process.priority import step_behind
 from services.visualizer.core import Visualizer
+from services.visualizer.feeds import feeds
 from services.visualizer.model.mesh_files import missing_meshes, scene_mesh
 from services.visualizer.model.triangle_meshes import TriangleMesh
 from services.visualizer.model.urdf import parse_urdf, tool_link
@@ -56,8 +36,7 @@ def run(node: Node, deployment: Deployment) -> None:
         nonlocal visualizer
         if visualizer is None:
             try:
-                visualizer = _visualizer(node, message, (root, root / deployment.robot))
-                _watch(node, visualizer, cameras)
+                visualizer = _visualizer(node, message, (root, root / deployment.robot), cameras)
             except ValueError as error:
                 node.log.error(f"the description of {message.robot} cannot be drawn: {error}")
                 return
@@ -76,14 +55,9 @@ def run(node: Node, deployment: Deployment) -> None:
     outputs.close()
 
 
-def _watch(node: Node, core: Visualizer, cameras: tuple[str, ...]) -> None:
-    for name in cameras:
-        node.subscribe(camera_info(name), core.cameras.on_info)
-        node.subscribe(camera_image(name), core.cameras.on_image)
-        node.subscribe(camera_detections(name), core.cameras.on_detections)
-
-
-def _visualizer(node: Node, message: RobotDescription, folders: tuple[Path, ...]) -> Visualizer:
+def _visualizer(
+    node: Node, message: RobotDescription, folders: tuple[Path, ...], cameras: tuple[str, ...]
+) -> Visualizer:
     """The core for the arm that was described, fed from the bus; the scene's mesh files are in `folders`."""
     model = parse_urdf(message.urdf)
 
@@ -91,22 +65,8 @@ def _visualizer(node: Node, message: RobotDescription, folders: tuple[Path, ...]
         return scene_mesh(shape, folders, node.log.warning)
 
     core = Visualizer(model, message.robot, tool_link(model, message.robot_toml), load)
-    node.subscribe(JOINT_STATES, core.on_joint_state, batch=1 / BATCH_RATE)
-    node.subscribe(JOINT_COMMANDS, core.on_joint_command, batch=1 / BATCH_RATE)
-    node.subscribe(STEP_ERRORS, core.on_step_errors, batch=1 / BATCH_RATE)
-    node.subscribe(DEVICE_STATE, core.on_device_state, batch=1 / BATCH_RATE)
-    node.subscribe(DEVICE_STATUS, core.on_device_status)
-    node.subscribe(DEVICE_EVENTS, core.event_log.on_event)
-    node.subscribe(SENSORS, core.on_sensors)
-    node.subscribe(DEVICE_SHAFT, core.on_shaft, batch=1 / BATCH_RATE)
-    node.subscribe(STEP_LEDGER, core.on_step_ledger)
-    node.subscribe(STOPPING_DISTANCE, core.on_stopping_distance)
-    node.subscribe(PLANNED_PATH, core.on_planned_path)
-    node.subscribe(SCENE, core.scene.on_scene)
-    arm = load_arm(folders[-1])
-    node.subscribe(GRIPPER_STATE, lambda state: core.scene.on_jaws(jaw_objects(arm, jaws_apart(arm, state))))
-    node.subscribe(CONTACTS, core.scene.on_contacts)
-    node.subscribe(LOG, core.event_log.on_log, own=True)
+    for topic, take, is_series in feeds(core, load_arm(folders[-1]), cameras):
+        node.subscribe(topic, take, own=topic is LOG, batch=1 / BATCH_RATE if is_series else None)
     return core
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+TIMELINE = "time"
 WORLD = "world"
 MEASURED = f"{WORLD}/measured"
 COMMANDED = f"{WORLD}/commanded"
@@ -14,6 +15,7 @@ CONTACTS = f"{REFUSED}/contacts"
 MODE = "device/mode"
 PANEL = "device/panel"
 LOG = "log"
+STORY = "story"
 
 
 def attached(root: str, link: str) -> str:

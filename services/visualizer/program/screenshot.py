@@ -13,16 +13,24 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 from rerun.experimental import ViewerClient
 
+from services.visualizer.content import entities
 from services.visualizer.program.rerun_program import environment, rerun_binary
 
 SETTLE = 6.0  # [s] until the viewer's own notices have gone and every chunk is drawn
+DRAWN = 1.5  # [s] until another time is drawn
 LOOPBACK = "127.0.0.1"
 
 
-def save_screenshot(rrd: Path, png: Path, size: tuple[int, int] = (1600, 900), timeout: float = 60.0) -> Path:
-    """Write `png` of `size` [pixels] from the recording `rrd`; raises RuntimeError with the viewer's own words."""
+def save_screenshot(
+    rrd: Path, png: Path, size: tuple[int, int] = (1600, 900), timeout: float = 60.0, at: int | None = None
+) -> Path:
+    """Write `png` of `size` [pixels] from the recording `rrd`; raises RuntimeError with the viewer's own words.
+
+    `at` [ns] UNIX is the time on the timeline "time" that it shows; absent: where the recording opens.
+    """
     if not rrd.is_file():
         raise RuntimeError(f"there is no recording {rrd}")
     png.parent.mkdir(parents=True, exist_ok=True)
@@ -30,6 +38,9 @@ def save_screenshot(rrd: Path, png: Path, size: tuple[int, int] = (1600, 900), t
     with _headless_viewer(rrd, png.with_suffix(".viewer.log"), size) as (viewer, port):
         client = _connected(viewer, port, deadline)
         _settle(client, deadline)
+        if at is not None:
+            client.set_time(timeline=entities.TIMELINE, timestamp=np.datetime64(at, "ns"), play_state="paused")
+            time.sleep(DRAWN)
         png.write_bytes(client.take_screenshot(max_size=max(size)))
     return png
 

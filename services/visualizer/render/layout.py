@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.blueprint.encodings import TimelineColumn
@@ -10,12 +12,25 @@ from services.visualizer.content import entities, palette
 from services.visualizer.core import unit
 from services.visualizer.model.visual_model import VisualJoint, VisualModel
 
-TIMELINE = "time"
+TIMELINE = entities.TIMELINE
 JOINTS_PER_PAGE = 3  # rows of plots that stay readable
 
 
-def blueprint(model: VisualModel, window: float, trail: float, cameras: tuple[str, ...] = ()) -> rrb.Blueprint:
-    """The layout for this arm and its cameras; `window` and `trail` in [s]."""
+LEAD, FOLLOW = 5.0, 2.0  # [s] before and after a moment that are played again and again
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A time that the view of a recording opens at, and what is told of it."""
+
+    stamp: int  # [ns] UNIX
+    story: str  # Markdown
+
+
+def blueprint(
+    model: VisualModel, window: float, trail: float, cameras: tuple[str, ...] = (), moment: Moment | None = None
+) -> rrb.Blueprint:
+    """The layout for this arm and its cameras, live or around a moment; `window` and `trail` in [s]."""
     scene = rrb.Vertical(
         _scene_and_cameras(model, trail, cameras),
         rrb.Horizontal(_panel(), rrb.Vertical(_modes(window), _log(), row_shares=[5, 9]), column_shares=[11, 8]),
@@ -23,12 +38,29 @@ def blueprint(model: VisualModel, window: float, trail: float, cameras: tuple[st
         name="Twin",
     )
     return rrb.Blueprint(
-        rrb.Horizontal(scene, _joints(model, window), column_shares=[11, 9]),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following"),
+        rrb.Horizontal(scene, _beside(model, window, moment), column_shares=[11, 9]),
+        _time_panel(moment),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         auto_views=False,
         auto_layout=False,
+    )
+
+
+def _beside(model: VisualModel, window: float, moment: Moment | None) -> rrb.Container:
+    """The joints; above them what happened, where that is told."""
+    if moment is None:
+        return _joints(model, window)
+    story = rrb.TextDocumentView(origin=entities.STORY, name="What happened")
+    return rrb.Vertical(story, _joints(model, window), row_shares=[3, 4])
+
+
+def _time_panel(moment: Moment | None) -> rrb.TimePanel:
+    if moment is None:
+        return rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following")
+    around = rr.encodings.AbsoluteTimeRange(min=moment.stamp - int(LEAD * 1e9), max=moment.stamp + int(FOLLOW * 1e9))
+    return rrb.TimePanel(
+        state="collapsed", timeline=TIMELINE, play_state="playing", loop_mode="selection", time_selection=around
     )
 
 

@@ -30,7 +30,7 @@ from services.visualizer.content.updates import (
 from services.visualizer.model.mesh_files import mesh_path
 from services.visualizer.model.triangle_meshes import TriangleMesh, primitive_mesh
 from services.visualizer.model.visual_model import Visual, VisualJoint, VisualModel
-from services.visualizer.render.layout import TIMELINE, blueprint
+from services.visualizer.render.layout import TIMELINE, Moment, blueprint
 
 APPLICATION = "gemelo"
 FRUSTUM_LENGTH = 0.12  # [m] from the camera to the picture that is drawn in the scene
@@ -48,16 +48,19 @@ class Sink:
         window: float,
         trail: float,
         cameras: tuple[str, ...] = (),
+        moment: Moment | None = None,
     ) -> None:
         """`window` [s] of the plots and `trail` [s] of the tool's path; `folder` holds the robot's meshes.
 
-        `cameras` are those that have a view of their images.
+        `cameras` are those that have a view of their images; a `moment` is what a recording is opened at.
         """
         self._stream = stream
         self._model = model
         self._folder = folder  # of the robot: meshes stand relative to it
         self._send_static()
-        stream.send_blueprint(blueprint(model, window, trail, cameras))
+        if moment is not None:
+            stream.log(entities.STORY, rr.TextDocument(moment.story, media_type="text/markdown"), static=True)
+        stream.send_blueprint(blueprint(model, window, trail, cameras, moment))
 
     def write(self, updates: list[Update]) -> None:
         """Send a batch."""

@@ -1,0 +1,128 @@
+"""The black box: the last minute in memory, and on any incident that minute with its story as a file of its own."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from schemas.message import Message
+from schemas.topics import Delivery, Topic
+from services.logger.files import MCAP, prune, stem_of
+from services.logger.incident_story import incident_of
+from services.logger.incident_watch import IncidentWatch, Trigger
+from services.recordings.channels import Entry
+from services.recordings.incidents import BLACK_BOX, Incident, IncidentKind, incident_metadata
+from services.recordings.mcap_file import McapFile
+
+SECOND = 1_000_000_000  # [ns]
+AFTERWARDS = 3 * SECOND  # [ns] that are waited for what follows an incident
+APART = 10 * SECOND  # [ns] between two files at least: what happens in between is in the second one
+TOGETHER = SECOND  # [ns] in which the gateway says what happened after it has aborted the goal for it
+MOST = 100_000  # messages: 60 s of an arm in motion are some 30,000
+
+
+@dataclass
+class BlackBox:
+    """The messages of the last `seconds`, and the incident that is waited out. Pure."""
+
+    seconds: float = 60.0
+    _watch: IncidentWatch = field(default_factory=IncidentWatch, init=False)
+    _entries: deque[Entry] = field(default_factory=lambda: deque(maxlen=MOST), init=False)
+    _latched: dict[tuple[str, str], Entry] = field(default_factory=dict, init=False)  # that have left `_entries`
+    _pending: Trigger | None = field(default=None, init=False)
+    _due: int = field(default=0, init=False)  # [ns] when the pending one is told
+    _told: int = field(default=-APART, init=False)  # [ns] when the last one was
+
+    def on_message(self, topic: Topic[Any], message: Message, now: int) -> None:
+        """Keeps one message that came at `now` [ns] UNIX."""
+        if len(self._entries) == MOST:
+            self._forget_oldest()
+        self._entries.append(Entry(topic, message, now))
+        self._take(self._watch.on_message(topic, message, now))
+
+    def step(self, now: int) -> tuple[Incident, tuple[Entry, ...]] | None:
+        """An incident that is to be saved now, with its messages; `now` in [ns] UNIX."""
+        horizon = now - int(self.seconds * SECOND)
+        while self._entries and self._entries[0].arrival < horizon:
+            self._forget_oldest()
+        self._take(self._watch.step(now))
+        return self._tell(now) if self._pending is not None and now >= self._due else None
+
+    def finish(self, now: int) -> tuple[Incident, tuple[Entry, ...]] | None:
+        """The incident that nobody waits for any more."""
+        return self._tell(now) if self._pending is not None else None
+
+    def _take(self, trigger: Trigger | None) -> None:
+        """What follows an incident is of its story, and no other one; an abort that comes before its cause is that."""
+        if trigger is None:
+            return
+        pending = self._pending
+        if pending is None:
+            self._pending = trigger
+            self._due = max(trigger.stamp + AFTERWARDS, self._told + APART)
+        elif pending.kind is IncidentKind.ABORT and trigger.stamp - pending.stamp < TOGETHER:
+            self._pending = replace(trigger, stamp=pending.stamp)
+
+    def _tell(self, now: int) -> tuple[Incident, tuple[Entry, ...]]:
+        assert self._pending is not None
+        entries = (*self._latched.values(), *self._entries)
+        incident = incident_of(self._pending, entries)
+        self._pending, self._told = None, now
+        return incident, entries
+
+    def _forget_oldest(self) -> None:
+        entry = self._entries.popleft()
+        if entry.topic.delivery is Delivery.LATCHED:
+            self._latched[entry.topic.key, getattr(entry.message, "node", "")] = entry
+
+
+class BlackBoxWriter:
+    """Writes black boxes beside the logger's own work; `tell` says where one is, or why it is not."""
+
+    def __init__(self, robot: str, metadata: dict[str, dict[str, str]], tell: Callable[[str], None]) -> None:
+        """`metadata` by the name of its record."""
+        self._robot, self._metadata, self._tell = robot, metadata, tell
+        self._thread: threading.Thread | None = None
+
+    def save(self, incident: Incident, entries: tuple[Entry, ...], folder: Path, keep: int) -> None:
+        """Begins to write a file in `folder`, of which the newest `keep` stay; at most one is being written."""
+        self.wait()
+        self._thread = threading.Thread(
+            target=self._save, args=(incident, entries, folder, keep), name="black box", daemon=True
+        )
+        self._thread.start()
+
+    def wait(self) -> None:
+        """Until the file is written."""
+        if self._thread is not None:
+            self._thread.join()
+
+    def _save(self, incident: Incident, entries: tuple[Entry, ...], folder: Path, keep: int) -> None:
+        try:
+            path = write_black_box(folder, self._robot, self._metadata, incident, entries)
+            prune(folder, self._robot, keep)
+        except OSError as error:
+            self._tell(f"{BLACK_BOX}{incident.sentence}; it cannot be written to {folder}: {error.strerror or error}")
+        else:
+            self._tell(f"{BLACK_BOX}{incident.sentence}; `gemelo blackbox open`, or {path}")
+
+
+def write_black_box(
+    folder: Path, robot: str, metadata: dict[str, dict[str, str]], incident: Incident, entries: tuple[Entry, ...]
+) -> Path:
+    """Writes the file; raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / (stem_of(robot, incident.stamp) + MCAP)
+    file = McapFile(path, {**metadata, **incident_metadata(incident)})
+    try:
+        file.write(entries)
+        file.close()
+    except OSError:
+        file.abandon()
+        path.unlink(missing_ok=True)
+        raise
+    return path

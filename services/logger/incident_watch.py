@@ -1,0 +1,96 @@
+"""The moments for which a black box is saved: faults, emergency stops, reboots, aborts, lost services. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from schemas.actions import GoalStatusCode
+from schemas.device import DeviceEvent, DeviceFault, DeviceMode, DeviceState
+from schemas.device_faults import fault_text
+from schemas.message import Message
+from schemas.system import NodeRecord, NodeStatistics
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY, REQUESTS, TOPICS, Topic
+from services.recordings.incidents import IncidentKind
+from services.runtime.actions import keys
+
+STOPPED = (DeviceMode.FAULT, DeviceMode.ESTOP)
+ENDED = keys.ended_topic(FOLLOW_JOINT_TRAJECTORY).key
+SILENT_AFTER = 4_000_000_000  # [ns] without statistics, which come every second
+HEARD_LATELY = 1_500_000_000  # [ns] in which another node must have spoken: else it is we who did not listen
+LONG_AGO = 30_000_000_000  # [ns] a start of before that was by another clock than ours
+SERVICES = frozenset({row.writer for row in TOPICS} | {row.server for row in REQUESTS}) - {"any"}
+
+
+@dataclass(frozen=True)
+class Trigger:
+    """Why a black box is saved; `stamp` in [ns] UNIX."""
+
+    kind: IncidentKind
+    stamp: int
+    what: str  # one clause for a person
+    joint: str = ""  # whose fault it is, where that is known
+
+
+@dataclass
+class IncidentWatch:
+    """Looks at every message; a device that is stopped when it is first heard has stopped before our time."""
+
+    _mode: DeviceMode | None = field(default=None, init=False)
+    _heard: dict[str, int] = field(default_factory=dict, init=False)  # [ns] arrival of each service's statistics
+    _started: dict[str, int] = field(default_factory=dict, init=False)  # [ns] UNIX start of each service
+    _newest: int = field(default=0, init=False)  # [ns] arrival of anybody's
+
+    def on_message(self, topic: Topic[Any], message: Message, now: int) -> Trigger | None:
+        """The trigger that `message` is, which came at `now` [ns] UNIX."""
+        match message:
+            case DeviceState():
+                return self._on_state(message, now)
+            case DeviceEvent(event="rebooted"):
+                return Trigger(IncidentKind.REBOOT, now, f"the device has rebooted: {message.detail}")
+            case NodeStatistics():
+                self._newest = now
+                if message.node in SERVICES:
+                    self._heard[message.node] = now
+            case NodeRecord(node=node) if node in SERVICES:
+                return self._on_record(message, now)
+        if topic.key == ENDED:
+            return _on_ended(message, now)
+        return None
+
+    def step(self, now: int) -> Trigger | None:
+        """The trigger that a silence is; `now` in [ns] UNIX."""
+        if now - self._newest > HEARD_LATELY:
+            return None
+        for node, heard in self._heard.items():
+            if now - heard > SILENT_AFTER:
+                del self._heard[node]
+                seconds = (now - heard) / 1e9
+                what = f"{node} has not been heard for {seconds:.1f} s: it has ended, hangs, or its host is cut off"
+                return Trigger(IncidentKind.LOST, now, what)
+        return None
+
+    def _on_record(self, record: NodeRecord, now: int) -> Trigger | None:
+        """A service that process-compose has started again spoke before its silence was noticed."""
+        before, self._started[record.node] = self._started.get(record.node), record.info.started
+        if before is None or before == record.info.started:
+            return None
+        stamp = min(max(record.info.started, now - LONG_AGO), now)
+        return Trigger(IncidentKind.LOST, stamp, f"{record.node} had ended, and was started again")
+
+    def _on_state(self, state: DeviceState, now: int) -> Trigger | None:
+        before, self._mode = self._mode, state.mode
+        if before is None or before in STOPPED or state.mode not in STOPPED:
+            return None
+        if state.mode is DeviceMode.ESTOP or state.fault == DeviceFault.EMERGENCY_STOP:
+            return Trigger(IncidentKind.EMERGENCY_STOP, now, "emergency stop")
+        what = fault_text(state.fault, state.fault_joint) or "the device is in FAULT"
+        return Trigger(IncidentKind.FAULT, now, what, state.fault_joint)
+
+
+def _on_ended(end: Any, now: int) -> Trigger | None:
+    """`end` is a `GoalEnd` with a typed result; one that was cancelled, or made room for another, is no incident."""
+    if end.status is not GoalStatusCode.ABORTED:
+        return None
+    reason = getattr(end.result, "error_string", "") or "no reason was given"
+    return Trigger(IncidentKind.ABORT, now, f"goal {end.goal_id[:8]} was aborted: {reason}")

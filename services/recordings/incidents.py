@@ -1,0 +1,83 @@
+"""What happened, as a black box keeps it: a sentence, what led to it, what followed; and the folder of them."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+
+import msgspec
+
+from services.recordings.reader import BadRecording, RecordingReader
+
+INCIDENT = "incident"  # the name of the metadata record
+BLACK_BOX = "black box: "  # the logger's line about a new one begins with it
+FOLDER = "blackbox"  # in the folder of what runs leave
+
+
+class IncidentKind(StrEnum):
+    """What a black box is saved for."""
+
+    EMERGENCY_STOP = "emergency stop"
+    FAULT = "fault"
+    REBOOT = "reboot"
+    ABORT = "abort"
+    LOST = "service lost"  # it has ended, hangs, or its host is cut off
+
+
+class Happening(msgspec.Struct, frozen=True, kw_only=True):
+    """One line of the story; `at` [s] counts from the incident, before it negative."""
+
+    at: float
+    text: str
+
+
+class Incident(msgspec.Struct, frozen=True, kw_only=True):
+    """The moment, and its story."""
+
+    stamp: int  # [ns] UNIX
+    kind: IncidentKind
+    sentence: str  # what happened, when, and in what
+    margins: tuple[str, ...] = ()  # the joints and their margins at that moment, a sentence each
+    story: tuple[Happening, ...] = ()  # in the order of time
+
+
+class BlackBoxFile(msgspec.Struct, frozen=True, kw_only=True):
+    """One saved black box."""
+
+    path: str
+    incident: Incident
+
+
+def incident_metadata(incident: Incident) -> dict[str, dict[str, str]]:
+    """The record of a recording's metadata."""
+    return {INCIDENT: {"json": msgspec.json.encode(incident).decode()}}
+
+
+def read_incident(path: Path) -> Incident:
+    """What a black box tells of itself; raises `BadRecording` where the file is none."""
+    reader = RecordingReader(path)
+    text = reader.read_metadata().get(INCIDENT, {}).get("json", "")
+    if not text:
+        raise BadRecording(f'"{path}" is a recording, but no black box: `gemelo bag info` says what is in it')
+    try:
+        return msgspec.json.decode(text, type=Incident)
+    except (msgspec.DecodeError, msgspec.ValidationError) as error:
+        raise BadRecording(f'"{path}": its incident cannot be read ({error})') from error
+
+
+def black_boxes(folder: Path, robot: str) -> list[BlackBoxFile]:
+    """Those of a robot in `folder`, the newest first; what cannot be read is left out."""
+    found = []
+    for path in sorted(folder.glob(f"*_{robot}.mcap"), reverse=True):
+        try:
+            found.append(BlackBoxFile(path=str(path), incident=read_incident(path)))
+        except BadRecording:
+            continue
+    return found
+
+
+def time_of(stamp: int) -> str:
+    """UTC to the millisecond, of ns UNIX."""
+    seconds, nanoseconds = divmod(stamp, 1_000_000_000)
+    return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%d %H:%M:%S}.{nanoseconds // 1_000_000:03d} UTC"

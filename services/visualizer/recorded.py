@@ -1,0 +1,197 @@
+"""`python -m services.visualizer.recorded FILE`: a recording in the twin's own view; a black box at its incident.
+
+What is drawn is made from the messages alone, by the same core that draws the living arm.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import rerun as rr
+
+from schemas.camera import CameraImage
+from schemas.deployment import ViewerMode
+from schemas.frames import RobotDescription
+from schemas.scene import MeshShape
+from schemas.topics import DESCRIPTION
+from services.arm.errors import DescriptionError
+from services.arm.model.description import load_arm
+from services.recordings.incidents import Incident, read_incident
+from services.recordings.reader import BadRecording, RecordingReader, Row
+from services.recordings.shadow import recorded_robot, shadow_folder, write_shadow
+from services.runtime.deployment import DeploymentError, load_deployment, project_root
+from services.visualizer.core import Visualizer
+from services.visualizer.feeds import feeds
+from services.visualizer.model.mesh_files import scene_mesh
+from services.visualizer.model.triangle_meshes import TriangleMesh
+from services.visualizer.model.urdf import parse_urdf, tool_link
+from services.visualizer.program.rerun_program import rerun_binary, start, stop
+from services.visualizer.program.screenshot import LOOPBACK, free_port, save_screenshot
+from services.visualizer.render.layout import Moment
+from services.visualizer.render.sink import APPLICATION, Sink
+from services.visualizer.viewer import address, resolved
+
+BATCH = 100_000_000  # [ns] of the recording that are drawn together, as live
+WINDOW = 10.0  # [s] of the plots, and of the tool's way
+PERIOD = 0.5  # [s] between two looks at the viewer
+IMAGE = "foxglove/camera/{}/image"
+
+
+def write_view(file: Path, rrd: Path, shadow: Path) -> Incident | None:
+    """Writes the recording `file` as the view `rrd`; returns the incident, if it is a black box.
+
+    The robot's files as they were recorded are written to the folder `shadow`. Raises `BadRecording` or OSError.
+    """
+    reader = RecordingReader(file)
+    robot = recorded_robot(reader)
+    write_shadow(reader, shadow, robot, project_root() / "urdf" / robot)
+    incident = _incident_in(file)
+    description = _description_in(reader)
+    cameras = _cameras_in(reader)
+    folders = (shadow, project_root())
+    try:
+        core = _core(description, folders)
+        taken = _takers(core, shadow, cameras)
+    except (DescriptionError, ValueError) as error:
+        raise BadRecording(f'"{file}": its robot cannot be drawn: {error}') from error
+    stream = rr.RecordingStream(APPLICATION, recording_id=file.stem)
+    rrd.parent.mkdir(parents=True, exist_ok=True)
+    stream.save(rrd)
+    moment = None if incident is None else Moment(incident.stamp, story_text(incident))
+    sink = Sink(stream, core.model, shadow, WINDOW, WINDOW, cameras, moment)
+    drawn = 0
+    for row in reader.rows(taken.__contains__):
+        if row.message.log_time - drawn > BATCH:
+            drawn = row.message.log_time
+            sink.write(core.step(drawn))
+        taken[row.channel.topic](row)
+    sink.write(core.step(drawn + BATCH))
+    sink.close(timeout=30.0)
+    return incident
+
+
+def story_text(incident: Incident) -> str:
+    """The incident as Markdown."""
+    margins = "".join(f"- {each}\n" for each in incident.margins)
+    story = "".join(f"| {each.at:+.2f} s | {_cell(each.text)} |\n" for each in incident.story)
+    return f"### {incident.sentence}\n\n{margins}\n| | |\n|--:|:--|\n{story}"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def _incident_in(file: Path) -> Incident | None:
+    try:
+        return read_incident(file)
+    except BadRecording:
+        return None
+
+
+def _description_in(reader: RecordingReader) -> RobotDescription:
+    for row in reader.rows(DESCRIPTION.key.__eq__):
+        return msgspec.json.decode(row.message.data, type=RobotDescription)
+    raise BadRecording(f'"{reader.path}" has no description of its robot: it was recorded without state_publisher')
+
+
+def _cameras_in(reader: RecordingReader) -> tuple[str, ...]:
+    """Those of which there are images."""
+    before, _, after = IMAGE.partition("{}")
+    topics = {row.channel.topic for row in reader.rows(lambda topic: topic.startswith(before))}
+    return tuple(sorted(topic[len(before) : -len(after)] for topic in topics if topic.endswith(after)))
+
+
+def _core(description: RobotDescription, folders: tuple[Path, ...]) -> Visualizer:
+    model = parse_urdf(description.urdf)
+
+    def load(shape: MeshShape) -> TriangleMesh | None:
+        return scene_mesh(shape, folders, lambda text: print(text, file=sys.stderr))
+
+    return Visualizer(model, description.robot, tool_link(model, description.robot_toml), load)
+
+
+def _takers(core: Visualizer, folder: Path, cameras: tuple[str, ...]) -> dict[str, Callable[[Row], None]]:
+    """Who takes a row of each topic; one that is not as its message should be is left out."""
+    found: dict[str, Callable[[Row], None]] = {}
+    for topic, take, _ in feeds(core, load_arm(folder), cameras):
+        found[topic.key] = _decoding(topic.message, take)
+    for name in cameras:
+        found[IMAGE.format(name)] = _decoding_image(name, core.cameras.on_image)
+    return found
+
+
+def _decoding(kind: type[Any], take: Callable[[Any], None]) -> Callable[[Row], None]:
+    decoder = msgspec.json.Decoder(kind)
+
+    def take_row(row: Row) -> None:
+        try:
+            message = decoder.decode(row.message.data)
+        except (msgspec.DecodeError, msgspec.ValidationError):
+            return
+        take(message)
+
+    return take_row
+
+
+def _decoding_image(camera: str, take: Callable[[CameraImage], None]) -> Callable[[Row], None]:
+    def take_row(row: Row) -> None:
+        recorded = msgspec.json.decode(row.message.data)
+        take(CameraImage(stamp=row.message.log_time, camera=camera, data=base64.b64decode(recorded["data"])))
+
+    return take_row
+
+
+def show(rrd: Path, stopping: threading.Event) -> int:
+    """Runs a viewer of its own on `rrd` until it is closed, or asked to stop; returns its exit code."""
+    deployment = load_deployment(None)
+    mode = resolved(ViewerMode.AUTO, os.environ)
+    viewer = msgspec.structs.replace(deployment.viewer, host=LOOPBACK, port=free_port(), web_port=free_port())
+    command = [str(rerun_binary()), str(rrd), "--bind", viewer.host, "--port", str(viewer.port)]
+    if mode is ViewerMode.WEB:
+        command += ["--serve-web", "--web-viewer-port", str(viewer.web_port)]
+    child = start(command)
+    try:
+        print(f"{address(viewer, mode)}; Ctrl-C ends it", flush=True)
+        while not stopping.wait(PERIOD) and child.poll() is None:
+            pass
+        return child.poll() or 0
+    finally:
+        stop(child)
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(prog="gemelo blackbox open", description=__doc__)
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--save", type=Path, metavar="FILE", help="write the view as an .rrd there, and open none")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="save a PNG of the view, and open none")
+    options = parser.parse_args()
+    stopping = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stopping.set())
+    try:
+        deployment = load_deployment(None)
+        out = project_root() / deployment.paths.out
+        rrd = options.save or out / "views" / f"{options.file.stem}.rrd"
+        incident = write_view(options.file, rrd, shadow_folder(out, options.file.stem))
+        if options.picture is not None:
+            print(save_screenshot(rrd, options.picture, at=None if incident is None else incident.stamp))
+        if options.save is not None:
+            print(rrd)
+        if options.picture is None and options.save is None:
+            sys.exit(show(rrd, stopping))
+    except (BadRecording, DeploymentError, RuntimeError, OSError) as error:
+        sys.exit(f"gemelo: {error}")
+
+
+if __name__ == "__main__":
+    main()

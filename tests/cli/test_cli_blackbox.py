@@ -1,0 +1,83 @@
+"""`gemelo blackbox`: the list, one story, and every mistake in one sentence."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from services.cli.errors import ExitCode
+from services.cli.main import run
+from services.logger.black_box import write_black_box
+from services.recordings.incidents import Happening, Incident, IncidentKind
+from services.recordings.mcap_file import McapFile
+
+SECOND = 1_000_000_000
+START = 1_795_000_000 * SECOND
+
+
+@pytest.fixture(autouse=True)
+def out(tmp_path: Path, monkeypatch) -> Path:
+    monkeypatch.setenv("GEMELO_PATHS_OUT", str(tmp_path))
+    monkeypatch.delenv("GEMELO_ROBOT", raising=False)
+    return tmp_path
+
+
+@pytest.fixture
+def two(out: Path) -> Path:
+    for number, kind in enumerate((IncidentKind.FAULT, IncidentKind.ABORT)):
+        stamp = START + number * SECOND
+        incident = Incident(
+            stamp=stamp, kind=kind, sentence=f"2026-11-18 11:06:4{number}.000 UTC: number {number}",
+            margins=("brazo_joint at rest",), story=(Happening(at=-1.5, text="device: IDLE -> RUN"),),
+        )  # fmt: skip
+        write_black_box(out / "blackbox", "rm1", {}, incident, ())
+    return out / "blackbox"
+
+
+def test_the_list_has_the_newest_first(two, capsys):
+    assert run(["blackbox", "list"]) is ExitCode.OK
+    out = capsys.readouterr().out
+    assert "2026-11-18 11:06:41.000 UTC" in out
+    assert out.index("number 1") < out.index("number 0")
+    assert run(["blackbox", "list", "--json"]) is ExitCode.OK
+    assert [each["incident"]["kind"] for each in json.loads(capsys.readouterr().out)] == ["abort", "fault"]
+
+
+def test_one_is_told_with_its_margins_and_its_story(two, capsys):
+    assert run(["blackbox", "show"]) is ExitCode.OK
+    assert capsys.readouterr().out.splitlines() == [
+        "2026-11-18 11:06:41.000 UTC: number 1", "  brazo_joint at rest", "   -1.50 s  device: IDLE -> RUN",
+    ]  # fmt: skip
+    assert run(["blackbox", "show", "2"]) is ExitCode.OK
+    assert "number 0" in capsys.readouterr().out
+    (older, _) = sorted(two.glob("*.mcap"))
+    assert run(["blackbox", "show", str(older), "--json"]) is ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["kind"] == "fault"
+
+
+def test_nothing_has_happened_yet(out, capsys):
+    assert run(["blackbox", "list"]) is ExitCode.OK
+    assert "nothing has happened yet" in capsys.readouterr().out
+    assert run(["blackbox", "open"]) is ExitCode.FAILED
+    assert "nothing has happened yet" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("which", "sentence"),
+    [
+        ("3", "there is no black box 3: there are 1 to 2"), ("0", "there is no black box 0"),
+        ("none.mcap", 'there is no file "none.mcap"'), ("-1", "-1"),
+    ],
+)  # fmt: skip
+def test_one_that_is_not_there_is_said(two, capsys, which, sentence):
+    assert run(["blackbox", "show", which]) is not ExitCode.OK
+    assert sentence in capsys.readouterr().err
+
+
+def test_a_recording_that_is_none_is_said(out, capsys):
+    file = McapFile(out / "bag.mcap", {})
+    file.close()
+    assert run(["blackbox", "open", str(out / "bag.mcap")]) is not ExitCode.OK
+    assert "is a recording, but no black box" in capsys.readouterr().err

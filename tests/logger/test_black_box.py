@@ -1,0 +1,377 @@
+"""The black box: what it is saved for, what it holds, what it tells; and what it does where the disk is full."""
+
+from __future__ import annotations
+
+import resource
+import signal
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from msgspec import Raw
+from msgspec.structs import replace
+
+from schemas.actions import GoalResponse, GoalStatusCode
+from schemas.device import (
+    DeviceCommandResponse,
+    DeviceEvent,
+    DeviceFault,
+    DeviceMode,
+    DeviceState,
+    InjectKind,
+    InjectRequest,
+    InjectResponse,
+)
+from schemas.joints import JointState, StepErrors
+from schemas.ledger import StepLedger, StoppingDistance
+from schemas.message import Message
+from schemas.motion import FollowErrorCode, FollowJointTrajectoryResult
+from schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Refusal
+from schemas.system import (
+    Failure,
+    LogLevel,
+    LogRecord,
+    NodeInfo,
+    NodeRecord,
+    NodeStatistics,
+    Parameter,
+    ParameterChange,
+)
+from schemas.topics import (
+    DESCRIPTION,
+    DEVICE_EVENTS,
+    DEVICE_INJECT,
+    DEVICE_STATE,
+    FOLLOW_JOINT_TRAJECTORY,
+    JOINT_COMMANDS,
+    JOINT_STATES,
+    LOG,
+    PARAMETER_CHANGES,
+    PLAN,
+    STATE_VALIDITY,
+    STATISTICS,
+    STEP_ERRORS,
+    STEP_LEDGER,
+    STOPPING_DISTANCE,
+)
+from services.arm.model.description import load_arm
+from services.logger.black_box import MOST, BlackBox, BlackBoxWriter
+from services.logger.incident_story import LONGEST, brief
+from services.recordings.incidents import Incident, IncidentKind, black_boxes, read_incident
+from services.recordings.reader import BadRecording
+from services.recordings.table import NODES, action_topics, exchanges_of, goal_request_of
+from services.state_publisher.main import describe
+
+SECOND = 1_000_000_000
+START = 1_795_000_000 * SECOND
+ROOT = Path(__file__).parents[2]
+ENDED = action_topics(FOLLOW_JOINT_TRAJECTORY)[3]
+GOAL = exchanges_of(goal_request_of(FOLLOW_JOINT_TRAJECTORY))
+
+
+class Rig:
+    """A black box whose clock is moved by hand."""
+
+    def __init__(self, seconds: float = 60.0) -> None:
+        self.box = BlackBox(seconds)
+        self.now = START
+        self.saved: list[tuple[Incident, tuple]] = []
+
+    def say(self, topic, *messages: Message) -> None:
+        for message in messages:
+            self.box.on_message(topic, message, self.now)
+
+    def state(self, mode: DeviceMode, **fields) -> None:
+        self.say(DEVICE_STATE, DeviceState(mode=mode, **fields))
+
+    def wait(self, seconds: float) -> None:
+        """In steps of 0.5 s, as the logger's."""
+        end = self.now + int(seconds * SECOND)
+        while self.now < end:
+            self.now = min(self.now + SECOND // 2, end)
+            told = self.box.step(self.now)
+            self.saved += [told] if told else []
+
+    def exchange(self, request, question, answer, **fields) -> None:
+        topic = exchanges_of(request)
+        self.say(topic, topic.message(question=question, answer=answer, **fields))
+
+    def goal(self, goal_id: str, accepted: bool = True) -> None:
+        question = GOAL.message.__annotations__["question"].__args__[0](goal_id=goal_id)
+        reason = "" if accepted else "the device is not referenced"
+        self.say(GOAL, GOAL.message(question=question, answer=GoalResponse(accepted=accepted, reason=reason)))
+
+    def end(self, goal_id: str, status: GoalStatusCode, reason: str = "") -> None:
+        result = FollowJointTrajectoryResult(error_code=FollowErrorCode.DEVICE_FAILED, error_string=reason)
+        self.say(ENDED, ENDED.message(goal_id=goal_id, status=status, result=result))
+
+    @property
+    def incident(self) -> Incident:
+        (told,) = self.saved
+        return told[0]
+
+    @property
+    def story(self) -> list[str]:
+        return [each.text for each in self.incident.story]
+
+
+@pytest.fixture
+def rig() -> Rig:
+    return Rig()
+
+
+def test_an_emergency_stop_in_the_middle_of_a_goal_is_told_with_what_led_to_it_and_what_followed(rig):
+    rig.say(DESCRIPTION, describe(load_arm(ROOT / "urdf/rm1")))
+    rig.state(DeviceMode.IDLE)
+    rig.exchange(PLAN, PlanRequest(goal=NamedGoal(name="left")), PlanResponse(code=PlanCode.SUCCESS, duration=4.1))
+    rig.wait(1.0)
+    rig.goal("4a682f77aa")
+    rig.state(DeviceMode.RUN, buffered=0.31, round_trip=0.004)
+    rig.say(
+        JOINT_STATES, JointState(name=("brazo_joint", "antebrazo_joint"), position=(0.5, 0.1), velocity=(0.3, 0.01))
+    )
+    rig.say(JOINT_COMMANDS, JointState(name=("brazo_joint",), position=(9.9,), velocity=(9.9,)))
+    rig.say(STEP_ERRORS, StepErrors(name=("brazo_joint", "antebrazo_joint"), error=(0.25, -1.75)))
+    rig.say(STEP_LEDGER, StepLedger(name=("brazo_joint",), arm_confidence=0.994, doubtful="antebrazo_joint"))
+    rig.say(STOPPING_DISTANCE, StoppingDistance(is_known=True, distance=0.012, duration=0.4))
+    rig.wait(2.0)
+    rig.exchange(DEVICE_INJECT, InjectRequest(kind=InjectKind.ESTOP, value=1.0), InjectResponse(accepted=True))
+    rig.wait(0.5)
+    rig.state(DeviceMode.ESTOP, fault=DeviceFault.EMERGENCY_STOP)
+    rig.wait(0.5)
+    rig.end("4a682f77aa", GoalStatusCode.ABORTED, "the device went into ESTOP")
+    assert not rig.saved
+    rig.wait(3.0)
+    incident = rig.incident
+    assert incident.kind is IncidentKind.EMERGENCY_STOP
+    assert incident.stamp == START + int(3.5 * SECOND)
+    assert incident.sentence == "2026-11-18 11:06:43.500 UTC: emergency stop, 2.50 s into goal 4a682f77"
+    assert rig.story == [
+        "plan: goal named (name left): planned, 4.10 s", "goal 4a682f77 for follow_joint_trajectory accepted",
+        "device: IDLE -> RUN", "device/inject: kind estop, value 1: accepted", "device: RUN -> ESTOP",
+        "goal 4a682f77 aborted: the device went into ESTOP",
+    ]  # fmt: skip
+    assert [each.at for each in incident.story] == [-3.5, -2.5, -2.5, -0.5, 0.0, 0.5]
+    limit = next(joint for joint in load_arm(ROOT / "urdf/rm1").joints if joint.name == "brazo_joint")
+    assert incident.margins[0].startswith("brazo_joint at 28.6 deg, at ")
+    assert f"{57.29578 * (limit.upper - 0.5):.1f} deg from its nearer limit" in incident.margins[0]
+    assert incident.margins[1:] == (
+        "largest step error 1.75 steps, of antebrazo_joint",
+        "99.4 % sure that no step was lost, least of antebrazo_joint",
+        "the tool would have gone 12 mm further in 0.40 s",
+        "0.31 s of the path in the device's queue, round trip 4.0 ms",
+    )
+
+
+def test_a_device_that_was_stopped_before_the_logger_heard_it_is_no_incident(rig):
+    rig.state(DeviceMode.ESTOP, fault=DeviceFault.EMERGENCY_STOP)
+    rig.state(DeviceMode.FAULT, fault=DeviceFault.LIMIT_SWITCH)
+    rig.wait(20.0)
+    assert not rig.saved
+
+
+def test_a_fault_names_its_joint(rig):
+    rig.say(DESCRIPTION, describe(load_arm(ROOT / "urdf/rm1")))
+    rig.say(JOINT_STATES, JointState(name=("brazo_joint", "antebrazo_joint"), position=(0.5, 0.1), velocity=(0.3, 0.0)))
+    rig.state(DeviceMode.RUN)
+    rig.state(DeviceMode.FAULT, fault=DeviceFault.LIMIT_SWITCH, fault_joint="antebrazo_joint")
+    rig.wait(3.0)
+    assert rig.incident.kind is IncidentKind.FAULT
+    assert 'LIMIT_SWITCH at joint "antebrazo_joint"' in rig.incident.sentence
+    assert rig.incident.margins[0].startswith("antebrazo_joint at 5.7 deg, at rest, ")
+
+
+@pytest.mark.parametrize(
+    ("status", "count"),
+    [
+        (GoalStatusCode.ABORTED, 1), (GoalStatusCode.CANCELED, 0), (GoalStatusCode.PREEMPTED, 0),
+        (GoalStatusCode.SUCCEEDED, 0),
+    ],
+)  # fmt: skip
+def test_only_a_goal_that_ended_against_everybodys_will_is_an_incident(rig, status, count):
+    rig.goal("4a682f77aa")
+    rig.wait(1.0)
+    rig.end("4a682f77aa", status, "path tolerance of brazo_joint")
+    rig.wait(5.0)
+    assert len(rig.saved) == count
+    if count:
+        assert rig.incident.sentence.endswith(
+            "goal 4a682f77 was aborted: path tolerance of brazo_joint, 1.00 s into goal 4a682f77"
+        )
+
+
+def test_an_abort_that_is_said_before_its_cause_is_told_as_that(rig):
+    rig.state(DeviceMode.RUN)
+    rig.goal("4a682f77aa")
+    rig.wait(1.0)
+    rig.end("4a682f77aa", GoalStatusCode.ABORTED, "the device stopped")
+    rig.now += SECOND // 50
+    rig.state(DeviceMode.ESTOP, fault=DeviceFault.EMERGENCY_STOP)
+    rig.wait(4.0)
+    assert rig.incident.kind is IncidentKind.EMERGENCY_STOP
+    assert rig.incident.sentence.endswith("emergency stop, 1.00 s into goal 4a682f77")
+    assert rig.incident.stamp == START + SECOND
+
+
+def test_a_reboot_is_one_and_a_refused_goal_is_told(rig):
+    rig.goal("123456789", accepted=False)
+    rig.say(DEVICE_EVENTS, DeviceEvent(device="rm1", event="connected"))
+    rig.say(DEVICE_EVENTS, DeviceEvent(device="rm1", event="rebooted", detail="watchdog"))
+    rig.wait(4.0)
+    assert rig.incident.kind is IncidentKind.REBOOT
+    assert "the device has rebooted: watchdog" in rig.incident.sentence
+    assert rig.story[0] == "goal 12345678 for follow_joint_trajectory refused: the device is not referenced"
+
+
+def beat(rig: Rig, seconds: float, *nodes: str) -> None:
+    for _ in range(int(seconds)):
+        rig.say(STATISTICS, *(NodeStatistics(node=node) for node in nodes))
+        rig.wait(1.0)
+
+
+def test_a_service_that_falls_silent_is_one_and_a_script_that_ends_is_none(rig):
+    beat(rig, 5, "planner", "stepper_gateway", "my_script")
+    beat(rig, 8, "stepper_gateway")
+    assert rig.incident.kind is IncidentKind.LOST
+    assert "planner has not been heard for 4." in rig.incident.sentence
+
+
+def test_a_silence_of_everybody_is_ours(rig):
+    """A machine that slept, or a logger that was frozen: nobody else has failed."""
+    beat(rig, 5, "planner", "stepper_gateway")
+    rig.wait(30.0)
+    beat(rig, 5, "planner", "stepper_gateway")
+    assert not rig.saved
+
+
+def test_a_service_that_is_back_within_a_second_has_failed_too(rig):
+    record = NodeRecord(node="planner", info=NodeInfo(started=START - 50 * SECOND))
+    rig.say(NODES, record, replace(record, parameters=(Parameter(name="x"),)))
+    rig.wait(5.0)
+    rig.say(NODES, replace(record, info=NodeInfo(started=rig.now - 2 * SECOND)))
+    rig.wait(4.0)
+    assert rig.incident.kind is IncidentKind.LOST
+    assert rig.incident.stamp == START + 3 * SECOND
+    assert "planner had ended, and was started again" in rig.incident.sentence
+
+
+def test_what_follows_within_3_s_is_of_the_same_story_and_files_are_10_s_apart(rig):
+    rig.state(DeviceMode.RUN)
+    for _ in range(30):
+        rig.state(DeviceMode.FAULT, fault=DeviceFault.LIMIT_SWITCH)
+        rig.wait(1.0)
+        rig.state(DeviceMode.IDLE)
+    assert len(rig.saved) == 3
+    assert [len([text for text in told[0].story if text.text.endswith("-> FAULT")]) for told in rig.saved] == [
+        3,
+        13,
+        19,
+    ]
+
+
+def test_it_holds_the_last_seconds_and_the_latched_messages_of_before(rig):
+    rig.say(DESCRIPTION, describe(load_arm(ROOT / "urdf/rm1")))
+    rig.state(DeviceMode.RUN)
+    for index in range(200):
+        rig.say(JOINT_STATES, JointState(name=("brazo_joint",), position=(float(index),)))
+        rig.wait(0.5)
+    rig.state(DeviceMode.FAULT, fault=DeviceFault.INTERNAL)
+    rig.wait(3.0)
+    ((_, entries),) = rig.saved
+    assert entries[0].topic is DESCRIPTION
+    positions = [entry.message.position[0] for entry in entries if entry.topic is JOINT_STATES]
+    assert positions[0] >= 85.0  # 3 s after 100 s, less 60 s: from second 43 on
+    assert positions[-1] == 199.0
+
+
+def test_its_memory_is_bounded(rig):
+    state = JointState(name=("brazo_joint",), position=(0.0,))
+    rig.say(DESCRIPTION, describe(load_arm(ROOT / "urdf/rm1")))
+    for _ in range(MOST + 10):
+        rig.box.on_message(JOINT_STATES, state, rig.now)
+    rig.state(DeviceMode.RUN)
+    rig.state(DeviceMode.FAULT, fault=DeviceFault.INTERNAL)
+    rig.wait(3.0)
+    ((_, entries),) = rig.saved
+    assert len(entries) == MOST + 1
+    assert entries[0].topic is DESCRIPTION
+
+
+def test_a_story_is_bounded_repeats_nothing_and_leaves_questions_out(rig):
+    rig.state(DeviceMode.RUN)
+    validity = exchanges_of(STATE_VALIDITY)
+    for index in range(100):
+        rig.say(LOG, LogRecord(node="planner", level=LogLevel.WARNING, text="word " * 100 + str(index % 2)))
+        rig.say(LOG, LogRecord(node="planner", level=LogLevel.INFO, text="nothing"))
+        rig.say(validity, validity.message())
+        rig.say(PARAMETER_CHANGES, ParameterChange(node="planner", parameter=Parameter(name="x", value=index)))
+    rig.say(exchanges_of(PLAN), exchanges_of(PLAN).message(question=PlanRequest(), failure=Failure(message="too busy")))
+    rig.state(DeviceMode.FAULT, fault=DeviceFault.INTERNAL)
+    rig.wait(3.0)
+    assert len(rig.story) == 20
+    assert all(len(text) <= LONGEST for text in rig.story)
+    assert rig.story[-2:] == ["plan: goal named (name ): too busy", "device: RUN -> FAULT"] or rig.story[-2].endswith(
+        ": too busy"
+    )
+    assert "planner: x = 99" in rig.story
+    assert not any("nothing" in text or "state_validity" in text for text in rig.story)
+
+
+def test_a_message_of_a_users_own_request_is_told_as_it_is():
+    assert brief({"value": 1.23456, "name": "cup"}) == "value 1.235, name cup"
+    assert brief(tuple(range(20))).endswith("... 20]")
+    assert brief(PlanResponse(refusal=Refusal(check="reach"))) == "refusal check reach"
+    assert brief(DeviceCommandResponse(sent=True)) == "accepted False, sent True, mode 0"
+    assert brief(Raw(b"\xc0"))
+
+
+def box_of(rig: Rig) -> tuple[Incident, tuple]:
+    rig.say(DESCRIPTION, describe(load_arm(ROOT / "urdf/rm1")))
+    for _ in range(50):
+        rig.say(JOINT_STATES, JointState(stamp=rig.now, name=("brazo_joint",), position=(0.1,), velocity=(0.0,)))
+        rig.wait(0.02)
+    rig.state(DeviceMode.RUN)
+    rig.state(DeviceMode.FAULT, fault=DeviceFault.INTERNAL)
+    told = rig.box.finish(rig.now)
+    assert told is not None  # a logger that ends waits for nothing
+    return told
+
+
+def test_a_file_is_read_by_another_reader_and_listed_by_its_story(rig, tmp_path):
+    said: list[str] = []
+    incident, entries = box_of(rig)
+    writer = BlackBoxWriter("rm1", {"gemelo": {"robot": "rm1"}}, said.append)
+    for late in range(4):
+        writer.save(replace(incident, stamp=incident.stamp + late * SECOND), entries, tmp_path / "box", keep=3)
+    writer.wait()
+    found = black_boxes(tmp_path / "box", "rm1")
+    assert [each.incident.stamp - incident.stamp for each in found] == [3 * SECOND, 2 * SECOND, SECOND]
+    assert not black_boxes(tmp_path / "box", "parol6")
+    assert len(said) == 4
+    assert "`gemelo blackbox open`" in said[0]
+    with Path(found[0].path).open("rb") as file:
+        reader = make_reader(file)
+        topics = [channel.topic for _, channel, _ in reader.iter_messages()]
+        names = {record.name for record in reader.iter_metadata()}
+    assert topics.count("joint_states") == 50
+    assert {"gemelo", "incident", "robot"} <= names
+    (tmp_path / "other.mcap").write_bytes(b"")
+    with pytest.raises(BadRecording, match="empty"):
+        read_incident(tmp_path / "other.mcap")
+
+
+def test_a_full_disk_is_said_and_leaves_no_half_file(rig, tmp_path):
+    said: list[str] = []
+    told = box_of(rig)
+    writer = BlackBoxWriter("rm1", {}, said.append)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (2000, before[1]))
+        writer.save(*told, tmp_path, keep=3)
+        writer.wait()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert "cannot be written" in said[0]
+    assert not list(tmp_path.glob("*.mcap"))

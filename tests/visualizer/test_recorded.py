@@ -1,0 +1,111 @@
+"""A recording in the twin's own view; a black box opens at its incident, with its story."""
+
+from __future__ import annotations
+
+import base64
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from schemas.device import DeviceMode, DeviceState
+from schemas.joints import JointState, StepErrors
+from schemas.message import Message
+from schemas.topics import DESCRIPTION, DEVICE_STATE, JOINT_COMMANDS, JOINT_STATES, STEP_ERRORS, Delivery, Topic
+from services.arm.model.description import load_arm
+from services.recordings.channels import Entry
+from services.recordings.incidents import Happening, Incident, IncidentKind, incident_metadata
+from services.recordings.mcap_file import ROBOT, McapFile
+from services.recordings.reader import BadRecording
+from services.state_publisher.main import describe
+from services.visualizer.content import entities
+from services.visualizer.program.rerun_program import rerun_binary
+from services.visualizer.recorded import story_text, write_view
+
+SECOND = 1_000_000_000
+START = 1_795_000_000 * SECOND
+ROOT = Path(__file__).parents[2]
+INCIDENT = Incident(
+    stamp=START + SECOND, kind=IncidentKind.FAULT, sentence="it stopped", margins=("brazo_joint at rest",),
+    story=(Happening(at=-0.5, text="a | b"),),
+)  # fmt: skip
+
+
+class Picture(Message, frozen=True, kw_only=True):
+    data: bytes = b""
+
+
+def recording(path: Path, *entries: Entry, incident: Incident | None = None) -> Path:
+    file = McapFile(path, incident_metadata(incident) if incident else {})
+    file.write(entries)
+    file.close()
+    return path
+
+
+def moving(robot: str) -> list[Entry]:
+    arm = load_arm(ROOT / f"urdf/{robot}")
+    names = tuple(joint.name for joint in arm.joints)
+    found = [Entry(DESCRIPTION, describe(arm), START)]
+    for index in range(100):
+        at = START + index * SECOND // 50
+        position = (0.001 * index,) * len(names)
+        state = JointState(stamp=at, name=names, position=position, velocity=(0.05,) * len(names))
+        found += [
+            Entry(JOINT_STATES, state, at),
+            Entry(JOINT_COMMANDS, state, at),
+            Entry(STEP_ERRORS, StepErrors(stamp=at, name=names, error=(0.2,) * len(names)), at),
+            Entry(DEVICE_STATE, DeviceState(stamp=at, mode=DeviceMode.RUN), at),
+        ]
+    return found
+
+
+def printed(rrd: Path) -> str:
+    return subprocess.run(
+        [rerun_binary(), "rrd", "print", "-vv", rrd], capture_output=True, text=True, check=True
+    ).stdout
+
+
+@pytest.mark.parametrize("robot", ["rm1", "parol6"])
+def test_everything_that_the_live_view_shows_is_drawn_and_the_story_is_beside_it(tmp_path, robot):
+    file = recording(tmp_path / "box.mcap", *moving(robot), incident=INCIDENT)
+    assert write_view(file, tmp_path / "view.rrd", tmp_path / "shadow") == INCIDENT
+    text = printed(tmp_path / "view.rrd")
+    joint = load_arm(ROOT / f"urdf/{robot}").joints[0].name
+    for entity in (entities.executed(joint), entities.error(joint), entities.MODE, entities.TRAIL, entities.STORY):
+        assert f"/{entity}" in text
+    assert "TimePanelBlueprint:time_selection" in text
+
+
+def test_a_plain_recording_opens_without_a_story(tmp_path):
+    file = recording(tmp_path / "bag.mcap", *moving("rm1"))
+    assert write_view(file, tmp_path / "view.rrd", tmp_path / "shadow") is None
+    text = printed(tmp_path / "view.rrd")
+    assert f"/{entities.STORY}" not in text
+    assert "time_selection" not in text
+
+
+def test_images_of_cameras_are_shown(tmp_path):
+    topic = Topic("foxglove/camera/overhead/image", Picture, Delivery.LATEST, None, True, "logger", "")
+    jpeg = base64.b64decode("/9j/4AAQSkZJRgABAQAAAQABAAD/2Q==")
+    entry = Entry(topic, Picture(data=jpeg), START + SECOND // 2)
+    file = recording(tmp_path / "bag.mcap", *moving("rm1"), entry)
+    write_view(file, tmp_path / "view.rrd", tmp_path / "shadow")
+    assert f"/{entities.camera_picture('overhead')}" in printed(tmp_path / "view.rrd")
+
+
+def test_the_story_is_a_table_that_no_text_breaks():
+    assert story_text(INCIDENT).splitlines() == [
+        "### it stopped", "", "- brazo_joint at rest", "", "| | |", "|--:|:--|", "| -0.50 s | a \\| b |",
+    ]  # fmt: skip
+
+
+def test_a_recording_of_no_robot_is_said(tmp_path):
+    file = recording(tmp_path / "bag.mcap")
+    with pytest.raises(BadRecording, match="recorded without state_publisher"):
+        write_view(file, tmp_path / "view.rrd", tmp_path / "shadow")
+    file = McapFile(
+        tmp_path / "wrong.mcap", {ROBOT: {"robot": "rm1", "robot_toml": "name = [", "urdf": "", "srdf": ""}}
+    )
+    file.close()
+    with pytest.raises(BadRecording, match=r"robot\.toml cannot be read"):
+        write_view(file.path, tmp_path / "view.rrd", tmp_path / "shadow")
