@@ -82,6 +82,8 @@ COMMANDS = (
             "camera_calibrate:run", "camera_calibrate:add_options", "gemelo camera calibrate overhead --bar 99.6mm"),
     Command(("camera", "mount"), "where a camera stands, from tags of the printed board that the tool touches",
             "camera_mount:run", "camera_mount:add_options", "gemelo camera mount overhead --points 6"),
+    Command(("camera", "check"), "point the tool above tags, say how far beside it is, and hear where that comes from",
+            "camera_check:run", "camera_check:add_options", "gemelo camera check overhead"),
     Command(("detect",), "the things of the cell file that cameras see: where, and how sure that is",
             "detect:run", "detect:add_options", "gemelo detect cup --scene", "detect:choices"),
     Command(("pick",), "take a thing that a camera sees to a place of the cell file",

@@ -38,6 +38,13 @@ def test_a_person_detects_and_picks_what_the_sample_cell_has(stack, monkeypatch)
     assert math.dist(seen["cup"]["pose"]["position"], (0.26, 0.16, 0.04)) < 1e-3
     command.gemelo(stack, "detect", "red_block", "--scene")
     assert "red_block" in command.gemelo(stack, "scene", "list")
+    check = subprocess.run(
+        [stack.root / ".venv/bin/gemelo", "camera", "check"], cwd=stack.root, env=stack.environment, input="\n\n",
+        capture_output=True, text=True, timeout=120.0, check=True,
+    )  # fmt: skip
+    assert re.search(r"cup: \+0\.0 \+0\.0 mm, step floor \+-[0-2]\.\d\d mm", check.stdout), check.stdout
+    assert "no more than camera, mount and arm are good for together" in check.stdout
+    assert "cup" not in command.gemelo(stack, "scene", "list")
     done = subprocess.run(
         [sys.executable, "examples/16_sort_by_colour.py"], cwd=stack.root, env=stack.environment, capture_output=True,
         text=True, timeout=120.0, check=False,

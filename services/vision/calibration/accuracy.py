@@ -1,0 +1,135 @@
+"""Where an error of pointing comes from: lens, place of the camera, or the arm; by its pattern over the table.
+
+An arm is sent above tags that a camera has located, and a person says how far beside each it points. A camera that
+stands elsewhere than believed shifts or turns all of them alike, a lens or print of a wrong scale spreads them, a first
+joint whose zero is wrong turns them about the base; what is left over is the arm's, or the noise of the image.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from services.vision.rigid import Array
+
+FEWEST_TO_TELL = 2  # tags: one shows how large the error is, not where it comes from
+SURE = 2.0  # standard deviations that an error may have
+AS_MUCH = 0.4  # by which two angles may differ and be one, as a share
+MOST_OF_IT = 0.75  # share of the squares that one cause must explain to be named alone
+
+
+class Cause(StrEnum):
+    """What an error of pointing comes from."""
+
+    NONE = "nothing"
+    UNKNOWN = "not known"
+    MOUNT = "mount"
+    SCALE = "scale"
+    ZERO = "zero of the first joint"
+    ARM = "arm"
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Standard deviations [m] that are to be expected of one pointing."""
+
+    camera: float
+    mount: float
+    arm: float
+
+    @property
+    def total(self) -> float:
+        return float(np.sqrt(self.camera**2 + self.mount**2 + self.arm**2))
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """What was found."""
+
+    cause: Cause
+    worst: float  # [m]
+    shift: float  # [m] that all have in common
+    turn: float  # [m] RMS that a turn of the camera explains
+    scale: float  # [m] RMS that a scale explains
+    rest: float  # [m] RMS that nothing of these explains
+    sentence: str
+
+
+def judge(points: Array, offsets: Array, budget: Budget) -> Accuracy:
+    """Of pointings at `points` (n, 2) [m] in the base, each beside its tag by `offsets` (n, 2) [m], tip minus tag."""
+    points, offsets = np.asarray(points, dtype=float), np.asarray(offsets, dtype=float)
+    sizes = np.linalg.norm(offsets, axis=1)
+    worst = float(sizes.max())
+    shift, turn, scale, rest = _parts(points, offsets)
+    cause = _cause(points, offsets, budget, (shift, turn, scale, rest))
+    return Accuracy(cause, worst, shift, turn, scale, rest, _sentence(cause, worst, budget, (shift, turn, scale, rest)))
+
+
+def _parts(points: Array, offsets: Array) -> tuple[float, float, float, float]:
+    """Shift, and RMS of turn, scale and rest [m], by least squares."""
+    common = offsets.mean(axis=0)
+    around = points - points.mean(axis=0)
+    spread = float(np.sum(around**2))
+    if len(points) < FEWEST_TO_TELL or spread < 1e-6:
+        return float(np.linalg.norm(common)), 0.0, 0.0, float(np.sqrt(np.mean(np.sum((offsets - common) ** 2, axis=1))))
+    across = np.column_stack([-around[:, 1], around[:, 0]])
+    turn = float(np.sum(across * offsets)) / spread
+    scale = float(np.sum(around * offsets)) / spread
+    rest = offsets - common - turn * across - scale * around
+    size = np.sqrt(spread / len(points))
+    return (
+        float(np.linalg.norm(common)), float(abs(turn) * size), float(abs(scale) * size),
+        float(np.sqrt(np.mean(np.sum(rest**2, axis=1)))),
+    )  # fmt: skip
+
+
+def _cause(points: Array, offsets: Array, budget: Budget, parts: Sequence[float]) -> Cause:
+    if float(np.linalg.norm(offsets, axis=1).max()) <= SURE * budget.total:
+        return Cause.NONE
+    if len(points) < FEWEST_TO_TELL:
+        return Cause.UNKNOWN
+    if len(points) > FEWEST_TO_TELL and _is_about_base(points, offsets):
+        return Cause.ZERO
+    shift, turn, scale, rest = (each**2 for each in parts)
+    found = {Cause.MOUNT: shift + turn, Cause.SCALE: scale, Cause.ARM: rest}
+    cause = max(found, key=lambda each: found[each])
+    return cause if found[cause] > MOST_OF_IT * sum(found.values()) else Cause.UNKNOWN
+
+
+def _is_about_base(points: Array, offsets: Array) -> bool:
+    """True if a turn about the base explains the offsets, and the tags also turn about their middle by as much."""
+    about_base, angle = _turn(points, offsets)
+    _, own_angle = _turn(points - points.mean(axis=0), offsets)
+    return about_base > MOST_OF_IT * float(np.sum(offsets**2)) and abs(own_angle - angle) < AS_MUCH * abs(angle)
+
+
+def _turn(points: Array, offsets: Array) -> tuple[float, float]:
+    """The squares [m^2] that a turn about the origin explains, and its angle [rad]."""
+    across = np.column_stack([-points[:, 1], points[:, 0]])
+    spread = max(float(np.sum(across**2)), 1e-12)
+    angle = float(np.sum(across * offsets)) / spread
+    return angle**2 * spread, angle
+
+
+def _sentence(cause: Cause, worst: float, budget: Budget, parts: Sequence[float]) -> str:
+    shift, turn, scale, rest = (1e3 * each for each in parts)
+    off = f"up to {1e3 * worst:.1f} mm off"
+    match cause:
+        case Cause.NONE:
+            return f"{off}: no more than camera, mount and arm are good for together (+-{1e3 * budget.total:.1f} mm)"
+        case Cause.MOUNT:
+            return (
+                f"{off}, {shift:.1f} mm of it everywhere alike and {turn:.1f} mm as a turn: the camera stands elsewhere"
+            )
+        case Cause.SCALE:
+            return f"{off}, {scale:.1f} mm of it growing with the distance: the lens, or a print of another scale"
+        case Cause.ZERO:
+            return f"{off}, as a turn about the base: the first joint's zero"
+        case Cause.ARM:
+            return f"{off}, {rest:.1f} mm of it different from tag to tag: the arm, or what it has lost"
+        case _:
+            said = f"alike {shift:.1f}, turned {turn:.1f}, spread {scale:.1f}, different {rest:.1f} mm"
+            return f"{off}, and not of one cause alone ({said})"
