@@ -16,7 +16,7 @@ from gemelo.homing_report import HomingReport
 from gemelo.jog import Jogging, Streaming, jog_command
 from gemelo.ledger import Ledger, Requirement, read_ledger
 from gemelo.motion import Motion, Motions, OnMotion
-from gemelo.picking import OnPicking, Picked, pick
+from gemelo.picking import OnPicking, Picked, named, pick
 from gemelo.planning import (
     Configurations,
     OnPlanProgress,
@@ -702,13 +702,21 @@ class Arm:
         """
         return self._eyes.detect(name, camera, scene)
 
-    def pick(self, name: str, *, to: str, camera: str = "", on_progress: OnPicking | None = None) -> Picked:
+    def pick(
+        self,
+        name: str,
+        *,
+        to: str,
+        camera: str = "",
+        on_progress: OnPicking | None = None,
+        is_cancelled: Callable[[], bool] | None = None,
+    ) -> Picked:
         """Takes the thing `name` of cell.toml from where a camera sees it to the place `to`.
 
         From above, straight down, with the thing attached while it is carried; a gripper that closes on nothing is
-        tried twice. `on_progress` is called with a sentence for each part. Raises `Refused` before anything has moved:
-        not seen, seen twice, not known well enough, out of reach, too wide or too flat for the jaws; and `Aborted`
-        with the thing where it is then.
+        tried twice. `on_progress` is called with a sentence for each part. Once `is_cancelled()` the arm decelerates,
+        and `Canceled` is raised. Raises `Refused` before anything has moved: not seen, seen twice, not known well
+        enough, out of reach, too wide or too flat for the jaws; and `Aborted` with the thing where it is then.
 
         >>> try:
         ...     arm.pick("cup", to="bin")
@@ -717,7 +725,18 @@ class Arm:
         cell
         """
         with_words = on_progress if on_progress is not None else _silent
-        return pick(self, self._eyes, name, to, camera, with_words)
+        return pick(self, self._eyes, name, to, camera, with_words, is_cancelled or _never)
+
+    def require_pickable(self, name: str, to: str) -> None:
+        """Raises `Refused` without a gripper or a cell, `BadArgument` for a thing or place that the cell has not.
+
+        >>> try:
+        ...     arm.require_pickable("cup", to="bin")
+        ... except gemelo.Refused as refused:
+        ...     print(refused.check)
+        cell
+        """
+        named(self, self._eyes, name, to)
 
     # What could be
 
@@ -777,6 +796,11 @@ class Arm:
 
 def _silent(text: str) -> None:
     """Nobody wants to hear it."""
+
+
+def _never() -> bool:
+    """Nobody can cancel it."""
+    return False
 
 
 def _with_speed(target: Target, speed: float | None) -> Target:

@@ -8,10 +8,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from gemelo.errors import Aborted, BadArgument, Refused
+from gemelo.errors import Aborted, BadArgument, Canceled, Refused
 from gemelo.seeing import Eyes, Seen, add_to_scene, body_of
 from gemelo.targets import FULL
 from gemelo.units import Point, Pose
+from schemas.actions import GoalStatusCode
 from schemas.cell import Place, PosePlace, Thing
 from schemas.robot import Gripper
 from services.arm.errors import DescriptionError
@@ -19,7 +20,11 @@ from services.arm.frames.transforms import IDENTITY, Quaternion, Rigid, compose,
 from services.arm.model.gripper import jaw_edges
 
 if TYPE_CHECKING:
+    from gemelo.arguments import Grip
     from gemelo.arm import Arm
+    from gemelo.gripping import Gripped
+    from gemelo.motion import Motion
+    from gemelo.planning import Plan
 
 APPROACH = 0.04  # [m] the straight way down to a thing, and up with it
 GAP = 0.003  # [m] between the thing's top and the tool, and between the jaws' tips and the table
@@ -32,6 +37,7 @@ DOWN = (0.0, 0.0, -1.0)
 SOLUTIONS = 8  # configurations of a tool pose that are considered
 
 OnPicking = Callable[[str], object]
+IsCancelled = Callable[[], bool]
 
 
 class Picked(NamedTuple):
@@ -65,10 +71,46 @@ class Way:
     turned: float  # [rad] from the thing's nearest side to the jaws
 
 
-def pick(arm: Arm, eyes: Eyes, name: str, to: str, camera: str, tell: OnPicking) -> Picked:
+@dataclass(frozen=True)
+class Hand:
+    """What moves while a thing is picked, each motion slowed down and ended once it is cancelled."""
+
+    arm: Arm
+    tell: OnPicking
+    is_cancelled: Callable[[], bool]
+
+    def move(self, joints: Mapping[str, float]) -> None:
+        """Plans and goes there."""
+        self._follow(self.arm.plan(joints=joints))
+
+    def rise(self, height: float) -> None:
+        """Straight up, or down where `height` [m] is negative."""
+        self._follow(self.arm.plan(offset=(0.0, 0.0, height), line=True, tool_speed=SLOW))
+
+    def grip(self, to: Grip) -> Gripped:
+        """Opens or closes the jaws."""
+        self._proceed()
+        return self.arm.grip(to, is_cancelled=self.is_cancelled)
+
+    def _follow(self, plan: Plan) -> None:
+        self._proceed()
+        self.arm.execute(plan, on_progress=self._look)
+        self._proceed()
+
+    def _look(self, motion: Motion) -> None:
+        if self.is_cancelled():
+            motion.cancel()
+
+    def _proceed(self) -> None:
+        if self.is_cancelled():
+            raise Canceled("the pick was cancelled: the arm stands", GoalStatusCode.CANCELED)
+
+
+def pick(arm: Arm, eyes: Eyes, name: str, to: str, camera: str, tell: OnPicking, is_cancelled: IsCancelled) -> Picked:
     """Takes the thing `name` to the place `to`; raises what `Arm.pick` raises."""
+    hand = Hand(arm, tell, is_cancelled)
     began = arm.node.monotonic()
-    thing, place, gripper = _named(arm, eyes, name, to)
+    thing, place, gripper = named(arm, eyes, name, to)
     for attempt in range(1, ATTEMPTS + 1):
         seen = eyes.one(name, camera)
         tell(str(seen))
@@ -80,8 +122,8 @@ def pick(arm: Arm, eyes: Eyes, name: str, to: str, camera: str, tell: OnPicking)
         release = _configuration_above(arm, (spot[0], spot[1], spot[2] + lift), _yaw_at(arm, place, seen, way))
         add_to_scene(arm.scene, thing, seen)
         try:
-            if _take(arm, thing, seen, way, tell):
-                _put(arm, name, release, tell)
+            if _take(hand, thing, seen, way):
+                _put(hand, name, release)
                 took = arm.node.monotonic() - began
                 return Picked(name, to, seen.pose, seen.sigma, way.turned, attempt, took)
         finally:
@@ -91,7 +133,8 @@ def pick(arm: Arm, eyes: Eyes, name: str, to: str, camera: str, tell: OnPicking)
     raise Aborted(f"{name} was not gripped: the jaws closed on nothing, {ATTEMPTS} times; where is it? `gemelo detect`")
 
 
-def _named(arm: Arm, eyes: Eyes, name: str, to: str) -> tuple[Thing, Place, Gripper]:
+def named(arm: Arm, eyes: Eyes, name: str, to: str) -> tuple[Thing, Place, Gripper]:
+    """What the cell and the arm have for it; raises `Refused` without a cell or gripper, `BadArgument` for a name."""
     cell = eyes.cell()
     gripper = arm.description.gripper
     if gripper is None:
@@ -206,19 +249,19 @@ def _spot(eyes: Eyes, place: Place, camera: str) -> Point:
     return compose((seen.pose.position, seen.pose.orientation), (place.offset, IDENTITY[1]))[0]
 
 
-def _take(arm: Arm, thing: Thing, seen: Seen, way: Way, tell: OnPicking) -> bool:
+def _take(hand: Hand, thing: Thing, seen: Seen, way: Way) -> bool:
     """True if the jaws have closed on something; the tool is above again in either case."""
-    arm.grip("open")
-    tell("above it")
-    arm.move(joints=way.above)
-    with _touching(arm, thing.name):
-        arm.line(offset=(0.0, 0.0, -APPROACH), speed=SLOW)
-        _turn_with_the_jaws(arm, thing, seen, way)
-        gripped = arm.grip("close")
-        tell(f"gripper: {gripped}")
-        arm.line(offset=(0.0, 0.0, APPROACH), speed=SLOW)
+    hand.grip("open")
+    hand.tell("above it")
+    hand.move(way.above)
+    with _touching(hand.arm, thing.name):
+        hand.rise(-APPROACH)
+        _turn_with_the_jaws(hand.arm, thing, seen, way)
+        gripped = hand.grip("close")
+        hand.tell(f"gripper: {gripped}")
+        hand.rise(APPROACH)
     if gripped.held != thing.name:
-        arm.grip("open")
+        hand.grip("open")
         return False
     return True
 
@@ -234,20 +277,21 @@ def _turn_with_the_jaws(arm: Arm, thing: Thing, seen: Seen, way: Way) -> None:
     arm.scene.move(thing.name, at, turn)
 
 
-def _put(arm: Arm, name: str, release: Mapping[str, float], tell: OnPicking) -> None:
+def _put(hand: Hand, name: str, release: Mapping[str, float]) -> None:
     """Carries it, lets it go, and rises; what fails with the thing between the jaws says so."""
     try:
-        tell("carrying it")
-        arm.move(joints=release)
-        with _touching(arm, name):
-            arm.line(offset=(0.0, 0.0, -APPROACH), speed=SLOW)
-            tell(f"gripper: {arm.grip('open')}")
-            arm.line(offset=(0.0, 0.0, APPROACH), speed=SLOW)
-    except Refused as refused:
-        held = arm.scene.objects.get(name)
+        hand.tell("carrying it")
+        hand.move(release)
+        with _touching(hand.arm, name):
+            hand.rise(-APPROACH)
+            hand.tell(f"gripper: {hand.grip('open')}")
+            hand.rise(APPROACH)
+    except (Refused, Canceled) as error:
+        held = hand.arm.scene.objects.get(name)
         if held is None or not held.attached:
             raise
-        raise Aborted(f"{name} was picked and is still between the jaws: {refused}") from refused
+        said = f"{name} was picked and is still between the jaws: {error}"
+        raise (Canceled(said, error.status) if isinstance(error, Canceled) else Aborted(said)) from error
 
 
 @contextmanager

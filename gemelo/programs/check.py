@@ -6,14 +6,14 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from gemelo.arm import Arm
-from gemelo.errors import Refused
+from gemelo.errors import BadArgument, Refused
 from gemelo.programs.meaning import find_mistakes
 from gemelo.programs.mistakes import Mistake
 from gemelo.programs.planning import plan_leg
 from gemelo.programs.points import Point
 from gemelo.programs.program import Program
 from gemelo.programs.sequence import Leg, legs_of, lost_blend
-from gemelo.programs.steps import Attach, Detach, Grip, MotionStep, StepPath, Wait, WaitFor, path_text, words_of
+from gemelo.programs.steps import Attach, Detach, Grip, MotionStep, Pick, StepPath, Wait, WaitFor, path_text, words_of
 
 SAME = 1e-6  # [rad] or [m] between two states that are one
 MOST_LEGS = 5_000  # that one check plans
@@ -152,6 +152,8 @@ class _Check:
         step, text = leg.steps[-1], "; ".join(words_of(step) for step in leg.steps)
         made = CheckedLeg(leg.paths, leg.rounds, text, note=self._note(leg, following))
         if not leg.is_motion:
+            if isinstance(step, Pick):
+                return self._picked(step, made), None
             if isinstance(step, Attach | Detach | Grip):
                 self._scene_note = f'planned in the scene as it is now, without step {path_text(leg.path)} ("{text}")'
             return replace(made, duration=step.time if isinstance(step, Wait) else 0.0), self._joints
@@ -168,6 +170,15 @@ class _Check:
             planning_time=plan.planning_time,
         )
         return done, plan.end
+
+    def _picked(self, step: Pick, made: CheckedLeg) -> CheckedLeg:
+        """A pick is planned when its thing is seen; whether the cell has thing and place is known now."""
+        try:
+            self._arm.require_pickable(step.thing, step.place)
+        except (Refused, BadArgument) as error:
+            refusal = error if isinstance(error, Refused) else Refused(str(error), check="cell", subject=step.thing)
+            return replace(made, refusal=refusal)
+        return replace(made, note="; ".join(filter(None, (made.note, "it is planned when the thing is seen"))))
 
     def _note(self, leg: Leg, following: Leg | None) -> str:
         notes = list(lost_blend((leg, following)).values()) if following is not None else []

@@ -16,7 +16,7 @@ from gemelo.planning import Plan
 from gemelo.programs.planning import plan_leg
 from gemelo.programs.points import Point
 from gemelo.programs.sequence import Leg
-from gemelo.programs.steps import Attach, Detach, Grip, Output, Wait, WaitFor
+from gemelo.programs.steps import Attach, Detach, Grip, Output, Pick, Wait, WaitFor
 from schemas.motion import FollowErrorCode
 
 LOOK_AHEAD = 50  # legs that are looked through for the next motion
@@ -113,6 +113,9 @@ class Execution:
                 self._arm.output(step.name, step.on)
             case Grip():
                 self._arm.grip(step.to, is_cancelled=self._controls.stop.is_set)
+            case Pick():
+                stopped = self._controls.stop.is_set
+                self._arm.pick(step.thing, to=step.place, camera=step.camera, is_cancelled=stopped)
             case Wait():
                 self._arm.wait_for(self._controls.stop.is_set, step.time)
             case WaitFor():
@@ -220,7 +223,7 @@ class Execution:
     def _upcoming(self) -> Leg | None:
         for index in range(LOOK_AHEAD):
             leg = self._peek(index)
-            if leg is None or isinstance(leg.steps[0], Attach | Detach | Grip):
+            if leg is None or isinstance(leg.steps[0], Attach | Detach | Grip | Pick):
                 return None
             if leg.is_motion:
                 return leg

@@ -20,6 +20,7 @@ from gemelo.programs.steps import (
     Line,
     MotionStep,
     Output,
+    Pick,
     Repeat,
     Speed,
     Wait,
@@ -115,6 +116,9 @@ class _Script:
                 return f"arm.output({_py(step.name)}, {step.on})"
             case Grip():
                 return f"arm.grip({_py(step.to)})"
+            case Pick():
+                camera = f", camera={_py(step.camera)}" if step.camera else ""
+                return f"arm.pick({_py(step.thing)}, to={_py(step.place)}{camera})"
             case Wait():
                 return f"time.sleep({step.time!r})"
             case WaitFor():

@@ -12,7 +12,7 @@ from gemelo.programs.names import program_name, read_text
 from gemelo.programs.points import Point
 from gemelo.programs.program import Program
 from gemelo.programs.reading import parse_program, value_mistakes
-from gemelo.programs.steps import AnyStep, Attach, Call, Grip, MotionStep, Output, WaitFor
+from gemelo.programs.steps import AnyStep, Attach, Call, Grip, MotionStep, Output, Pick, WaitFor
 from gemelo.programs.values import DEEPEST, Wrong, in_words_of_a_file
 from gemelo.targets import joint_state
 from services.arm.errors import suggestion
@@ -83,6 +83,9 @@ class _Search:
                 yield from _unknown("name", "output", step.name, [each.name for each in robot.outputs], robot)
             case Grip():
                 yield from self._grip(step)
+            case Pick():
+                if robot.gripper is None:
+                    yield "thing", f"{robot.name} has no gripper: write a [gripper] into its robot.toml"
             case WaitFor():
                 yield from _unknown("sensor", "sensor", step.sensor, [each.name for each in robot.sensors], robot)
             case Attach():

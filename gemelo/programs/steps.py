@@ -61,6 +61,14 @@ class Grip(Step, frozen=True, kw_only=True, tag="grip"):
     to: str | float  # "open", "close", or [m] between the jaws
 
 
+class Pick(Step, frozen=True, kw_only=True, tag="pick"):
+    """Takes a thing of cell.toml that a camera sees to a place."""
+
+    thing: str
+    place: str
+    camera: str = ""  # only this one looks; any if left out
+
+
 class Wait(Step, frozen=True, kw_only=True, tag="wait"):
     """Stands for a time."""
 
@@ -109,8 +117,8 @@ class Call(Step, frozen=True, kw_only=True, tag="call"):
     program: str
 
 
-AnyStep = Go | Line | Arc | Output | Grip | Wait | WaitFor | Speed | Attach | Detach | Repeat | Call
-KINDS: tuple[type[Step], ...] = (Go, Line, Arc, Output, Grip, Wait, WaitFor, Speed, Attach, Detach, Repeat, Call)
+AnyStep = Go | Line | Arc | Output | Grip | Pick | Wait | WaitFor | Speed | Attach | Detach | Repeat | Call
+KINDS: tuple[type[Step], ...] = (Go, Line, Arc, Output, Grip, Pick, Wait, WaitFor, Speed, Attach, Detach, Repeat, Call)
 GOALS = ("point", "state", "joints", "position", "offset")  # of a motion: exactly one of them
 
 

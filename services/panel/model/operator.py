@@ -14,6 +14,7 @@ from services.panel.model.goal import GoalSolver
 from services.panel.model.jogging import Jogging
 from services.panel.model.live import LiveSliders
 from services.panel.model.motions import MotionChoice, Motions
+from services.panel.model.picks import Picks
 from services.panel.model.problems import Problem, problem_of
 from services.panel.model.readings import Bus
 from services.panel.model.teaching import Teaching
@@ -35,7 +36,9 @@ class Operator:
 
     def __init__(self, arm: gemelo.Arm) -> None:
         self.arm, self.bus = arm, Bus(arm)
-        self.cameras = CameraPictures(arm, deployed_cell(arm.deployment).camera_names)
+        cell = deployed_cell(arm.deployment)
+        self.cameras = CameraPictures(arm, cell.camera_names)
+        self.picks = Picks(arm, cell, self.tell, self.wake)
         self.choice = MotionChoice()
         self.homing: dict[str, str] = {}  # by joint what it does, while the arm homes
         self._told: ToldProblem | None = None
@@ -144,6 +147,7 @@ class Operator:
     def stop(self) -> None:
         """Before everything else; also what is planned just now does not begin."""
         self.motions.on_stop()
+        self.picks.on_stop()
         self.jogging.release()
         self.live.switch(False)
         self.guarded(self.arm.stop)

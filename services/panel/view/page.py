@@ -16,6 +16,7 @@ from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
 from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, read_browser, script_html
 from services.panel.view.kit import Kit, Mirror, box, esc, picture, set_if_new, without_event
+from services.panel.view.pick_box import PickBox
 from services.panel.view.tabs.device import DeviceTab
 from services.panel.view.tabs.jog import JogTab
 from services.panel.view.tabs.move import MoveTab
@@ -74,6 +75,8 @@ class Page:
         self._device.refresh(readings)
         self._scene.refresh(readings)
         self._show_cameras()
+        if self._picks is not None:
+            self._picks.refresh()
         self._teach.refresh(readings)
         self._programs.refresh(readings)
         pose = self._world.tool_pose
@@ -129,6 +132,8 @@ class Page:
         with tabs.add_tab(words("tab_scene")):
             self._scene = SceneTab(kit, self._world)
             self._cameras = {name: kit.line() for name in self._operator.cameras.names}
+            picks = self._operator.picks
+            self._picks = PickBox(kit) if picks.things and picks.places else None
         with tabs.add_tab(words("tab_state")):
             self._state = StateTab(kit)
             self._settings(look)

@@ -18,6 +18,7 @@ from gemelo.programs import (
     Grip,
     Line,
     Output,
+    Pick,
     Repeat,
     Speed,
     Wait,
@@ -26,10 +27,24 @@ from gemelo.programs import (
 from services.panel.model.teaching import target_names
 from services.panel.view.kit import Kit, set_if_new
 
-KINDS = ("go", "line", "arc", "output", "grip", "wait", "wait_for", "speed", "attach", "detach", "repeat", "call")
+KINDS = (
+    "go",
+    "line",
+    "arc",
+    "output",
+    "grip",
+    "pick",
+    "wait",
+    "wait_for",
+    "speed",
+    "attach",
+    "detach",
+    "repeat",
+    "call",
+)
 SHOWN = {  # which fields each kind shows
     "go": ("target", "blend"), "line": ("target", "blend", "number"), "arc": ("target", "through", "number"),
-    "output": ("name", "on"), "grip": ("number",), "wait": ("number",),
+    "output": ("name", "on"), "grip": ("number",), "pick": ("name", "target"), "wait": ("number",),
     "wait_for": ("name", "on", "number"), "speed": ("number",),
     "attach": ("name",), "detach": ("name",), "repeat": ("number",), "call": ("name",),
 }  # fmt: skip
@@ -37,7 +52,7 @@ LABELS = {  # of the fields "number" and "name", by kind
     "line": "number_tool_speed", "arc": "number_tool_speed", "grip": "number_opening",
     "wait": "number_seconds", "wait_for": "number_sensor",
     "speed": "number_percent", "repeat": "number_times", "output": "name_output", "attach": "name_object",
-    "detach": "name_object", "call": "name_program",
+    "detach": "name_object", "call": "name_program", "pick": "name_thing",
 }  # fmt: skip
 
 
@@ -62,7 +77,7 @@ class NewStep:
     def refresh(self) -> None:
         """Shows the fields of the kind, with the names that there are now."""
         kind, words = self._chosen_kind, self._kit.words
-        targets = self._targets()
+        targets = self._targets(kind)
         seen = (kind, targets, self._names(kind))
         if seen == self._seen:
             return
@@ -85,6 +100,7 @@ class NewStep:
         set_if_new(
             self._name, "label", words(LABELS[kind] if LABELS.get(kind, "").startswith("name") else "name_sensor")
         )
+        set_if_new(self._target, "label", words("name_place" if kind == "pick" else "target"))
         set_if_new(self._on, "label", words("above_limit" if kind == "wait_for" else "on"))
 
     def make(self) -> AnyStep:
@@ -96,6 +112,7 @@ class NewStep:
             "arc": lambda: self._with_goal(Arc(through=self._through_point(), tool_speed=max(0.0, number / 1000.0))),
             "output": lambda: Output(name=self._known(name), on=self._on.value),
             "grip": lambda: Grip(to=number / 1000.0),
+            "pick": lambda: Pick(thing=self._known(name), place=self._known(str(self._target.value))),
             "wait": lambda: Wait(time=number),
             "wait_for": lambda: WaitFor(sensor=self._known(name), **{"above" if self._on.value else "below": number}),
             "speed": lambda: Speed(share=number / 100.0),
@@ -110,7 +127,9 @@ class NewStep:
     def _chosen_kind(self) -> str:
         return self._titles[str(self._kind.value)]
 
-    def _targets(self) -> tuple[str, ...]:
+    def _targets(self, kind: str) -> tuple[str, ...]:
+        if kind == "pick":
+            return self._operator.picks.places
         return target_names(self._operator.teaching.points, self._operator.arm.states)
 
     def _names(self, kind: str) -> tuple[str, ...]:
@@ -122,6 +141,8 @@ class NewStep:
                 return tuple(sensor.name for sensor in arm.sensors)
             case "attach" | "detach":
                 return tuple(item.name for item in self._operator.bus.scene.objects)
+            case "pick":
+                return self._operator.picks.things
             case "call":
                 return tuple(name for name in teaching.programs if name != teaching.program.name)
         return ()

@@ -1,0 +1,28 @@
+"""Picking on the page: which thing, to which place, and how it goes; below the images of the cameras."""
+
+from __future__ import annotations
+
+from services.panel.view.kit import Kit, esc, note, set_if_new
+
+
+class PickBox:
+    """Of a cell with things and places."""
+
+    def __init__(self, kit: Kit) -> None:
+        self._kit, self._picks = kit, kit.operator.picks
+        words, picks = kit.words, kit.operator.picks
+        with kit.gui.add_folder(words("picking")):
+            self._thing = kit.gui.add_dropdown(words("name_thing"), picks.things)
+            self._place = kit.gui.add_dropdown(words("name_place"), picks.places)
+            kit.button(words("look"), picks.look, color="gray")
+            kit.button(words("pick_this"), self._pick, color="green", needs="move")
+            self._lines = kit.line()
+            kit.reasons(move=words("pick_this"))
+
+    def refresh(self) -> None:
+        """What was seen, or what the pick is at."""
+        set_if_new(self._lines, "content", note("<br>".join(esc(line) for line in self._picks.lines)))
+
+    def _pick(self) -> None:
+        self._kit.operator.forget_problem()
+        self._picks.pick(str(self._thing.value), str(self._place.value))
