@@ -150,6 +150,7 @@ class OnnxThing(ThingRecord, frozen=True, kw_only=True, tag_field="kind", tag="o
     label: Annotated[int, Meta(ge=0)]  # number of the class
     box: Edges  # [m] about
     threshold: Annotated[float, Meta(gt=0.0, lt=1.0)] = 0.5
+    input: Annotated[int, Meta(ge=32, le=4096)] = 640  # [px] edge of the square image that it was exported with
 
 
 Thing = TagThing | BoxThing | ColourThing | OnnxThing

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from schemas.camera import CameraInfo
-from schemas.cell import BoxThing, Colour, ColourThing, TagRecord, TagThing
+from schemas.cell import BoxThing, Colour, ColourThing, OnnxThing, TagRecord, TagThing
 from schemas.detections import Detection, DetectionKind, Detections
 from schemas.frames import Transform
 from services.arm.cell.cell_file import Cell, Tagged, height_of_frame
 from services.arm.cell.colours import RGB, nearest_colour
 from services.arm.frames.transforms import from_rpy
+from services.detector.user_models import Found, Standing, UserModel, standing
 from services.vision.boxes import BoxFit, ColourImage, colour_strength, coloured_regions, fit_box, raised
 from services.vision.camera_model import CameraModel, model_of
 from services.vision.rigid import Array, from_transform, inverse, to_transform
@@ -53,8 +55,14 @@ class View:
 class Detector:
     """Finds the things of one cell."""
 
-    def __init__(self, cell: Cell) -> None:
+    def __init__(self, cell: Cell, models: Mapping[Path, UserModel] | None = None) -> None:
+        """`models` by their files; things of others are not looked for."""
         self._cell = cell
+        self._modelled: dict[Path, list[OnnxThing]] = {}
+        for thing in cell.things:
+            if isinstance(thing, OnnxThing) and cell.path_of(thing.model) in (models or {}):
+                self._modelled.setdefault(cell.path_of(thing.model), []).append(thing)
+        self._models = models or {}
         self._tagged = {(each.family, each.id): each for each in cell.all_tags}
         self._coloured: dict[Colour, list[ColourThing]] = {}
         for thing in cell.things:
@@ -78,6 +86,7 @@ class Detector:
         items = [item for _, item in tags]
         if base_from_camera is not None and self._cell.table is not None:
             items += self._colours(view)
+            items += self._classes(view)
             items += self._standing_out(view, items)
         return Detections(stamp=stamp, camera=info.name, items=tuple(items), doubt=self._doubt(tags))
 
@@ -150,6 +159,20 @@ class Detector:
                     if best is not None:
                         yield self._box_item(view, *best, DetectionKind.COLOUR)
 
+    def _classes(self, view: View) -> Iterator[Detection]:
+        """What the models of users find, as boxes of the things' size on the table."""
+        assert self._cell.table is not None
+        plane = view.plane(self._cell.table)
+        assert plane is not None
+        for path, things in self._modelled.items():
+            found = self._models[path].look(view.image, min(thing.threshold for thing in things))
+            for thing in things:
+                for each in found:
+                    if each.label == thing.label and each.score >= thing.threshold:
+                        place = standing(each, view.model, plane, thing.box)
+                        if place is not None:
+                            yield _class_item(view, thing, each, plane, place)
+
     def _standing_out(self, view: View, found: Sequence[Detection]) -> Iterator[Detection]:
         """Boxes by nothing but that they have another colour than the table."""
         if not self._boxes:
@@ -195,6 +218,20 @@ class Detector:
             is_located=True,
             sigma=float(np.hypot(fit.sigma, view.mount_error)),
         )
+
+
+def _class_item(view: View, thing: OnnxThing, found: Found, plane: Array, place: Standing) -> Detection:
+    left, upper, right, lower = found.sides
+    pose = plane @ place.plane_from_box
+    return Detection(
+        name=thing.name,
+        kind=DetectionKind.ONNX,
+        corners=_rows(np.array([[left, upper], [right, upper], [right, lower], [left, lower]])),
+        camera_from_thing=to_transform(pose),
+        base_from_thing=_in_base(view, pose),
+        is_located=True,
+        sigma=float(np.hypot(place.sigma, view.mount_error)),
+    )
 
 
 def _name_of(record: Tagged) -> str:

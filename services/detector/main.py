@@ -26,6 +26,7 @@ from services.runtime.process.priority import step_behind
 
 if TYPE_CHECKING:
     from services.detector.core import Detector
+    from services.detector.user_models import UserModel
     from services.vision.rigid import Array
 
 RATE = 1.0  # [Hz] of its own step, which does nothing: images wake it
@@ -47,20 +48,32 @@ def run(node: Node, deployment: Deployment) -> None:
     cell = load_cell(Path(deployment.cell), arm) if deployment.cell else Cell(Path())
     if not cell.cameras:
         node.log.info("there is no camera in the cell: this process stands aside")
-    for thing in cell.things:
-        if isinstance(thing, OnnxThing):
-            node.log.warning('thing "%s": the models of users are not looked for yet; give it a tag', thing.name)
     if cell.cameras:
         import cv2
 
         from services.detector.core import Detector  # OpenCV: 60 MB that only a cell with cameras is worth
 
         cv2.setNumThreads(1)
+        models = read_models(cell, node.log.warning)
         places, parameters = Places(arm), node.parameters(DetectorParameters)
         node.subscribe(JOINT_STATES, places.on_joint_state)
         for camera in cell.cameras:
-            Watch(node, camera.name, Detector(cell), places, lambda: parameters.value.rate)
+            Watch(node, camera.name, Detector(cell, models), places, lambda: parameters.value.rate)
     node.spin(lambda now: node.set_ready(True), rate=RATE)
+
+
+def read_models(cell: Cell, warn: Callable[[str], object]) -> dict[Path, UserModel]:
+    """The models of the cell's things, each once; what cannot be read is said to `warn`, and not looked for."""
+    from services.detector.user_models import BadModel, UserModel
+
+    found: dict[Path, UserModel] = {}
+    for thing in cell.things:
+        if isinstance(thing, OnnxThing) and cell.path_of(thing.model) not in found:
+            try:
+                found[cell.path_of(thing.model)] = UserModel(cell.path_of(thing.model), thing.input)
+            except BadModel as error:
+                warn(f'thing "{thing.name}" is not looked for: {error}')
+    return found
 
 
 class Places:

@@ -1,0 +1,163 @@
+"""Models of users: ONNX files in a layout of YOLO, run by OpenCV on the processor.
+
+Layouts, told apart by their shape: (1, 4 + classes, n) of YOLOv8 and later, with centre and size of each box and a
+score for each class; (1, n, 5 + classes) of YOLOv5 and v7, with a score of its own for "something"; and (1, n, 6) with
+at most 1,000 boxes of models that suppress doubles themselves: two corners, score, class.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from services.vision.boxes import ColourImage, raised
+from services.vision.camera_model import CameraModel
+from services.vision.rigid import Array, apply
+from services.vision.tag_pose import flat, on_plane
+
+GREY = 114  # of the border around an image that is not square, as YOLO is trained
+SAME = 0.45  # overlap from which on two boxes of a class are one
+MOST_FINAL = 1_000  # boxes of a model that suppresses doubles itself
+PIXELS = 2.0  # [px] standard deviation of a side of a box; chosen
+LIKE_SIZE = (0.6, 1.6)  # of a found box's edges to those of the thing where it would stand
+TURNS = np.linspace(0.0, np.pi, 12, endpoint=False)  # [rad] that are tried
+ROUNDS = 4
+NUDGE = 1e-5  # [m] for differences
+CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0.0, 1.0)])
+
+
+class BadModel(ValueError):
+    """A file that is no such model; one sentence with the remedy."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A box in an image."""
+
+    label: int
+    score: float
+    sides: Array  # (4,) [px] left, upper, right, lower
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where a thing stands whose box in the image is known."""
+
+    plane_from_box: Array  # (4, 4) of the middle of the thing
+    sigma: float  # [m]
+
+
+class UserModel:
+    """One ONNX file; raises `BadModel` where it cannot be read, or answers an empty image as no YOLO does."""
+
+    def __init__(self, path: Path, size: int) -> None:
+        """`size` [px]: the edge of the square image that it takes."""
+        self._path, self._size = path, size
+        try:
+            self._net = cv2.dnn.readNetFromONNX(str(path))
+        except cv2.error as error:
+            raise BadModel(f"{path} cannot be read by OpenCV: {_first_line(error)}; export it with opset 12") from error
+        self.look(np.full((size, size, 3), GREY, dtype=np.uint8), 0.99)
+
+    def look(self, image: ColourImage, threshold: float) -> list[Found]:
+        """What is in `image` (h, w, 3; red first) with at least that score; raises `BadModel`."""
+        scale = self._size / max(image.shape[:2])
+        small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        square = np.full((self._size, self._size, 3), GREY, dtype=np.uint8)
+        square[: small.shape[0], : small.shape[1]] = small
+        try:
+            self._net.setInput(cv2.dnn.blobFromImage(square, 1.0 / 255.0))
+            said = np.asarray(self._net.forward(), dtype=np.float64)
+        except cv2.error as error:
+            raise BadModel(
+                f"{self._path} does not take images of {self._size} x {self._size} pixels ({_first_line(error)}): "
+                "write the size that it was exported with as `input` of the thing"
+            ) from error
+        sides, scores = self._boxes(said)
+        return _without_doubles((sides + 0.5) / scale - 0.5, scores, threshold)
+
+    def _boxes(self, said: Array) -> tuple[Array, Array]:
+        """(n, 4) sides [px of the square], and (n, classes) scores."""
+        table = said[0] if said.ndim == 3 and said.shape[0] == 1 else np.empty((0, 0))
+        rows, columns = table.shape
+        if columns == 6 and 0 < rows <= MOST_FINAL:
+            labels = np.clip(table[:, 5].astype(int), 0, None)
+            return table[:, :4], np.eye(int(labels.max()) + 1)[labels] * table[:, 4:5]
+        if 4 < rows < columns:
+            return _sides(table[:4].T), table[4:].T
+        if 5 < columns < rows:
+            return _sides(table[:, :4]), table[:, 5:] * table[:, 4:5]
+        raise BadModel(
+            f"{self._path} answers with numbers of shape {tuple(said.shape)}: a layout of YOLO is (1, 4 + classes, n), "
+            "(1, n, 5 + classes) or (1, n, 6)"
+        )
+
+
+def standing(found: Found, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Standing | None:
+    """Where on the plane a thing of edges `size` (3,) [m] stands that fills the box; None if none of that size does.
+
+    How it is turned is only known as far as the box's shape says it: a square one stands along the axes.
+    """
+    if found.sides[2] - found.sides[0] < 1.0 or found.sides[3] - found.sides[1] < 1.0:
+        return None
+    turns = TURNS[:1] if abs(size[0] - size[1]) < 1e-3 * max(size) else TURNS
+    fits = [_fit(found.sides, float(turn), model, camera_from_plane, size) for turn in turns]
+    error, values, slope = min(fits, key=lambda each: each[0])
+    sides = _projected(values, model, camera_from_plane, size)
+    shares = (found.sides[2:] - found.sides[:2]) / (sides[2:] - sides[:2])
+    if not np.isfinite(values).all() or shares.min() < LIKE_SIZE[0] or shares.max() > LIKE_SIZE[1]:
+        return None
+    covariance = np.linalg.inv(slope.T @ slope) * max(error, PIXELS) ** 2
+    pose = flat(values)
+    pose[2, 3] = size[2] / 2.0
+    return Standing(pose, float(np.sqrt(covariance[0, 0] + covariance[1, 1])))
+
+
+def _fit(
+    sides: Array, turn: float, model: CameraModel, camera_from_plane: Array, size: Sequence[float]
+) -> tuple[float, Array, Array]:
+    """RMS [px], x, y [m] and turn [rad], and how the sides (4,) move with x and y."""
+    middle = np.array([[(sides[0] + sides[2]) / 2.0, (sides[1] + sides[3]) / 2.0]])
+    seed = on_plane(model.rays(middle), raised(camera_from_plane, size[2] / 2.0))[0]
+    values = np.array([seed[0], seed[1], turn])
+    slope = np.zeros((4, 2))
+    for _ in range(ROUNDS):
+        here = _projected(values, model, camera_from_plane, size)
+        for axis in range(2):
+            ahead = values.copy()
+            ahead[axis] += NUDGE
+            slope[:, axis] = (_projected(ahead, model, camera_from_plane, size) - here) / NUDGE
+        values[:2] += np.linalg.lstsq(slope, sides - here, rcond=None)[0]
+    off = sides - _projected(values, model, camera_from_plane, size)
+    return float(np.sqrt(np.mean(off**2))), values, slope
+
+
+def _projected(values: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Array:
+    """(4,) [px] the box in the image around the thing."""
+    pixels = model.project(apply(camera_from_plane @ flat(values), CORNERS * np.asarray(size)))
+    return np.concatenate([pixels.min(axis=0), pixels.max(axis=0)])
+
+
+def _sides(boxes: Array) -> Array:
+    """From centres and sizes (n, 4)."""
+    return np.column_stack([boxes[:, :2] - boxes[:, 2:] / 2.0, boxes[:, :2] + boxes[:, 2:] / 2.0])
+
+
+def _without_doubles(sides: Array, scores: Array, threshold: float) -> list[Found]:
+    labels = scores.argmax(axis=1)
+    best = scores[np.arange(len(scores)), labels]
+    found = []
+    for label in np.unique(labels[best >= threshold]):
+        chosen = np.flatnonzero((labels == label) & (best >= threshold))
+        boxes = [(x, y, right - x, lower - y) for x, y, right, lower in sides[chosen].tolist()]
+        kept = np.asarray(cv2.dnn.NMSBoxes(boxes, best[chosen].tolist(), threshold, SAME), dtype=int).ravel()
+        found += [Found(int(label), float(best[chosen[index]]), sides[chosen[index]]) for index in kept]
+    return found
+
+
+def _first_line(error: cv2.error) -> str:
+    return str(error).strip().splitlines()[0][:120]
