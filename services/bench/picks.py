@@ -6,12 +6,11 @@ import math
 import os
 import random
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import gemelo
@@ -19,8 +18,9 @@ from schemas.cell import PosePlace
 from schemas.detections import Detections
 from schemas.topics import camera_truth
 from services.arm.cell.cell_file import load_cell
-from services.bench.figures import Figure, Goal, of_samples
+from services.bench.figures import Figure, Goal, NotMeasured, of_samples
 from services.runtime.deployment import project_root
+from services.runtime.topics import Latest
 from services.stack.stack import Stack
 
 PROCESSES = ("router", "broker", "virtual_esp32", "stepper_gateway", "state_publisher", "planner", "camera", "detector")
@@ -29,7 +29,7 @@ PLACES, POSTS = 5, 1
 APART = 0.06  # [m] between the middles of two places
 LET_GO = 0.03  # [m] above the table
 POST = (0.025, 0.025, 0.1)  # [m]
-TO_SETTLE = 1.5  # [s] after which the camera has told where things are now
+TO_TELL = 10.0  # [s] in which the camera tells where things are now, as it does every second
 FLOOR = {"rm1": 1.65e-3, "parol6": 0.2e-3}  # [m] the nearest full step of the joints, at its worst place
 MM = 1e3
 SEED = 1
@@ -128,9 +128,10 @@ def picks(robot: str, count: int, seed: int) -> tuple[Trial, ...]:
             off = None
             if not reason:
                 taken[thing] = place.name
-                time.sleep(TO_SETTLE)
+                ended = arm.node.now()
+                arm.wait_for(partial(_is_since, truth, ended), TO_TELL)
                 assert isinstance(place, PosePlace)
-                off = math.dist(_where(truth.message, thing), place.position[:2])
+                off = math.dist(_where(truth.message, ended, thing), place.position[:2])
             trials.append(Trial(thing, place.name, off, reason))
     return tuple(trials)
 
@@ -170,8 +171,13 @@ def _reason_of(arm: gemelo.Arm, thing: str, place: str, aside: str) -> str:
     return ""
 
 
-def _where(truth: Detections | None, thing: str) -> tuple[float, float]:
-    """(x, y) [m] where the virtual camera has the thing in truth."""
-    assert truth is not None
+def _is_since(truth: Latest[Detections], moment: int) -> bool:
+    return truth.message is not None and truth.message.stamp > moment
+
+
+def _where(truth: Detections | None, since: int, thing: str) -> tuple[float, float]:
+    """(x, y) [m] where the virtual camera has the thing in truth, told after `since` [ns] UNIX."""
+    if truth is None or truth.stamp <= since:
+        raise NotMeasured("the virtual camera does not tell where the things are")
     item = next(item for item in truth.items if item.name == thing)
     return item.base_from_thing.translation[0], item.base_from_thing.translation[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import resource
 import signal
@@ -21,6 +22,7 @@ Heal = Callable[[Site], None]
 
 READY = 20.0  # [s] after the heal in which every process is ready again: ARCHITECTURE.md's table, on a busy machine
 FEW, MANY = 20, 200  # frames
+SLIP = 0.05  # of a joint's travel, to either side
 
 
 def nothing(site: Site) -> None:
@@ -82,6 +84,16 @@ def injected(what: str, value: tuple[float, float] = (1.0, 1.0), on_joint: bool 
         return f"{what} {target} {amount:.3g}".replace("  ", " ")
 
     return begin
+
+
+def slipped(site: Site, random: Random) -> str:
+    """A shaft slips as far as something can push it: not beyond the ends of its joint."""
+    joint = random.choice(site.arm.description.joints)
+    at, travel = site.arm.joints[joint.name], min(joint.upper - joint.lower, math.tau)
+    to = joint.clamp(at + random.uniform(-SLIP, SLIP) * travel)
+    steps = round((to - at) * joint.steps.per_unit)
+    site.arm.device.inject("slip", joint.name, steps)
+    return f"slip {joint.name} {steps}"
 
 
 def released(what: str) -> Heal:
@@ -208,7 +220,7 @@ FAULTS: tuple[Fault, ...] = (
     Fault("e-stop", "pressed and released", injected("estop"), SHORT, released("estop"), trips=True, slips=True),
     Fault("blocked joint", "its shaft is held fast", injected("block", on_joint=True), SHORT, released("block"),
           slips=True),
-    Fault("slipping joint", "its shaft slips", injected("slip", (-400.0, 400.0), on_joint=True), slips=True),
+    Fault("slipping joint", "its shaft slips", slipped, slips=True),
     Fault("disk full", "the logger cannot write", disk_full, LONG, disk_freed, mutes=True),
     Fault("stop", "a person's stop", stopped),
     Fault("hold", "a person's hold, and go on", held, SHORT, resumed),
