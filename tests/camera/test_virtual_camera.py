@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from schemas.camera import CameraInfo
 from schemas.cell import VirtualSource
@@ -110,6 +111,25 @@ def test_jaws_that_close_beside_a_thing_do_not_hold_it(
         world.on_gripper_state(GripperState(known=True, position=opening))
     stand(world, arm, "left")
     assert world.snapshot().things["red_block"] == there
+
+
+@pytest.mark.parametrize(("turn", "side"), [(0.2, 0.026), (1.4, 0.034), (-1.7, 0.034), (3.0, 0.026)])
+def test_jaws_are_as_far_apart_as_the_side_that_is_between_them(arm: Arm, cell: Cell, turn: float, side: float) -> None:
+    """They close along the tool's y, on the longer side too."""
+    block = replace(next(each for each in cell.things if each.name == "red_block"), box=(0.034, 0.026, 0.03))
+    world = World(arm, Cell(cell.path, things=(block,), table=cell.table))
+    tool = stand(world, arm, "ready")[arm.tool_frame]
+    world.put("red_block", compose(tool, ((0.0, 0.0, 0.008), from_rpy(np.pi, 0.0, turn))))
+    assert arm.gripper is not None
+    for opening in (arm.gripper.open, side + 0.003, side):
+        world.on_gripper_state(GripperState(known=True, position=opening))
+    before = world.snapshot().things["red_block"]
+    stand(world, arm, "left")
+    assert world.snapshot().things["red_block"] != before
+    world.on_gripper_state(GripperState(known=True, position=side + 0.003))
+    fallen = world.snapshot().things["red_block"]
+    stand(world, arm, "ready")
+    assert world.snapshot().things["red_block"] == fallen
 
 
 def test_closed_jaws_that_come_upon_a_thing_do_not_hold_it(arm: Arm, cell: Cell, world: World) -> None:

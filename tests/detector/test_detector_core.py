@@ -186,6 +186,23 @@ def test_a_box_is_found_by_standing_out_from_the_table_and_is_no_tagged_or_colou
     assert off(item, table.truth()["wood"]) < OF_BOX
 
 
+@pytest.mark.parametrize("box", [(0.03, 0.026, 0.03), (0.026, 0.03, 0.03), (0.04, 0.02, 0.03), (0.03, 0.03, 0.03)])
+def test_a_block_is_found_however_it_is_turned(rm1: Arm, box: tuple[float, float, float]) -> None:
+    """Of nearly equal sides too: which is which must not be guessed from the region alone."""
+    random = np.random.default_rng(5)
+    cell = load_cell(rm1.folder / "cell.toml", rm1)
+    block = next(thing for thing in cell.things if thing.name == "red_block")
+    table = Table(rm1, changed(cell, things=(replace(block, box=box),), places=()))
+    table.world.on_joint_state(JointState(stamp=1, name=rm1.joint_names, position=rm1.named_states["folded"]))
+    for _ in range(12):
+        radius, angle, yaw = random.uniform(0.2, 0.34), random.uniform(-1.0, 1.0), random.uniform(-np.pi, np.pi)
+        place = (radius * np.cos(angle), radius * np.sin(angle), box[2] / 2.0)
+        table.world.put("red_block", (place, from_rpy(0.0, 0.0, yaw)))
+        found = {item.name: item for item in table.look().items}
+        assert "red_block" in found, (place, yaw)
+        assert off(found["red_block"], table.truth()["red_block"]) < OF_BOX
+
+
 def test_an_image_of_another_size_is_refused_with_both_sizes(rm1: Arm) -> None:
     table = Table(rm1)
     with pytest.raises(ValueError, match="its image is 320 x 240, not 640 x 480 pixels"):

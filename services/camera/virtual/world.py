@@ -48,6 +48,7 @@ class Held:
 
     name: str
     tool_from_thing: Rigid
+    width: float  # [m] of what is between the jaws
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +98,7 @@ class World:
         tool = self._link_poses()[self._arm.tool_frame]
         if self._held is None:
             self._held = self._caught(tool, before)
-        elif state.position > grasp_width(self._cell.thing(self._held.name)) + CAUGHT:
+        elif state.position > self._held.width + CAUGHT:
             released = compose(tool, self._held.tool_from_thing)
             self._things = {**self._things, self._held.name: self._fallen(self._held.name, released)}
             self._held = None
@@ -162,9 +163,10 @@ class World:
             x, y, z = compose(local, (thing.grasp_offset, IDENTITY[1]))[0]
             is_between = abs(x) <= along / 2.0 + ALONG_JAW and abs(y) <= self._arm.gripper.open / 2.0
             is_reached = -ALONG_JAW <= z <= beyond + ALONG_JAW
-            if is_between and is_reached and self._opening <= grasp_width(thing) + CAUGHT < before:
+            width = width_across(thing, local)
+            if is_between and is_reached and self._opening <= width + CAUGHT < before:
                 (px, py, pz), turn = local
-                return Held(name, ((px, py - y, pz), turn))
+                return Held(name, ((px, py - y, pz), turn), width)
         return None
 
     def _fallen(self, name: str, pose: Rigid) -> Rigid:
@@ -173,6 +175,15 @@ class World:
         ahead = rotate(pose[1], (1.0, 0.0, 0.0))
         position: Point = (pose[0][0], pose[0][1], (self._cell.table or 0.0) + height_of_frame(thing))
         return position, from_axis_angle((0.0, 0.0, 1.0), math.atan2(ahead[1], ahead[0]))
+
+
+def width_across(thing: Thing, tool_from_thing: Rigid) -> float:
+    """[m] between jaws that close along the tool's y: the side of the thing that is nearest to that way."""
+    if thing.grasp_width is not None or thing.box is None:
+        return grasp_width(thing)
+    along_x = abs(rotate(tool_from_thing[1], (1.0, 0.0, 0.0))[1])
+    along_y = abs(rotate(tool_from_thing[1], (0.0, 1.0, 0.0))[1])
+    return thing.box[0] if along_x > along_y else thing.box[1]
 
 
 def tag_pose(record: TagRecord, links: Mapping[str, Rigid]) -> Rigid:
