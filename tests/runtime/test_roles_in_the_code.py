@@ -19,7 +19,7 @@ from tests.runtime.support import ROOT
 VERBS = {
     "publisher": "publishes", "subscribe": "subscribes", "latest": "subscribes", "newest": "subscribes",
     "serve": "serves", "serve_later": "serves", "serve_action": "serves",
-    "call": "asks", "ask": "asks", "action": "asks",
+    "call": "asks", "ask": "asks", "action": "asks", "Feed": "subscribes",
 }  # fmt: skip
 OF_NOBODY = {DEVICE_CONFIGURE.key, DEVICE_INJECT.key}  # what `gemelo` can ask and a script may not
 FOLDERS = (
@@ -35,12 +35,13 @@ def uses(folder: Path) -> Iterator[tuple[str, str]]:
     for file in folder.rglob("*.py"):
         for call in (each for each in ast.walk(ast.parse(file.read_text("utf-8"))) if isinstance(each, ast.Call)):
             named = call.args[0] if call.args else None
-            if isinstance(call.func, ast.Attribute) and call.func.attr in VERBS and isinstance(named, ast.Name):
+            verb = VERBS.get(getattr(call.func, "attr", getattr(call.func, "id", "")))
+            if verb is not None and isinstance(named, ast.Name):
                 row = getattr(topics, named.id, None)
                 if isinstance(row, Action):
-                    yield VERBS[call.func.attr], goal_request(row).key
+                    yield verb, goal_request(row).key
                 elif isinstance(row, Topic | Request):
-                    yield VERBS[call.func.attr], row.key
+                    yield verb, row.key
 
 
 @pytest.mark.parametrize(("folder", "name", "least"), FOLDERS)
