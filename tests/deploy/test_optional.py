@@ -51,6 +51,16 @@ def test_where_all_is_here_nothing_is_said(bare: Path):
     assert not {"git", "mosquitto", "qemu-system-misc"} & set(said(bare, "packages").stdout.split())
 
 
+@pytest.mark.parametrize(("user", "is_named"), [(1000, True), (0, False)])
+def test_what_only_root_can_run_is_in_the_same_line(bare: Path, user: int, is_named: bool):
+    (bare / "id").write_text(f"#!/bin/sh\necho {user}\n")
+    (bare / "id").chmod(0o755)
+    told = said(bare).stdout
+    assert len(told.splitlines()) == 1
+    assert ("sudo .venv/bin/pytest tests/stack/test_hosts.py" in told) is is_named
+    assert told.partition("sudo apt-get install ")[2].split() == said(bare, "packages").stdout.split()
+
+
 @pytest.mark.parametrize(
     ("environment", "outcome"), [({}, pytest.skip.Exception), ({"CI": "true"}, pytest.fail.Exception)]
 )
