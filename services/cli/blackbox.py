@@ -24,11 +24,11 @@ def list_options(parser: Parser) -> None:
 
 def run_list(options: Options) -> ExitCode:
     """Prints the saved black boxes, the newest first."""
-    found = _found()
+    folder, found = _found()
     if options.json:
         print(msgspec.json.encode(found).decode())
     elif not found:
-        print(f"no black box in {_folder()}: nothing has happened yet")
+        print(f"no black box in {folder}: nothing has happened yet")
     else:
         rows = [
             (str(number), time_of(each.incident.stamp), str(each.incident.kind), _clause(each.incident))
@@ -85,21 +85,20 @@ def _chosen(which: str) -> tuple[Path, Incident]:
     if not which.isdecimal():
         with one_sentence():
             return Path(which), read_incident(Path(which))
-    found = _found()
+    folder, found = _found()
     if not found:
-        raise CommandError(f"no black box in {_folder()}: nothing has happened yet")
+        raise CommandError(f"no black box in {folder}: nothing has happened yet")
     if not 1 <= int(which) <= len(found):
         raise CommandError(f"there is no black box {which}: there are 1 to {len(found)}, `gemelo blackbox list`")
     chosen = found[int(which) - 1]
     return Path(chosen.path), chosen.incident
 
 
-def _found() -> list[BlackBoxFile]:
-    return black_boxes(_folder(), load_robot().description.name)
-
-
-def _folder() -> Path:
-    return project_root() / load_robot().deployment.paths.out / FOLDER
+def _found() -> tuple[Path, list[BlackBoxFile]]:
+    """The folder, and what is in it of the deployment's robot."""
+    robot = load_robot()
+    folder = project_root() / robot.deployment.paths.out / FOLDER
+    return folder, black_boxes(folder, robot.description.name)
 
 
 def _clause(incident: Incident) -> str:

@@ -14,6 +14,7 @@ import msgspec
 from schemas.camera import CameraImage, CameraInfo
 from schemas.message import Message, Vector
 from schemas.topics import LATCHED, LATEST, Delivery, Topic, camera_image, camera_info
+from services.recordings.foxglove import CAMERA, IMAGE
 from services.runtime.node import Node
 
 PERIOD_SLACK = 0.2  # of the time between two images: one that comes so much early counts as on time
@@ -87,9 +88,9 @@ class CameraRecorder:
     """One camera's messages, thinned to a rate and as Foxglove has them."""
 
     def __init__(self, camera: str) -> None:
-        key = f"foxglove/camera/{camera}"
+        key = CAMERA.format(camera)
         self._frame = f"camera_{camera}"
-        self._image = _topic(f"{key}/image", CompressedImage, LATEST, "a few of its images a second")
+        self._image = _topic(f"{key}/{IMAGE}", CompressedImage, LATEST, "a few of its images a second")
         self._lens = _topic(f"{key}/calibration", CameraCalibration, LATCHED, "its lens")
         self._pose = _topic(f"{key}/frame", CameraFrame, LATCHED, "where it is")
         self._due = 0  # [ns] the stamp from which on the next image is recorded

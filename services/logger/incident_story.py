@@ -33,6 +33,7 @@ LATELY = 4  # happenings within which the same is not told again
 TOLD_ELSEWHERE = ("goal ", BLACK_BOX)  # beginnings of lines of the log
 SMALL = 4  # fields of a message that is told whole
 NOTHING = ("", (), None)
+UNTOLD = frozenset({"stamp", "request_id"})  # fields of a message that tell a person nothing
 MANY = 8  # elements of a list that are written out
 QUIET = frozenset({"state_validity", "ik", "fk", "device/echo"})  # questions that change nothing
 GOALS = tuple(keys.goal_request(action).key for action in (FOLLOW_JOINT_TRAJECTORY, GRIPPER_COMMAND))
@@ -126,7 +127,7 @@ def brief(value: object) -> str:
         is_small = len(fields) <= SMALL
         said = {name: getattr(value, name) for name in fields}
         said = {name: item for name, item in said.items() if item not in NOTHING and (is_small or item != fields[name])}
-        named = ", ".join(f"{name} {brief(item)}" for name, item in said.items() if name != "stamp")
+        named = ", ".join(f"{name} {brief(item)}" for name, item in said.items() if name not in UNTOLD)
         tag = type(value).__struct_config__.tag
         return " ".join(part for part in (str(tag) if tag else "", f"({named})" if tag and named else named) if part)
     if isinstance(value, float):

@@ -14,6 +14,7 @@ from services.recordings.foxglove_shapes import Drawn, drawn_links, drawn_object
 
 FRAMES, STATIC_FRAMES, LOG = "foxglove/frames", "foxglove/static_frames", "foxglove/log"
 SCENE, ARM = "foxglove/scene", "foxglove/arm"
+CAMERA, IMAGE = "foxglove/camera/{}", "image"  # of one camera, by its name; its images
 KINDS: dict[str, type[fox.Record]] = {
     FRAMES: fox.FrameTransforms, STATIC_FRAMES: fox.FrameTransforms, LOG: fox.Log,
     SCENE: fox.SceneUpdate, ARM: fox.SceneUpdate,

@@ -56,14 +56,19 @@ def incident_metadata(incident: Incident) -> dict[str, dict[str, str]]:
 
 def read_incident(path: Path) -> Incident:
     """What a black box tells of itself; raises `BadRecording` where the file is none."""
-    reader = RecordingReader(path)
-    text = reader.read_metadata().get(INCIDENT, {}).get("json", "")
-    if not text:
+    incident = incident_in(RecordingReader(path))
+    if incident is None:
         raise BadRecording(f'"{path}" is a recording, but no black box: `gemelo bag info` says what is in it')
+    return incident
+
+
+def incident_in(reader: RecordingReader) -> Incident | None:
+    """The incident of a recording, if it is a black box; raises `BadRecording` where it cannot be read."""
+    text = reader.read_metadata().get(INCIDENT, {}).get("json", "")
     try:
-        return msgspec.json.decode(text, type=Incident)
+        return msgspec.json.decode(text, type=Incident) if text else None
     except (msgspec.DecodeError, msgspec.ValidationError) as error:
-        raise BadRecording(f'"{path}": its incident cannot be read ({error})') from error
+        raise BadRecording(f'"{reader.path}": its incident cannot be read ({error})') from error
 
 
 def black_boxes(folder: Path, robot: str) -> list[BlackBoxFile]:

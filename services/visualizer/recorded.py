@@ -25,7 +25,8 @@ from schemas.scene import MeshShape
 from schemas.topics import DESCRIPTION
 from services.arm.errors import DescriptionError
 from services.arm.model.description import load_arm
-from services.recordings.incidents import Incident, read_incident
+from services.recordings.foxglove import CAMERA, IMAGE
+from services.recordings.incidents import Incident, incident_in
 from services.recordings.reader import BadRecording, RecordingReader, Row
 from services.recordings.shadow import recorded_robot, shadow_folder, write_shadow
 from services.runtime.deployment import DeploymentError, load_deployment, project_root
@@ -43,7 +44,6 @@ from services.visualizer.viewer import address, resolved
 BATCH = 100_000_000  # [ns] of the recording that are drawn together, as live
 WINDOW = 10.0  # [s] of the plots, and of the tool's way
 PERIOD = 0.5  # [s] between two looks at the viewer
-IMAGE = "foxglove/camera/{}/image"
 
 
 def write_view(file: Path, rrd: Path, shadow: Path) -> Incident | None:
@@ -54,7 +54,7 @@ def write_view(file: Path, rrd: Path, shadow: Path) -> Incident | None:
     reader = RecordingReader(file)
     robot = recorded_robot(reader)
     write_shadow(reader, shadow, robot, project_root() / "urdf" / robot)
-    incident = _incident_in(file)
+    incident = incident_in(reader)
     description = _description_in(reader)
     cameras = _cameras_in(reader)
     folders = (shadow, project_root())
@@ -90,13 +90,6 @@ def _cell(text: str) -> str:
     return text.replace("|", "\\|")
 
 
-def _incident_in(file: Path) -> Incident | None:
-    try:
-        return read_incident(file)
-    except BadRecording:
-        return None
-
-
 def _description_in(reader: RecordingReader) -> RobotDescription:
     for row in reader.rows(DESCRIPTION.key.__eq__):
         return msgspec.json.decode(row.message.data, type=RobotDescription)
@@ -105,7 +98,7 @@ def _description_in(reader: RecordingReader) -> RobotDescription:
 
 def _cameras_in(reader: RecordingReader) -> tuple[str, ...]:
     """Those of which there are images."""
-    before, _, after = IMAGE.partition("{}")
+    before, _, after = f"{CAMERA}/{IMAGE}".partition("{}")
     topics = {row.channel.topic for row in reader.rows(lambda topic: topic.startswith(before))}
     return tuple(sorted(topic[len(before) : -len(after)] for topic in topics if topic.endswith(after)))
 
@@ -125,7 +118,7 @@ def _takers(core: Visualizer, folder: Path, cameras: tuple[str, ...]) -> dict[st
     for topic, take, _ in feeds(core, load_arm(folder), cameras):
         found[topic.key] = _decoding(topic.message, take)
     for name in cameras:
-        found[IMAGE.format(name)] = _decoding_image(name, core.cameras.on_image)
+        found[f"{CAMERA}/{IMAGE}".format(name)] = _decoding_image(name, core.cameras.on_image)
     return found
 
 

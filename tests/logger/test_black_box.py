@@ -123,7 +123,11 @@ def rig() -> Rig:
 def test_an_emergency_stop_in_the_middle_of_a_goal_is_told_with_what_led_to_it_and_what_followed(rig):
     rig.say(DESCRIPTION, describe(load_arm(ROOT / "urdf/rm1")))
     rig.state(DeviceMode.IDLE)
-    rig.exchange(PLAN, PlanRequest(goal=NamedGoal(name="left")), PlanResponse(code=PlanCode.SUCCESS, duration=4.1))
+    rig.exchange(
+        PLAN,
+        PlanRequest(goal=NamedGoal(name="left"), request_id="41839bcedab5"),
+        PlanResponse(code=PlanCode.SUCCESS, duration=4.1),
+    )
     rig.wait(1.0)
     rig.goal("4a682f77aa")
     rig.state(DeviceMode.RUN, buffered=0.31, round_trip=0.004)
