@@ -83,8 +83,8 @@ class Hand:
         """Plans and goes there."""
         self._follow(self.arm.plan(joints=joints))
 
-    def rise(self, height: float) -> None:
-        """Straight up, or down where `height` [m] is negative."""
+    def go_straight(self, height: float) -> None:
+        """Up by `height` [m], or down where that is negative."""
         self._follow(self.arm.plan(offset=(0.0, 0.0, height), line=True, tool_speed=SLOW))
 
     def grip(self, to: Grip) -> Gripped:
@@ -255,11 +255,11 @@ def _take(hand: Hand, thing: Thing, seen: Seen, way: Way) -> bool:
     hand.tell("above it")
     hand.move(way.above)
     with _touching(hand.arm, thing.name):
-        hand.rise(-APPROACH)
+        hand.go_straight(-APPROACH)
         _turn_with_the_jaws(hand.arm, thing, seen, way)
         gripped = hand.grip("close")
         hand.tell(f"gripper: {gripped}")
-        hand.rise(APPROACH)
+        hand.go_straight(APPROACH)
     if gripped.held != thing.name:
         hand.grip("open")
         return False
@@ -283,9 +283,9 @@ def _put(hand: Hand, name: str, release: Mapping[str, float]) -> None:
         hand.tell("carrying it")
         hand.move(release)
         with _touching(hand.arm, name):
-            hand.rise(-APPROACH)
+            hand.go_straight(-APPROACH)
             hand.tell(f"gripper: {hand.grip('open')}")
-            hand.rise(APPROACH)
+            hand.go_straight(APPROACH)
     except (Refused, Canceled) as error:
         held = hand.arm.scene.objects.get(name)
         if held is None or not held.attached:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 import gemelo
+from gemelo.targets import FULL
 from services.cli.camera_images import Subject, subject
 from services.cli.errors import CommandError, ExitCode, in_commands, usage
 from services.cli.parser import Options, Parser, positive_integer
@@ -31,7 +32,6 @@ REMEDIES = {
     Cause.ARM: "`gemelo verify`; play in the gears; the length of what points (`--tip`)",
 }
 DOWN = (0.0, 0.0, -1.0)
-FULL = 6  # joints that can hold the tool straight
 
 
 class Pointing(NamedTuple):

@@ -14,9 +14,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from services.vision.boxes import ColourImage, raised
+from services.vision.boxes import ColourImage, project_box, raised
 from services.vision.camera_model import CameraModel
-from services.vision.rigid import Array, apply
+from services.vision.rigid import Array
 from services.vision.tag_pose import flat, on_plane
 
 GREY = 114  # of the border around an image that is not square, as YOLO is trained
@@ -27,7 +27,6 @@ LIKE_SIZE = (0.6, 1.6)  # of a found box's edges to those of the thing where it 
 TURNS = np.linspace(0.0, np.pi, 12, endpoint=False)  # [rad] that are tried
 ROUNDS = 4
 NUDGE = 1e-5  # [m] for differences
-CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0.0, 1.0)])
 
 
 class BadModel(ValueError):
@@ -138,7 +137,7 @@ def _fit(
 
 def _projected(values: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Array:
     """(4,) [px] the box in the image around the thing."""
-    pixels = model.project(apply(camera_from_plane @ flat(values), CORNERS * np.asarray(size)))
+    pixels = project_box(values, model, camera_from_plane, size)
     return np.concatenate([pixels.min(axis=0), pixels.max(axis=0)])
 
 

@@ -152,14 +152,14 @@ def _seed(region: NDArray[np.bool_], model: CameraModel, camera_from_plane: Arra
     return np.array([x / 1000.0, y / 1000.0, turned])
 
 
-def _project(values: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Array:
+def project_box(values: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Array:
     """The pixels (8, 2) of the box's corners."""
     return model.project(apply(camera_from_plane @ flat(values), CORNERS * np.asarray(size)))
 
 
 def _outline(values: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> tuple[Array, Index]:
     """The pixels (8, 2) of the corners, and which of them are the outline, clockwise in the image."""
-    corners = _project(values, model, camera_from_plane, size)
+    corners = project_box(values, model, camera_from_plane, size)
     ring = cv2.convexHull(corners.astype(np.float32), clockwise=True, returnPoints=False)[:, 0].astype(np.intp)
     area = cv2.contourArea(corners[ring].astype(np.float32), oriented=True)
     return corners, ring if area > 0.0 else ring[::-1]
@@ -171,8 +171,8 @@ def _slopes(
     """(3, edges, m, 2): how the points at `shares` (m,) of the outline's edges move with x, y and turn."""
     moves = []
     for nudge, length in zip(NUDGES, np.diag(NUDGES), strict=True):
-        ahead = _project(values + nudge, model, camera_from_plane, size)
-        behind = _project(values - nudge, model, camera_from_plane, size)
+        ahead = project_box(values + nudge, model, camera_from_plane, size)
+        behind = project_box(values - nudge, model, camera_from_plane, size)
         by = (ahead - behind) / (2.0 * length)
         starts, ends = by[ring], by[np.roll(ring, -1)]
         moves.append(starts[:, None] + shares[:, None] * (ends - starts)[:, None])
