@@ -52,6 +52,8 @@ def run(deployment: Deployment, log: logging.Logger) -> int:
         readiness.ready()
         readiness.beat()
 
+    if section.broker is Broker.MOSQUITTO:
+        mosquitto.find()  # raises where it is not installed
     log.info("%s listens on %s port %d%s", section.broker, host, port, " with TLS" if section.secure_folder else "")
     if section.broker is Broker.MOSQUITTO:
         return mosquitto.serve(section, folder, beat, readiness.not_ready)

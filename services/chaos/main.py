@@ -26,7 +26,7 @@ from services.chaos.faults import FAULTS, Fault
 from services.chaos.invariants import missing_records
 from services.chaos.options import add_chaos_options
 from services.chaos.report import Report, page_of, text_of
-from services.chaos.site import Site
+from services.chaos.site import Site, installed_broker
 from services.runtime.deployment import load_deployment
 from services.stack.stack import StackError
 
@@ -48,8 +48,9 @@ def main() -> None:
     wanted = order(seed, faults)
     if options.episode is not None:
         wanted = itertools.islice(wanted, options.episode, options.episode + 1)
+    broker = options.broker or installed_broker()
     try:
-        sys.exit(0 if run(wanted, seed, options.minutes * 60.0, options.broker, options.out.resolve()) else 1)
+        sys.exit(0 if run(wanted, seed, options.minutes * 60.0, broker, options.out.resolve()) else 1)
     except StackError as error:
         sys.exit(f"chaos: {error}")
 

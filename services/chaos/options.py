@@ -6,6 +6,7 @@ from argparse import ArgumentParser
 from pathlib import Path
 
 BROKERS = ("amqtt", "mosquitto")
+BROKER_HELP = "[mosquitto where it is installed, else amqtt]"
 
 
 def add_chaos_options(parser: ArgumentParser) -> None:
@@ -14,7 +15,7 @@ def add_chaos_options(parser: ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=None, help="of the order and of all chance; else a new one")
     parser.add_argument("--episode", type=int, default=None, metavar="N", help="only this one of the seed")
     parser.add_argument("--only", nargs="+", default=[], metavar="FAULT", help="only faults whose names contain this")
-    parser.add_argument("--broker", choices=BROKERS, default="mosquitto")
+    parser.add_argument("--broker", choices=BROKERS, default=None, help=BROKER_HELP)
     parser.add_argument("--out", type=Path, default=Path("out/chaos"), help="folder of the results")
     parser.add_argument("--list", action="store_true", help="what there is")
 
@@ -23,5 +24,5 @@ def add_soak_options(parser: ArgumentParser) -> None:
     """How long, and which moves."""
     parser.add_argument("--hours", type=float, default=1.0, help="how long")
     parser.add_argument("--seed", type=int, default=1, help="of the moves")
-    parser.add_argument("--broker", choices=BROKERS, default="mosquitto")
+    parser.add_argument("--broker", choices=BROKERS, default=None, help=BROKER_HELP)
     parser.add_argument("--out", type=Path, default=Path("out/soak"), help="folder of the results")

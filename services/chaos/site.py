@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from random import Random
 from types import TracebackType
@@ -15,6 +15,7 @@ from paho.mqtt.enums import CallbackAPIVersion
 import gemelo
 from schemas.deployment import RouterSection
 from schemas.topics import ACTIONS, TOPICS, Delivery
+from services.broker import mosquitto
 from services.chaos.slow_link import SlowLink
 from services.runtime.actions.keys import feedback_topic, status_topic
 from services.runtime.bus.zenoh_bus import ZenohBus
@@ -22,6 +23,14 @@ from services.stack.stack import Stack, free_ports
 
 KEPT = 200  # frames of the wire that can be said again
 TO_CONNECT = 30.0  # [s] for the arm to be there
+
+
+def installed_broker() -> str:
+    """mosquitto, or amqtt where mosquitto is not installed."""
+    with suppress(mosquitto.NotInstalled):
+        mosquitto.find()
+        return "mosquitto"
+    return "amqtt"
 
 
 class Site:

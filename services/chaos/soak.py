@@ -23,11 +23,12 @@ import gemelo
 from schemas.deployment import DeviceKind
 from services.chaos.options import add_soak_options
 from services.chaos.person import Person
-from services.chaos.site import Site
+from services.chaos.site import Site, installed_broker
 from services.runtime.deployment import load_deployment
 from services.stack.stack import StackError
 
 EVERY = 5.0  # [s] between two samples
+TOLD_EVERY = 300.0  # [s] between two lines about how far it is
 WARM_UP = 0.25  # of the time: caches fill, allocators settle
 STEEPEST = 1.0  # [MB/h] of resident memory
 FEW = 4  # files, sockets or threads that come and go
@@ -68,8 +69,9 @@ def main() -> None:
         sys.exit(f"soak: --hours {options.hours}: it must be above 0")
     if load_deployment().device is DeviceKind.BOARD:
         sys.exit('soak: this deployment drives a real board (device = "board"): soak is for virtual devices only')
+    broker = options.broker or installed_broker()
     try:
-        sys.exit(0 if run(options.hours * HOUR, options.seed, options.broker, options.out.resolve()) else 1)
+        sys.exit(0 if run(options.hours * HOUR, options.seed, broker, options.out.resolve()) else 1)
     except StackError as error:
         sys.exit(f"soak: {error}")
 
@@ -81,7 +83,7 @@ def run(seconds: float, seed: int, broker: str, out: Path) -> bool:
     random, samples, failures, moves = Random(seed), dict[str, list[Sample]](), list[str](), 0
     with Site(out, broker, seed) as site:
         person, begun = Person(site.arm), time.monotonic()
-        due = begun
+        due, told = begun, begun + TOLD_EVERY
         while (now := time.monotonic()) < begun + seconds:
             try:
                 motion = person.start(random)
@@ -95,12 +97,21 @@ def run(seconds: float, seed: int, broker: str, out: Path) -> bool:
                 for name, pid in site.stack.pids().items():
                     with suppress(psutil.Error):
                         samples.setdefault(name, []).append(sample_of(pid, now - begun))
+            if now >= told:
+                told = now + TOLD_EVERY
+                print(progress(now - begun, seconds, moves, len(failures), samples), flush=True)
     growths = [growth_of(name, kept) for name, kept in sorted(samples.items())]
     found = [word for growth in growths for word in complaints(growth, len(samples[growth.process]))] + failures
     report = {"seconds": seconds, "moves": moves, "processes": growths, "violations": found, "samples": samples}
     (out / "report.json").write_bytes(msgspec.json.encode(report) + b"\n")
     print(text_of(growths, moves, found))
     return not found
+
+
+def progress(elapsed: float, seconds: float, moves: int, failed: int, samples: Mapping[str, Sequence[Sample]]) -> str:
+    """One line of a soak that goes on; `elapsed` of `seconds` [s]."""
+    memory = sum(of_one[-1].memory for of_one in samples.values())
+    return f"{elapsed / 60.0:.0f} of {seconds / 60.0:.0f} min: {moves} moves, {failed} failed, {memory:.0f} MB in all"
 
 
 def sample_of(pid: int, at: float) -> Sample:
