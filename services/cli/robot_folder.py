@@ -110,14 +110,18 @@ def run_fit(options: Options) -> ExitCode:
 
 
 def matrix_options(parser: Parser) -> None:
-    """Adds folder and --write."""
+    """Adds folder, --always-within and --write."""
     folder_option(parser)
+    parser.add_argument(
+        "--always-within", type=positive_length, default=None, metavar="LENGTH",
+        help="links that are never farther apart are excused [the robot's clearance]; more where shapes are coarse",
+    )  # fmt: skip
     parser.add_argument("--write", action="store_true", help="change the SRDF; its comments stay")
 
 
 def run_matrix(options: Options) -> ExitCode:
     """Prints and writes the pairs."""
-    return print_matrix(options.folder, options.write)
+    return print_matrix(options.folder, options.write, options.always_within)
 
 
 def spheres(folder: Path, bulge: float) -> ExitCode:
@@ -138,8 +142,8 @@ def _fitted(folder: Path, *options: str) -> ExitCode:
     return ExitCode.OK if ended.returncode == 0 else ExitCode.FAILED
 
 
-def print_matrix(folder: Path, write: bool) -> ExitCode:
-    """Prints the pairs that sampling finds and the changes of the SRDF; changes it if `write`."""
+def print_matrix(folder: Path, write: bool, always_within: float | None) -> ExitCode:
+    """Prints the pairs that sampling finds and the changes of the SRDF; changes it if `write`. `always_within` [m]."""
     from services.arm.kinematics.collision_matrix import collision_matrix
     from services.arm.model.description import load_arm
     from services.arm.model.srdf_edit import with_pairs
@@ -149,7 +153,7 @@ def print_matrix(folder: Path, write: bool) -> ExitCode:
         text = arm.srdf_path.read_text(encoding="utf-8")
     except (ValueError, OSError) as error:
         raise usage(str(error)) from error
-    verdicts = collision_matrix(arm, tell=lambda said: print(said, file=sys.stderr, flush=True))
+    verdicts = collision_matrix(arm, tell=_say, always_within=always_within)
     wanted, lines = plan_of(text, verdicts)
     print(listing(verdicts))
     changed = with_pairs(text, wanted)
@@ -159,6 +163,10 @@ def print_matrix(folder: Path, write: bool) -> ExitCode:
     elif lines:
         print("nothing is written: give --write for that")
     return ExitCode.OK
+
+
+def _say(progress: str) -> None:
+    print(progress, file=sys.stderr, flush=True)
 
 
 def plan_of(text: str, verdicts: list[LinkPairData]) -> tuple[dict[tuple[str, str], str], list[str]]:

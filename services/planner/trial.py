@@ -10,7 +10,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 import msgspec
@@ -22,7 +22,9 @@ from schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse
 from services.arm.checks.findings import Finding, error, warning
 from services.arm.kinematics.self_collisions import LinkPair
 from services.arm.model.description import Arm, load_arm
+from services.arm.model.urdf import JointKind
 from services.planner.core import Planner
+from services.planner.native import assembly
 from services.planner.request.deadline import Deadline
 
 Array = NDArray[np.float64]
@@ -31,10 +33,14 @@ Array = NDArray[np.float64]
 CONFIGURATIONS = 300
 PLANS = 30
 SEED = 0
+MOST_TURNED = 3  # joints, one after the other
+TURN = 2.0 * np.pi  # [rad]
 SECONDS = 4.0  # for all of it, once the planner is ready: what has not begun by then is left out
 ALLOWED = 2.0  # [s] for one plan
+FEWEST = 5  # plans that are tried however long they take, and that must all fail for the robot to be called unfit
 LEAST_FREE = 0.01  # share of the configurations: with less, plans have nowhere to go
 OFTEN = 0.5  # of how often the most frequent pair is near: rarer ones are not named
+UNCONNECTED = "nothing, where no path can be: the limits may leave two free regions, as on both sides of the base"
 MOST_NAMED = 3  # findings about pairs, and about plans
 
 
@@ -113,25 +119,55 @@ def _nowhere_free(arm: Arm, near: dict[LinkPair, list[float]], count: int) -> li
 
 
 def _plans(planner: Planner, free: list[Array], deadline: Deadline) -> Iterator[Finding]:
-    """One finding for each reason that plans between free configurations fail for, the most frequent first."""
+    """One finding for each reason that plans between free configurations fail for, the most frequent first.
+
+    They are errors where every plan fails: two free configurations need not have a path between them.
+    """
     failed: Counter[str] = Counter()
     said: dict[str, str] = {}
     tried = 0
     for start, goal in list(pairwise(free))[:PLANS]:
-        if tried and deadline.has_passed():
+        if tried >= FEWEST and deadline.has_passed():
             break
         tried += 1
         response = _planned(planner, start, goal)
         if response.code is not PlanCode.SUCCESS and response.refusal is not None:
             failed[response.refusal.subject] += 1
             said.setdefault(response.refusal.subject, f"{response.refusal.message} -> {response.refusal.remedy}")
-    severe = error if 2 * sum(failed.values()) > tried else warning
+    severe = error if sum(failed.values()) == tried >= FEWEST else warning
     for subject, times in failed.most_common(MOST_NAMED):
         message = f"{times} of {tried} plans between free configurations fail: {said[subject]}"
-        yield severe(planner.arm.urdf_path.name, f"plans, {subject or 'any'}", message)
+        remedy = "" if severe is error else UNCONNECTED
+        yield severe(planner.arm.urdf_path.name, f"plans, {subject or 'any'}", message, remedy)
+
+
+def looking_the_same(arm: Arm, start: Array, goal: Array) -> Iterator[Array]:
+    """(n,) configurations within the limits that look as `goal`: each joint within half a turn of `start` [rad], then
+    one joint after the other from the base on turned the other way round.
+
+    A shoulder that may turn twice can often reach a place on one side of its base only.
+    """
+    lower, upper = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
+    may_turn = np.array([arm.model.joint(name).kind is not JointKind.PRISMATIC for name in arm.joint_names])
+
+    def inside(wanted: Array, otherwise: Array) -> Array:
+        return np.where(may_turn & (wanted >= lower) & (wanted <= upper), wanted, otherwise)
+
+    nearest = inside(start + np.mod(goal - start + np.pi, TURN) - np.pi, goal)
+    yield nearest
+    others = inside(nearest - TURN * np.sign(nearest - start), nearest)
+    for joint in np.flatnonzero(others != nearest)[:MOST_TURNED]:
+        yield np.where(np.arange(len(goal)) == joint, others, nearest)
 
 
 def _planned(planner: Planner, start: Array, goal: Array) -> PlanResponse:
+    """The first plan to `goal` [rad] or [m], or to what looks the same, that succeeds; else the first refusal."""
+    responses = (_planned_to(planner, start, each) for each in looking_the_same(planner.arm, start, goal))
+    first = next(responses)
+    return next((each for each in chain((first,), responses) if each.code is PlanCode.SUCCESS), first)
+
+
+def _planned_to(planner: Planner, start: Array, goal: Array) -> PlanResponse:
     names = planner.arm.joint_names
     request = PlanRequest(
         start=JointState(name=names, position=tuple(start.tolist())),
@@ -148,6 +184,7 @@ def _mm(distance: float) -> str:
 def main() -> None:
     """Prints the findings."""
     logging.basicConfig(format="%(message)s", level=logging.INFO)  # to the standard error: how large models are made
+    logging.getLogger(assembly.__name__).addFilter(lambda record: record.levelno < logging.WARNING)  # findings say it
     for finding in trial(load_arm(Path(sys.argv[1]))):
         print(msgspec.json.encode(finding).decode())
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from services.arm.checks.check import check
@@ -55,8 +55,9 @@ def import_robot(options: ImportOptions) -> Path:
         write_robot(building, description)
         (building / ANSWERS_FILE).write_text(answers_text(questions.answers), encoding="utf-8")
         with step("gemelo check, with plans between random configurations"):
-            _require_well(check(building))
-            _require_well(trial_findings(building))
+            known = {(each.subject, each.message) for each in description.mended.findings()}
+            _require_well([each for each in check(building) if (each.subject, each.message) not in known])
+            _require_well([_in_folder(each, building, folder) for each in trial_findings(building)])
     arm = load_arm(folder)
     print("\n".join(speed_lines(arm) if arm.has_motors else [f"{name}: {NO_MOTORS}"]))
     return folder
@@ -131,6 +132,11 @@ def _require_well(findings: Sequence[Finding]) -> None:
     _show([each for each in findings if each.severity is not Severity.NOTE])
     if any(each.severity is Severity.ERROR for each in findings):
         raise DescriptionError("the finished robot has the errors above; nothing is written")
+
+
+def _in_folder(finding: Finding, building: Path, folder: Path) -> Finding:
+    """The finding about `building` as one about `folder`, which takes its name."""
+    return replace(finding, remedy=finding.remedy.replace(str(building), str(folder)))
 
 
 def _show(findings: Sequence[Finding]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -11,15 +11,18 @@ from numpy.typing import NDArray
 
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.kinematics import Kinematics
+from services.arm.kinematics.self_collisions import SelfCollisionChecker
 from services.arm.model.description import Arm
 from services.arm.model.urdf import JointKind, UrdfJoint
 
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-CLEAR = 0.008  # [m] between links that may touch, in a named state: twice what plans keep
+CLEAR = 0.008  # [m] between links that may touch, in a named state: twice what plans keep, if any state has it
+TIGHT = 0.001  # [m] that must be between them at least
 TRIES = 3000
 INSET = 0.01  # of the travel from a limit to `home`
+ASIDE = 1e-3  # of the travel from a limit to any named state
 READY = 0.4  # of the way from the middle to the limits, at most, for `ready`
 # That one joint of `ready` must be away from `home`: so much [rad] or [m], or so large a share of its travel if less.
 NEAREST_READY, NEAREST_READY_SHARE = 0.3, 0.2
@@ -43,30 +46,47 @@ def named_states(arm: Arm) -> dict[str, dict[str, float]]:
     checker = Kinematics(arm).collisions
     urdf = [arm.model.joint(name) for name in arm.joint_names]
     lower, upper = np.array([_range(joint) for joint in urdf]).T
-    home = _first_free(checker.distance, _around(_zero(lower, upper), lower, upper), "home", arm)
+    home = _first_free(checker, states_around(_zero(lower, upper), lower, upper), "home", arm)
     middle, half = (lower + upper) / 2.0, (upper - lower) / 2.0
     least = np.minimum(NEAREST_READY, NEAREST_READY_SHARE * (upper - lower))
-    away = (each for each in _around(middle + READY * 0.5 * half, lower, upper) if (abs(each - home) >= least).any())
-    ready = _first_free(checker.distance, away, "ready", arm)
-    rounded = {"home": np.clip(np.round(home, 4), lower, upper), "ready": np.clip(np.round(ready, 4), lower, upper)}
+    away = (
+        each for each in states_around(middle + READY * 0.5 * half, lower, upper) if (abs(each - home) >= least).any()
+    )
+    ready = _first_free(checker, away, "ready", arm)
+    inside = _inside(lower, upper)
+    rounded = {"home": np.clip(np.round(home, 4), *inside), "ready": np.clip(np.round(ready, 4), *inside)}
     return {name: dict(zip(arm.joint_names, state.tolist(), strict=True)) for name, state in rounded.items()}
 
 
-def _around(center: Array, lower: Array, upper: Array) -> Iterator[Array]:
+def states_around(center: Array, lower: Array, upper: Array) -> Iterator[Array]:
     """(n,) the center, then random ones that lie farther and farther away."""
-    random = np.random.default_rng(SEED)
+    random, (least, most) = np.random.default_rng(SEED), _inside(lower, upper)
     for number in range(TRIES):
         reach = number / TRIES * (upper - lower)
-        yield np.clip(center + reach * random.uniform(-1.0, 1.0, len(center)), lower, upper)
+        yield np.clip(center + reach * random.uniform(-1.0, 1.0, len(center)), least, most)
 
 
-def _first_free(distance: Callable[[Array], float], states: Iterator[Array], name: str, arm: Arm) -> Array:
+def _inside(lower: Array, upper: Array) -> tuple[Array, Array]:
+    """(n,) each: so far from the limits that a state lies within them also as the text of a file."""
+    aside = ASIDE * (upper - lower)
+    return lower + aside, upper - aside
+
+
+def _first_free(checker: SelfCollisionChecker, states: Iterator[Array], name: str, arm: Arm) -> Array:
+    """(n,) [rad] or [m] the first that is CLEAR, else the one with the most room if that is above TIGHT."""
+    best, most = np.empty(0), -math.inf
     for state in states:
-        if distance(state) > CLEAR:
+        distance = checker.distance(state)
+        if distance > CLEAR:
             return state
+        if distance > most:
+            best, most = state, distance
+    if most > TIGHT:
+        return best
+    touching = ", ".join(f"{first} and {second}" for first, second in checker.pairs_within(best, TIGHT)) or "none"
     raise DescriptionError(
-        f'{arm.urdf_path}: no configuration of {TRIES} is free of contact for the state "{name}": see with '
-        "`gemelo collision matrix` which links touch always, and correct their shapes"
+        f'{arm.name}: no configuration of {TRIES} is free of contact for the state "{name}"; in the best one touch: '
+        f"{touching}. See with `gemelo collision matrix` how near they are elsewhere, and correct shapes or limits"
     )
 
 

@@ -5,16 +5,20 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from services.arm.checks.findings import Severity
 from services.arm.model.description import load_arm
 from services.cli.errors import ExitCode
 from services.cli.main import run
-from services.planner.trial import trial
+from services.planner.trial import looking_the_same, trial
 from tests.arm.editing import edit
 from tests.arm.plates import add_rigid_plates, add_turning_disc
 
+RM1 = Path(__file__).parents[2] / "urdf" / "rm1"
 LONG = 60.0  # [s]: every configuration and plan is tried however loaded the machine is
 
 
@@ -62,3 +66,18 @@ def test_check_says_all_is_well_only_where_plans_succeed(copy: Path, capsys: pyt
     said = capsys.readouterr().out
     assert "all is well" not in said
     assert "nearer than the clearance of 2.0 mm" in said
+
+
+@given(st.data())
+def test_a_goal_is_turned_to_what_looks_the_same_within_the_limits(data: st.DataObject):
+    arm = load_arm(RM1)
+    lower, upper = (np.array([getattr(joint, side) for joint in arm.joints]) for side in ("lower", "upper"))
+    start, goal = (np.array([data.draw(st.floats(*each)) for each in zip(lower, upper, strict=True)]) for _ in range(2))
+    turned = list(looking_the_same(arm, start, goal))
+    assert len({tuple(np.round(each, 9)) for each in turned}) == len(turned)
+    for each in turned:
+        turns = (each - goal) / (2 * np.pi)
+        assert turns == pytest.approx(np.round(turns), abs=1e-9)
+        assert (each >= lower).all()
+        assert (each <= upper).all()
+    assert (abs(turned[0] - start) <= np.maximum(np.pi, abs(goal - start)) + 1e-9).all()

@@ -231,6 +231,23 @@ def workspace(root: Path) -> Export:
     return Export(root / "src", (), tuple(f"joint_{number}" for number in range(1, 7)))
 
 
+def hobby(root: Path) -> Export:
+    """A desk arm: each joint has the name of its child link, and the first turns two discs 6 mm apart on one axis."""
+    folder = root / "hobby"
+    for name in ("base", "disc"):
+        mesh(folder, f"{name}.stl", length=0.02)
+    mesh(folder, "arm.stl")
+    limit = '<limit lower="0.820304748437335" upper="2.5" effort="9" velocity="2"/>'
+    hub = '<visual><origin xyz="0 0 0.003"/><geometry><cylinder radius="0.01" length="0.006"/></geometry></visual>'
+    urdf = write(
+        folder / "hobby.urdf", "hobby",
+        link("base", "base.stl"), f'<link name="hub">{hub}</link>', link("disc", "disc.stl"), link("arm", "arm.stl"),
+        joint("hub", "base", "hub", axis="0 0 1", z=0.02), joint("disc", "hub", "disc", axis="0 0 1", z=0.006),
+        joint("arm", "disc", "arm", z=0.06, rest=limit),
+    )  # fmt: skip
+    return Export(urdf, (), ("hub", "disc", "arm"))
+
+
 EXPORTS: tuple[Callable[[Path], Export], ...] = (
-    solidworks, fusion, ros2, by_hand, obj, flat, degrees, workspace,
+    solidworks, fusion, ros2, by_hand, obj, flat, degrees, workspace, hobby,
 )  # fmt: skip

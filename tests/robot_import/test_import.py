@@ -17,7 +17,7 @@ from services.arm.model.description import Arm, load_arm
 from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.planner.core import Planner
-from tests.robot_import.exports import EXPORTS, Export
+from tests.robot_import.exports import EXPORTS, Export, hobby
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,11 @@ def test_every_link_that_is_drawn_has_collision_shapes_and_no_mesh_among_them(im
         assert all(shape.mesh is None for shape in link.collisions)
         for visual in link.visuals:
             assert visual.mesh is None or (imported.arm.folder / visual.mesh).is_file()
+
+
+@pytest.mark.parametrize("imported", [hobby], indirect=True)
+def test_links_of_one_hinge_are_excused_where_shapes_are_fitted(imported: Imported):
+    assert imported.arm.collisions_are_disabled("base", "disc")
 
 
 def test_a_plan_from_home_to_ready_and_back_succeeds(imported: Imported):

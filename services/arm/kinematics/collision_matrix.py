@@ -37,7 +37,7 @@ class DisabledReason(StrEnum):
 
     ADJACENT = "Adjacent"
     RIGID = "Rigid"  # no joint moves them against one another
-    ALWAYS = "Always"  # never farther apart than the clearance
+    ALWAYS = "Always"  # never farther apart than the clearance, or what is given for it
     NEVER = "Never"
 
 
@@ -56,18 +56,22 @@ def _tell_nobody(_: str) -> None:
 
 
 def collision_matrix(
-    arm: Arm, samples: int = SAMPLES, tell: Callable[[str], None] = _tell_nobody
+    arm: Arm, samples: int = SAMPLES, tell: Callable[[str], None] = _tell_nobody, always_within: float | None = None
 ) -> list[LinkPairData]:
-    """Every pair of links that have collision shapes; the same arm gives the same matrix. `tell` hears of progress."""
+    """Every pair of links that have collision shapes; the same arm gives the same matrix. `tell` hears of progress.
+
+    Links that can touch and are never farther apart than `always_within` [m], else the clearance, are always near.
+    """
     began = time.monotonic()
     kinematics = Kinematics(arm)
     random = np.random.default_rng(SEED)
     configurations = _configurations(arm, samples, random)
     links = LinkDistances(arm, kinematics.model, kinematics.configuration, configurations)
     tell(f"{len(configurations)} configurations sampled after {time.monotonic() - began:.1f} s")
+    within = arm.clearance if always_within is None else always_within
     found, said = [], time.monotonic()
     for number in range(len(links.pairs)):
-        found.append(_pair_data(arm, links, number, configurations, random))
+        found.append(_pair_data(arm, links, number, configurations, random, within))
         if time.monotonic() - said > SAYING:
             tell(f"{number + 1} of {len(links.pairs)} pairs of links after {time.monotonic() - began:.1f} s")
             said = time.monotonic()
@@ -75,18 +79,18 @@ def collision_matrix(
 
 
 def _pair_data(
-    arm: Arm, links: LinkDistances, number: int, configurations: Array, random: np.random.Generator
+    arm: Arm, links: LinkDistances, number: int, configurations: Array, random: np.random.Generator, within: float
 ) -> LinkPairData:
     pair, never_below = links.pairs[number], arm.clearance + SPARE
     is_settled = are_adjacent(arm, *pair) or are_rigid_links(arm, *pair)
     seen = _nearest_samples(links, number, configurations, math.inf if is_settled else never_below)
     nearest = min(seen.values())
-    farthest = max(nearest, _farthest(links, number, configurations, -math.inf if is_settled else arm.clearance))
+    farthest = max(nearest, _farthest(links, number, configurations, -math.inf if is_settled else within))
     if are_adjacent(arm, *pair):
         return LinkPairData(pair, DisabledReason.ADJACENT, nearest, farthest)
     if are_rigid_links(arm, *pair):
         return LinkPairData(pair, DisabledReason.RIGID, nearest, farthest)
-    if farthest <= arm.clearance:
+    if farthest <= within and nearest <= never_below:
         return LinkPairData(pair, DisabledReason.ALWAYS, nearest, farthest)
     if nearest > never_below:
         starts = configurations[sorted(seen, key=lambda sample: (seen[sample], sample))[:SEARCHES]]

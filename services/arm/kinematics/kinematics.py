@@ -27,6 +27,11 @@ class Pose:
     rotation: Array
 
 
+def frame_of_link(model: pin.Model, link: str) -> int:
+    """The index of a link's frame; a joint may have the same name."""
+    return int(model.getFrameId(link, pin.FrameType.BODY))
+
+
 class Kinematics:
     """The arm's geometry; joint values are (n,) [rad] or [m] in the arm's order, poses in its base frame."""
 
@@ -35,10 +40,10 @@ class Kinematics:
         self._model = pin.buildModelFromUrdf(str(arm.urdf_path))
         self._data = self._model.createData()
         self._configuration = JointMapping(arm, self._model)
-        self._tool = self._model.getFrameId(arm.tool_frame)
+        self._tool = frame_of_link(self._model, arm.tool_frame)
         self._base = self._fixed_base()
         self._base_is_root = self._base.isIdentity()
-        self._links = {name: self._model.getFrameId(name) for name in arm.model.link_names}
+        self._links = {name: frame_of_link(self._model, name) for name in arm.model.link_names}
         self.collisions = SelfCollisionChecker(arm, self._model, self._configuration)
 
     @property
@@ -92,7 +97,7 @@ class Kinematics:
         return placement if self._base_is_root else self._base.actInv(placement)
 
     def _fixed_base(self) -> pin.SE3:
-        frame = self._model.frames[self._model.getFrameId(self.arm.base_frame)]
+        frame = self._model.frames[frame_of_link(self._model, self.arm.base_frame)]
         if frame.parentJoint != 0:
             raise DescriptionError(f'{self.arm.robot_path}: base_frame "{self.arm.base_frame}" moves with the joints')
         return frame.placement.copy()

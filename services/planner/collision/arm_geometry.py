@@ -13,7 +13,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from schemas.scene import PlanningScene, SceneObject
-from services.arm.kinematics.kinematics import Kinematics
+from services.arm.kinematics.kinematics import Kinematics, frame_of_link
 from services.arm.kinematics.self_collisions import driver_of, load_collision_geometry, shape_reach
 from services.arm.model.description import Arm
 from services.planner.collision.scene_shapes import SceneError, is_read_from_a_file, shape_of
@@ -72,7 +72,7 @@ class ArmGeometry:
             return PlacedObject(shape, placed, 0, box_of(geometry), np.zeros(len(self.drivers)))
         if item.frame not in self.arm.model.link_names:
             raise SceneError(f'object "{item.name}" is attached to "{item.frame}", which {self.arm.name} does not have')
-        number = self.pinocchio.getFrameId(item.frame)
+        number = frame_of_link(self.pinocchio, item.frame)
         frame = self.pinocchio.frames[number]
         joint = int(frame.parentJoint)
         placed = pin.GeometryObject(item.name, joint, number, frame.placement.act(inner), geometry)

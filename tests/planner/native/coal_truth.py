@@ -10,6 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from services.arm.kinematics.joint_mapping import JointMapping
+from services.arm.kinematics.kinematics import frame_of_link
 from services.arm.model.description import Arm
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
@@ -28,7 +29,7 @@ class Truth:
         self._geometry.removeAllCollisionPairs()
         links = [self._model.frames[item.parentFrame].name for item in self._geometry.geometryObjects]
         moving = [item.parentJoint != 0 for item in self._geometry.geometryObjects]
-        base = self._model.frames[self._model.getFrameId(arm.base_frame)].placement
+        base = self._model.frames[frame_of_link(self._model, arm.base_frame)].placement
         for first in range(len(links)):
             for second in range(first + 1, len(links)):
                 if links[first] != links[second] and not arm.collisions_are_disabled(links[first], links[second]):
