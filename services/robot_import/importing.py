@@ -25,7 +25,10 @@ from services.robot_import.trial import trial_findings
 
 ANSWERS_FILE = "import.toml"
 NOT_IN_A_NAME = r"[^A-Za-z0-9_-]+"
-TOOL_NAMES = ("tool0", "tcp", "tool", "ee_link", "end_effector", "flange", "hand")
+TOOL_NAMES = (
+    "tool0", "tcp", "tool", "ee_link", "end_effector", "eef", "gripper_frame_link", "flange", "hand", "gripper_link",
+    "gripper",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
