@@ -13,6 +13,7 @@ from pathlib import Path
 import zenoh
 
 from schemas.deployment import RouterSection
+from services.runtime.bus.dead_links import end_dead_links
 from services.runtime.bus.zenoh_config import router_config
 from services.runtime.deployment import DeploymentError, exposure, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
@@ -43,10 +44,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             log.warning("%s", warning)
         with stop_on_signals(stop):
             require_free(host, port, "router", "listen_port" if deployment.router.listen_port else "port")
-            with zenoh.open(config):
+            with zenoh.open(config) as session:
+                watch = end_dead_links(session)
                 locked = " with TLS, for certificates of its authority" if is_locked else ""
                 log.info("listening on %s port %d%s", host, port, locked)
                 _beat_until(stop, Readiness(Path(deployment.paths.run), "router"))
+                del watch
     except (DeploymentError, PortTaken, zenoh.ZError) as error:
         log.error("%s", error)
         return 1

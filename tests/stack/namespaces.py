@@ -1,4 +1,4 @@
-"""Hosts as network namespaces on one bridge, and the processes of a rendered site in them."""
+"""Hosts as network namespaces on one bridge or switch, and the processes of a rendered site in them."""
 
 from __future__ import annotations
 
@@ -17,16 +17,20 @@ from services.hosts.keys import make_keys
 from services.hosts.layout import processes
 from services.hosts.render import write
 from services.runtime.deployment import project_root
+from tests.stack.ethernet import Ethernet
 
 READY = 60.0  # [s] for all processes of all hosts
 LAN = "lan"  # the namespace of the bridge
 
 
 class Hosts:
-    """One namespace for each host of a site, with its address; a link can be cut and healed."""
+    """One namespace for each host of a site, with its address; a link can be cut and healed.
 
-    def __init__(self, site: Site) -> None:
-        self._site, self._prefix = site, f"gemelo{os.getpid()}-"
+    They meet on a bridge of the kernel, or on `ethernet`, whose cables also delay and cut one direction only.
+    """
+
+    def __init__(self, site: Site, ethernet: Ethernet | None = None) -> None:
+        self._site, self._ethernet, self._prefix = site, ethernet, f"gemelo{os.getpid()}-"
 
     def __enter__(self) -> Hosts:
         try:
@@ -36,12 +40,16 @@ class Hosts:
             self._in(LAN, "link", "set", "bridge", "up")
             for name, host in self._site.hosts.items():
                 self._join(name, host.address)
+            if self._ethernet is not None:
+                self._ethernet.start()
         except BaseException:
             self.__exit__()
             raise
         return self
 
     def __exit__(self, *_: object) -> None:
+        if self._ethernet is not None:
+            self._ethernet.close()
         for name in (*self._site.hosts, LAN):
             subprocess.run(["ip", "netns", "delete", self.namespace(name)], check=False, stderr=subprocess.DEVNULL)
 
@@ -62,9 +70,12 @@ class Hosts:
             self._in(LAN, "link", "set", f"to-{host}", "up")
 
     def _join(self, host: str, address: str) -> None:
-        end = f"to-{host}"
-        self._in(LAN, "link", "add", end, "type", "veth", "peer", "name", "eth0", "netns", self.namespace(host))
-        self._in(LAN, "link", "set", end, "master", "bridge", "up")
+        if self._ethernet is not None:
+            self._ethernet.plug(host, self.namespace(host))
+        else:
+            end = f"to-{host}"
+            self._in(LAN, "link", "add", end, "type", "veth", "peer", "name", "eth0", "netns", self.namespace(host))
+            self._in(LAN, "link", "set", end, "master", "bridge", "up")
         self._in(host, "address", "add", f"{address}/24", "dev", "eth0")
         for link in ("lo", "eth0"):
             self._in(host, "link", "set", link, "up")

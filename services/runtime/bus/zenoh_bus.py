@@ -19,6 +19,7 @@ from zenoh.handlers import Callback
 from schemas.deployment import RouterSection
 from schemas.system import Exchange
 from schemas.topics import Delivery
+from services.runtime.bus.dead_links import end_dead_links
 from services.runtime.bus.interface import Arrival, BusReply, Query
 from services.runtime.bus.zenoh_config import client_config
 from services.runtime.bus.zenoh_declarations import (
@@ -53,6 +54,7 @@ class ZenohBus:
     def __init__(self, router: RouterSection, robot: str) -> None:
         """Raises `BusNotOpen` where the router does not take the session."""
         self._router, self._robot = router, robot
+        self._watches: list[object] = []
         self._session = self._open()
         self._urgent_session: zenoh.Session | None = None
         self._name = str(self._session.zid()).encode()
@@ -73,9 +75,11 @@ class ZenohBus:
 
     def _open(self) -> zenoh.Session:
         try:
-            return zenoh.open(client_config(self._router, self._robot))
+            session = zenoh.open(client_config(self._router, self._robot))
         except zenoh.ZError as error:
             raise BusNotOpen(str(error)) from error
+        self._watches.append(end_dead_links(session))
+        return session
 
     @property
     def certificate(self) -> str:
