@@ -1,6 +1,8 @@
 """A person at a desk, as a process of its own: moves the arm, and says on stdout what came of it.
 
-For each line of stdin one move; `moving` is printed in the middle of it, and a line of JSON at its end.
+A line of stdin is a move: `move`, of a goal that goes on without its client, or `attached`, of one that does not.
+`moving` is printed in the middle of it, a line of JSON when its end is heard, and for `again` one more after a move
+that needed whatever a person had to do first.
 """
 
 from __future__ import annotations
@@ -11,10 +13,12 @@ import sys
 from itertools import pairwise
 from types import SimpleNamespace
 
+from services.runtime.errors import NoAnswer, ServerLost
 from tests.stack.person import Operator, jumps
 
 SPEED = 0.4
 AFTERWARDS = 50  # joint states that are watched after the end of a move
+PATIENCE = 30.0  # [s] after the end of a trajectory
 
 
 def main() -> None:
@@ -22,28 +26,42 @@ def main() -> None:
     try:
         outcome, _ = operator.move_again()
         say(ready=outcome.status.name)
-        for _ in sys.stdin:
-            say(**move(operator))
+        for line in sys.stdin:
+            say(**again(operator) if line.strip() == "again" else move(operator, line.strip() == "attached"))
     finally:
         operator.close()
 
 
-def move(operator: Operator) -> dict[str, object]:
+def move(operator: Operator, is_attached: bool = False) -> dict[str, object]:
     plan = operator.plan(SPEED)
-    handle = operator.send(plan)
+    handle = operator.send(plan, is_attached)
     is_midway = operator.wait_for(lambda: elapsed(handle) > 0.3 * plan.duration, 10.0)
     print("moving" if is_midway else "not moving", flush=True)
-    outcome = handle.wait(plan.duration + 20.0)
+    try:
+        outcome = handle.wait(plan.duration + PATIENCE)
+    except (ServerLost, NoAnswer) as error:
+        return {"status": type(error).__name__, "why": str(error), "goal": plan.trajectory.points[-1].positions}
     way = list(operator.seen)
     operator.seen.clear()
     operator.wait_for(lambda: len(operator.seen) >= AFTERWARDS, 5.0)
     return {
         "status": outcome.status.name,
+        "why": outcome.result.error_string,
+        "goal": plan.trajectory.points[-1].positions,
         "is_exact": outcome.result.executed_steps == outcome.result.commanded_steps,
         "jumps": jumps(operator.arm, way),
-        "longest_gap": max(after.stamp - before.stamp for before, after in pairwise(way)) * 1e-9,
+        "longest_gap": max((after.stamp - before.stamp for before, after in pairwise(way)), default=0) * 1e-9,
         "positions_afterwards": len({state.position for state in operator.seen}),
     }
+
+
+def again(operator: Operator) -> dict[str, object]:
+    """Where the arm stands, and the end of a move made as soon as the stack lets one; what a person had to do."""
+    operator.seen.clear()
+    operator.wait_for(lambda: operator.seen, 5.0)
+    stands = operator.seen[-1].position if operator.seen else ()
+    outcome, done = operator.move_again()
+    return {"stands": stands, "again": outcome.status.name, "hands": [str(each) for each in done]}
 
 
 def elapsed(handle) -> float:

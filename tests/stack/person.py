@@ -79,13 +79,13 @@ class Operator:
         assert plan.code is PlanCode.SUCCESS, plan.refusal
         return plan
 
-    def send(self, plan):
-        """The handle of a goal; joint states are kept from here on."""
+    def send(self, plan, attached=False):
+        """The handle of a goal, which ends with this node if `attached`; joint states are kept from here on."""
         self.seen.clear()
         goal = FollowJointTrajectoryGoal(
             trajectory=plan.trajectory, scene_version=plan.scene_version, scene_epoch=plan.scene_epoch
         )
-        return self.follow.send(goal)
+        return self.follow.send(goal, attached=attached)
 
     def move(self, speed=1.0):
         """Plans and moves; the outcome."""
