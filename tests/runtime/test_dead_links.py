@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from types import SimpleNamespace
@@ -15,8 +16,9 @@ from types import SimpleNamespace
 import pytest
 
 from services.runtime.bus import dead_links
+from services.runtime.bus.dead_links import UNACKNOWLEDGED_MS
 from services.runtime.bus.zenoh_bus import ZenohBus
-from services.runtime.bus.zenoh_config import LEASE_MS, locked_router
+from services.runtime.bus.zenoh_config import locked_router
 from tests.optional import need
 from tests.runtime.locks import Lock
 from tests.runtime.support import ROOT, RouterProcess, until
@@ -48,11 +50,11 @@ def test_every_session_has_the_limit_on_its_link_also_after_the_router_was_away(
     router = RouterProcess(tmp_path)
     bus = ZenohBus(router.deployment.router, "rm1")
     try:
-        assert until(lambda: limits(router.port) == [LEASE_MS])
+        assert until(lambda: limits(router.port) == [UNACKNOWLEDGED_MS])
         router.kill()
         assert until(lambda: not bus.is_connected)
         router.start()
-        assert until(lambda: limits(router.port) == [LEASE_MS], PATIENCE)
+        assert until(lambda: limits(router.port) == [UNACKNOWLEDGED_MS], PATIENCE)
     finally:
         bus.close()
         router.stop()
@@ -131,4 +133,14 @@ def test_a_peer_whose_cable_is_cut_is_missed_while_it_is_cut_and_heard_under_its
         assert until(lambda: not nodes["b"].said["connected"], PATIENCE), "it does not know that it is alone"
     heard = {name: node.said["heard"] for name, node in nodes.items()}
     assert until(lambda: all(node.is_back(heard[name]) for name, node in nodes.items()), 2 * PATIENCE), nodes["b"].said
+    assert [node.said["wrong"] for node in nodes.values()] == [0, 0]
+
+
+def test_a_cable_that_is_cut_for_about_as_long_as_the_lease_mixes_no_keys(far):
+    ethernet, nodes = far
+    for lasts in (0.7, 0.75, 0.8, 0.85, 0.9, 1.0, 1.1):
+        with ethernet.impaired("b", CUT, OPEN):
+            time.sleep(lasts)  # how long it is cut is what this is about
+        heard = {name: node.said["heard"] for name, node in nodes.items()}
+        assert until(lambda heard=heard: all(node.is_back(heard[name]) for name, node in nodes.items()), 2 * PATIENCE)
     assert [node.said["wrong"] for node in nodes.values()] == [0, 0]

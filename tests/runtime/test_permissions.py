@@ -16,6 +16,7 @@ from schemas.message import Message
 from schemas.roles import ROLES, role
 from schemas.topics import DEVICE_EVENTS, DEVICE_STATUS, TOPICS, Delivery, Topic
 from services.runtime.bus.zenoh_bus import ZenohBus
+from services.runtime.bus.zenoh_config import client_config
 from services.runtime.permissions import ABOUT, SET, Permissions, permissions
 from services.runtime.robots import robots_on
 from tests.runtime.locks import Lock, LockedRouter, sessions
@@ -25,6 +26,7 @@ MAY: dict[str, Permissions] = {each.name: permissions(each) for each in ROLES}
 NAMES = tuple(MAY)
 SPOKEN = tuple(sorted(set().union(*(may.publishes | may.subscribes for may in MAY.values()))))
 ASKED = tuple(sorted(key for key in set().union(*(may.serves for may in MAY.values())) if "@node" not in key))
+CACHE = "/@adv/pub/0123456789abcdef/1/_"  # below a key: where its writer keeps what it wrote
 TO_ANSWER = 3.0  # [s] for all questions of all roles together
 Sessions = dict[str, zenoh.Session]
 Pairs = dict[str, set[tuple[str, str]]]  # by key: who was heard or answered by whom
@@ -187,15 +189,17 @@ def test_a_robot_that_is_not_the_routers_is_nobodys(lock, tmp_path):
     open_router.stop()
 
 
+SERVICES = [each.node for each in ROLES if each.node]
+
+
 def bearers(opened: Sessions) -> dict[str, set[str]]:
     """By service, the roles whose token under its name others see."""
-    services = [each.node for each in ROLES if each.node]
     tokens = [
         session.liveliness().declare_token(f"@id/{service}/{name}")
-        for name, session in opened.items() for service in services
+        for name, session in opened.items() for service in SERVICES
     ]  # fmt: skip
     exchange(opened)
-    seen: dict[str, set[str]] = {service: set() for service in services}
+    seen: dict[str, set[str]] = {service: set() for service in SERVICES}
     for looker in ("viewer", "operator"):
         replies = opened[looker].liveliness().get("@id/*/*", timeout=2.0)
         for _, service, name in (str(reply.ok.key_expr).split("/") for reply in replies if reply.ok):
@@ -208,6 +212,84 @@ def bearers(opened: Sessions) -> dict[str, set[str]]:
 def test_a_name_of_a_service_is_borne_by_its_role_alone(locked, unlocked):
     assert bearers(unlocked) == {each.node: set(NAMES) for each in ROLES if each.node}
     assert bearers(locked) == {each.node: {each.name} for each in ROLES if each.node}
+
+
+def test_a_service_is_said_alive_by_its_role_alone(locked, unlocked):
+    def sayers(opened: Sessions) -> dict[str, set[str]]:
+        """By service, the roles whose word that it is alive is heard."""
+        said: dict[str, set[str]] = {service: set() for service in SERVICES}
+        for name, session in opened.items():
+            tokens = [session.liveliness().declare_token(f"@alive/{service}") for service in SERVICES]
+            exchange(opened)
+            looker = opened["viewer" if name != "viewer" else "operator"]
+            for reply in looker.liveliness().get("@alive/*", timeout=2.0):
+                if reply.ok:
+                    said[str(reply.ok.key_expr).removeprefix("@alive/")].add(name)
+            for each in tokens:
+                each.undeclare()
+            exchange(opened)
+        return said
+
+    assert sayers(unlocked) == {service: set(NAMES) for service in SERVICES}
+    assert sayers(locked) == {each.node: {each.name} for each in ROLES if each.node}
+
+
+KEPT = tuple(topic.key for topic in TOPICS if topic.delivery is not Delivery.LATEST)
+
+
+def test_what_was_written_before_is_told_by_its_writers_alone_to_its_readers(locked, unlocked):
+    """The caches of EVERY and LATCHED keys: a forged one would speak to every late joiner."""
+
+    def cached(opened: Sessions) -> Pairs:
+        return {
+            key.removesuffix(CACHE): pairs
+            for key, pairs in answered(opened, tuple(f"{key}{CACHE}" for key in KEPT)).items()
+        }
+
+    may = {
+        key: {(one, other) for one, other in all_pairs()
+              if key in MAY[one].publishes and key in MAY[other].subscribes}
+        for key in KEPT
+    }  # fmt: skip
+    assert cached(unlocked) == dict.fromkeys(KEPT, all_pairs())
+    assert cached(locked) == {key: pairs for key, pairs in may.items() if pairs}
+
+
+def test_the_id_of_a_session_that_is_there_is_not_taken_and_that_of_one_that_was_gives_no_right(lock, tmp_path):
+    """Zenoh names sessions by an id that everybody can read and choose."""
+
+    def forges(router: RouterProcess, sections: dict[str, RouterSection]) -> bool:
+        roles = ("gateway", "operator")
+        with sessions({name: sections[name] for name in roles}) as opened:
+            own = str(opened["gateway"].zid())
+            with pytest.raises(zenoh.ZError):
+                zenoh.open(under(sections["viewer"], own))
+            heard: list[str] = []
+            reader = opened["operator"].declare_subscriber(
+                "joint_states", lambda sample: heard.append(sample.payload.to_string())
+            )
+            assert until(lambda: opened["gateway"].put("joint_states", "true") or "true" in heard)
+            opened["gateway"].close()
+            opened["gateway"] = thief = zenoh.open(under(sections["viewer"], own))
+            assert str(thief.zid()) == own
+            # `log` is everybody's: where that has come, what was sent before it has come too, or never will.
+            logged = opened["operator"].declare_subscriber("log", zenoh.handlers.FifoChannel(100))
+            assert until(lambda: [thief.put(key, "forged") for key in ("joint_states", "log")] and logged.try_recv())
+            for each in (reader, logged):
+                each.undeclare()
+        router.stop()
+        return "forged" in heard
+
+    locked, unlocked = LockedRouter(tmp_path / "locked", lock), RouterProcess(tmp_path / "open")
+    names = ("gateway", "operator", "viewer")
+    assert forges(unlocked, dict.fromkeys(names, unlocked.deployment.router))
+    assert not forges(locked, {name: locked.section(name) for name in names})
+
+
+def under(section: RouterSection, identity: str) -> zenoh.Config:
+    config = client_config(section, "rm1")
+    config.insert_json5("id", f'"{identity}"')
+    return config
 
 
 def test_parameters_are_set_by_the_operator_alone_and_read_by_all(locked):

@@ -1,6 +1,7 @@
 """A person at a desk, as a process of its own: moves the arm, and says on stdout what came of it.
 
-A line of stdin is a move: `move`, of a goal that goes on without its client, or `attached`, of one that does not.
+A line of stdin is a move: `move`, of a goal that goes on without its client, `attached`, of one that does not, or
+`stop`, of one that is stopped midway.
 `moving` is printed in the middle of it, a line of JSON when its end is heard, and for `again` one more after a move
 that needed whatever a person had to do first.
 """
@@ -10,9 +11,12 @@ from __future__ import annotations
 import json
 import os
 import sys
+import time
 from itertools import pairwise
 from types import SimpleNamespace
 
+from schemas.device import DeviceStopRequest
+from schemas.topics import DEVICE_STOP
 from services.runtime.errors import NoAnswer, ServerLost
 from tests.stack.person import Operator, jumps
 
@@ -27,32 +31,42 @@ def main() -> None:
         outcome, _ = operator.move_again()
         say(ready=outcome.status.name)
         for line in sys.stdin:
-            say(**again(operator) if line.strip() == "again" else move(operator, line.strip() == "attached"))
+            word = line.strip()
+            say(**again(operator) if word == "again" else move(operator, word == "attached", word == "stop"))
     finally:
         operator.close()
 
 
-def move(operator: Operator, is_attached: bool = False) -> dict[str, object]:
+def move(operator: Operator, is_attached: bool = False, is_stopped: bool = False) -> dict[str, object]:
     plan = operator.plan(SPEED)
     handle = operator.send(plan, is_attached)
     is_midway = operator.wait_for(lambda: elapsed(handle) > 0.3 * plan.duration, 10.0)
     print("moving" if is_midway else "not moving", flush=True)
+    began = time.monotonic()
+    said: dict[str, object] = {"goal": plan.trajectory.points[-1].positions} | (stop(operator) if is_stopped else {})
     try:
         outcome = handle.wait(plan.duration + PATIENCE)
     except (ServerLost, NoAnswer) as error:
-        return {"status": type(error).__name__, "why": str(error), "goal": plan.trajectory.points[-1].positions}
+        return said | {"status": type(error).__name__, "why": str(error), "told_after": time.monotonic() - began}
+    said["told_after"] = time.monotonic() - began
     way = list(operator.seen)
     operator.seen.clear()
     operator.wait_for(lambda: len(operator.seen) >= AFTERWARDS, 5.0)
-    return {
+    return said | {
         "status": outcome.status.name,
         "why": outcome.result.error_string,
-        "goal": plan.trajectory.points[-1].positions,
         "is_exact": outcome.result.executed_steps == outcome.result.commanded_steps,
         "jumps": jumps(operator.arm, way),
         "longest_gap": max((after.stamp - before.stamp for before, after in pairwise(way)), default=0) * 1e-9,
         "positions_afterwards": len({state.position for state in operator.seen}),
     }
+
+
+def stop(operator: Operator) -> dict[str, object]:
+    """Whether it was carried out, and the time [ms] until that was said."""
+    called = time.monotonic()
+    answer = operator.node.call(DEVICE_STOP, DeviceStopRequest(), timeout=3.0)
+    return {"stopped": answer.accepted, "stop_ms": (time.monotonic() - called) * 1e3}
 
 
 def again(operator: Operator) -> dict[str, object]:

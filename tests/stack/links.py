@@ -90,7 +90,7 @@ class Row:
     case: Case
     heard: str  # by the client: the goal's status, ServerLost or NoAnswer
     why: str
-    told_after: float  # [s] from the beginning of the fault to that
+    told_after: float  # [s] from the beginning of the fault, by the client's clock
     arm: str  # FINISHED or HELD
     ready_after: float  # [s] from the heal until every process of every host is ready; inf: never
     again: str  # how the next move ended
@@ -151,23 +151,23 @@ class Links:
         self._arm = load_arm(project_root() / "urdf/rm1")
         self._config = device_config(self._arm)
         self._slots = folder / "slots"
-        self._hosts = Hosts(site, self.ethernet)
-        self._lab = Lab(site, self._hosts, folder / "out")
+        self.hosts = Hosts(site, self.ethernet)
+        self.lab = Lab(site, self.hosts, folder / "out")
         self._said: SimpleQueue[str] = SimpleQueue()
         self._closing = ExitStack()
         _let_watch(folder / "out/board/process-compose.yaml", self._slots)
 
     def __enter__(self) -> Links:
         with ExitStack() as closing:
-            closing.enter_context(self._hosts)
-            closing.enter_context(self._lab)
+            closing.enter_context(self.hosts)
+            closing.enter_context(self.lab)
             self._desk = closing.enter_context(subprocess.Popen(
-                self._hosts.command("desk", sys.executable, "-m", "tests.stack.desk"), cwd=project_root(), text=True,
-                bufsize=1, env=self._lab.environment("desk", "rm1"), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                self.hosts.command("desk", sys.executable, "-m", "tests.stack.desk"), cwd=project_root(), text=True,
+                bufsize=1, env=self.lab.environment("desk", "rm1"), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             ))  # fmt: skip
             closing.callback(self._desk.kill)
             threading.Thread(target=self._listen, daemon=True).start()
-            assert json.loads(self._hear())["ready"] == "SUCCEEDED", self._lab.logs()
+            assert json.loads(self._hear())["ready"] == "SUCCEEDED", self.lab.logs()
             self._closing = closing.pop_all()
         return self
 
@@ -179,7 +179,6 @@ class Links:
         first = max(witness.size(self._slots) - witness.ROW.size, 0)
         self._say("attached" if case.is_attached else "move")
         assert self._hear() == "moving\n"
-        began = time.monotonic()
         with self.ethernet.impaired(case.host, case.out, case.into):
             if case.lasts:
                 time.sleep(case.lasts)  # how long the link is down is what this is about
@@ -188,7 +187,6 @@ class Links:
         healed = time.monotonic()
         ready = self._wait_ready() - healed
         heard = json.loads(self._hear()) if case.lasts else heard
-        at = self._heard_at
         self._wait_rest()
         faults = slots.violations(self._config, slots.read(self._slots, first))
         stood = witness.size(self._slots)
@@ -203,12 +201,21 @@ class Links:
         if after["again"] != "SUCCEEDED" or (after["hands"] and came[0] == FINISHED):
             faults.append("it is not ready again by itself")
         return Row(
-            case=case, heard=heard["status"], why=heard["why"], told_after=at - began, arm=came[0], ready_after=ready,
-            again=after["again"], hands=tuple(after["hands"]), faults=tuple(faults),
+            case=case, heard=heard["status"], why=heard["why"], told_after=heard["told_after"], arm=came[0],
+            ready_after=ready, again=after["again"], hands=tuple(after["hands"]), faults=tuple(faults),
         )  # fmt: skip
 
+    def watched(self, word: str) -> tuple[dict[str, object], list[str]]:
+        """What the desk says of a move, with what the judge of slots finds in it."""
+        first = max(witness.size(self._slots) - witness.ROW.size, 0)
+        self._say(word)
+        assert self._hear() == "moving\n"
+        came = json.loads(self._hear())
+        self._wait_rest()
+        return came, slots.violations(self._config, slots.read(self._slots, first))
+
     def logs(self) -> str:
-        return self._lab.logs()
+        return self.lab.logs()
 
     def _where(self, goal: list[float], stands: list[float]) -> str:
         pairs = zip(self._arm.joints, goal, stands, strict=True)
@@ -219,7 +226,7 @@ class Links:
         """[s monotonic] when every process had said so anew; infinity after READY."""
         files = [
             Path(site.state, process.robot or "host", "run", f"{process.service.name}.ready")
-            for name, site in self._lab.sites.items() for process in processes(site, name)
+            for name, site in self.lab.sites.items() for process in processes(site, name)
         ]  # fmt: skip
         end = time.monotonic() + READY
         while time.monotonic() < end:
@@ -240,7 +247,6 @@ class Links:
     def _listen(self) -> None:
         assert self._desk.stdout is not None
         for line in self._desk.stdout:
-            self._heard_at = time.monotonic()
             self._said.put(line)
 
     def _say(self, word: str) -> None:
@@ -251,7 +257,7 @@ class Links:
         try:
             return self._said.get(timeout=TO_TELL)
         except Empty:
-            raise AssertionError(f"the desk says nothing for {TO_TELL:g} s\n{self._lab.logs()}") from None
+            raise AssertionError(f"the desk says nothing for {TO_TELL:g} s\n{self.lab.logs()}") from None
 
 
 def _let_watch(file: Path, record: Path) -> None:

@@ -1,9 +1,9 @@
-"""Links that are dead without a word, a cable out or a host gone, given up by the kernel after the lease.
+"""Links that are dead without a word, a cable out or a host gone, given up by the kernel before the lease ends.
 
 Zenoh misses such a peer after the lease and then says goodbye over TLS. While the socket's buffer is full, that waits
 for the link to heal: until then the peer's tokens live on, and a session that comes back is taken for the old one, so
-that for seconds its messages arrive under the keys of others (Zenoh 1.10.2). A socket that the kernel ends waits for
-nothing.
+that for seconds its messages arrive under the keys of others (Zenoh 1.10.2). A socket that the kernel has ended waits
+for nothing.
 """
 
 from __future__ import annotations
@@ -18,12 +18,16 @@ import zenoh
 
 from services.runtime.bus.zenoh_config import LEASE_MS
 
+# Shorter than the lease, which a peer may count from its last sign of life, a quarter of it before the link died.
+UNACKNOWLEDGED_MS = LEASE_MS * 3 // 4
 OWN_FILES = "/proc/self/fd"
 
 
 def end_dead_links(session: zenoh.Session) -> zenoh.LinkEventsListener[None] | None:
-    """From now on every link of the session ends when what it was sent is not acknowledged for the lease; keep what is
-    returned. None where the system cannot: elsewhere than on Linux."""
+    """From now on every link of the session ends when what it was sent is not acknowledged in time.
+
+    Keep what is returned; it is None where the system cannot: elsewhere than on Linux.
+    """
     if not sys.platform.startswith("linux"):
         return None
 
@@ -41,7 +45,7 @@ def limit(link: zenoh.Link) -> int:
     for opened in _sockets():
         with suppress(OSError), opened:
             if (opened.getsockname()[1], opened.getpeername()[1]) == ends:
-                opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, LEASE_MS)
+                opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_MS)
                 found += 1
     return found
 

@@ -1,0 +1,80 @@
+"""A viewer with a true certificate that floods the bus or stops reading: the arm moves exactly and can be stopped."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from services.runtime.deployment import project_root
+from tests.optional import need
+from tests.stack.links import Links
+
+STOP_GOAL = 100.0  # [ms] said, not asserted: other things run on the machine
+
+
+@pytest.fixture(scope="module")
+def links(tmp_path_factory) -> Iterator[Links]:
+    need("ip")
+    need("mosquitto")
+    if os.geteuid() != 0 or not os.access("/dev/net/tun", os.W_OK):
+        pytest.skip("namespaces are root's: sudo .venv/bin/pytest tests/stack/test_hostile_viewer.py")
+    with Links(tmp_path_factory.mktemp("viewer")) as made:
+        yield made
+
+
+@contextmanager
+def hostile(links: Links, what: str) -> Iterator[subprocess.Popen[str]]:
+    """The viewer's process at the desk, from its first harm on."""
+    keys = f"{links.lab.sites['desk'].config}/keys"
+    shown = {"GEMELO_ROUTER_CERTIFICATE": f"{keys}/viewer.pem", "GEMELO_ROUTER_KEY": f"{keys}/viewer.key"}
+    command = links.hosts.command("desk", sys.executable, "-m", "tests.stack.hostile", what)
+    environment = links.lab.environment("desk", "rm1") | shown
+    with subprocess.Popen(command, cwd=project_root(), env=environment, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            assert int(process.stdout.readline()) > 0
+            yield process
+        finally:
+            process.kill()
+
+
+def require_exact_and_stoppable(links: Links, capsys) -> None:
+    came, faults = links.watched("move")
+    assert (came["status"], came["is_exact"], faults) == ("SUCCEEDED", True, []), came
+    assert came["positions_afterwards"] == 1
+    came, faults = links.watched("stop")
+    assert (came["status"], came["stopped"], faults) == ("ABORTED", True, []), came
+    with capsys.disabled():
+        print(f" stop answered after {came['stop_ms']:.1f} ms (goal {STOP_GOAL:g})", end="")
+
+
+def test_ten_thousand_messages_a_second_of_a_viewer_neither_move_nor_disturb_the_arm(links, capsys):
+    with hostile(links, "flood") as process:
+        require_exact_and_stoppable(links, capsys)
+        process.kill()
+        sent = [int(line) for line in process.stdout]
+    seconds = len(sent)
+    assert seconds > 5
+    with capsys.disabled():
+        print(f", {sent[-1] / (seconds + 1):.0f} messages a second", end="")
+
+
+@pytest.mark.parametrize("frozen", [False, True], ids=["stalled", "frozen"])
+def test_a_reader_that_stops_reading_holds_nobody_up(links, capsys, frozen):
+    with hostile(links, "stalled") as process:
+        if frozen:
+            process.send_signal(signal.SIGSTOP)
+        require_exact_and_stoppable(links, capsys)
+        process.send_signal(signal.SIGCONT)
+
+
+def test_after_all_of_it_everything_is_ready_and_a_move_goes_on(links):
+    came, faults = links.watched("move")
+    assert (came["status"], faults) == ("SUCCEEDED", [])
+    assert "Traceback" not in links.logs()
