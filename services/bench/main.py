@@ -77,6 +77,8 @@ FIGURES = {
     "estop_reaction_ticks": Row("pulses:estop_reaction_ticks", "ticks"),
     "render_ms": Row("camera:render_ms", "ms"),
     "cli_start_ms": Row("stack:cli_start_ms", "ms"),
+    "handshake_ms": Row("handshake:handshake_ms", "ms"),
+    "arms_on_one_router": Row("many_arms:arms_on_one_router", "arms"),
     "tick_instructions": Row("firmware_cost:tick_instructions", "instr"),
     "slot_instructions": Row("firmware_cost:slot_instructions", "instr"),
     "core_text_bytes": Row("firmware_cost:core_text_bytes", "bytes"),

@@ -20,6 +20,7 @@ ISSUE = (
     "gripper_reaction_ms", "estop_reaction_ticks", "seed_move_percent",
     "ik_ms", "ik_success", "plan_success", "plan_python_ms", "path_length_ratio", "duration_ratio",
     "collision_checks_per_s", "state_check_us", "lin_ms", "jog_tick_us", "ledger", "stopping_distance",
+    "arms_on_one_router", "handshake_ms",
 )  # fmt: skip
 
 
