@@ -151,16 +151,21 @@ class Bed:
             over.set()
             heart.join()
 
-    def move(self, goal: int, duration: float, start: int = 0, stream: int = 1) -> bytes:
-        """Send a whole move of q1, once the drivers have been energised for long enough; returns the ACK."""
+    def chunk(self, goal: int, duration: float, start: int = 0, stream: int = 1) -> bytes:
+        """A whole move of q1 in one TRAJ frame, for this boot."""
         boot = self.status["boot_id"]
         assert isinstance(boot, int)
         rows: list[Row] = []
         for i in range(round(duration * 50) + 1):
             p, v = smooth(start, goal, duration, i * 0.02)
             rows.append(([round(p * 256), 0, 0], [round(v * 256), 0, 0]))
+        return traj(stream, 0, rows, FIRST | LAST, boot=boot)
+
+    def move(self, goal: int, duration: float, start: int = 0, stream: int = 1) -> bytes:
+        """Send a whole move of q1, once the drivers have been energised for long enough; returns the ACK."""
+        frame = self.chunk(goal, duration, start, stream)
         while True:
-            self.publish("traj", traj(stream, 0, rows, FIRST | LAST, boot=boot))
+            self.publish("traj", frame)
             answer = self.answer("traj/ack")
             if answer[20] != NOT_ARMED:
                 return answer
