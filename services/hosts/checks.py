@@ -19,6 +19,7 @@ from services.hosts.layout import BROKER, OF_A_ROBOT, ROUTER
 from services.hosts.site_file import Problems, nearest, read_site
 
 USER = re.compile(r"[a-z_][a-z0-9_-]{0,31}")  # as useradd takes it
+ZONE = re.compile(r"[A-Za-z0-9_.-]{1,15}")  # an interface's name after the % of an IPv6 address (RFC 4007)
 LABEL = re.compile(r"[A-Za-z0-9]([A-Za-z0-9-]{0,61}[A-Za-z0-9])?")  # of a host's name (RFC 1123)
 HAS_MEANING = re.compile(r"[$%\\]")  # to systemd, process-compose and compose, whatever stands around it
 GATEWAY, DEVICE = "stepper_gateway", "virtual_esp32"
@@ -165,10 +166,11 @@ def _require_meaningless(path: str, place: Where, problems: Problems) -> None:
 
 def _is_address(text: str) -> bool:
     try:
-        ipaddress.ip_address(text)
+        address = ipaddress.ip_address(text)
     except ValueError:
         return len(text) < 254 and all(LABEL.fullmatch(each) for each in text.split("."))
-    return True
+    zone = getattr(address, "scope_id", None)  # of which Python takes any text
+    return zone is None or ZONE.fullmatch(zone) is not None
 
 
 def _is_unspecified(text: str) -> bool:

@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from schemas.site import Site
+from services.hosts import install
 from services.hosts.checks import load_site
 from services.hosts.layout import processes, robots
 from services.hosts.render import rendered
@@ -118,6 +119,49 @@ def test_whatever_a_person_writes_is_refused_or_stays_one_value(tmp_path, writte
     wire = '[robots.rm1]\nwire = "serial"' if "serial" in written else "[robots.rm1]"
     require_nothing_injected(lab, site(tmp_path, "[robots.rm1]", wire))
     require_readable(lab, tmp_path)
+
+
+addresses = st.one_of(
+    texts,
+    texts.map("fe80::1%{}".format),
+    st.sampled_from(("fe80::1%eth0", "fe80::1%eth0 x", "10.0.0.9", "lab-1.example")),
+)
+
+
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.sampled_from(("cell", "brain")), st.sampled_from(("address", "listen")), addresses)
+@example("cell", "listen", "fe80::1%a b")
+@example("brain", "address", "fe80::1%eth0")
+def test_whatever_is_written_as_an_address_is_refused_or_stays_one_word(tmp_path, host, key, written):
+    header = f"[hosts.{host}.services]"
+    if key == "address":
+        own = {"cell": '"10.0.0.11"', "brain": '"10.0.0.12"'}[host]
+        file = changed(tmp_path, own, escaped(written))
+    else:
+        file = changed(tmp_path, header, f"listen = {escaped(written)}\n{header}")
+    try:
+        lab = load_site(file, project_root())
+    except (SiteError, UnicodeEncodeError):
+        return
+    require_nothing_injected(lab, site(tmp_path))
+    require_readable(lab, tmp_path)
+    at = lab.hosts[host].listen or lab.hosts[host].address
+    files = rendered(lab, host)
+    if "mosquitto.conf" in files:
+        (listener,) = (line for line in files["mosquitto.conf"].splitlines() if line.startswith("listener"))
+        assert listener.split() == ["listener", "8883", at]
+    if "router.json5" in files:
+        (endpoint,) = json.loads(files["router.json5"])["listen"]["endpoints"]
+        assert endpoint == f"tls/[{at}]:7447" if ":" in at else f"tls/{at}:7447"
+    shown = install_commands(lab, host, tmp_path)
+    assert [command[1].partition("@")[2] for command in shown if command[0] == "ssh"] == [lab.hosts[host].address] * 2
+    assert not any(word.startswith("-") for command in shown for word in command[1:2] if command[0] == "ssh")
+
+
+def install_commands(lab: Site, host: str, folder: Path) -> tuple[tuple[str, ...], ...]:
+    for name in ("systemd", "keys"):
+        (folder / name).mkdir(exist_ok=True)
+    return install.commands(lab, host, folder)
 
 
 def rooted(key: str, text: str) -> str:
