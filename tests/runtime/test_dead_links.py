@@ -46,7 +46,8 @@ def limits(port: int) -> list[int]:
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="TCP_USER_TIMEOUT is Linux's")
-def test_every_session_has_the_limit_on_its_link_also_after_the_router_was_away(tmp_path):
+def test_every_session_has_the_limit_on_its_link_also_after_the_router_was_away(tmp_path, monkeypatch):
+    monkeypatch.setattr(dead_links, "is_loopback", lambda host: False)
     router = RouterProcess(tmp_path)
     bus = ZenohBus(router.deployment.router, "rm1")
     try:
@@ -60,12 +61,22 @@ def test_every_session_has_the_limit_on_its_link_also_after_the_router_was_away(
         router.stop()
 
 
+def test_a_link_on_loopback_has_none(tmp_path):
+    router = RouterProcess(tmp_path)
+    bus = ZenohBus(router.deployment.router, "rm1")
+    assert not bus.wait_served("nothing", 0.3)  # by then the other test's session has its limit
+    assert limits(router.port) == [0]
+    bus.close()
+    router.stop()
+
+
 @pytest.mark.parametrize(
-    ("locator", "port"),
-    [("tls/10.0.0.1:7447", 7447), ("tcp/[fe80::1%eth0]:52100", 52100), ("tls/lab.example:1?rel=1#so=2", 1)],
-)
-def test_the_port_of_any_locator_is_found(locator, port):
-    assert dead_links._port(locator) == port
+    ("locator", "host", "port"),
+    [("tls/10.0.0.1:7447", "10.0.0.1", 7447), ("tcp/[fe80::1%eth0]:52100", "fe80::1%eth0", 52100),
+     ("tls/lab.example:1?rel=1#so=2", "lab.example", 1)],
+)  # fmt: skip
+def test_host_and_port_of_any_locator_are_found(locator, host, port):
+    assert (dead_links._host(locator), dead_links._port(locator)) == (host, port)
 
 
 class Far:

@@ -4,6 +4,9 @@ Zenoh misses such a peer after the lease and then says goodbye over TLS. While t
 for the link to heal: until then the peer's tokens live on, and a session that comes back is taken for the old one, so
 that for seconds its messages arrive under the keys of others (Zenoh 1.10.2). A socket that the kernel has ended waits
 for nothing.
+
+Linux also ends the link of a reader that takes nothing for so long, so loopback, where no cable is, stays without the
+limit: there a script may think for a second with its images waiting.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from contextlib import suppress
 import zenoh
 
 from services.runtime.bus.zenoh_config import LEASE_MS
+from services.runtime.deployment import is_loopback
 
 # Shorter than the lease, which a peer may count from its last sign of life, a quarter of it before the link died.
 UNACKNOWLEDGED_MS = LEASE_MS * 3 // 4
@@ -32,7 +36,7 @@ def end_dead_links(session: zenoh.Session) -> zenoh.LinkEventsListener[None] | N
         return None
 
     def on_event(event: zenoh.LinkEvent) -> None:
-        if event.kind == zenoh.SampleKind.PUT:
+        if event.kind == zenoh.SampleKind.PUT and not is_loopback(_host(str(event.link.dst))):
             limit(event.link)
 
     return session.info.declare_link_events_listener(on_event, history=True)
@@ -69,8 +73,17 @@ def _sockets() -> Iterator[socket.socket]:
 
 
 def _port(locator: str) -> int:
-    """Of `tls/10.0.0.1:7447`, with what may stand after `#` or `?`."""
+    return int(_address(locator)[1])
+
+
+def _host(locator: str) -> str:
+    return _address(locator)[0].strip("[]")
+
+
+def _address(locator: str) -> tuple[str, str]:
+    """Host and port of `tls/10.0.0.1:7447`, with what may stand after `#` or `?`."""
     address = locator.partition("/")[2]
     for mark in "#?":
         address = address.partition(mark)[0]
-    return int(address.rpartition(":")[2])
+    host, _, port = address.rpartition(":")
+    return host, port
