@@ -57,7 +57,7 @@ def test_what_only_root_can_run_is_in_the_same_line(bare: Path, user: int, is_na
     (bare / "id").chmod(0o755)
     told = said(bare).stdout
     assert len(told.splitlines()) == 1
-    assert ("sudo .venv/bin/pytest tests/stack/test_hosts.py" in told) is is_named
+    assert ("sudo .venv/bin/pytest tests/stack tests/runtime/test_dead_links.py" in told) is is_named
     assert told.partition("sudo apt-get install ")[2].split() == said(bare, "packages").stdout.split()
 
 

@@ -11,7 +11,8 @@ import pytest
 from services.arm.device.device_config import device_config
 from tests.optional import need
 from tests.stack import slots
-from tests.stack.links import CASES, Case, Links
+from tests.stack.link_cases import CASES, Case
+from tests.stack.links import Links
 from tests.stack.witness import STOOD, row
 
 # All of them: sudo .venv/bin/python -m tests.stack.links
