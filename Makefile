@@ -1,6 +1,6 @@
 # What a person does with gemelo. Everything here needs only `deploy/bootstrap`, which `make setup` runs.
 .DEFAULT_GOAL := help
-.PHONY: help setup up down test check coverage format docs demo bench lock clean
+.PHONY: help setup up down test check coverage format docs demo bench recordings lock clean
 MAKEFLAGS += --no-print-directory
 bin := .venv/bin
 # On every core at once; then the tests that start processes, a file on each core; then browsers, and what watches processes in time.
@@ -60,6 +60,9 @@ coverage: setup ## lines of the firmware core that its tests reach, and why not 
 
 bench: setup ## the figures: out/bench.json
 	@$(bin)/python -m services.bench
+
+recordings: setup ## the recordings that `make test` replays, made anew: tests/replay/recordings
+	@$(bin)/python -m services.replay.make_recordings
 
 lock: setup ## resolve pyproject.toml anew into requirements.lock
 	@deploy/lock

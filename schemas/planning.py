@@ -8,7 +8,7 @@ from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.message import Message, Vector
 from schemas.motion import JointTrajectory
-from schemas.scene import Contact
+from schemas.scene import Contact, SceneObject
 
 
 class PoseGoal(Message, frozen=True, kw_only=True, tag="pose"):
@@ -181,6 +181,20 @@ class PlanResponse(Message, frozen=True, kw_only=True):
     planner_id: str = ""  # that found the way
     scene_version: int | None = None  # of the planning scene it is free of; absent: of a planner that knows none
     scene_epoch: int | None = None  # of the same scene; a goal carries both
+
+
+class PlanInputs(Message, frozen=True, kw_only=True):
+    """What the planner has made its next answer from, beside the question: enough to make the same answer again."""
+
+    stamp: int = 0  # [ns] UNIX time of the answer
+    number: int = 0  # of the answer since the planner started, from 1
+    planned: bool = False  # false: refused or cancelled before any process had planned it
+    present: JointState | None = None  # the newest joint state when the plan began
+    age: float = 0.0  # [s] of that state
+    scene_version: int = 0  # of the planning scene
+    scene_epoch: int = 0
+    jaws: tuple[SceneObject, ...] = ()  # the gripper's, which stand in no scene
+    elapsed: float = 0.0  # [s] that the plan took; near the time allowed, the clock may have ended a search
 
 
 class PlanCancel(Message, frozen=True, kw_only=True):

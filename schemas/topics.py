@@ -50,6 +50,7 @@ from schemas.planning import (
     JogStatus,
     PlanCancel,
     PlanCancelResult,
+    PlanInputs,
     PlannedPath,
     PlanProgress,
     PlanRequest,
@@ -141,6 +142,9 @@ PLANNED_PATH = Topic("planned_path", PlannedPath, LATCHED, None, True, "planner"
 PLAN_PROGRESS = Topic(  # EVERY: several plans share the key, and the newest of one must not push out another's
     "plan/progress", PlanProgress, EVERY, None, True, "planner", "how each plan stands that takes longer than 0.1 s"
 )
+PLAN_INPUTS = Topic(
+    "plan/inputs", PlanInputs, EVERY, None, True, "planner", "what the next answer was made from, for `gemelo replay`"
+)
 SCENE = Topic("scene", PlanningScene, LATCHED, None, True, "planner", "what stands around the arm and what it carries")
 CONTACTS = Topic("contacts", Contacts, LATCHED, None, True, "planner", "what touches where a plan was refused")
 JOG = Topic("jog", JogCommand, LATEST, 50.0, True, ANY, "how to move now, by hand")
@@ -174,7 +178,7 @@ PARAMETER_CHANGES = Topic(
 
 TOPICS: tuple[Topic[Message], ...] = (
     DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, JOINT_TARGETS, FRAMES, STATIC_FRAMES, PLANNED_PATH,
-    PLAN_PROGRESS,
+    PLAN_PROGRESS, PLAN_INPUTS,
     SCENE, CONTACTS, JOG, JOG_STATUS, DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, DEVICE_CONFIGURATION,
     SENSORS, DEVICE_SHAFT, GRIPPER_STATE, STEP_LEDGER, STOPPING_DISTANCE,
     COMMANDS, COMMAND_ACKS, LOG, STATISTICS, PARAMETER_CHANGES,

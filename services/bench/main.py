@@ -62,6 +62,7 @@ FIGURES = {
     "mount_mm": Row("vision.figures:mount_mm", "mm"),
     "pick_mm": Row("picks:pick_mm", "mm", takes_count=True),
     "pick_success": Row("picks:pick_success", "%", takes_count=True),
+    "replay_speed": Row("replaying:replay_speed", "x real time"),
     "lost_of_45000_at_25hz": Row("virtual_time:lost_of_45000_at_25hz", "chunks"),
     "seed_move_percent": Row("seed_move:seed_move_percent", "%"),
     "ra_remainder_steps": Row("old_dialects:ra_remainder_steps", "steps"),

@@ -169,6 +169,8 @@ COMMANDS = (
             "bag:run_export", "bag:export_options", "gemelo bag export test.mcap joint_states --to parquet"),
     Command(("bag", "repair"), "write what is readable of a recording that was cut off, and say what is lost",
             "bag:run_repair", "bag:repair_options", "gemelo bag repair test.mcap"),
+    Command(("replay",), "a recording as a test: what a service heard, through its core again, beside what it said",
+            "replay:run", "replay:add_options", "gemelo replay out/recordings/20261121T013306.250Z_rm1.mcap planner"),
     Command(("scene", "add"), "put an object around the arm, or in its hand",
             "scene:add", "scene:add_options"),
     Command(("scene", "remove"), "take an object away",

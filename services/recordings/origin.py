@@ -29,10 +29,20 @@ def origin(robot: str, root: Path) -> dict[str, str]:
         "robot": robot,
         "python": platform.python_version(),
         "system": platform.platform(),
+        "processor": processor(),
         "commit": commit(root),
-        **{name: _version(package) for name, package in PACKAGES.items()},
+        **{name: version_of(package) for name, package in PACKAGES.items()},
     }
     return {key: value for key, value in said.items() if value}
+
+
+def processor() -> str:
+    """The model of the processor: libraries of mathematics round otherwise on another one; empty if it is not known."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
 
 
 def commit(root: Path) -> str:
@@ -54,7 +64,7 @@ def _packed(git: Path, reference: str) -> str:
     return next((line.split()[0] for line in lines if line.endswith(f" {reference}")), "")
 
 
-def _version(package: str) -> str:
+def version_of(package: str) -> str:
     try:
         return version(package)
     except PackageNotFoundError:

@@ -240,4 +240,5 @@ def test_no_option_but_these_takes_a_bare_number():
         "grip --max-effort", "scene add --scale", "scene resize --scale", "bag record --duration",
         "bag record --max-minutes", "bag record --max-mb", "deploy keys --renew-within",
         "chaos --seed", "chaos --minutes", "chaos --episode", "soak --seed", "soak --hours",
+        "replay --tolerance",
     }  # fmt: skip

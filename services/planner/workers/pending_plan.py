@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from schemas.planning import PlanCode, PlanPhase, PlanProgress, PlanRequest, PlanResponse, Refusal
+from schemas.planning import PlanCode, PlanInputs, PlanPhase, PlanProgress, PlanRequest, PlanResponse, Refusal
 
 WORDS = {
     PlanPhase.WAITING: "waiting",
@@ -18,6 +18,7 @@ WORDS = {
 }
 
 Answer = Callable[[PlanResponse], None]
+OnInputs = Callable[[PlanInputs], object]  # what it was planned from
 
 
 class Cancelled(Exception):
@@ -27,8 +28,8 @@ class Cancelled(Exception):
 class PendingPlan:
     """Answers exactly once; everything here may be called from any thread."""
 
-    def __init__(self, request_id: str, request: PlanRequest, answer: Answer) -> None:
-        self.request_id, self.request = request_id, request
+    def __init__(self, request_id: str, request: PlanRequest, answer: Answer, on_inputs: OnInputs) -> None:
+        self.request_id, self.request, self.on_inputs = request_id, request, on_inputs
         self.phase = PlanPhase.WAITING
         self._answer = answer
         self._asked = time.monotonic()

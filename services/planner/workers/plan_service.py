@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from schemas.planning import PlanCancel, PlanCancelResult, PlanCode, PlanRequest, PlanResponse
-from schemas.topics import PLAN, PLAN_CANCEL, PLAN_PROGRESS, PLANNED_PATH
+from schemas.planning import PlanCancel, PlanCancelResult, PlanCode, PlanInputs, PlanRequest, PlanResponse
+from schemas.topics import PLAN, PLAN_CANCEL, PLAN_INPUTS, PLAN_PROGRESS, PLANNED_PATH
 from services.planner.core import Planner
 from services.planner.scene.scene_keeper import SceneKeeper
 from services.planner.workers.workers import Workers
@@ -19,6 +19,7 @@ class PlanService:
     def __init__(self, node: Node, workers: Workers, planner: Planner, keeper: SceneKeeper) -> None:
         self._node, self._workers, self._planner, self._keeper = node, workers, planner, keeper
         self._path, self._progress = node.publisher(PLANNED_PATH), node.publisher(PLAN_PROGRESS)
+        self._inputs, self._answers = node.publisher(PLAN_INPUTS), 0
         node.serve_later(PLAN, self._plan)
         node.serve(PLAN_CANCEL, self._cancel)
 
@@ -29,15 +30,22 @@ class PlanService:
 
     def _plan(self, request: PlanRequest, pending: Pending[PlanResponse]) -> None:
         began = self._node.monotonic()
-        self._workers.plan(request, lambda response: self._node.post(lambda: self._answer(response, pending, began)))
+        inputs = [PlanInputs()]
+
+        def answer(response: PlanResponse) -> None:
+            self._node.post(lambda: self._answer(response, pending, began, inputs[-1]))
+
+        self._workers.plan(request, answer, inputs.append)
 
     def _cancel(self, request: PlanCancel) -> PlanCancelResult:
         return self._workers.cancel(request.request_id)
 
-    def _answer(self, response: PlanResponse, pending: Pending[PlanResponse], began: float) -> None:
+    def _answer(self, response: PlanResponse, pending: Pending[PlanResponse], began: float, inputs: PlanInputs) -> None:
         if response.code is PlanCode.SUCCESS:
             self._path.put(self._planner.planned_path(response.trajectory, self._node.now()))
         elif response.refusal is not None:
             self._node.log.info(f"refused: {response.refusal.message}")
         self._keeper.show_refusal(response)
+        self._answers += 1
+        self._inputs.put(replace(inputs, stamp=self._node.now(), number=self._answers))
         pending.reply(replace(response, planning_time=self._node.monotonic() - began))

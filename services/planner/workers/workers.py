@@ -13,12 +13,21 @@ from queue import Empty, SimpleQueue
 from msgspec.structs import replace
 
 from schemas.joints import JointState
-from schemas.planning import PlanCancelResult, PlanCode, PlanProgress, PlanRequest, PlanResponse, Refusal
+from schemas.planning import (
+    PlanCancelResult,
+    PlanCode,
+    PlanInputs,
+    PlanProgress,
+    PlanRequest,
+    PlanResponse,
+    Refusal,
+)
 from schemas.scene import PlanningScene
+from services.arm.model.gripper import JAWS
 from services.planner.core import LONGEST
 from services.planner.workers.jobs import Job
-from services.planner.workers.pending_plan import Answer, Cancelled, PendingPlan
-from services.planner.workers.process import Late, Process, WorkerDied
+from services.planner.workers.pending_plan import Answer, Cancelled, OnInputs, PendingPlan
+from services.planner.workers.process import Late, Process, WorkerDied, nothing
 
 MOST = 2  # processes: as many as small computers have cores for it
 LATEST = 0.08  # of the allowed time, beyond it: then the plan is answered, whatever its process does
@@ -56,14 +65,17 @@ class Workers:
         """True while a process lives that plans: then a plan need not wait for one to start."""
         return any(process.is_ready for process in self._processes)
 
-    def plan(self, request: PlanRequest, answer: Answer) -> None:
-        """`answer` is called with the response, mostly in another thread; a second process starts for a second plan."""
+    def plan(self, request: PlanRequest, answer: Answer, on_inputs: OnInputs = nothing) -> None:
+        """`answer` is called with the response, mostly in another thread; a second process starts for a second plan.
+
+        `on_inputs` is told before, in the same thread, what a process has planned from: the last call counts.
+        """
         with self._lock:
             request_id = request.request_id or f"planner-{next(self._numbers)}"
             objection = self._objection(request_id)
             if objection is None:
                 pending_plan = PendingPlan(
-                    request_id, request, lambda response: self._end(request_id, response, answer)
+                    request_id, request, lambda response: self._end(request_id, response, answer), on_inputs
                 )
                 self._pending_plans[request_id] = pending_plan
                 self._tasks.put(pending_plan)
@@ -168,6 +180,7 @@ class Workers:
                 job = Job(request=request, present=present, age=age)
                 began = time.monotonic()
                 response = process.plan(pending_plan, job, _longest(request))
+                pending_plan.on_inputs(_inputs(job, scene, time.monotonic() - began))
             except Cancelled:
                 return None
             except TimeoutError:
@@ -197,6 +210,19 @@ class Workers:
         return PlanResponse(
             code=PlanCode.TIMED_OUT, refusal=refusal, scene_version=scene.version, scene_epoch=scene.epoch
         )
+
+
+def _inputs(job: Job, scene: PlanningScene, elapsed: float) -> PlanInputs:
+    """What `job` was planned from, in `elapsed` [s]."""
+    return PlanInputs(
+        planned=True,
+        present=job.present,
+        age=job.age if job.present is not None else 0.0,  # infinite before the first state
+        scene_version=scene.version,
+        scene_epoch=scene.epoch,
+        jaws=tuple(each for each in scene.objects if each.name in JAWS),
+        elapsed=elapsed,
+    )
 
 
 def _longest(request: PlanRequest) -> float:

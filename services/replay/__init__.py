@@ -1,0 +1,1 @@
+"""Recorded inputs through the core of one service again, and its outputs beside the recorded ones."""

@@ -1,0 +1,164 @@
+"""A recording as the inputs and outputs of one service: whole, of this robot, and of the messages spoken here."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Generic, TypeVar, cast
+
+import msgspec
+
+from schemas.message import Message
+from schemas.topics import Topic
+from services.arm.model.description import Arm, load_arm
+from services.recordings.channels import schema_of
+from services.recordings.mcap_file import DEPLOYMENT, METADATA, ROBOT
+from services.recordings.reader import RecordingReader, Row
+from services.recordings.table import described
+from services.runtime.deployment import project_root
+
+M = TypeVar("M", bound=Message)
+
+FILES = {"urdf": "URDF", "srdf": "SRDF", "robot_toml": "robot.toml"}  # as the recording keeps them
+AGAIN = "record again with this version (the recordings of the tests: `make recordings`)"
+
+
+class NotReplayable(ValueError):
+    """A recording that cannot be replayed; one sentence with what is wrong and what would do."""
+
+
+@dataclass(frozen=True)
+class Heard(Generic[M]):
+    """One recorded message."""
+
+    message: M
+    sequence: int  # in its topic, from 0
+    arrival: int  # [ns] UNIX, at the recorder
+    at: float  # [s] after the first message of the recording
+
+
+@dataclass
+class Recorded:
+    """The messages of `topics`, decoded; raises `NotReplayable`, `BadRecording`."""
+
+    path: Path
+    topics: Iterable[Topic[Any]]
+    robot: Path | None = None  # the folder of the arm; None: that of the recorded arm, in this checkout
+    seconds: float = 0.0  # from the first message of the whole recording to the last
+    _heard: dict[str, list[Heard[Any]]] = field(default_factory=lambda: defaultdict(list))
+
+    def __post_init__(self) -> None:
+        self._reader = RecordingReader(self.path)
+        rows = list(self._reader.rows())
+        if self._reader.damage.is_any:
+            said = f"{self.path}: {self._reader.damage.problem}"
+            raise NotReplayable(f"{said}; `gemelo bag repair {self.path}` writes what is readable, replay that")
+        if not rows:
+            raise NotReplayable(f"{self.path}: there is no message in it; record while the twin runs")
+        self._first = min(row.message.log_time for row in rows)
+        self.seconds = (max(row.message.log_time for row in rows) - self._first) / 1e9
+        wanted = {topic.key: topic for topic in self.topics}
+        for row in rows:
+            if not row.is_derived and row.channel.topic in wanted:
+                self._take(wanted[row.channel.topic], row)
+        for topic in self.topics:
+            self._require_unbroken(topic)
+
+    def of(self, topic: Topic[M]) -> list[Heard[M]]:
+        """The messages of one of the topics, in their order."""
+        return cast("list[Heard[M]]", self._heard[topic.key])
+
+    def require(self, topic: Topic[M]) -> list[Heard[M]]:
+        """As `of`; raises `NotReplayable` where there is none."""
+        if not self._heard[topic.key]:
+            raise NotReplayable(
+                f"{self.path}: there is no message of {topic.key}, which {topic.writer} writes and a replay needs; "
+                f"record it too (`gemelo bag record` without topics, or the recording that `logger` writes by itself)"
+            )
+        return self.of(topic)
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """The software that was recorded, and the machine."""
+        return self._reader.metadata.get(METADATA, {})
+
+    def arm(self) -> Arm:
+        """The arm that was recorded, of this checkout's files; raises `NotReplayable` where they are not the same."""
+        recorded = self._reader.metadata.get(ROBOT)
+        if recorded is None:
+            raise NotReplayable(
+                f"{self.path}: the robot's files are not in it, so nobody knows which arm it is; record the topic "
+                "`description` too"
+            )
+        folder = self.robot or self._folder()
+        arm = load_arm(folder)
+        if arm.name != recorded["robot"]:
+            raise NotReplayable(
+                f'{self.path}: it is of the robot "{recorded["robot"]}", and {folder} is "{arm.name}": name the '
+                "folder of that robot with --robot"
+            )
+        for name, path in (("urdf", arm.urdf_path), ("srdf", arm.srdf_path), ("robot_toml", arm.robot_path)):
+            if recorded[name] != (here := path.read_text(encoding="utf-8")):
+                raise NotReplayable(
+                    f"{self.path}: its {FILES[name]} is another than {path}, first in line "
+                    f"{first_other_line(recorded[name], here)}: {self._with_its_own_version()}"
+                )
+        return arm
+
+    def _folder(self) -> Path:
+        """In this checkout, else where it was recorded."""
+        deployment = json.loads(self._reader.metadata.get(DEPLOYMENT, {}).get("json", "{}"))
+        said = Path(str(deployment.get("robot", "")))
+        for folder in (project_root() / "urdf" / said.name, project_root() / said):
+            if (folder / "robot.toml").exists():
+                return folder
+        raise NotReplayable(
+            f'{self.path}: it is of the robot in "{said}", and there is no such folder here: name it with --robot'
+        )
+
+    def _with_its_own_version(self) -> str:
+        commit = self.versions.get("commit", "")
+        return f"replay it with the files of commit {commit[:12]}, or {AGAIN}" if commit else AGAIN
+
+    def _take(self, topic: Topic[Any], row: Row) -> None:
+        if row.schema.data != schema_of(described(topic)):
+            raise NotReplayable(
+                f"{self.path}: its message {row.schema.name} of {topic.key} has other fields than here: "
+                f"{_other_fields(row.schema.data, schema_of(described(topic)))}; {self._with_its_own_version()}"
+            )
+        try:
+            message = msgspec.json.decode(row.message.data, type=topic.message)
+        except (msgspec.DecodeError, ValueError) as error:
+            raise NotReplayable(
+                f"{self.path}: message {row.message.sequence} of {topic.key} cannot be read: {error}; {AGAIN}"
+            ) from error
+        arrival = row.message.log_time
+        self._heard[topic.key].append(Heard(message, row.message.sequence, arrival, (arrival - self._first) / 1e9))
+
+    def _require_unbroken(self, topic: Topic[Any]) -> None:
+        for before, after in pairwise(self._heard[topic.key]):
+            if after.sequence != before.sequence + 1:
+                raise NotReplayable(
+                    f"{self.path}: {after.sequence - before.sequence - 1} messages of {topic.key} are missing between "
+                    f"{before.at:.3f} s and {after.at:.3f} s (sequence {before.sequence} is followed by "
+                    f"{after.sequence}): what was heard after that cannot be replayed; take another recording"
+                )
+
+
+def first_other_line(one: str, other: str) -> int:
+    """The number of the first line, from 1, in which two texts differ."""
+    lines = list(zip(one.splitlines(), other.splitlines(), strict=False))
+    return next((number for number, (ours, theirs) in enumerate(lines, 1) if ours != theirs), len(lines) + 1)
+
+
+def _other_fields(recorded: bytes, here: bytes) -> str:
+    """The fields at the top that only one of two schemas has, or that some within differ."""
+    ours, theirs = (set(json.loads(schema or b"{}").get("properties", {})) for schema in (here, recorded))
+    new, gone = sorted(ours - theirs), sorted(theirs - ours)
+    parts = [f"new {', '.join(new)}"] if new else []
+    parts += [f"no longer {', '.join(gone)}"] if gone else []
+    return "; ".join(parts) or "a field within has changed"
