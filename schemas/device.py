@@ -278,6 +278,15 @@ class CommandChunk(Message, frozen=True, kw_only=True):
     step_rate: tuple[tuple[int, ...], ...] = ()  # [1/256 step/s] as on the wire
 
 
+class GatewayInputs(Message, frozen=True, kw_only=True):
+    """What the gateway's core was given for a while, each with the readings of its clocks; for `gemelo replay`."""
+
+    stamp: int = 0  # [ns] UNIX time of the first
+    session: int = 0  # of the gateway's process
+    number: int = 0  # of this message in the session, from 0, which has the core's beginning
+    inputs: bytes = b""  # zlib of msgpack: services/stepper_gateway/inputs.py
+
+
 class CommandAck(Message, frozen=True, kw_only=True):
     """The device's answer to a chunk."""
 

@@ -26,6 +26,7 @@ from schemas.device import (
     DeviceStopRequest,
     EchoRequest,
     EchoResponse,
+    GatewayInputs,
     InjectRequest,
     InjectResponse,
     SensorReadings,
@@ -168,6 +169,9 @@ GRIPPER_STATE = Topic(
 )
 COMMANDS = Topic("commands", CommandChunk, EVERY, None, True, GATEWAY, "every chunk of knots sent to the device")
 COMMAND_ACKS = Topic("command_acks", CommandAck, EVERY, None, True, GATEWAY, "the device's answer to every chunk")
+GATEWAY_INPUTS = Topic(
+    "device/inputs", GatewayInputs, EVERY, None, True, GATEWAY, "all that the gateway's core was given, for a replay"
+)
 LOG = Topic("log", LogRecord, EVERY, None, True, ANY, "the log of every node")
 STATISTICS = Topic(
     "statistics", NodeStatistics, EVERY, None, True, ANY, "loop rate, losses and CPU of every node, 1 Hz"
@@ -181,7 +185,7 @@ TOPICS: tuple[Topic[Message], ...] = (
     PLAN_PROGRESS, PLAN_INPUTS,
     SCENE, CONTACTS, JOG, JOG_STATUS, DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, DEVICE_CONFIGURATION,
     SENSORS, DEVICE_SHAFT, GRIPPER_STATE, STEP_LEDGER, STOPPING_DISTANCE,
-    COMMANDS, COMMAND_ACKS, LOG, STATISTICS, PARAMETER_CHANGES,
+    COMMANDS, COMMAND_ACKS, GATEWAY_INPUTS, LOG, STATISTICS, PARAMETER_CHANGES,
 )  # fmt: skip
 
 # One of each for every camera of the cell file, by the camera's name.

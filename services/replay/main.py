@@ -19,7 +19,7 @@ from schemas.errors import ConfigurationError
 from schemas.topics import Topic
 from services.recordings.origin import PACKAGES, processor, version_of
 from services.recordings.reader import BadRecording
-from services.replay import planner, state_publisher
+from services.replay import planner, state_publisher, stepper_gateway
 from services.replay.comparison import Comparison, Difference
 from services.replay.options import add_options
 from services.replay.recorded import NotReplayable, Recorded
@@ -36,6 +36,7 @@ class Service(NamedTuple):
 
 SERVICES = {
     "planner": Service(planner.TOPICS, planner.replay),
+    "stepper_gateway": Service(stepper_gateway.TOPICS_REPLAYED, stepper_gateway.replay),
     "state_publisher": Service(state_publisher.TOPICS, state_publisher.replay),
 }
 

@@ -33,12 +33,30 @@ class NotReplayable(ValueError):
 
 @dataclass(frozen=True)
 class Heard(Generic[M]):
-    """One recorded message."""
+    """One recorded message, which is decoded when it is looked at: an hour of them would be gigabytes."""
 
-    message: M
+    file: Path
+    topic: Topic[M]
+    data: bytes
     sequence: int  # in its topic, from 0
+    stamp: int  # [ns] UNIX, the message's own; of one without, its arrival
     arrival: int  # [ns] UNIX, at the recorder
-    at: float  # [s] after the first message of the recording
+    began: int  # [ns] UNIX arrival of the first message of the recording
+
+    @property
+    def at(self) -> float:
+        """[s] into the recording."""
+        return (self.arrival - self.began) / 1e9
+
+    @property
+    def message(self) -> M:
+        """Raises `NotReplayable`."""
+        try:
+            return msgspec.json.decode(self.data, type=self.topic.message)
+        except (msgspec.DecodeError, ValueError) as error:
+            raise NotReplayable(
+                f"{self.file}: message {self.sequence} of {self.topic.key} cannot be read: {error}; {AGAIN}"
+            ) from error
 
 
 @dataclass
@@ -50,21 +68,23 @@ class Recorded:
     robot: Path | None = None  # the folder of the arm; None: that of the recorded arm, in this checkout
     seconds: float = 0.0  # from the first message of the whole recording to the last
     _heard: dict[str, list[Heard[Any]]] = field(default_factory=lambda: defaultdict(list))
+    _first: int = 0  # [ns] UNIX arrival of the first message
 
     def __post_init__(self) -> None:
         self._reader = RecordingReader(self.path)
-        rows = list(self._reader.rows())
+        wanted = {topic.key: topic for topic in self.topics}
+        last = 0
+        for row in self._reader.rows():
+            time = row.message.log_time
+            self._first, last = min(self._first or time, time), max(last, time)
+            if not row.is_derived and row.channel.topic in wanted:
+                self._take(wanted[row.channel.topic], row)
         if self._reader.damage.is_any:
             said = f"{self.path}: {self._reader.damage.problem}"
             raise NotReplayable(f"{said}; `gemelo bag repair {self.path}` writes what is readable, replay that")
-        if not rows:
+        if not self._first:
             raise NotReplayable(f"{self.path}: there is no message in it; record while the twin runs")
-        self._first = min(row.message.log_time for row in rows)
-        self.seconds = (max(row.message.log_time for row in rows) - self._first) / 1e9
-        wanted = {topic.key: topic for topic in self.topics}
-        for row in rows:
-            if not row.is_derived and row.channel.topic in wanted:
-                self._take(wanted[row.channel.topic], row)
+        self.seconds = (last - self._first) / 1e9
         for topic in self.topics:
             self._require_unbroken(topic)
 
@@ -80,6 +100,10 @@ class Recorded:
                 f"record it too (`gemelo bag record` without topics, or the recording that `logger` writes by itself)"
             )
         return self.of(topic)
+
+    def at(self, unix: int) -> float:
+        """[s] into the recording at `unix` [ns]."""
+        return float((unix - self._first) / 1e9)
 
     @property
     def versions(self) -> dict[str, str]:
@@ -130,14 +154,9 @@ class Recorded:
                 f"{self.path}: its message {row.schema.name} of {topic.key} has other fields than here: "
                 f"{_other_fields(row.schema.data, schema_of(described(topic)))}; {self._with_its_own_version()}"
             )
-        try:
-            message = msgspec.json.decode(row.message.data, type=topic.message)
-        except (msgspec.DecodeError, ValueError) as error:
-            raise NotReplayable(
-                f"{self.path}: message {row.message.sequence} of {topic.key} cannot be read: {error}; {AGAIN}"
-            ) from error
-        arrival = row.message.log_time
-        self._heard[topic.key].append(Heard(message, row.message.sequence, arrival, (arrival - self._first) / 1e9))
+        said = row.message
+        heard = Heard(self.path, topic, said.data, said.sequence, said.publish_time, said.log_time, self._first)
+        self._heard[topic.key].append(heard)
 
     def _require_unbroken(self, topic: Topic[Any]) -> None:
         for before, after in pairwise(self._heard[topic.key]):

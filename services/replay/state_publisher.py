@@ -17,18 +17,19 @@ def replay(recorded: Recorded, comparison: Comparison) -> None:
     publisher = StatePublisher(recorded.arm())
     states = recorded.require(JOINT_STATES)
     for told in recorded.of(STATIC_FRAMES):
-        stamps = {each.stamp for each in told.message.transforms}
-        now = min(stamps, default=0)  # the only clock reading that the core is given
-        if not comparison.hold(STATIC_FRAMES.key, told, told.message, publisher.static_frames(now)):
+        was = told.message
+        now = min((each.stamp for each in was.transforms), default=0)  # the only clock reading that the core is given
+        if not comparison.hold(STATIC_FRAMES.key, told, was, publisher.static_frames(now)):
             return
-    inputs = iter(states)
+    inputs, first = (each.message for each in states), states[0].message.stamp
     for frames in recorded.require(FRAMES):
-        stamp = frames.message.transforms[0].stamp if frames.message.transforms else 0
-        if stamp < states[0].message.stamp:
+        said = frames.message
+        stamp = said.transforms[0].stamp if said.transforms else 0
+        if stamp < first:
             comparison.aside[BEFORE] += 1
             continue
         state = next(inputs, None)
-        while state is not None and state.message.stamp != stamp:
+        while state is not None and state.stamp != stamp:
             comparison.aside[UNHEARD] += 1
             state = next(inputs, None)
         if state is None:
@@ -36,6 +37,6 @@ def replay(recorded: Recorded, comparison: Comparison) -> None:
                 f"{recorded.path}: the joint state of stamp {stamp} ns is missing, of which {FRAMES.key} "
                 f"{frames.sequence} was made at {frames.at:.3f} s: an input was lost; take another recording"
             )
-        if not comparison.hold(FRAMES.key, frames, frames.message, publisher.on_joint_state(state.message).frames):
+        if not comparison.hold(FRAMES.key, frames, said, publisher.on_joint_state(state).frames):
             return
     comparison.aside[UNHEARD] += sum(1 for _ in inputs)

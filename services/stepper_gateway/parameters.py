@@ -45,4 +45,7 @@ class GatewayParameters(msgspec.Struct, frozen=True, kw_only=True):
     command_timeout: Annotated[
         float, Meta(ge=0.2, le=10.0, description="[s] after which an unanswered device command has failed")
     ] = 2.0
+    record_inputs: Annotated[
+        bool, Meta(description="publish what the core is given, twice a second, so that a recording can be replayed")
+    ] = True
     feedback_rate: Annotated[float, Meta(ge=1.0, le=50.0, description="[Hz] of goal feedback")] = 20.0

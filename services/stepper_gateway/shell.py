@@ -31,6 +31,7 @@ from schemas.topics import (
     DEVICE_INJECT,
     DEVICE_STOP,
     FOLLOW_JOINT_TRAJECTORY,
+    GATEWAY_INPUTS,
     GRIPPER_COMMAND,
     JOINT_TARGETS,
     SCENE,
@@ -40,8 +41,30 @@ from services.runtime.node import Node
 from services.runtime.parameters import ParameterSet
 from services.runtime.requests.server import Pending
 from services.stepper_gateway.core import GatewayCore
+from services.stepper_gateway.goals.goal_executor import GoalVerdict
+from services.stepper_gateway.input_log import InputLog
+from services.stepper_gateway.inputs import (
+    Began,
+    Cancel,
+    Command,
+    Configure,
+    Echo,
+    Frame,
+    Goal,
+    Grip,
+    GripCancel,
+    Inject,
+    Input,
+    Link,
+    Parameters,
+    Reply,
+    Scene,
+    Step,
+    Stop,
+    Targets,
+)
 from services.stepper_gateway.ledger.ledger_file import LedgerFile
-from services.stepper_gateway.links.link import Link
+from services.stepper_gateway.links import link as links
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import (
     Answer,
@@ -70,24 +93,31 @@ class Shell:
     """Everything here runs in the thread of logic, but `wake`."""
 
     def __init__(
-        self, node: Node, core: GatewayCore, parameters: ParameterSet[GatewayParameters], ledger: LedgerFile
+        self,
+        node: Node,
+        core: GatewayCore,
+        began: Began,
+        parameters: ParameterSet[GatewayParameters],
+        ledger: LedgerFile,
     ) -> None:
         self._node, self._core, self._parameters, self._ledger = node, core, parameters, ledger
-        self._link: Link | None = None
+        self._inputs = InputLog(core, began, self._moment(), node.publisher(GATEWAY_INPUTS).put)
+        self._told = began.parameters
+        self._link: links.Link | None = None
         self._is_woken = threading.Event()
         self._callers: dict[int, Pending[Any]] = {}  # by ticket: who waits for the device's answer
         self._tickets = itertools.count(1)
         self._server: Server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self._on_goal, self._on_cancel)
         self._gripper: Gripper = node.serve_action(GRIPPER_COMMAND, self._on_grip, self._on_grip_cancel)
         node.subscribe(JOINT_TARGETS, self._on_targets)
-        node.subscribe(SCENE, core.on_scene)
+        node.subscribe(SCENE, lambda scene: self._give(Scene(scene.version, scene.epoch)))
         self._commands = node.serve_later(DEVICE_COMMAND, self._on_command)
         node.serve_later(DEVICE_STOP, self._on_stop)
         node.serve_later(DEVICE_CONFIGURE, self._on_configure)
         node.serve_later(DEVICE_INJECT, self._on_inject)
         node.serve_later(DEVICE_ECHO, self._on_echo)
 
-    def use(self, link: Link) -> None:
+    def use(self, link: links.Link) -> None:
         self._link = link
         self.wake()
 
@@ -99,10 +129,18 @@ class Shell:
 
     def step(self, _now: int) -> None:
         """One turn of the control loop."""
-        self._core.set_parameters(self._parameters.value)
-        self._carry_out(self._core.step(self._moment()))
-        reason = self._core.not_ready(self._moment())
+        if self._parameters.value is not self._told:
+            self._told = self._parameters.value
+            self._give(Parameters(self._told))
+        self._give(Step())
+        moment = self._moment()
+        reason = self._core.not_ready(moment)
         self._node.set_ready(not reason, reason)
+        self._inputs.step(moment, self._told.record_inputs)
+
+    def finish(self) -> None:
+        """The last word of the inputs; the loop has ended."""
+        self._inputs.finish()
 
     def _moment(self) -> Moment:
         return Moment(self._node.now(), self._node.monotonic())
@@ -112,38 +150,30 @@ class Shell:
         link = self._link
         if link is None:
             return
-        self._carry_out(self._core.on_link(link.connected, link.reason, self._moment()))
+        self._give(Link(link.connected, link.reason))
         received = link.take(AT_ONCE)
         for payload in received:
-            self._carry_out(self._core.on_received(payload, self._moment()))
+            self._give(Frame(*payload))
         if len(received) == AT_ONCE:
             self.wake()
 
     def _on_goal(self, goal_id: str, goal: FollowJointTrajectoryGoal) -> GoalDecision:
-        verdict, outputs = self._core.on_goal(goal_id, goal, self._moment())
-        self._carry_out(outputs)
-        return accept() if verdict.accepted else refuse(verdict.code, verdict.reason)
+        return _decision(self._give(Goal(goal_id, goal)))
 
     def _on_cancel(self, goal_id: str) -> str:
-        reason, outputs = self._core.on_cancel(goal_id, self._moment())
-        self._carry_out(outputs)
-        return reason
+        return str(self._give(Cancel(goal_id)))
 
     def _on_grip(self, goal_id: str, goal: GripperCommandGoal) -> GoalDecision:
-        verdict, outputs = self._core.on_grip(goal_id, goal, self._moment())
-        self._carry_out(outputs)
-        return accept() if verdict.accepted else refuse(verdict.code, verdict.reason)
+        return _decision(self._give(Grip(goal_id, goal)))
 
     def _on_grip_cancel(self, goal_id: str) -> str:
-        reason, outputs = self._core.on_grip_cancel(goal_id, self._moment())
-        self._carry_out(outputs)
-        return reason
+        return str(self._give(GripCancel(goal_id)))
 
     def _on_targets(self, targets: JointTargets) -> None:
-        self._carry_out(self._core.on_targets(targets, self._moment()))
+        self._give(Targets(targets))
 
     def _on_command(self, request: DeviceCommandRequest, pending: Pending[DeviceCommandResponse]) -> None:
-        self._carry_out(self._core.on_command(request, self._ticket(pending), self._moment()))
+        self._give(Command(self._ticket(pending), request))
 
     def _on_stop(self, request: DeviceStopRequest, pending: Pending[DeviceCommandResponse]) -> None:
         """What waits behind a stop was asked for before it, and must not move the arm after it."""
@@ -151,16 +181,22 @@ class Shell:
         self._server.refuse_waiting(reason)
         self._gripper.refuse_waiting(reason)
         self._commands.refuse_waiting(reason)
-        self._carry_out(self._core.on_stop(request, self._ticket(pending), self._moment()))
+        self._give(Stop(self._ticket(pending), request))
 
     def _on_configure(self, _request: ConfigureRequest, pending: Pending[ConfigureResponse]) -> None:
-        self._carry_out(self._core.on_configure(self._ticket(pending), self._moment()))
+        self._give(Configure(self._ticket(pending)))
 
     def _on_inject(self, request: InjectRequest, pending: Pending[InjectResponse]) -> None:
-        self._carry_out(self._core.on_inject(request, self._ticket(pending), self._moment()))
+        self._give(Inject(self._ticket(pending), request))
 
     def _on_echo(self, _request: EchoRequest, pending: Pending[EchoResponse]) -> None:
-        self._carry_out(self._core.on_echo(self._ticket(pending), self._moment()))
+        self._give(Echo(self._ticket(pending)))
+
+    def _give(self, given: Input) -> Reply:
+        """Gives the core one input now, carries out what comes of it, and returns what it says at once."""
+        reply, outputs = self._inputs.give(given, self._moment())
+        self._carry_out(outputs)
+        return reply
 
     def _ticket(self, pending: Pending[Any]) -> int:
         ticket = next(self._tickets)
@@ -193,3 +229,9 @@ class Shell:
                     self._ledger.keep(record)
                 case LogLine(level, text):
                     self._node.log.log(level, "%s", text)
+
+
+def _decision(reply: Reply) -> GoalDecision:
+    """A verdict as the action's server says it."""
+    assert isinstance(reply, GoalVerdict)
+    return accept() if reply.accepted else refuse(reply.code, reply.reason)

@@ -14,6 +14,12 @@ from tests.replay.conftest import RECORDINGS
 
 LEAST = {  # messages that are compared, by topic
     "planner": {"@request/plan": 8, "planned_path": 5},
+    "stepper_gateway": {
+        "joint_states": 300, "joint_commands": 300, "step_errors": 300, "device/state": 300, "commands": 100,
+        "command_acks": 100, "follow_joint_trajectory/ended": 3,
+        "device/events": 3, "device/status": 1, "step_ledger": 20, "stopping_distance": 50,
+        "frames, results, answers and log lines": 300,
+    },
     "state_publisher": {"frames": 300, "static_frames": 1},
 }  # fmt: skip
 ROUNDED = 1e-9  # share by which floats may differ on another processor, whose libraries round otherwise

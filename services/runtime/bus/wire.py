@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TypeVar
 
 from schemas.camera import CameraImage
+from schemas.device import GatewayInputs
 from schemas.frames import RobotDescription
 from schemas.message import BadMessage, Message, decode, encode
 from schemas.system import Exchange
@@ -15,6 +16,7 @@ M = TypeVar("M", bound=Message)
 MAX_PAYLOAD = 512 * 1024  # [bytes] a trajectory of 6 joints and 2,000 points is half of this
 MAX_PAYLOAD_OF: dict[str, int] = {  # [bytes]
     RobotDescription.__name__: 8 * 1024 * 1024,  # URDF text
+    GatewayInputs.__name__: 2 * 1024 * 1024,  # the largest goal, and all that has come beside it
     CameraImage.__name__: 8 * 1024 * 1024,  # 1920 x 1080 in rgb8 is 6.2 million
     Exchange.__name__: 2 * MAX_PAYLOAD + 64 * 1024,  # a question, its answer, and who asked
 }

@@ -1,0 +1,206 @@
+"""Everything that the core can be given, as values: the shell gives them to the core, and a replay gives them again.
+
+The core has no clock, no wire and no chance of its own, so the same inputs at the same moments give the same outputs.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from hashlib import blake2b
+
+import msgspec
+
+from schemas.device import DeviceCommandRequest, DeviceStopRequest, InjectRequest
+from schemas.gripper import GripperCommandGoal
+from schemas.joints import JointTargets
+from schemas.motion import FollowJointTrajectoryGoal
+from schemas.scene import PlanningScene
+from services.stepper_gateway.core import GatewayCore
+from services.stepper_gateway.goals.goal_executor import GoalVerdict
+from services.stepper_gateway.ledger.record import LedgerRecord
+from services.stepper_gateway.links.link import Kind, Received
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.outputs import Output, Publish
+from services.stepper_gateway.parameters import GatewayParameters
+
+LARGEST = 64 * 1024 * 1024  # [B] of one message's inputs, unpacked
+
+
+class _Input(msgspec.Struct, frozen=True, tag=True, array_like=True):
+    """The base of every input."""
+
+
+class Began(_Input, frozen=True):
+    """The core was made; `kept` is the step ledger of the gateway before."""
+
+    session: int
+    parameters: GatewayParameters
+    kept: LedgerRecord | None = None
+
+
+class Parameters(_Input, frozen=True):
+    """Other parameters were set."""
+
+    parameters: GatewayParameters
+
+
+class Step(_Input, frozen=True):
+    """One turn of the control loop."""
+
+
+class Link(_Input, frozen=True):
+    """How the wire is, whenever something has happened on it."""
+
+    connected: bool
+    reason: str
+
+
+class Frame(_Input, frozen=True):
+    """One payload from the device."""
+
+    kind: Kind
+    payload: bytes
+    retained: bool
+    arrival: int  # [ns] monotonic clock
+
+
+class Goal(_Input, frozen=True):
+    goal_id: str
+    goal: FollowJointTrajectoryGoal
+
+
+class Cancel(_Input, frozen=True):
+    goal_id: str
+
+
+class Grip(_Input, frozen=True):
+    goal_id: str
+    goal: GripperCommandGoal
+
+
+class GripCancel(_Input, frozen=True):
+    goal_id: str
+
+
+class Scene(_Input, frozen=True):
+    """All of a scene that the gateway looks at."""
+
+    version: int
+    epoch: int
+
+
+class Targets(_Input, frozen=True):
+    targets: JointTargets
+
+
+class Command(_Input, frozen=True):
+    ticket: int
+    request: DeviceCommandRequest
+
+
+class Stop(_Input, frozen=True):
+    ticket: int
+    request: DeviceStopRequest
+
+
+class Configure(_Input, frozen=True):
+    ticket: int
+
+
+class Inject(_Input, frozen=True):
+    ticket: int
+    request: InjectRequest
+
+
+class Echo(_Input, frozen=True):
+    ticket: int
+
+
+Input = (
+    Began | Parameters | Step | Link | Frame | Goal | Cancel | Grip | GripCancel | Scene | Targets | Command | Stop
+    | Configure | Inject | Echo
+)  # fmt: skip
+Reply = GoalVerdict | str | None  # what is said at once
+
+
+class Given(msgspec.Struct, frozen=True, array_like=True):
+    """One input, the moment at which the core was given it, and what came of it."""
+
+    unix: int  # [ns]
+    monotonic: float  # [s]
+    digest: int  # of the outputs: `digest_of`
+    input: Input
+
+    @property
+    def moment(self) -> Moment:
+        return Moment(self.unix, self.monotonic)
+
+
+def give(core: GatewayCore, given: Input, moment: Moment) -> tuple[Reply, list[Output]]:
+    """Gives the core one input; what it says at once, and its outputs."""
+    match given:
+        case Step():
+            return None, core.step(moment)
+        case Link(connected, reason):
+            return None, core.on_link(connected, reason, moment)
+        case Frame(kind, payload, retained, arrival):
+            return None, core.on_received(Received(kind, payload, retained, arrival), moment)
+        case Targets(targets):
+            return None, core.on_targets(targets, moment)
+        case Goal(goal_id, goal):
+            return core.on_goal(goal_id, goal, moment)
+        case Cancel(goal_id):
+            return core.on_cancel(goal_id, moment)
+        case Grip(goal_id, goal):
+            return core.on_grip(goal_id, goal, moment)
+        case GripCancel(goal_id):
+            return core.on_grip_cancel(goal_id, moment)
+        case Scene(version, epoch):
+            core.on_scene(PlanningScene(version=version, epoch=epoch))
+        case Command(ticket, request):
+            return None, core.on_command(request, ticket, moment)
+        case Stop(ticket, request):
+            return None, core.on_stop(request, ticket, moment)
+        case Configure(ticket):
+            return None, core.on_configure(ticket, moment)
+        case Inject(ticket, request):
+            return None, core.on_inject(request, ticket, moment)
+        case Echo(ticket):
+            return None, core.on_echo(ticket, moment)
+        case Parameters(parameters):
+            core.set_parameters(parameters)
+        case Began():
+            raise ValueError("a core begins once: make another one")
+    return None, []
+
+
+def digest_of(reply: Reply, outputs: list[Output]) -> int:
+    """BLAKE2 of everything but the messages for the bus, which a recording has: frames, results, answers, log lines.
+
+    0 where there is none. No CRC-32: that of a frame which ends with its own CRC-32 is the same for every content.
+    """
+    said = [] if reply is None else [msgspec.msgpack.encode(reply)]
+    for output in outputs:
+        if type(output) is not Publish:
+            said += (type(output).__name__.encode(), msgspec.msgpack.encode(output))
+    return int.from_bytes(blake2b(b"".join(said), digest_size=8).digest(), "big") if said else 0
+
+
+_decoder = msgspec.msgpack.Decoder(list[Given])
+
+
+def packed(encoded: list[bytes]) -> bytes:
+    """Inputs, each as msgpack, as a message carries them."""
+    count = len(encoded)
+    return zlib.compress(b"\xdd" + count.to_bytes(4, "big") + b"".join(encoded), 1)  # an array of msgpack
+
+
+def unpacked(payload: bytes) -> Iterator[Given]:
+    """Raises ValueError for what is no list of inputs."""
+    unzip = zlib.decompressobj()
+    try:
+        content = unzip.decompress(payload, LARGEST)
+    except zlib.error as error:
+        raise ValueError(f"{error}") from error
+    yield from _decoder.decode(content)
