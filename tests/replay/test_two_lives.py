@@ -1,0 +1,85 @@
+"""A gateway that is killed and starts again while it is recorded: both of its lives are replayed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from schemas.topics import DESCRIPTION, GATEWAY_INPUTS
+from services.recordings.channels import Entry
+from services.recordings.mcap_file import McapFile
+from services.replay.main import replay, text_of
+from services.replay.stepper_gateway import OUTSIDE
+from services.state_publisher.main import describe
+from services.stepper_gateway.core import GatewayCore
+from services.stepper_gateway.input_log import InputLog
+from services.stepper_gateway.inputs import Began, Link, Step
+from services.stepper_gateway.moment import Moment
+from services.stepper_gateway.outputs import Publish
+from services.stepper_gateway.parameters import GatewayParameters
+from services.virtual_arm.virtual_arm import UNIX, rm1
+
+PERIOD = 0.02  # [s]
+
+
+class Life:
+    """One process of the gateway, without a device; its messages and inputs go into `entries`."""
+
+    def __init__(self, session: int, start: float, entries: list[Entry]) -> None:
+        self.now, self._entries = start, entries
+        began = Began(session, GatewayParameters())
+        core = GatewayCore(rm1(), session, began.parameters)
+        self._log = InputLog(core, began, self.moment, lambda said: self._keep(GATEWAY_INPUTS, said))
+
+    @property
+    def moment(self) -> Moment:
+        return Moment(UNIX + round(self.now * 1e9), 1000.0 + self.now)
+
+    def run(self, seconds: float) -> None:
+        for turn in range(round(seconds / PERIOD)):
+            self.now += PERIOD
+            self.give(Step())
+            if turn % 50 == 0:
+                self.give(Link(turn % 100 == 0, "the broker is gone" if turn % 100 else ""))
+            self._log.step(self.moment, True)
+
+    def give(self, given) -> None:
+        for output in self._log.give(given, self.moment)[1]:
+            if isinstance(output, Publish):
+                self._keep(output.topic, output.message)
+
+    def end(self) -> None:
+        self._log.finish()
+
+    def _keep(self, topic, message) -> None:
+        self._entries.append(Entry(topic, message, self.moment.unix + 300_000))
+
+
+def recorded(path: Path, entries: list[Entry]) -> Path:
+    file = McapFile(path, {"deployment": {"json": '{"robot": "urdf/rm1"}'}})
+    file.write([Entry(DESCRIPTION, describe(rm1()), UNIX), *entries])
+    file.close()
+    return path
+
+
+def test_both_lives_are_the_same_again(tmp_path):
+    entries: list[Entry] = []
+    first = Life(11, 0.0, entries)
+    first.run(15.3)  # its last inputs are lost with it
+    second = Life(12, 20.0, entries)
+    second.run(12.0)
+    second.end()
+    replayed = replay(recorded(tmp_path / "lives.mcap", entries), "stepper_gateway")
+    assert replayed.difference is None, text_of(replayed)
+    said = sum(entry.topic is not GATEWAY_INPUTS for entry in entries)
+    alike = sum(count for topic, count in replayed.alike.items() if "/" in topic)
+    assert alike > 20
+    assert alike + replayed.aside.get(OUTSIDE, 0) == said
+
+
+def test_a_message_that_the_first_life_never_said_is_found(tmp_path):
+    entries: list[Entry] = []
+    Life(11, 0.0, entries).run(15.3)
+    events = [each for each in entries if each.topic.key == "device/events"]
+    entries.insert(entries.index(events[3]), events[2])  # the same one twice
+    found = replay(recorded(tmp_path / "lives.mcap", entries), "stepper_gateway").difference
+    assert (found.topic, found.sequence) == ("device/events", 3)
