@@ -14,7 +14,7 @@ help: ## this list
 setup: ## make this folder ready to run; skips what is done
 	@deploy/bootstrap
 
-up: setup ## start the twin (setup first); Ctrl-C stops it
+up: setup ## start the twin (setup first), ARMS="rm1 parol6": several; Ctrl-C stops it
 	@deploy/up
 
 down: ## stop a twin that runs elsewhere

@@ -13,7 +13,7 @@ from schemas.deployment import Deployment
 from services.arm.errors import suggestion
 from services.arm.model import description as descriptions
 from services.arm.model.description import Arm as Description
-from services.runtime.deployment import load_deployment, project_root
+from services.runtime.deployment import deployment_of_arm, load_deployment, project_root
 
 LOOK_TIMEOUT = 1.0  # [s] of one look for the router
 
@@ -32,14 +32,19 @@ class Robot(NamedTuple):
 def load_robot(robot: str = "", *, deployment: str | Path | None = None) -> Robot:
     """Reads the files of the arm that `connect` with the same arguments is for; asks nobody.
 
+    One of several arms that `make up ARMS=...` has started has folders of its own.
     Raises `Error` where a file is wrong, `BadArgument` where there is no such arm.
 
     >>> gemelo.load_robot("parol6").description.tool_frame
     'tool_link'
     """
     try:
-        found = load_deployment(None if deployment is None else Path(deployment))
-        if robot:
+        file = deployment_of_arm(robot) if robot and deployment is None else None
+        if file is not None:
+            found = load_deployment(file, {})  # what the environment said when it was started stands in the file
+        else:
+            found = load_deployment(None if deployment is None else Path(deployment))
+        if robot and file is None:
             found = replace(found, robot=str(_folder(robot)))
         return Robot(found, descriptions.load_arm(project_root() / found.robot))
     except (ValueError, OSError) as error:

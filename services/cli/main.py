@@ -26,13 +26,29 @@ def parse(arguments: Sequence[str]) -> Options:
 
 
 def with_robot(arguments: list[str]) -> list[str]:
-    """Without `--robot NAME` before the command, which chooses the robot for this process; as $GEMELO_ROBOT does."""
+    """Without `--robot NAME` before the command, which chooses the robot for this process."""
     if arguments[:1] != ["--robot"]:
         return arguments
     if len(arguments) < 2:
         raise usage("--robot NAME: the name of an arm in urdf/, of a recording that is played, or its folder")
-    os.environ["GEMELO_ROBOT"] = robot_folder(arguments[1])
+    choose_robot(arguments[1])
     return arguments[2:]
+
+
+def choose_robot(name: str) -> None:
+    """One of several arms that were started together has a deployment of its own; any other has that of this process.
+
+    Raises `CommandError` where there is no such robot.
+    """
+    from services.runtime.deployment import deployment_of_arm, overriding
+
+    file = deployment_of_arm(name)
+    if file is None:
+        os.environ["GEMELO_ROBOT"] = robot_folder(name)
+        return
+    for variable in overriding(os.environ):  # what they said when it was started stands in the file
+        del os.environ[variable]
+    os.environ["GEMELO_CONFIG"] = str(file)
 
 
 def robot_folder(name: str) -> str:

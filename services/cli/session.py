@@ -102,7 +102,7 @@ def other_robots(deployment: Deployment, arm: Description) -> str:
     router = f"{deployment.router.host}:{deployment.router.port}"
     return (
         f"the router at {router} has no {arm.name}, but {', '.join(robots)}: "
-        f"GEMELO_ROBOT=urdf/{robots[0]} gemelo ... speaks with it"
+        f"`gemelo --robot {robots[0]} ...` speaks with it"
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
-Value = str | int | bool
+Value = str | int | float | bool
 
 
 def systemd(text: str) -> str:

@@ -6,6 +6,7 @@ import difflib
 import ipaddress
 import os
 import re
+import shutil
 import tomllib
 from collections.abc import Mapping
 from enum import StrEnum
@@ -21,6 +22,7 @@ DEFAULT_FILE = "deploy/local.toml"
 MQTT_FILES = ("secure_folder", "password_file", "device_password_file", "ca", "certificate", "key")
 ROUTER_FILES = ("configuration", "ca", "certificate", "key")
 PREFIX = "GEMELO_"
+ARMS = "arms"  # folder in `paths.run` with a deployment for each of several arms that `make up ARMS=...` started last
 REMEDIES = {
     "router": "`gemelo deploy` gives router and nodes certificates (deploy/README.md)",
     "mqtt": "`gemelo broker secure` gives it TLS (docs/my_broker.md)",
@@ -69,6 +71,22 @@ def robot_name(deployment: Deployment) -> str:
     if not isinstance(name, str) or not name or "/" in name:
         raise DeploymentError(f'{file}: key "name" must be a text without "/"')
     return name
+
+
+def deployment_of_arm(name: str, environ: Mapping[str, str] | None = None) -> Path | None:
+    """The deployment file of an arm that was started last among several; None where it was not."""
+    file = Path(load_deployment(None, environ).paths.run) / ARMS / f"{name}.toml"
+    return file if "/" not in name and file.is_file() else None
+
+
+def forget_arms(common: Deployment) -> None:
+    """Several arms that were started before are no more."""
+    shutil.rmtree(Path(common.paths.run) / ARMS, ignore_errors=True)
+
+
+def overriding(environ: Mapping[str, str]) -> list[str]:
+    """The variables in `environ` that would override a deployment file."""
+    return _override({}, environ)
 
 
 def exposure(section: str, host: str, is_locked: bool, is_insecure: bool) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TextIO
 
 from schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
 from schemas.errors import ConfigurationError
@@ -12,7 +13,7 @@ from services.arm.model.description import Arm, load_arm, require_motors
 from services.arm.model.virtual_drive import NO_MOTORS
 from services.mqtt.access import device_access, gateway_access
 from services.mqtt.secure_folder import listener
-from services.runtime.deployment import exposure, load_deployment, project_root
+from services.runtime.deployment import exposure, forget_arms, load_deployment, project_root
 from services.runtime.process.ports import PortTaken, require_free
 
 
@@ -91,14 +92,16 @@ def main() -> int:
     for problem in found:
         print(f"gemelo: {problem}", file=sys.stderr)
     if not found:
-        _say_virtual(load_arm(project_root() / deployment.robot))
+        forget_arms(deployment)
+        say_virtual(load_arm(project_root() / deployment.robot), sys.stdout)
     return 1 if found else 0
 
 
-def _say_virtual(arm: Arm) -> None:
+def say_virtual(arm: Arm, to: TextIO) -> None:
     """What a person is to know of an arm without motors, as the stack starts."""
     if not arm.has_motors:
-        print(f"{arm.name}: {NO_MOTORS}; a virtual device is generated, at {arm.device.tick_hz / 1000:g} kHz")
+        said = f"{arm.name}: {NO_MOTORS}; a virtual device is generated, at {arm.device.tick_hz / 1000:g} kHz"
+        print(said, file=to)
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ def test_a_command_for_a_robot_that_is_not_there_names_the_one_that_is(router, p
     assert run(words) is ExitCode.NO_STACK
     error = capsys.readouterr().err
     assert f"the router at 127.0.0.1:{router.port} has no rm1, but parol6" in error
-    assert "GEMELO_ROBOT=urdf/parol6" in error
+    assert "`gemelo --robot parol6 ...` speaks with it" in error
 
 
 def test_a_router_with_nobody_says_what_does_not_run(router, monkeypatch, capsys):

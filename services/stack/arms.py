@@ -1,0 +1,155 @@
+"""Several arms on one machine: a deployment for each, on one router and one broker, or why they cannot run together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+from msgspec.structs import replace
+
+from schemas.deployment import Broker, Deployment, DeviceKind, ViewerMode, Wire
+from schemas.errors import ConfigurationError
+from services.arm.errors import suggestion
+from services.arm.model.description import Arm, load_arm
+from services.hosts.quoting import Value, toml
+from services.runtime.deployment import ARMS
+
+HEADER = "# Written by `make up ARMS=...`, of deploy/local.toml and of the environment then.\n\n"
+SHARED = ("router", "broker")  # processes that serve all arms
+
+
+@dataclass(frozen=True)
+class StackedArm:
+    """An arm among others on one machine."""
+
+    arm: Arm
+    deployment: Deployment
+
+    @property
+    def name(self) -> str:
+        return self.arm.name
+
+
+def stacked_arms(names: Sequence[str], common: Deployment, root: Path) -> tuple[StackedArm, ...]:
+    """The arms of urdf/, or of folders, each with its own page, view, recordings and readiness.
+
+    The first has the ports of `common`, each further one the next. Raises `ConfigurationError` with every collision.
+    """
+    folders = [_folder(name, root) for name in names]
+    arms = [load_arm(folder) for folder in folders]
+    made = tuple(
+        StackedArm(arm, _deployment(common, arm, folder, folders, index))
+        for index, (arm, folder) in enumerate(zip(arms, folders, strict=True))
+    )
+    if problems := [*_same_names(made), *_same_devices(made), *_same_ports(made, common)]:
+        raise ConfigurationError("\n".join(problems))
+    return made
+
+
+def deployment_file(deployment: Deployment) -> str:
+    """The deployment as TOML; raises `ConfigurationError` for a text that TOML cannot hold on a line."""
+    plain = msgspec.to_builtins(deployment)
+    tables: dict[str, dict[str, Value]] = {"": {}}
+    for key, value in plain.items():
+        if key == "parameters":
+            tables |= {f'parameters."{node}"': values for node, values in value.items()}
+        elif isinstance(value, dict):
+            tables[key] = value
+        else:
+            tables[""][key] = value
+    try:
+        return HEADER + toml(tables)
+    except ValueError as error:
+        raise ConfigurationError(f"a deployment for several arms cannot be written: {error}") from error
+
+
+def left_out(deployment: Deployment) -> frozenset[str]:
+    """The processes that would only stand aside; with several arms they are not started."""
+    aside = {
+        "viewer": deployment.viewer.mode is ViewerMode.NONE,
+        "virtual_esp32": deployment.device is DeviceKind.BOARD,
+        "camera": not deployment.cell,
+        "detector": not deployment.cell,
+    }
+    return frozenset(name for name, is_aside in aside.items() if is_aside)
+
+
+def _folder(name: str, root: Path) -> Path:
+    for folder in (root / "urdf" / name, root / name):
+        if (folder / "robot.toml").is_file():
+            return folder.resolve()
+    known = sorted(path.parent.name for path in (root / "urdf").glob("*/robot.toml"))
+    raise ConfigurationError(f'ARMS: there is no arm "{name}"{suggestion(name, known)}')
+
+
+def _deployment(common: Deployment, arm: Arm, folder: Path, all_folders: Sequence[Path], index: int) -> Deployment:
+    paths, viewer = common.paths, common.viewer
+    return replace(
+        common,
+        robot=str(folder),
+        cell=common.cell if _is_for(Path(common.cell), folder, all_folders) else "",
+        viewer=replace(viewer, port=viewer.port + index, web_port=viewer.web_port + index),
+        panel=replace(common.panel, port=common.panel.port + index),
+        paths=replace(paths, run=f"{paths.run}/{arm.name}", out=f"{paths.out}/{arm.name}"),
+    )
+
+
+def _is_for(cell: Path, folder: Path, all_folders: Sequence[Path]) -> bool:
+    """A cell file in the folder of one of the arms is that arm's alone; any other is everybody's."""
+    owners = [each for each in all_folders if cell.resolve().is_relative_to(each)]
+    return not owners or folder in owners
+
+
+def _same_names(arms: Sequence[StackedArm]) -> Iterator[str]:
+    seen: dict[str, str] = {}
+    for each in arms:
+        folder = each.deployment.robot
+        if each.name == ARMS:
+            yield f'{folder}: no robot among several can have the name "{ARMS}": change name in its robot.toml'
+        if each.name in seen:
+            both = f"{seen[each.name]} and {folder}" if seen[each.name] != folder else f"{folder} twice"
+            yield f'ARMS names {both}: the robot "{each.name}" can be on a router once; give one another name'
+        seen.setdefault(each.name, folder)
+
+
+def _same_devices(arms: Sequence[StackedArm]) -> Iterator[str]:
+    """Of one MQTT name, or at the end of one cable."""
+    seen: dict[str, str] = {}
+    for each in arms:
+        deployment, name = each.deployment, each.arm.device.name
+        if deployment.wire is Wire.MQTT:
+            key, what = name, f'the device "{name}" at the broker: change [device] name in one robot.toml'
+        elif deployment.device is DeviceKind.BOARD:
+            key = deployment.serial.device
+            what = f"a board at {key}: several boards on cables are a site of one host (gemelo deploy)"
+        else:
+            continue
+        if key in seen and seen[key] != each.name:
+            yield f"{seen[key]} and {each.name} would both have {what}"
+        seen.setdefault(key, each.name)
+
+
+def _same_ports(arms: Sequence[StackedArm], common: Deployment) -> Iterator[str]:
+    wanted = [(common.router.listening[1], "the router ([router] port)")]
+    if common.mqtt.broker is not Broker.EXTERNAL:
+        wanted.append((common.mqtt.listening[1], "the broker ([mqtt] port)"))
+    for index, each in enumerate(arms):
+        viewer, plus = each.deployment.viewer, f" + {index}" if index else ""
+        wanted.append((each.deployment.panel.port, f"the page of {each.name} ([panel] port{plus})"))
+        if viewer.mode is not ViewerMode.NONE:
+            wanted.append((viewer.port, f"the viewer's data of {each.name} ([viewer] port{plus})"))
+            wanted.append((viewer.web_port, f"the view of {each.name} ([viewer] web_port{plus})"))
+    seen: dict[int, str] = {}
+    for port, who in wanted:
+        if not 0 < port < 65536:
+            yield f"{who} would be {port}, which is no port: 1 to 65535"
+        elif port in seen:
+            yield f"port {port} is wanted by {seen[port]} and by {who}: move one in deploy/local.toml"
+        seen.setdefault(port, who)
+
+
+def file_of(common: Deployment, name: str) -> Path:
+    """Where the deployment of an arm stands, for its processes and for `gemelo --robot`."""
+    return Path(common.paths.run) / ARMS / f"{name}.toml"

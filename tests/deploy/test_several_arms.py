@@ -1,0 +1,192 @@
+"""`make up ARMS=...` before anything starts: what is made of one deployment for several arms, and what is refused."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+
+import msgspec
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from schemas.deployment import Deployment, DeviceKind, MqttSection, PanelSection, PathsSection, ViewerMode, Wire
+from schemas.errors import ConfigurationError
+from services.runtime.deployment import deployment_of_arm, load_deployment, project_root
+from services.stack.arms import deployment_file, file_of, stacked_arms
+from services.stack.several_arms import compose_of, main, write
+from services.stack.start_check import main as start_check
+
+ROOT = project_root()
+SINGLE = yaml.safe_load((ROOT / "process-compose.yaml").read_text())
+BOTH = ("rm1", "parol6")
+
+
+@pytest.fixture
+def common(tmp_path) -> Deployment:
+    return Deployment(paths=PathsSection(run=str(tmp_path / "run"), out=str(tmp_path / "out"), programs="/p"))
+
+
+def copy_of(robot: str, folder: Path, *changes: tuple[str, str]) -> str:
+    """A folder with a robot that is `robot` but for the changes to its robot.toml."""
+    shutil.copytree(ROOT / "urdf" / robot, folder)
+    file = folder / "robot.toml"
+    text = file.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    file.write_text(text)
+    return str(folder)
+
+
+def refusal(names, common) -> str:
+    with pytest.raises(ConfigurationError) as raised:
+        stacked_arms(names, common, ROOT)
+    return str(raised.value)
+
+
+def test_each_arm_has_ports_recordings_and_readiness_of_its_own_and_all_share_router_and_broker(common):
+    first, second = (each.deployment for each in stacked_arms(BOTH, common, ROOT))
+    assert (first.router, first.mqtt) == (second.router, second.mqtt) == (common.router, common.mqtt)
+    assert (first.panel.port, second.panel.port) == (8088, 8089)
+    assert (first.viewer.port, second.viewer.port) == (9876, 9877)
+    assert (first.viewer.web_port, second.viewer.web_port) == (9090, 9091)
+    for name, each in zip(BOTH, (first, second), strict=True):
+        assert each.paths.out == f"{common.paths.out}/{name}"
+        assert each.paths.run == f"{common.paths.run}/{name}"
+        assert each.paths.programs == common.paths.programs  # whose files bear the robot's name
+
+
+def test_the_same_arm_twice_is_refused(common):
+    assert 'rm1 twice: the robot "rm1" can be on a router once' in refusal(("rm1", "rm1"), common)
+
+
+def test_two_folders_with_one_name_are_refused_and_both_are_named(common, tmp_path):
+    said = refusal(("rm1", copy_of("rm1", tmp_path / "other")), common)
+    assert f"{ROOT}/urdf/rm1 and {tmp_path}/other" in said
+
+
+def test_two_arms_with_one_device_at_the_broker_are_refused_and_both_are_named(common, tmp_path):
+    other = copy_of("parol6", tmp_path / "other", ('name = "parol6"', 'name = "left"'))
+    said = refusal(("parol6", other), common)
+    assert 'parol6 and left would both have the device "parol6" at the broker' in said
+
+
+def test_two_boards_at_one_cable_are_refused_and_virtual_lines_are_each_arms_own(common):
+    serial = msgspec.structs.replace(common, wire=Wire.SERIAL)
+    assert len(stacked_arms(BOTH, serial, ROOT)) == 2
+    boards = msgspec.structs.replace(serial, device=DeviceKind.BOARD)
+    assert "rm1 and parol6 would both have a board at /dev/ttyUSB0" in refusal(BOTH, boards)
+
+
+@pytest.mark.parametrize(
+    ("port", "one", "other"),
+    [
+        (7446, "the router ([router] port)", "the page of parol6 ([panel] port + 1)"),
+        (1883, "the broker ([mqtt] port)", "the page of rm1 ([panel] port)"),
+        (9875, "the viewer's data of rm1 ([viewer] port)", "the page of parol6 ([panel] port + 1)"),
+        (9091, "the page of rm1 ([panel] port)", "the view of parol6 ([viewer] web_port + 1)"),
+    ],
+)
+def test_two_on_one_port_are_refused_and_both_are_named(common, port, one, other):
+    said = refusal(BOTH, msgspec.structs.replace(common, panel=PanelSection(port=port)))
+    assert one in said
+    assert other in said
+
+
+def test_a_port_beyond_the_last_one_is_refused(common):
+    said = refusal(BOTH, msgspec.structs.replace(common, panel=PanelSection(port=65535)))
+    assert "the page of parol6 ([panel] port + 1) would be 65536" in said
+
+
+def test_an_arm_that_is_not_there_is_named_with_the_nearest(common):
+    assert 'there is no arm "paro6"; did you mean "parol6"?' in refusal(("rm1", "paro6"), common)
+
+
+def test_a_cell_file_in_the_folder_of_an_arm_is_that_arms_alone_and_any_other_is_everybodys(common, tmp_path):
+    own = msgspec.structs.replace(common, cell=str(ROOT / "urdf/rm1/cell.toml"))
+    assert [bool(each.deployment.cell) for each in stacked_arms(BOTH, own, ROOT)] == [True, False]
+    shared = msgspec.structs.replace(common, cell=str(tmp_path / "cell.toml"))
+    assert [each.deployment.cell for each in stacked_arms(BOTH, shared, ROOT)] == [shared.cell] * 2
+
+
+def test_every_process_of_the_single_stack_runs_once_for_each_arm_and_router_and_broker_once(common):
+    arms = stacked_arms(BOTH, common, ROOT)
+    made = compose_of(SINGLE, arms, common, {})["processes"]
+    of_each = set(SINGLE["processes"]) - {"router", "broker", "about", "camera", "detector"}  # there is no cell
+    assert set(made) == {"router", "broker", "about"} | {f"{arm}-{name}" for arm in BOTH for name in of_each}
+    assert set(made["about"]["depends_on"]) == set(made) - {"about"}
+    assert made["about"]["command"].endswith("deploy/welcome rm1 parol6")
+    for name, process in made.items():
+        assert set(process["depends_on"]) <= set(made) - {name}
+
+
+def test_what_would_only_stand_aside_is_left_out(common):
+    bare = msgspec.structs.replace(
+        common, device=DeviceKind.BOARD, viewer=msgspec.structs.replace(common.viewer, mode=ViewerMode.NONE)
+    )
+    made = compose_of(SINGLE, stacked_arms(BOTH, bare, ROOT), bare, {})["processes"]
+    assert not {name for name in made if name.endswith(("viewer", "virtual_esp32"))}
+    assert set(made["rm1-visualizer"]["depends_on"]) == {"router"}
+
+
+def test_process_compose_takes_the_file_and_a_process_gets_its_arms_deployment_whatever_the_environment_says(
+    tmp_path, monkeypatch
+):
+    environ = {
+        "GEMELO_PATHS_RUN": str(tmp_path / "run $HOME"),
+        "GEMELO_PANEL_PORT": "18088",
+        "GEMELO_ROBOT": "urdf/rm1",
+    }
+    common = load_deployment(None, environ)
+    file = write(stacked_arms(BOTH, common, ROOT), common, ROOT, environ)
+    command = [ROOT / ".venv/bin/process-compose", "--dry-run", "-f", file]
+    assert subprocess.run(command, cwd=ROOT, capture_output=True, check=False).returncode == 0
+    made = yaml.safe_load(file.read_text())["processes"]["parol6-panel"]
+    given = dict(each.replace("$$", "$").split("=", 1) for each in made["environment"])
+    seen = load_deployment(None, {**environ, **given})
+    assert seen.robot == str(ROOT / "urdf/parol6")
+    assert seen.panel.port == 18089
+    assert seen.paths.run == str(tmp_path / "run $HOME/parol6")
+
+
+texts = st.text(st.characters(blacklist_categories=("Cc", "Cs", "Zl", "Zp", "Cf", "Co", "Cn")), max_size=20).filter(
+    str.isprintable
+)
+
+
+@given(host=texts, out=texts, value=texts | st.booleans() | st.integers(-(2**40), 2**40))
+def test_a_deployment_that_is_written_is_read_as_it_was(tmp_path_factory, host, out, value):
+    made = Deployment(
+        robot="/r", mqtt=MqttSection(host=host), paths=PathsSection(run="/r", out=f"/{out}", programs="/p"),
+        parameters={"logger": {"log_dir": value}},
+    )  # fmt: skip
+    file = tmp_path_factory.getbasetemp() / "written.toml"
+    file.write_text(deployment_file(made), encoding="utf-8")
+    assert msgspec.convert(tomllib.loads(file.read_text(encoding="utf-8")), Deployment) == made
+
+
+def test_the_command_line_finds_an_arms_deployment_until_one_arm_is_started_alone(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("GEMELO_PATHS_RUN", str(tmp_path / "run"))
+    monkeypatch.setenv("GEMELO_VIEWER_MODE", "none")
+    for section, port in zip(("ROUTER", "MQTT", "PANEL"), (17447, 11883, 18088), strict=True):
+        monkeypatch.setenv(f"GEMELO_{section}_PORT", str(port))
+    assert main(BOTH) == 0
+    assert capsys.readouterr().out.strip() == str(file_of(load_deployment(), "process-compose").with_suffix(".json"))
+    assert deployment_of_arm("parol6") == tmp_path / "run/arms/parol6.toml"
+    assert deployment_of_arm("../arms/parol6") is None
+    assert start_check() == 0
+    assert deployment_of_arm("parol6") is None
+
+
+def test_every_problem_is_a_line_and_nothing_is_written(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("GEMELO_PATHS_RUN", str(tmp_path / "run"))
+    monkeypatch.setenv("GEMELO_PANEL_PORT", "7446")
+    assert main(("rm1", "parol6", "rm1")) == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) >= 2
+    assert all(line.startswith("gemelo: ") for line in lines)
+    assert not (tmp_path / "run").exists()

@@ -1,0 +1,115 @@
+"""`make up ARMS="rm1 parol6"`: both arms on one router and one broker, moved at once, each to the step."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from schemas.actions import GoalStatusCode
+from services.recordings.mcap_file import METADATA
+from services.recordings.reader import RecordingReader
+from services.runtime.deployment import deployment_of_arm
+from services.runtime.robots import robots_on
+from services.stack.stack import Stack, free_ports
+from tests.stack.gemelo import gemelo
+from tests.stack.person import Operator, jumps
+
+ARMS = ("rm1", "parol6")
+OF_EACH = ("virtual_esp32", "stepper_gateway", "state_publisher", "planner", "logger", "visualizer", "panel")
+
+
+class OneOf:
+    """A stack as one of its arms has it."""
+
+    def __init__(self, stack: Stack, name: str) -> None:
+        file = deployment_of_arm(name, stack.environment)
+        assert file is not None
+        kept = {key: value for key, value in stack.environment.items() if key not in stack.deployment}
+        self.environment = {**kept, "GEMELO_CONFIG": str(file)}
+
+
+def two_free_ports() -> int:
+    """The first of two that follow one another."""
+    while True:
+        first = free_ports(1)[0]
+        try:
+            urllib.request.urlopen(f"http://127.0.0.1:{first + 1}", timeout=0.5)
+        except OSError:
+            return first
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory):
+    names = ("router", "broker", *(f"{arm}/{name}" for arm in ARMS for name in OF_EACH))
+    page = {"GEMELO_PANEL_PORT": str(two_free_ports())}
+    command = ("make", "up", f"ARMS={' '.join(ARMS)}")
+    out = tmp_path_factory.mktemp("out")
+    with Stack(command=command, processes=names, environment=page, out=out, ready_timeout=120.0) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def people(stack):
+    made = [Operator(OneOf(stack, name)) for name in ARMS]
+    yield made
+    for each in made:
+        each.close()
+
+
+def test_both_arms_are_on_one_router(people):
+    assert robots_on(people[0].node.deployment.router, "stepper_gateway") == tuple(sorted(ARMS))
+
+
+def test_both_move_at_once_and_lose_no_step(people):
+    plans = [each.plan(speed=0.5) for each in people]
+    goals = [each.send(plan) for each, plan in zip(people, plans, strict=True)]
+    end = time.monotonic() + 10.0
+    while not all(each.is_moving() for each in people):
+        assert time.monotonic() < end, "they did not move at one moment"
+        for each in people:
+            each.node.wait(0.01)
+    for person, goal, plan in zip(people, goals, plans, strict=True):
+        outcome = goal.wait(plan.duration + 20.0)
+        assert outcome.status is GoalStatusCode.SUCCEEDED, outcome
+        assert outcome.result.executed_steps == outcome.result.commanded_steps
+        assert not jumps(person.arm, person.seen)
+
+
+def test_the_command_line_speaks_with_the_arm_that_is_named(stack):
+    said = {name: gemelo(stack, "--robot", name, "state") for name in ARMS}
+    assert "joint_6" in said["parol6"]
+    assert "joint_6" not in said["rm1"]
+    gemelo(stack, "--robot", "parol6", "move", "--named", "ready")
+    assert "parol6" in gemelo(stack, "--robot", "parol6", "device", "status")
+
+
+def test_the_end_of_the_start_says_where_each_page_is_and_they_are_there(stack):
+    end = time.monotonic() + 30.0
+    while "gemelo is up with 2 arms" not in stack.console():
+        assert time.monotonic() < end, stack.console()
+        time.sleep(0.1)
+    first = int(stack.deployment["GEMELO_PANEL_PORT"])
+    for port in (first, first + 1):
+        assert f"http://127.0.0.1:{port}" in stack.console()
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}", timeout=5.0) as page:
+            assert page.status == 200
+
+
+def test_one_stop_for_all_and_the_recordings_are_apart(stack, people):
+    for each in people:
+        each.node.close()
+    subprocess.run(("make", "down"), cwd=stack.root, env=_addressed(stack), check=True, timeout=60, capture_output=True)
+    assert stack.server is not None
+    stack.server.wait(30.0)
+    for name in ARMS:
+        (file,) = (Path(stack.out) / name / "recordings").glob("*.mcap")
+        assert file.stem.endswith(f"_{name}")
+        assert RecordingReader(file).read_metadata()[METADATA]["robot"] == name
+
+
+def _addressed(stack: Stack) -> dict[str, str]:
+    return {**stack.environment, "PC_SOCKET_PATH": str(stack.socket)}
