@@ -33,6 +33,7 @@ def load_robot(robot: str = "", *, deployment: str | Path | None = None) -> Robo
     """Reads the files of the arm that `connect` with the same arguments is for; asks nobody.
 
     One of several arms that `make up ARMS=...` has started has folders of its own.
+
     Raises `Error` where a file is wrong, `BadArgument` where there is no such arm.
 
     >>> gemelo.load_robot("parol6").description.tool_frame

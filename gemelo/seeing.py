@@ -14,14 +14,17 @@ from gemelo.units import Point, Pose
 from schemas.camera import CameraCondition, CameraStatus
 from schemas.cell import TagThing, Thing
 from schemas.detections import Detection, Detections
-from schemas.topics import JOINT_STATES, camera_detections, camera_status
+from schemas.system import Empty
+from schemas.topics import CAMERA, JOINT_STATES, camera_detections, camera_status
 from services.arm.cell.cell_file import Cell, load_cell
 from services.arm.errors import DescriptionError
 from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_message
+from services.runtime.endpoints import info_request
 from services.runtime.topics import Subscription
 
 IMAGES = 5  # of which the median is taken
 ENOUGH = 3  # of them that must show a thing
+ANSWER = 2.0  # [s] for the camera's process to tell its time
 PATIENCE = 3.0  # [s] for the first image, beside the time that `IMAGES` of them take
 TO_REST = 1.0  # [s] that an arm which is just arriving may take
 AT_REST = 1e-3  # [rad/s] or [m/s]
@@ -128,17 +131,18 @@ class Eyes:
         """What was found in the next images of a camera; raises `Refused` where none come, or they are old."""
         heard: list[Detections] = []
         status: list[CameraStatus] = []
-        begin = self._session.node.now()
-        late: list[int] = []  # [ns] ages of images from before
+        late: list[int] = []  # [ns] how long before the question images were taken
 
         def on_found(message: Detections) -> None:
             with self._session.news:
                 if message.stamp >= begin:
                     heard.append(message)
                 else:
-                    late.append(self._session.node.now() - message.stamp)
+                    late.append(begin - message.stamp)
                 self._session.news.notify_all()
 
+        # By the camera's own clock, which it looked at after this question: what it stamps from then on shows the rest.
+        begin = self._session.call(info_request(CAMERA), Empty(), ANSWER).clock
         subscriptions: list[Subscription[Any]] = [
             self._session.node.subscribe(camera_detections(camera), on_found),
             self._session.node.subscribe(camera_status(camera), status.append),
@@ -230,7 +234,10 @@ def _why_none(camera: str, status: Sequence[CameraStatus], late: Sequence[int], 
     if status and status[-1].text:
         return status[-1].text
     if late and min(late) > OLDEST * 1e9:
-        return f'the images of camera "{camera}" are {min(late) / 1e9:.1f} s old: do the clocks of the hosts agree?'
+        seconds = min(late) / 1e9
+        return (
+            f'the newest image of camera "{camera}" was taken {seconds:.1f} s before it was asked for: what lags there?'
+        )
     if status and status[-1].condition is CameraCondition.STREAMING:
         return f"nothing is heard of the detector for {patience:.1f} s: is the process `detector` running?"
     return f'no image of camera "{camera}" within {patience:.1f} s: `gemelo camera list`'

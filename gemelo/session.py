@@ -19,6 +19,7 @@ from schemas.topics import Request, Topic
 from services.arm.model.description import Arm as Description
 from services.runtime import errors as runtime
 from services.runtime.node import Node
+from services.runtime.node_clock import NodeClock
 from services.runtime.requests.client import PendingCall
 from services.runtime.topics import Latest
 
@@ -43,6 +44,7 @@ class Session:
         self._latest: dict[str, Latest[Any]] = {}
         self._changed = 0.0  # [s] monotonic: what is asked from now on must have been heard after this
         self._changed_unix = 0  # [ns] the same moment, after which it should also have been measured
+        self._clocks: dict[str, NodeClock] = {}  # by the name of the node
         self._pid = os.getpid()
         self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._run, name=self._node.name, daemon=True)
@@ -86,15 +88,27 @@ class Session:
             return latest.message is not None if topic.rate is None else is_fresh()
 
         def was_measured_since() -> bool:
-            return is_there() and getattr(latest.message, "stamp", self._changed_unix) >= self._changed_unix
+            if not is_there():
+                return False
+            measured = clock.to_own(getattr(latest.message, "stamp", 0))
+            return measured is not None and measured >= self._changed_unix
 
-        if topic.rate is not None:
-            self.wait_for(was_measured_since, ON_ITS_WAY)  # not for ever: the clocks of two hosts may differ
+        if topic.rate is not None and self._changed:
+            clock = self._clock_of(topic.writer)
+            self.wait_for(was_measured_since, ON_ITS_WAY)  # not for ever: it came after the change in any case
         if not self.wait_for(is_there, PATIENCE) or latest.message is None:
             raise Lost(
                 f"nothing heard of {topic.key} for {PATIENCE:g} s: is {topic.writer} running? `gemelo node list`"
             )
         return latest.message
+
+    def _clock_of(self, writer: str) -> NodeClock:
+        """The clock of the node that stamps a topic."""
+        node = self.node
+        with self.news:
+            if writer not in self._clocks:
+                self._clocks[writer] = NodeClock(node, writer)
+            return self._clocks[writer]
 
     def changed(self) -> None:
         """Something has moved or was switched: what was heard before is no longer fresh."""

@@ -29,7 +29,7 @@ class TrajectoryPoint(Message, frozen=True, kw_only=True):
 class JointTrajectory(Message, frozen=True, kw_only=True):
     """Timed points for `joint_names`; every point lists the joints in that order."""
 
-    stamp: int = 0  # [ns] UNIX time at which it is to start; 0 is "now"
+    stamp: int = 0  # [ns] UNIX time by stepper_gateway's clock, as in joint_states, at which it is to start; 0: now
     joint_names: tuple[str, ...] = ()
     points: tuple[TrajectoryPoint, ...] = ()
 

@@ -62,6 +62,9 @@ class NodeInfo(Message, frozen=True, kw_only=True):
     subscribes: tuple[str, ...] = ()
     serves: tuple[str, ...] = ()
     actions: tuple[str, ...] = ()
+    clock: int = 0  # [ns] UNIX time by its own clock, as it answered
+    ready: bool = False  # its state is valid
+    problem: str = ""  # why it is not, where it says so
 
 
 class TopicInterface(Message, frozen=True, kw_only=True):
@@ -149,3 +152,5 @@ class NodeRecord(Message, frozen=True, kw_only=True):
     info: NodeInfo = NodeInfo()
     topics: tuple[TopicInterface, ...] = ()
     parameters: tuple[Parameter, ...] = ()
+    clock_offset: float | None = None  # [s] what its clock showed more than the recorder's; None: not measured
+    clock_bound: float = 0.0  # [s] by how much at most that is wrong

@@ -116,7 +116,7 @@ class Action(Generic[G_co, F_co, R_co]):
 
 
 LATEST, EVERY, LATCHED = Delivery.LATEST, Delivery.EVERY, Delivery.LATCHED
-GATEWAY, ANY = "stepper_gateway", "any"
+GATEWAY, CAMERA, ANY = "stepper_gateway", "camera", "any"
 
 DESCRIPTION = Topic(
     "description", RobotDescription, LATCHED, None, True, "state_publisher", "URDF, SRDF and robot.toml"
@@ -193,17 +193,17 @@ TOPICS: tuple[Topic[Message], ...] = (
 
 def camera_image(camera: str) -> Topic[CameraImage]:
     """The newest image of a camera."""
-    return Topic(f"camera/{camera}/image", CameraImage, LATEST, None, False, "camera", "what the camera sees")
+    return Topic(f"camera/{camera}/image", CameraImage, LATEST, None, False, CAMERA, "what the camera sees")
 
 
 def camera_info(camera: str) -> Topic[CameraInfo]:
     """What maps a camera's pixels to rays, and where it stands."""
-    return Topic(f"camera/{camera}/info", CameraInfo, LATCHED, None, False, "camera", "its lens and where it stands")
+    return Topic(f"camera/{camera}/info", CameraInfo, LATCHED, None, False, CAMERA, "its lens and where it stands")
 
 
 def camera_status(camera: str) -> Topic[CameraStatus]:
     """How a camera is; latched, and repeated once a second."""
-    return Topic(f"camera/{camera}/status", CameraStatus, LATCHED, None, True, "camera", "whether images come, or why")
+    return Topic(f"camera/{camera}/status", CameraStatus, LATCHED, None, True, CAMERA, "whether images come, or why")
 
 
 def camera_detections(camera: str) -> Topic[Detections]:
@@ -215,7 +215,7 @@ def camera_detections(camera: str) -> Topic[Detections]:
 def camera_truth(camera: str) -> Topic[Detections]:
     """Where the things of a virtual camera's cell are in truth, once a second: what a detector is judged by."""
     about = "where a virtual camera has the things"
-    return Topic(f"camera/{camera}/truth", Detections, LATEST, None, True, "camera", about)
+    return Topic(f"camera/{camera}/truth", Detections, LATEST, None, True, CAMERA, about)
 
 
 CAMERA_TOPICS = (camera_image, camera_info, camera_status, camera_detections, camera_truth)

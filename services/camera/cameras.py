@@ -7,6 +7,7 @@ import cv2
 from schemas.camera import CameraCondition
 from schemas.cell import CameraRecord, FileSource, FolderSource, V4l2Source, VirtualSource
 from schemas.topics import (
+    GATEWAY,
     GRIPPER_STATE,
     JOINT_STATES,
     SCENE,
@@ -26,6 +27,7 @@ from services.camera.sources.v4l2 import V4l2Camera
 from services.camera.virtual.virtual_camera import VirtualCamera, true_detections
 from services.camera.virtual.world import World
 from services.runtime.node import Node
+from services.runtime.node_clock import NodeClock
 
 REOPEN = 3_000_000_000  # [ns] between two attempts to wake a camera that gives the same image again and again
 
@@ -124,7 +126,7 @@ def _watched_world(node: Node, arm: Arm, cell: Cell) -> World | None:
     """The world that virtual cameras look at, kept up to date; None where there is none of them."""
     if not any(isinstance(record.source, VirtualSource) for record in cell.cameras):
         return None
-    world = World(arm, cell)
+    world = World(arm, cell, NodeClock(node, GATEWAY).to_own)
     node.subscribe(JOINT_STATES, world.on_joint_state)
     node.subscribe(GRIPPER_STATE, world.on_gripper_state)
     node.subscribe(SCENE, world.on_scene)

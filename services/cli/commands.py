@@ -109,6 +109,8 @@ COMMANDS = (
             "deploy:run_keys", "deploy:keys_options", "gemelo deploy keys example"),
     Command(("deploy", "install"), "give a host its files over ssh, and start what does not run there yet",
             "deploy:run_install", "deploy:install_options", "gemelo deploy install example brain --dry-run"),
+    Command(("deploy", "status"), "every service of a site as the bus has it: ready or why not, version, clock",
+            "deploy_status:run", "deploy_status:status_options", "gemelo deploy status example --json"),
     Command(("chaos",), "faults in the middle of moves, judged: on a stack of its own with the virtual device",
             "chaos:run_chaos", "chaos:add_chaos_options", "gemelo chaos --minutes 3 --seed 7"),
     Command(("soak",), "moves for hours on a stack of its own: does any process grow?",

@@ -48,7 +48,7 @@ def run_check(options: Options) -> ExitCode:
     """Says what runs where, or everything that is wrong, with lines."""
     from services.hosts.layout import processes
 
-    site = _site(options.site)
+    site = site_named(options.site)
     rows = []
     for name, host in site.hosts.items():
         running = ", ".join(process.unit.removeprefix("gemelo-") for process in processes(site, name))
@@ -61,7 +61,7 @@ def run_render(options: Options) -> ExitCode:
     """Writes the files of some hosts below out/."""
     from services.hosts.render import write
 
-    site = _site(options.site)
+    site = site_named(options.site)
     for host in options.hosts:
         if host not in site.hosts:
             raise unknown("host", host, site.hosts)
@@ -78,7 +78,7 @@ def run_keys(options: Options) -> ExitCode:
     """Makes and renews certificates and passwords below out/."""
     from services.hosts.keys import make_keys
 
-    site = _site(options.site)
+    site = site_named(options.site)
     try:
         made = make_keys(site, _folder(site), project_root(), options.renew_within)
     except ConfigurationError as error:
@@ -96,7 +96,7 @@ def run_install(options: Options) -> ExitCode:
     """Gives a host its folder over ssh, and starts what does not run there yet."""
     from services.hosts import install
 
-    site = _site(options.site)
+    site = site_named(options.site)
     if options.host not in site.hosts:
         raise unknown("host", options.host, site.hosts)
     try:
@@ -111,7 +111,8 @@ def run_install(options: Options) -> ExitCode:
     return ExitCode.OK
 
 
-def _site(name: str) -> Site:
+def site_named(name: str) -> Site:
+    """The site of that name or file, checked; raises `CommandError`."""
     from services.hosts.checks import load_site
 
     root = project_root()

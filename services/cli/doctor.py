@@ -6,7 +6,8 @@ import os
 import platform
 import shutil
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -17,16 +18,16 @@ from schemas.deployment import Deployment, MqttSection, Wire
 from schemas.device import DeviceState, DeviceStatus
 from schemas.device_faults import fault_text
 from schemas.errors import ConfigurationError
-from schemas.joints import JointState
-from schemas.topics import DEVICE_STATE, DEVICE_STATUS, JOINT_STATES
+from schemas.topics import DEVICE_STATE, DEVICE_STATUS
 from services.cli.errors import CommandError, ExitCode
-from services.cli.node import living
+from services.cli.node import TIMEOUT, living
 from services.cli.parser import Options
 from services.cli.session import Session, connect
 from services.cli.text_table import table
 from services.cli.version import version_text
 from services.credentials.private_files import AccessError
 from services.mqtt.access import gateway_access
+from services.runtime.clock_offset import ClockOffset
 from services.runtime.deployment import load_deployment, project_root
 
 UP = "start the twin with `make up`"
@@ -37,7 +38,7 @@ LEAST_MEMORY = 5e8  # [bytes] free: what the stack needs itself
 MOST_CPU = 85.0  # [%] of all cores: above it, ticks of a virtual device come late
 CPU_OVER = 1.0  # [s]
 LISTENING = 1.5  # [s] for what the nodes say
-MOST_SKEW = 0.5  # [s] between this clock and that of a state's stamp
+MOST_SKEW = 0.5  # [s] between this host's clock and a node's
 
 
 class Verdict(StrEnum):
@@ -179,19 +180,26 @@ def twin(session: Session) -> Iterator[Diagnosis]:
     node = session.node
     statuses: list[DeviceStatus] = []
     states: list[DeviceState] = []
-    ages: list[float] = []
     node.subscribe(DEVICE_STATUS, statuses.append)
     node.subscribe(DEVICE_STATE, states.append)
-
-    def on_joints(state: JointState) -> None:
-        ages.append((node.now() - state.stamp) / 1e9)
-
-    node.subscribe(JOINT_STATES, on_joints)
     node.wait(LISTENING)
     nodes = living(session)
     yield Diagnosis(Verdict.OK if nodes else Verdict.ERROR, "nodes", ", ".join(nodes) or "none", "" if nodes else UP)
     yield device(statuses[-1] if statuses else None, states[-1] if states else None)
-    yield clocks(ages)
+    yield clocks(_offsets(session, nodes))
+
+
+def _offsets(session: Session, nodes: Iterable[str]) -> dict[str, ClockOffset]:
+    from services.runtime.errors import NoAnswer  # 0.1 s, for a twin that runs
+    from services.runtime.node_clock import ask_about
+
+    found = {}
+    for name in nodes:
+        with suppress(NoAnswer):  # that it is silent, `gemelo node list` says
+            _, clock = ask_about(session.node, name, TIMEOUT)
+            if clock is not None:
+                found[name] = clock
+    return found
 
 
 def device(status: DeviceStatus | None, state: DeviceState | None) -> Diagnosis:
@@ -208,13 +216,19 @@ def device(status: DeviceStatus | None, state: DeviceState | None) -> Diagnosis:
     return Diagnosis(Verdict.OK, "device", f"{status.device} is online")
 
 
-def clocks(ages: list[float]) -> Diagnosis:
-    """How far this clock is from that of the stepper_gateway: `ages` [s] of states when they came."""
-    if not ages:
-        return Diagnosis(Verdict.WARNING, "clocks", "no joint state has come, so they cannot be compared")
-    least = min(ages, key=abs)
-    found = f"states are {1000.0 * least:.1f} ms old when they come"
-    if abs(least) > MOST_SKEW:
-        remedy = "let both machines take their time from one server (timedatectl set-ntp true)"
-        return Diagnosis(Verdict.WARNING, "clocks", found, remedy)
-    return Diagnosis(Verdict.OK, "clocks", found)
+def clocks(offsets: Mapping[str, ClockOffset]) -> Diagnosis:
+    """How far the clock of each node's host is from this one's; no motion depends on it."""
+    if not offsets:
+        return Diagnosis(Verdict.WARNING, "clocks", "no node tells its time, so they cannot be compared")
+    apart = {name: each for name, each in offsets.items() if abs(each.offset) > MOST_SKEW + each.bound}
+    if apart:
+        found = ", ".join(f"{name} {each}" for name, each in apart.items())
+        remedy = (
+            "let all hosts take their time from one server (timedatectl set-ntp true): motions do not mind, but logs "
+            "and recordings of several hosts are hard to lay side by side"
+        )
+        return Diagnosis(Verdict.WARNING, "clocks", f"against this host's: {found}", remedy)
+    name = max(offsets, key=lambda each: abs(offsets[each].offset))
+    return Diagnosis(
+        Verdict.OK, "clocks", f"{len(offsets)} nodes; farthest from this host's is {name}, {offsets[name]}"
+    )

@@ -114,13 +114,22 @@ def living(session: Session) -> list[str]:
 
 
 def listing(session: Session) -> str:
-    """The table of all living nodes."""
+    """The table of all living nodes; a clock is against this host's."""
+    from services.runtime.errors import NoAnswer  # 0.1 s, for a command that connects
+    from services.runtime.node_clock import ask_about
+
     rows = []
     for name in living(session):
-        info = information_of(session, name)
+        try:
+            info, clock = ask_about(session.node, name, TIMEOUT)
+        except NoAnswer:  # it hangs, or has just ended
+            rows.append((name, session.arm.name, "-", "-", "-", "-", "does not answer", "-"))
+            continue
         started = datetime.datetime.fromtimestamp(info.started / 1e9).strftime("%H:%M:%S")
-        rows.append((name, info.robot, info.host, str(info.pid), info.version, started))
-    return table(("node", "robot", "host", "pid", "version", "started [local time]"), rows)
+        ready = "yes" if info.ready else info.problem or "no"
+        about = (info.host, str(info.pid), info.version, started, ready)
+        rows.append((name, info.robot, *about, "-" if clock is None else str(clock)))
+    return table(("node", "robot", "host", "pid", "version", "started [local time]", "ready", "clock"), rows)
 
 
 def information(session: Session, name: str) -> str:

@@ -41,7 +41,7 @@ def connect_arm(robot: Robot | None = None) -> Iterator[Arm]:
     """
     robot = robot or load_robot()
     require_router(robot.deployment)
-    with reported(robot), gemelo.connect(robot, name=_name(), needs_gateway=False) as arm:
+    with reported(robot), gemelo.connect(robot, name=own_name(), needs_gateway=False) as arm:
         yield arm
 
 
@@ -74,7 +74,7 @@ def connect(robot: Robot | None = None) -> Iterator[Session]:
     from services.runtime.node import Node
 
     try:
-        with Node(_name(), deployment, robot=arm.name) as node:
+        with Node(own_name(), deployment, robot=arm.name) as node:
             yield Session(deployment, arm, node)
     except NoAnswer as error:
         raise CommandError(other_robots(deployment, arm) or str(error), ExitCode.NO_STACK) from error
@@ -106,6 +106,6 @@ def other_robots(deployment: Deployment, arm: Description) -> str:
     )
 
 
-def _name() -> str:
+def own_name() -> str:
     """The name of this command's node; `gemelo node list` leaves it out."""
     return f"cli-{os.getpid()}"

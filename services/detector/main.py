@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import msgspec
 from msgspec import Meta
+from msgspec.structs import replace
 
 from schemas.camera import CameraImage, CameraInfo
 from schemas.cell import OnnxThing
 from schemas.deployment import Deployment
 from schemas.joints import JointState
-from schemas.topics import JOINT_STATES, camera_detections, camera_image, camera_info
+from schemas.topics import CAMERA, GATEWAY, JOINT_STATES, camera_detections, camera_image, camera_info
 from services.arm.cell.cell_file import Cell, load_cell
 from services.arm.frames.transforms import compose, inverse, to_message
 from services.arm.kinematics.chain import link_transforms
@@ -22,6 +23,7 @@ from services.arm.model.description import Arm, load_arm
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
+from services.runtime.node_clock import NodeClock
 from services.runtime.process.priority import step_behind
 
 if TYPE_CHECKING:
@@ -56,9 +58,16 @@ def run(node: Node, deployment: Deployment) -> None:
         cv2.setNumThreads(1)
         models = read_models(cell, node.log.warning)
         places, parameters = Places(arm), node.parameters(DetectorParameters)
-        node.subscribe(JOINT_STATES, places.on_joint_state)
+        clocks = Clocks(NodeClock(node, GATEWAY), NodeClock(node, CAMERA))
+
+        def on_joint_state(state: JointState) -> None:
+            stamp = clocks.gateway.to_own(state.stamp)
+            if stamp is not None:
+                places.on_joint_state(replace(state, stamp=stamp))
+
+        node.subscribe(JOINT_STATES, on_joint_state)
         for camera in cell.cameras:
-            Watch(node, camera.name, Detector(cell, models), places, lambda: parameters.value.rate)
+            Watch(node, camera.name, Detector(cell, models), places, clocks.camera, lambda: parameters.value.rate)
     node.spin(lambda now: node.set_ready(True), rate=RATE)
 
 
@@ -76,8 +85,15 @@ def read_models(cell: Cell, warn: Callable[[str], object]) -> dict[Path, UserMod
     return found
 
 
+class Clocks(NamedTuple):
+    """Of the nodes whose stamps meet here; each may run on another host."""
+
+    gateway: NodeClock
+    camera: NodeClock
+
+
 class Places:
-    """Where the frames that carry cameras were at a moment."""
+    """Where the frames that carry cameras were at a moment; all stamps are by this node's clock."""
 
     def __init__(self, arm: Arm) -> None:
         self._arm = arm
@@ -86,8 +102,11 @@ class Places:
     def on_joint_state(self, state: JointState) -> None:
         self._states.append(state)
 
-    def base_from_camera(self, info: CameraInfo, stamp: int) -> Array | None:
-        """(4, 4) at `stamp` [ns UNIX]; None where the camera was never mounted, or the arm's state is not known."""
+    def base_from_camera(self, info: CameraInfo, stamp: int | None) -> Array | None:
+        """(4, 4) at `stamp` [ns UNIX]; None where the camera was never mounted, or the arm's state is not known then.
+
+        `stamp` is None where the camera's clock is not known: then only for a camera that the arm does not carry.
+        """
         from services.vision.rigid import from_transform
 
         if not info.is_mounted:
@@ -95,6 +114,8 @@ class Places:
         local = from_transform(info.parent_from_camera)
         if info.parent == self._arm.base_frame:
             return local
+        if stamp is None:
+            return None
         state = min(self._states, key=lambda each: abs(each.stamp - stamp), default=None)
         if state is None or abs(state.stamp - stamp) > SAME_TIME or len(state.position) != len(state.name):
             return None
@@ -108,9 +129,11 @@ class Places:
 class Watch:
     """One camera between the bus and the detector."""
 
-    def __init__(self, node: Node, name: str, detector: Detector, places: Places, rate: Callable[[], float]) -> None:
-        """`rate()` [Hz]: more images than that are left out."""
-        self._node, self._name, self._detector, self._places = node, name, detector, places
+    def __init__(
+        self, node: Node, name: str, detector: Detector, places: Places, clock: NodeClock, rate: Callable[[], float]
+    ) -> None:
+        """`clock` stamps the images; `rate()` [Hz]: more images than that are left out."""
+        self._node, self._name, self._detector, self._places, self._clock = node, name, detector, places, clock
         self._rate, self._due = rate, 0.0  # [s] monotonic
         self._info: CameraInfo | None = None
         self._found = node.publisher(camera_detections(name))
@@ -131,7 +154,7 @@ class Watch:
             return
         self._due = max(self._due, now - SLACK) + 1.0 / self._rate()
         try:
-            where = self._places.base_from_camera(self._info, image.stamp)
+            where = self._places.base_from_camera(self._info, self._clock.to_own(image.stamp))
             found = self._detector.look(decoded(image), self._info, where, image.stamp)
         except (NoPicture, ValueError, cv2.error) as error:
             self._say(str(error).strip().replace("\n", " "))

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from schemas.message import Message
 from schemas.system import Empty, Interfaces, NodeInfo, NodeRecord, NodeStatistics, Parameters
 from schemas.topics import STATISTICS, Request
+from services.runtime.clock_offset import ClockOffset, measured
 from services.runtime.endpoints import info_request, interfaces_request
 from services.runtime.errors import NoAnswer, Refused
 from services.runtime.node import Node
@@ -27,14 +28,19 @@ class _Asked:
     """One node that is being asked, until all three answers are there."""
 
     name: str
+    at: int  # [ns] when the first of them left
     answers: dict[str, Message] = field(default_factory=dict)
+    clock: ClockOffset | None = None
 
     def record(self, stamp: int) -> NodeRecord | None:
         info, spoken, set_to = (self.answers.get(key) for key in ("NodeInfo", "Interfaces", "Parameters"))
         if isinstance(info, NodeInfo) and isinstance(spoken, Interfaces) and isinstance(set_to, Parameters):
-            return NodeRecord(
-                stamp=stamp, node=self.name, info=info, topics=spoken.topics, parameters=set_to.parameters
-            )
+            record = NodeRecord(
+                stamp=stamp, node=self.name, info=replace(info, clock=0), topics=spoken.topics,
+                parameters=set_to.parameters,
+            )  # fmt: skip
+            clock = self.clock
+            return record if clock is None else replace(record, clock_offset=clock.offset, clock_bound=clock.bound)
         return None
 
 
@@ -54,28 +60,46 @@ class Census:
             return
         if is_new or now - self._asked_at[message.node] > PERIOD:
             self._asked_at[message.node] = now
-            self._ask(_Asked(message.node))
+            self._ask(_Asked(message.node, self._node.now()))
 
     def _ask(self, asked: _Asked) -> None:
         try:
-            for request in (info_request, interfaces_request, parameters_request):
+            for request in (info_request, interfaces_request, parameters_request):  # the first one also for its clock
                 self._ask_one(asked, request(asked.name))
         except NoAnswer:  # it has just ended
             return
 
     def _ask_one(self, asked: _Asked, request: Request[Empty, Any]) -> None:
+        began = self._node.monotonic()
+
         def on_answer() -> None:
-            self._node.post(lambda: self._take(asked, pending))
+            took = self._node.monotonic() - began
+            self._node.post(lambda: self._take(asked, pending, took))
 
         pending = self._node.ask(request, Empty(), TIMEOUT, on_answer)
 
-    def _take(self, asked: _Asked, pending: PendingCall[Empty, Any]) -> None:
+    def _take(self, asked: _Asked, pending: PendingCall[Empty, Any], took: float) -> None:
+        """`took` [s] is the round trip."""
         try:
             answer = pending.response()
         except (NoAnswer, Refused):
             return
         asked.answers[type(answer).__name__] = answer
+        if isinstance(answer, NodeInfo) and answer.clock:
+            asked.clock = measured(asked.at, answer.clock, took)
         record = asked.record(self._node.now())
-        if record is not None and record != replace(self._known.get(asked.name, NodeRecord()), stamp=record.stamp):
+        if record is not None and is_news(self._known.get(asked.name, NodeRecord()), record):
             self._known[asked.name] = record
             self._on_record(record)
+
+
+def is_news(before: NodeRecord, record: NodeRecord) -> bool:
+    """True if a node speaks of other things, or its clock has moved farther against ours than both errors explain."""
+    if record != replace(
+        before, stamp=record.stamp, clock_offset=record.clock_offset, clock_bound=record.clock_bound,
+        info=replace(before.info, ready=record.info.ready, problem=record.info.problem),
+    ):  # fmt: skip
+        return True
+    if before.clock_offset is None or record.clock_offset is None:
+        return before.clock_offset is not record.clock_offset
+    return abs(record.clock_offset - before.clock_offset) > record.clock_bound + before.clock_bound

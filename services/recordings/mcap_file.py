@@ -15,6 +15,7 @@ import msgspec
 from mcap.writer import CompressionType, Writer
 
 from schemas.frames import RobotDescription
+from schemas.system import NodeRecord
 from schemas.topics import Topic
 from services.recordings import foxglove
 from services.recordings.channels import MESSAGE_ENCODING, SCHEMA_ENCODING, Channel, Entry, channel_of
@@ -24,6 +25,7 @@ from services.recordings.channels import MESSAGE_ENCODING, SCHEMA_ENCODING, Chan
 CHUNK_SIZE = 1024 * 1024
 PROFILE = "gemelo"
 METADATA, ROBOT, DEPLOYMENT = "gemelo", "robot", "deployment"  # the names of our metadata records
+CLOCKS = "clocks"  # of another one: by node, whose stamps it writes and how far its clock is from the recorder's
 
 _encode = msgspec.json.Encoder(enc_hook=repr).encode  # repr: msgpack's own extensions in a user's messages
 
@@ -44,6 +46,7 @@ class McapFile:
         self._described = ""
         self._channels: dict[tuple[str, type], int] = {}
         self._sequences: dict[int, int] = {}
+        self._clocks: dict[str, str] = {}
         self._twin = foxglove.FoxgloveTwin()
         self._file: IO[bytes] = path.open("xb")
         self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=compression)
@@ -70,6 +73,8 @@ class McapFile:
             self._add(self._channel(entry.topic), entry, data)
             if isinstance(entry.message, RobotDescription):
                 self.describe(entry.message)
+            elif isinstance(entry.message, NodeRecord):
+                self._clocks[entry.message.node] = clock_text(entry.message)
             for key, message in self._twin.derived(entry):
                 self._add(self._derived[key], entry, _encode(message))
         self._writer.flush()
@@ -84,8 +89,10 @@ class McapFile:
         self._writer.flush()
 
     def close(self) -> None:
-        """Ends the file properly, with the index that lets readers jump."""
+        """Ends the file properly, with the clocks as they were last, and the index that lets readers jump."""
         try:
+            if self._clocks:
+                self._writer.add_metadata(CLOCKS, self._clocks)
             self._writer.finish()
         finally:
             self.abandon()
@@ -108,3 +115,9 @@ class McapFile:
     def _register(self, channel: Channel) -> int:
         schema = self._writer.register_schema(channel.schema_name, SCHEMA_ENCODING, channel.schema)
         return self._writer.register_channel(channel.key, MESSAGE_ENCODING, schema, channel.metadata)  # type: ignore[no-any-return]
+
+
+def clock_text(record: NodeRecord) -> str:
+    """As JSON: the host whose clock stamped what this node wrote, and that clock against the recorder's, in [s]."""
+    said = {"host": record.info.host, "offset": record.clock_offset, "bound": record.clock_bound}
+    return msgspec.json.encode(said).decode()

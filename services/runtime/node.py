@@ -80,6 +80,7 @@ class Node:
         self._loop = Loop(self._stop)
         self._worker = Worker()
         self._readiness: Readiness | None = None
+        self._problem = ""  # why it is not ready
         self._endpoints = NodeEndpoints()
         self._rates = RequestRates()
         from_file = self.deployment.parameters.get(name, {})
@@ -184,8 +185,9 @@ class Node:
         return self._set_parameter(SetParameter(name=name, value=value))
 
     def info(self) -> NodeInfo:
-        """The node's identity and endpoints."""
-        return self._endpoints.info(self._identity, self.robot)
+        """The node's identity, endpoints, readiness, and its clock."""
+        about = self._endpoints.info(self._identity, self.robot)
+        return msgspec.structs.replace(about, clock=self.now(), ready=self.is_ready, problem=self._problem)
 
     def statistics(self) -> tuple[TopicStatistics, ...]:
         """The messages received, dropped and bad since the start, by key: of topics and of requests served."""
@@ -193,6 +195,7 @@ class Node:
 
     def set_ready(self, ok: bool, reason: str = "") -> None:
         """Says whether this node's state is valid; `reason` is logged when it changes."""
+        self._problem = "" if ok else reason
         if self._readiness is None:
             self._readiness = Readiness(project_root() / Path(self.deployment.paths.run), self.name)
         if ok == self._readiness.is_ready:

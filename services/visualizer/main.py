@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+from msgspec.structs import replace
 
 from schemas.deployment import Deployment
 from schemas.frames import RobotDescription
 from schemas.scene import MeshShape
-from schemas.topics import DESCRIPTION, LOG
+from schemas.topics import ANY, DESCRIPTION, LOG
 from services.arm.cell.cell_file import deployed_cell
 from services.arm.model.description import load_arm
 from services.runtime.application import service
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
+from services.runtime.node_clock import NodeClock
 from services.runtime.process.priority import step_behind
 from services.visualizer.core import Visualizer
 from services.visualizer.feeds import feeds
@@ -65,9 +70,23 @@ def _visualizer(
         return scene_mesh(shape, folders, node.log.warning)
 
     core = Visualizer(model, message.robot, tool_link(model, message.robot_toml), load)
+    clocks: dict[str, NodeClock] = {}
     for topic, take, is_series in feeds(core, load_arm(folders[-1]), cameras):
+        if topic.writer != ANY and "stamp" in topic.message.__struct_fields__:
+            clock = clocks.get(topic.writer) or clocks.setdefault(topic.writer, NodeClock(node, topic.writer))
+            take = by_own_clock(clock, take)
         node.subscribe(topic, take, own=topic is LOG, batch=1 / BATCH_RATE if is_series else None)
     return core
+
+
+def by_own_clock(clock: NodeClock, take: Callable[[Any], object]) -> Callable[[Any], None]:
+    """`take` with stamps by this host's clock, on which the whole view is; as they are before it is known."""
+
+    def taken(message: Any) -> None:
+        stamp = clock.to_own(message.stamp)
+        take(message if stamp in (None, message.stamp) else replace(message, stamp=stamp))
+
+    return taken
 
 
 def main() -> None:

@@ -64,11 +64,11 @@ def deployment(tmp_path: Path) -> Deployment:
 
 @contextmanager
 def running(deployment: Deployment) -> Iterator[tuple[Node, Node]]:
-    """The camera's process as a thread, and a node that listens."""
+    """The camera's process as a thread, and the gateway, which listens."""
     network = MemoryNetwork()
     with (
         Node("camera", deployment, bus=MemoryBus(network)) as node,
-        Node("listener", deployment, bus=MemoryBus(network)) as listener,
+        Node("stepper_gateway", deployment, bus=MemoryBus(network)) as listener,
     ):
         thread = threading.Thread(target=run, args=(node, deployment))
         thread.start()

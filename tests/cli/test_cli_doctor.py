@@ -13,7 +13,10 @@ from services.cli import doctor
 from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.mqtt import secure_folder
+from services.runtime.clock_offset import ClockOffset
 from tests.stepper_gateway.locked import Mosquitto, external, locked
+
+OK = ClockOffset(0.0, 0.001)
 
 
 @pytest.fixture
@@ -45,9 +48,10 @@ def test_the_doctor_without_a_twin_says_what_would_do(monkeypatch, capsys):
         (doctor.device(None, None), "error", "make up"),
         (doctor.device(DeviceStatus(reason="no state for 0.5 s"), None), "error", "offline: no state for 0.5 s"),
         (doctor.device(DeviceStatus(online=True, device="rm1"), DeviceState(fault=3)), "warning", "gemelo reset"),
-        (doctor.clocks([5.2, 5.1]), "warning", "timedatectl"),
-        (doctor.clocks([-3.0]), "warning", "-3000.0 ms"),
-        (doctor.clocks([]), "warning", "no joint state"),
+        (doctor.clocks({"planner": ClockOffset(5.2, 0.01)}), "warning", "timedatectl"),
+        (doctor.clocks({"a": ClockOffset(-3.0, 0.002), "b": OK}), "warning", "a -3000.0 ±2.0 ms let"),
+        (doctor.clocks({"a": ClockOffset(0.0003, 0.001), "b": OK}), "ok", "farthest from this host's is a, +0.3 ±1.0"),
+        (doctor.clocks({}), "warning", "no node tells its time"),
         (doctor.serial_port("/dev/nobody"), "error", "/dev/nobody is not there"),
     ],
 )

@@ -7,7 +7,7 @@ onto the table when they open. What a detector believes (objects of the scene wi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -58,16 +58,19 @@ class Snapshot:
     solids: tuple[Solid, ...]
     links: Mapping[str, Rigid]
     things: Mapping[str, Rigid]
-    stamp: int  # [ns] UNIX time of the joint state; 0 before the first
+    stamp: int  # [ns] UNIX time of the joint state by this host's clock; 0 where that is not known
     key: tuple[object, ...] = field(default=())
 
 
 class World:
     """Takes what the bus says of the arm and the scene; `snapshot` may be called from another thread."""
 
-    def __init__(self, arm: Arm, cell: Cell) -> None:
-        """Raises `DescriptionError` where the arm's URDF cannot be read."""
-        self._arm, self._cell = arm, cell
+    def __init__(self, arm: Arm, cell: Cell, to_own: Callable[[int], int | None] = lambda stamp: stamp) -> None:
+        """`to_own(stamp)` is a joint state's stamp by this host's clock, None while that is not known.
+
+        Raises `DescriptionError` where the arm's URDF cannot be read.
+        """
+        self._arm, self._cell, self._to_own = arm, cell, to_own
         self._links = arm_solids(arm)
         self._parts = {thing.name: thing_faces(thing) for thing in cell.things}
         self._fixed = fixed_solids(cell)
@@ -123,7 +126,7 @@ class World:
         solids += self._jaws(links, opening)
         solids += self._obstacles(links, scene)
         key = (joints.position, scene.version, scene.epoch, opening, tuple(things.items()))
-        return Snapshot(tuple(solids), links, things, joints.stamp, key)
+        return Snapshot(tuple(solids), links, things, self._to_own(joints.stamp) or 0, key)
 
     def _link_poses(self, joints: JointState | None = None) -> dict[str, Rigid]:
         """In the base frame."""

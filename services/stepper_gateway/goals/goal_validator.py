@@ -159,8 +159,8 @@ def _require_time_ahead(trajectory: JointTrajectory, now: int) -> None:
     if end < now * 1e-9:
         raise GoalRejected(
             FollowErrorCode.OLD_HEADER_TIMESTAMP,
-            f"the trajectory ended {now * 1e-9 - end:.3f} s ago by its stamp; use stamp 0 to start now, and check the "
-            "clocks of both machines",
+            f"the trajectory ended {now * 1e-9 - end:.3f} s ago by its stamp; use stamp 0 to start now, or count from "
+            "the stamp of the newest joint_states: the time is that of stepper_gateway's host",
         )
     delay = trajectory.stamp * 1e-9 - now * 1e-9
     if delay > MAX_DELAY:

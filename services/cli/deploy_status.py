@@ -1,0 +1,125 @@
+"""`gemelo deploy status`: every service of a site as the bus has it, from a person's host with its certificate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import msgspec
+
+import gemelo
+from schemas.deployment import Deployment
+from schemas.errors import ConfigurationError
+from schemas.site import Site
+from schemas.topics import DEVICE_STATUS
+from services.cli.deploy import site_named, site_option
+from services.cli.errors import CommandError, ExitCode, usage
+from services.cli.parser import Options, Parser, json_option
+from services.cli.session import own_name, require_router
+from services.cli.text_table import table
+from services.runtime.clock_offset import ClockOffset
+from services.runtime.deployment import load_deployment
+
+if TYPE_CHECKING:
+    from services.hosts.status import SeenNode, SeenRobot, ServiceStatus
+    from services.runtime.node import Node
+
+HEADINGS = ("host", "robot", "service", "is", "machine", "version", "clock", "why")
+TO_ANSWER = 2.0  # [s] of one node
+TO_TELL = 1.0  # [s] until what is latched has come
+
+
+def status_options(parser: Parser) -> None:
+    """Adds the site and --json."""
+    site_option(parser)
+    json_option(parser)
+
+
+def run(options: Options) -> ExitCode:
+    """Prints every service; FAILED if one of them is not ready, or should not be there."""
+    from services.hosts.status import is_well, site_status
+
+    site = site_named(options.site)
+    deployment = _deployment(site)
+    require_router(deployment)
+    names = dict.fromkeys((*site.robots, *gemelo.robots(deployment)))
+    found = site_status(site, {name: seen_robot(deployment, name) for name in names})
+    if options.json:
+        print(msgspec.json.encode(found).decode())
+    else:
+        print(table(HEADINGS, [_row(each) for each in found]))
+        print(summary(found))
+    return ExitCode.OK if is_well(found) else ExitCode.FAILED
+
+
+def summary(found: Iterable[ServiceStatus]) -> str:
+    """One sentence about all, and one where hosts have different versions."""
+    from services.hosts.status import Standing
+
+    rows = tuple(found)
+    wrong = [f"{each.service} of {each.robot or 'the site'} is {each.standing}" for each in rows
+             if each.standing is not Standing.READY]  # fmt: skip
+    lines = ["; ".join(wrong) if wrong else f"all {len(rows)} are ready"]
+    versions = {each.version: each for each in rows if each.version}
+    if len(versions) > 1:
+        told = ", ".join(f"{version} ({each.service} on {each.machine})" for version, each in sorted(versions.items()))
+        lines.append(f"versions differ: {told}: install one on all hosts")
+    return "\n".join(lines)
+
+
+def seen_robot(deployment: Deployment, robot: str) -> SeenRobot:
+    """Who is alive of a robot, what each says of itself, and what its gateway says of the device."""
+    from services.hosts.status import SeenRobot
+    from services.runtime.errors import BusError
+    from services.runtime.node import Node
+
+    try:
+        with Node(own_name(), deployment, robot=robot, log_level="error") as node:
+            device = node.latest(DEVICE_STATUS)
+            nodes = seen_nodes(node)
+            if "stepper_gateway" in nodes:
+                end = node.monotonic() + TO_TELL
+                while device.message is None and node.monotonic() < end:
+                    node.wait(0.05)
+            return SeenRobot(nodes, device.message if "stepper_gateway" in nodes else None)
+    except BusError as error:
+        raise CommandError(str(error), ExitCode.NO_STACK) from error
+
+
+def seen_nodes(node: Node) -> dict[str, SeenNode]:
+    """Every living node but commands', each asked about itself and its clock."""
+    from services.hosts.status import SeenNode
+    from services.runtime.errors import NoAnswer, Refused
+    from services.runtime.node_clock import ask_about
+
+    found = {}
+    for name in sorted(each for each in node.alive() if not each.startswith("cli-")):
+        try:
+            found[name] = SeenNode(*ask_about(node, name, TO_ANSWER))
+        except (NoAnswer, Refused):
+            found[name] = SeenNode()
+    return found
+
+
+def _deployment(site: Site) -> Deployment:
+    """The person's own, which must be for the site's router."""
+    try:
+        deployment = load_deployment()
+    except ConfigurationError as error:
+        raise usage(str(error)) from error
+    own, wanted = deployment.router, site.hosts[site.router.host]
+    if (own.host, own.port) != (wanted.address, site.router.port):
+        raise usage(
+            f"the router of {site.name} is {wanted.address}:{site.router.port}, and this deployment's is "
+            f"{own.host}:{own.port}: export GEMELO_CONFIG={site.config}/{next(iter(site.robots), 'rm1')}.toml, on a "
+            "host where people work (roles)"
+        )
+    return deployment
+
+
+def _row(each: ServiceStatus) -> tuple[str, ...]:
+    clock = "-" if each.clock_offset is None else str(ClockOffset(each.clock_offset, each.clock_bound))
+    return (
+        each.host or "-", each.robot or "-", each.service, each.standing, each.machine or "-", each.version or "-",
+        clock, each.reason or "-",
+    )  # fmt: skip

@@ -1,0 +1,105 @@
+"""Hosts whose clocks are seconds apart and drift: a script and its camera decide as with one clock."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+from gemelo.scene import Scene
+from gemelo.seeing import Eyes
+from gemelo.session import Session
+from schemas.deployment import Deployment, PathsSection
+from schemas.detections import Detection, DetectionKind, Detections
+from schemas.frames import Transform
+from schemas.joints import JointState
+from schemas.topics import JOINT_STATES, camera_detections
+from services.arm.model.description import load_arm
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.node import Node
+from tests.runtime.support import spinning
+from tests.runtime.test_clock_offset import Skewed
+
+MS = 1_000_000
+APART = [(0.0, 0.0), (5.0, 1e-4), (-5.0, -1e-4)]  # [s] ahead, [s/s] fast
+
+
+@pytest.fixture
+def deployment(tmp_path: Path, rm1_folder: Path) -> Deployment:
+    paths = PathsSection(run=str(tmp_path / "run"), out=str(tmp_path / "out"))
+    return Deployment(robot=str(rm1_folder), cell=str(rm1_folder / "cell.toml"), paths=paths)
+
+
+@contextmanager
+def hosts(deployment: Deployment, *skewed: tuple[str, Skewed]) -> Iterator[tuple[Session, dict[str, Node]]]:
+    """A script's session, and nodes on hosts with other clocks."""
+    network = MemoryNetwork()
+    with ExitStack() as living:
+        nodes = {}
+        for name, clock in skewed:
+            node = living.enter_context(Node(name, deployment, robot="rm1", bus=MemoryBus(network)))
+            nodes[name] = clock.on(node)
+        for node in nodes.values():
+            living.enter_context(spinning(node))
+            living.callback(node.stop)
+        arm = load_arm(Path(deployment.robot))
+        session = Session(deployment, arm, Node("script", deployment, robot="rm1", bus=MemoryBus(network)))
+        living.callback(session.close)
+        yield session, nodes
+
+
+@pytest.mark.parametrize(("ahead", "drift"), APART)
+def test_what_a_script_sees_after_a_change_was_measured_after_it(deployment, ahead, drift):
+    with hosts(deployment, ("stepper_gateway", Skewed(ahead, drift))) as (session, nodes):
+        gateway = nodes["stepper_gateway"]
+        states = gateway.publisher(JOINT_STATES)
+        names = session.description.joint_names
+
+        def put(age: int, place: float) -> None:
+            states.put(JointState(stamp=gateway.now() - age, name=names, position=(place, 0.0, 0.0)))
+
+        latest = session.latest(JOINT_STATES)
+        put(0, 1.0)
+        assert session.wait_for(lambda: latest.message is not None, 2.0)
+        session.changed()
+        put(100 * MS, 1.0)  # measured before, and late on its way
+        later = threading.Timer(0.1, put, (0, 2.0))
+        later.start()
+        assert session.newest(JOINT_STATES).position[0] == 2.0
+        later.join()
+
+
+def seen(stamp: int, x: float) -> Detections:
+    place = Transform(translation=(x, 0.1, 0.04), rotation=(0.0, 0.0, 0.0, 1.0))
+    cup = Detection(name="cup", kind=DetectionKind.TAG, sigma=1e-4, is_located=True, base_from_thing=place)
+    return Detections(stamp=stamp, camera="overhead", items=(cup,))
+
+
+@pytest.mark.parametrize(("ahead", "drift"), APART)
+def test_a_thing_is_where_images_show_it_that_were_taken_after_the_arm_had_come_to_rest(deployment, ahead, drift):
+    clocks = (("stepper_gateway", Skewed(-ahead, -drift)), ("camera", Skewed(ahead, drift)))
+    with hosts(deployment, *clocks, ("detector", Skewed(2 * ahead))) as (session, nodes):
+        gateway, camera, detector = (nodes[name] for name in ("stepper_gateway", "camera", "detector"))
+        states, found = gateway.publisher(JOINT_STATES), detector.publisher(camera_detections("overhead"))
+        names = session.description.joint_names
+        end = threading.Event()
+
+        def speak() -> None:
+            """Every image that was taken before now shows the cup elsewhere, and all come late."""
+            began = camera.now()
+            while not end.wait(0.02):
+                states.put(JointState(stamp=gateway.now(), name=names, position=(0.0,) * 3, velocity=(0.0,) * 3))
+                stamp = camera.now() - 200 * MS
+                found.put(seen(stamp, 0.1 if stamp < began else 0.2))
+
+        speaker = threading.Thread(target=speak)
+        speaker.start()
+        try:
+            (cup,) = Eyes(session, Scene(session)).detect("cup", "overhead", False)
+            assert cup.pose.position[0] == pytest.approx(0.2)
+        finally:
+            end.set()
+            speaker.join()

@@ -1,0 +1,71 @@
+"""A recording says whose clock each stamp is of, and how far that clock is from the recorder's."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from schemas.deployment import Deployment, PathsSection
+from schemas.system import NodeInfo, NodeRecord, Parameter
+from services.recordings.census import Census, is_news
+from services.recordings.channels import Entry
+from services.recordings.mcap_file import CLOCKS, McapFile
+from services.recordings.reader import RecordingReader
+from services.recordings.table import NODES
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.node import Node
+from tests.runtime.support import hear, spinning
+from tests.runtime.test_clock_offset import Skewed
+
+RECORD = NodeRecord(node="planner", info=NodeInfo(host="brain"), clock_offset=5.0, clock_bound=0.001)
+
+
+@pytest.mark.parametrize("ahead", [5.0, -5.0, 0.0])
+def test_the_clock_of_every_node_is_in_its_record(tmp_path: Path, ahead: float) -> None:
+    deployment = Deployment(paths=PathsSection(run=str(tmp_path / "run"), out=str(tmp_path / "out")))
+    network, records = MemoryNetwork(), []
+    with (
+        Node("planner", deployment, robot="rm1", bus=MemoryBus(network)) as planner,
+        Node("logger", deployment, robot="rm1", bus=MemoryBus(network)) as logger,
+        spinning(Skewed(ahead).on(planner)),
+    ):
+        Census(logger, records.append)
+        assert hear(logger, lambda: records, 10.0)
+    (record,) = records
+    assert record.clock_offset is not None
+    assert abs(record.clock_offset - ahead) <= record.clock_bound + 1e-3
+    assert record.info.clock == 0  # the moment of the answer is nothing of the node
+
+
+@pytest.mark.parametrize(
+    ("after", "news"),
+    [
+        (RECORD, False),
+        (replace(RECORD, stamp=7), False),
+        (replace(RECORD, clock_offset=5.0015, clock_bound=0.001), False),  # both errors explain it
+        (replace(RECORD, clock_offset=5.0025, clock_bound=0.001), True),  # it has drifted, or was set
+        (replace(RECORD, clock_offset=None), True),
+        (replace(RECORD, info=NodeInfo(host="brain", ready=True)), False),
+        (replace(RECORD, info=NodeInfo(host="cell")), True),
+        (replace(RECORD, parameters=(Parameter(name="x"),)), True),
+    ],
+)
+def test_a_record_is_told_again_when_its_clock_has_moved_farther_than_errors_explain(after, news) -> None:
+    assert is_news(RECORD, after) is news
+
+
+def test_the_metadata_has_each_writers_host_and_clock_as_it_was_last(tmp_path: Path) -> None:
+    file = McapFile(tmp_path / "a.mcap", {})
+    other = replace(RECORD, node="camera", info=NodeInfo(host="cell"), clock_offset=None)
+    file.write(Entry(NODES, each, 1) for each in (RECORD, other, replace(RECORD, clock_offset=6.0)))
+    file.close()
+    reader = RecordingReader(tmp_path / "a.mcap")
+    list(reader.rows())
+    clocks = {name: json.loads(text) for name, text in reader.metadata[CLOCKS].items()}
+    assert clocks == {
+        "planner": {"host": "brain", "offset": 6.0, "bound": 0.001},
+        "camera": {"host": "cell", "offset": None, "bound": 0.001},
+    }
