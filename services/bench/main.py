@@ -48,6 +48,7 @@ FIGURES = {
     "plan_any_success": Row("any_planning:plan_any_success", "%", takes_count=True),
     "plan_mesh_ms": Row("mesh_planning:plan_mesh_ms", "ms"),
     "import_s": Row("import_time:import_s", "s"),
+    "extra_mb": Row("extra_sizes:extra_mb", "MB"),
     "fit_excess_mm": Row("fit_quality:fit_excess_mm", "mm"),
     "first_plan_s": Row("first_plan:first_plan_s", "s"),
     "deadline_overrun_ms": Row("deadlines:deadline_overrun_ms", "ms"),

@@ -46,14 +46,15 @@ def install_options(parser: Parser) -> None:
 
 def run_check(options: Options) -> ExitCode:
     """Says what runs where, or everything that is wrong, with lines."""
-    from services.hosts.layout import processes
+    from services.hosts.layout import extras, processes
 
     site = site_named(options.site)
     rows = []
     for name, host in site.hosts.items():
         running = ", ".join(process.unit.removeprefix("gemelo-") for process in processes(site, name))
-        rows.append((name, host.address, running or "-", ", ".join(host.roles) or "-"))
-    print(table(("host", "address", "runs", "people"), rows))
+        needed = f'EXTRAS="{" ".join(extras(site, name))}"'
+        rows.append((name, host.address, running or "-", ", ".join(host.roles) or "-", needed))
+    print(table(("host", "address", "runs", "people", "make setup"), rows))
     return ExitCode.OK
 
 

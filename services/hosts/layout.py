@@ -31,7 +31,7 @@ SERVICES = {
         Service("stepper_gateway", "trajectories to step knots", "512M"),
         Service("state_publisher", "joint states to frames", "256M"),
         Service("planner", "goals to verified trajectories", "4G", ("planner",)),
-        Service("logger", "everything to MCAP, every command to CSV", "1G"),
+        Service("logger", "everything to MCAP, every command to CSV", "1G", ("record",)),
         Service("visualizer", "everything to Rerun", "2G", ("view",)),
         Service("viewer", "the Rerun viewer", "6G", ("view",)),
         Service("panel", "the operator's page", "2G", ("panel",)),
@@ -73,6 +73,11 @@ def processes(site: Site, host: str) -> Iterator[Process]:
         yield Process(SERVICES[BROKER])
     for robot, names in site.hosts[host].services.items():
         yield from (Process(SERVICES[name], robot) for name in names)
+
+
+def extras(site: Site, host: str) -> tuple[str, ...]:
+    """The extras of pyproject.toml that a host needs for its services."""
+    return tuple(sorted({extra for process in processes(site, host) for extra in process.service.extras}))
 
 
 def roles(site: Site, host: str) -> tuple[str, ...]:

@@ -62,12 +62,12 @@ class Machine:
         path.write_text(text)
         path.chmod(path.stat().st_mode | stat.S_IXUSR)
 
-    def begin(self) -> subprocess.Popen[str]:
+    def begin(self, **environ: str) -> subprocess.Popen[str]:
         """A bootstrap in a process group of its own, as a terminal gives it."""
         return subprocess.Popen(
             [self.bin / "bash", "deploy/bootstrap"],
             cwd=self.root,
-            env={"PATH": str(self.bin), "HOME": str(self.home), "LC_ALL": "C"},
+            env={"PATH": str(self.bin), "HOME": str(self.home), "LC_ALL": "C", **environ},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -75,8 +75,8 @@ class Machine:
             start_new_session=True,
         )
 
-    def bootstrap(self) -> subprocess.CompletedProcess[str]:
-        process = self.begin()
+    def bootstrap(self, **environ: str) -> subprocess.CompletedProcess[str]:
+        process = self.begin(**environ)
         try:
             stdout, stderr = process.communicate(timeout=60)
         finally:

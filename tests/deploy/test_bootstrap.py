@@ -53,6 +53,17 @@ def test_a_removed_venv_is_made_again(machine):
     assert (machine.root / ".venv/bin/process-compose").exists()
 
 
+@pytest.mark.parametrize("extras", ["", "planner record"])
+def test_a_host_with_extras_installs_only_those_in_the_locks_versions_and_all_when_asked_again(machine, extras):
+    machine.complete()
+    machine.bootstrap(EXTRAS=extras)
+    (first,) = (line for line in (machine.home / "uv.log").read_text().splitlines() if "--requirement" in line)
+    chosen = "".join(f" --extra {extra}" for extra in extras.split())
+    assert first.endswith(f"--requirement pyproject.toml --extra build --constraints requirements.lock{chosen}")
+    assert "Python packages" in machine.bootstrap().stdout
+    assert "--require-hashes --requirement requirements.lock" in (machine.home / "uv.log").read_text()
+
+
 def test_packages_are_installed_by_hash(machine):
     machine.complete()
     machine.bootstrap()

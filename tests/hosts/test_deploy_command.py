@@ -45,7 +45,9 @@ def gemelo(*words: str) -> int:
 
 def test_check_says_what_runs_where_and_a_mistake_ends_with_its_line(tmp_path, capsys):
     assert gemelo("deploy", "check", "example") == 0
-    assert "router, rm1-planner, rm1-logger" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "router, rm1-planner, rm1-logger" in said
+    assert 'EXTRAS="planner record"' in said  # what this host is to install
     file = tmp_path / "lab.toml"
     file.write_text(EXAMPLE.read_text().replace('"planner", "logger"', '"planer"'))
     assert gemelo("deploy", "check", str(file)) == 1

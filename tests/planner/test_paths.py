@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import sys
 import time
 from collections.abc import Iterator
 from functools import cache
@@ -28,6 +29,7 @@ from services.planner.path.path import PathNotFound
 from services.planner.path.search import KNOWN, Search
 from services.planner.request.deadline import Deadline, Stopwatch
 from services.planner.timing.profile import joint_limits
+from services.planner.timing.toppra_speeds import load_toppra
 from services.planner.verification.verify import limit_shares, require_ends, sample
 from tests.planner.native.coal_truth import Truth
 from tests.planner.native.scenes import star_mesh, stl_of
@@ -344,3 +346,15 @@ def test_an_arm_at_rest_stays_where_it_is_whatever_it_is_asked_with(planner: Pla
     for timing in Timing:
         request = asked(planner, configuration, configuration, timing=timing)
         require_sound(planner, request, planner.plan(request, None))
+
+
+def test_without_toppra_the_time_optimal_timing_is_refused_with_what_would_do(planner: Planner, monkeypatch):
+    request = between(planner)
+    fast = asked(planner, request.start.position, request.goal.position, timing=Timing.TIME_OPTIMAL)
+    load_toppra.cache_clear()
+    monkeypatch.setitem(sys.modules, "toppra", None)  # as on a machine for which it has no wheel
+    refused = planner.plan(fast, None)
+    load_toppra.cache_clear()
+    assert refused.code is not PlanCode.SUCCESS
+    assert "ask for the jerk-limited timing" in f"{refused.refusal.message} {refused.refusal.remedy}"
+    assert planner.plan(request, None).code is PlanCode.SUCCESS

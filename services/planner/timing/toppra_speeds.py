@@ -85,12 +85,21 @@ class _Task:
 
 @cache
 def load_toppra() -> Any:
-    """Imported where it is needed: it takes seconds, and its sources have strings that Python warns about."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        import toppra
-        import toppra.algorithm
-        import toppra.constraint
+    """Imported where it is needed: it takes seconds, and its sources have strings that Python warns about.
+
+    Raises `NoProfile` where it is not installed, as on machines for which it has no wheel.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            import toppra
+            import toppra.algorithm
+            import toppra.constraint
+    except ImportError as error:
+        raise NoProfile(
+            f"the time-optimal timing needs toppra, which is not on this machine ({error}): it has wheels for x86_64 "
+            "alone; ask for the jerk-limited timing"
+        ) from error
 
     toppra.setup_logging("ERROR")
     return toppra

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 import traceback
+from contextlib import suppress
 from pathlib import Path
 from queue import SimpleQueue
 from typing import IO
@@ -20,6 +21,7 @@ from services.planner.collision.sphere_check import cancel_flag
 from services.planner.collision.world import World
 from services.planner.core import Planner
 from services.planner.request.deadline import Stopwatch
+from services.planner.timing.profile import NoProfile
 from services.planner.timing.toppra_speeds import load_toppra
 from services.planner.workers.jobs import (
     ORDERS,
@@ -85,7 +87,8 @@ def main() -> None:
                 answers.put(Shown())
             case AtHand() as at_hand:
                 if at_hand.job.request.timing is Timing.TIME_OPTIMAL:
-                    load_toppra()  # seconds, the first time, which are not the plan's
+                    with suppress(NoProfile):  # which the plan itself will say
+                        load_toppra()  # seconds, the first time, which are not the plan's
                 answers.put(Planned(plan_at_hand(planner, at_hand)))
 
 
