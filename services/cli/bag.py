@@ -12,10 +12,11 @@ import msgspec
 from services.cli.errors import CommandError, ExitCode, unknown, usage
 from services.cli.parser import Options, Parser, json_option
 from services.cli.text_table import table
-from services.recordings.contents import Contents, contents_of
+from services.recordings.contents import Contents, WriterClock, contents_of
 from services.recordings.export import FORMS, NothingToExport, export
 from services.recordings.reader import BadRecording
 from services.recordings.repair import repair
+from services.runtime.clock_offset import ClockOffset
 
 
 def file_option(parser: Parser) -> None:
@@ -87,6 +88,13 @@ def one_sentence() -> Iterator[None]:
         ) from error
 
 
+def _apart(contents: Contents) -> Iterator[tuple[str, WriterClock, ClockOffset]]:
+    """The writers whose clocks were others than the recorder's."""
+    for name, each in contents.clocks.items():
+        if each.offset is not None and not (clock := ClockOffset(each.offset, each.bound)).may_agree:
+            yield name, each, clock
+
+
 def information(contents: Contents) -> str:
     """A recording as text."""
     start = f"{datetime.fromtimestamp(contents.start / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC" if contents.start else "-"
@@ -95,6 +103,9 @@ def information(contents: Contents) -> str:
         f"start     {start}, {contents.duration:.1f} s",
         f"messages  {contents.messages} on {len(contents.topics)} topics",
         "versions  " + ", ".join(f"{name} {value}" for name, value in contents.versions.items() if name != "system"),
+    ]
+    head += [
+        f"clock     of {name} on {each.host}: {clock} from the recorder's" for name, each, clock in _apart(contents)
     ]
     head += [f"damaged   {contents.damage}"] if contents.damage else []
     rows = [(each.topic, each.message, str(each.count), f"{each.rate:.2f}") for each in contents.topics]

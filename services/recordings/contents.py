@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 from mcap.reader import make_reader
 
+from services.recordings.mcap_file import CLOCKS
 from services.recordings.reader import UNREADABLE, Damage, RecordingReader
 
 
@@ -21,6 +23,14 @@ class TopicContents(msgspec.Struct, frozen=True, kw_only=True):
     rate: float  # [Hz] on average over the whole recording
 
 
+class WriterClock(msgspec.Struct, frozen=True, kw_only=True):
+    """The clock by which a node stamped what it wrote."""
+
+    host: str
+    offset: float | None = None  # [s] what it showed more than the recorder's; None: not measured
+    bound: float = 0.0  # [s] by how much at most that is wrong
+
+
 class Contents(msgspec.Struct, frozen=True, kw_only=True):
     """A recording as a whole."""
 
@@ -31,6 +41,7 @@ class Contents(msgspec.Struct, frozen=True, kw_only=True):
     messages: int  # without those that are derived for Foxglove
     topics: tuple[TopicContents, ...]
     versions: dict[str, str]
+    clocks: dict[str, WriterClock] = {}  # by the node that wrote
     damage: str = ""  # why it ends early; empty: it is whole
 
 
@@ -59,8 +70,16 @@ def contents_of(path: Path) -> Contents:
     return Contents(
         file=str(path), size=path.stat().st_size, start=counted.start, duration=duration,
         messages=sum(each.count for each in topics), topics=tuple(sorted(topics, key=lambda each: each.topic)),
-        versions=reader.metadata.get("gemelo", {}), damage=_sentence(reader.damage),
+        versions=reader.metadata.get("gemelo", {}), clocks=_clocks(reader), damage=_sentence(reader.damage),
     )  # fmt: skip
+
+
+def _clocks(reader: RecordingReader) -> dict[str, WriterClock]:
+    found = {}
+    for node, text in reader.metadata.get(CLOCKS, {}).items():
+        with suppress(msgspec.DecodeError):  # of a file that somebody else has written
+            found[node] = msgspec.json.decode(text, type=WriterClock)
+    return found
 
 
 def _sentence(damage: Damage) -> str:

@@ -10,8 +10,10 @@ from msgspec.structs import replace
 
 from schemas.deployment import Deployment, PathsSection
 from schemas.system import NodeInfo, NodeRecord, Parameter
+from services.cli.bag import information
 from services.recordings.census import Census, is_news
 from services.recordings.channels import Entry
+from services.recordings.contents import contents_of
 from services.recordings.mcap_file import CLOCKS, McapFile
 from services.recordings.reader import RecordingReader
 from services.recordings.table import NODES
@@ -69,3 +71,15 @@ def test_the_metadata_has_each_writers_host_and_clock_as_it_was_last(tmp_path: P
         "planner": {"host": "brain", "offset": 6.0, "bound": 0.001},
         "camera": {"host": "cell", "offset": None, "bound": 0.001},
     }
+
+
+def test_the_contents_name_the_writers_whose_clock_was_not_the_recorders(tmp_path: Path) -> None:
+    file = McapFile(tmp_path / "a.mcap", {})
+    near = replace(RECORD, node="logger", clock_offset=0.0005)
+    file.write(Entry(NODES, each, 1) for each in (RECORD, near))
+    file.close()
+    contents = contents_of(tmp_path / "a.mcap")
+    assert (contents.clocks["planner"].host, contents.clocks["planner"].offset) == ("brain", 5.0)
+    said = information(contents)
+    assert "clock     of planner on brain: +5000.0 ±1.0 ms from the recorder's" in said
+    assert "of logger" not in said
