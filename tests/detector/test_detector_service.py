@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from schemas.camera import CameraImage, CameraInfo
 from schemas.cell import VirtualSource
@@ -16,10 +17,10 @@ from schemas.deployment import Deployment
 from schemas.detections import Detections
 from schemas.joints import JointState
 from schemas.system import LogRecord
-from schemas.topics import LOG, camera_detections, camera_image, camera_info
+from schemas.topics import JOINT_STATES, LOG, camera_detections, camera_image, camera_info
 from services.arm.cell.camera_model import believed_info
 from services.arm.cell.cell_file import Cell, load_cell
-from services.arm.frames.transforms import compose, from_rpy, inverse, to_message
+from services.arm.frames.transforms import compose, from_message, from_rpy, inverse, to_message
 from services.arm.kinematics.chain import link_transforms
 from services.arm.model.description import Arm, load_arm
 from services.camera.sources.source import encoded
@@ -30,7 +31,8 @@ from services.detector.main import Places, run
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.deployment import load_deployment
 from services.runtime.node import Node
-from tests.runtime.support import hear
+from tests.runtime.support import hear, spinning
+from tests.runtime.test_clock_offset import Skewed
 
 
 @pytest.fixture
@@ -145,3 +147,46 @@ def test_grey_and_coloured_rows_are_read() -> None:
     assert grey[0, 1].tolist() == [2, 2, 2]
     rgb = decoded(CameraImage(encoding="rgb8", width=1, height=1, data=b"\x01\x02\x03"))
     assert rgb[0, 0].tolist() == [1, 2, 3]
+
+
+@pytest.mark.parametrize("ahead", [0.0, 5.0, -5.0])
+def test_an_image_and_the_state_of_its_moment_meet_whatever_the_clocks_of_their_hosts_say(
+    arm: Arm, cell: Cell, tmp_path: Path, ahead: float
+) -> None:
+    """The camera rides on the tool, so where a thing is depends on the joint state of the image's own moment."""
+    text = cell.path.read_text().replace('name = "overhead"', f'name = "hand"\nparent = "{arm.tool_frame}"', 1)
+    (tmp_path / "cell.toml").write_text(text)
+    environ = {"GEMELO_PATHS_RUN": str(tmp_path / "run"), "GEMELO_CELL": str(tmp_path / "cell.toml")}
+    deployment = load_deployment(environ=environ)
+    data, seen = picture(arm, cell)  # its lens; the camera is now on the tool, at the place where the other one hangs
+    info = replace(seen, name="hand", parent=arm.tool_frame)
+    with running(deployment) as camera, ExitStack() as living:
+        gateway = Node("stepper_gateway", deployment, bus=MemoryBus(camera._bus.network))  # type: ignore[attr-defined]
+        living.enter_context(gateway)
+        for node, seconds in ((camera, ahead), (gateway, -ahead)):
+            Skewed(seconds, 1e-4).on(node)
+        living.enter_context(spinning(gateway))
+        living.callback(gateway.stop)
+        found: list[Detections] = []
+        camera.subscribe(camera_detections("hand"), found.append)
+        image, lens = camera.publisher(camera_image("hand")), camera.publisher(camera_info("hand"))
+        states = gateway.publisher(JOINT_STATES)
+        lens.put(info)
+        stood = {}  # where the joints were, by the image's stamp
+        for turn in range(60):
+            at = arm.named_states["ready" if turn % 2 else "left"]
+            stamp = gateway.now()
+            states.put(JointState(stamp=stamp, name=arm.joint_names, position=at))
+            moment = camera.now()
+            stood[moment] = at
+            camera.wait(0.3)
+            image.put(CameraImage(stamp=moment, camera="hand", width=640, height=480, encoding="jpeg", data=data))
+            if hear(camera, lambda: any(item.is_located for each in found for item in each.items), 0.3):
+                break
+        (shown, *_) = (each for each in found if any(item.is_located for item in each.items))
+        links = link_transforms(arm.model, dict(zip(arm.joint_names, stood[shown.stamp], strict=True)))
+        base_from_tool = compose(inverse(links[arm.base_frame]), links[arm.tool_frame])
+        for item in (each for each in shown.items if each.is_located):
+            tool_from_camera = from_message(info.parent_from_camera)
+            expected = compose(compose(base_from_tool, tool_from_camera), from_message(item.camera_from_thing))
+            assert from_message(item.base_from_thing)[0] == pytest.approx(expected[0], abs=1e-6)
