@@ -88,9 +88,10 @@ class Session:
             return latest.message is not None if topic.rate is None else is_fresh()
 
         def was_measured_since() -> bool:
-            if not is_there():
-                return False
-            measured = clock.to_own(getattr(latest.message, "stamp", 0))
+            stamp = getattr(latest.message, "stamp", None)
+            if not is_there() or stamp is None:
+                return is_there()
+            measured = clock.to_own(stamp)
             return measured is not None and measured >= self._changed_unix
 
         if topic.rate is not None and self._changed:
