@@ -201,6 +201,8 @@ class Arm:
     def frame(self, target: str, source: str, stamp: int = 0) -> Pose:
         """The pose of the frame `source` in the frame `target`, now or at `stamp` [ns UNIX] of the last 10 s.
 
+        `stamp` is by the clock of the host that stamps `joint_states`.
+
         >>> arm.frame("base_link", "efector_link") == arm.pose()
         True
         """
