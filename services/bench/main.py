@@ -61,6 +61,7 @@ FIGURES = {
     "box_mm": Row("vision.figures:box_mm", "mm"),
     "image_to_pose_ms": Row("vision.figures:image_to_pose_ms", "ms"),
     "mount_mm": Row("vision.figures:mount_mm", "mm"),
+    "mount_images_mm": Row("vision.figures:mount_images_mm", "mm"),
     "pick_mm": Row("picks:pick_mm", "mm", takes_count=True),
     "pick_success": Row("picks:pick_success", "%", takes_count=True),
     "replay_speed": Row("replaying:replay_speed", "x real time"),

@@ -1,16 +1,18 @@
-"""`gemelo camera mount`: where a camera stands, from points of a printed board that the arm's tool has touched."""
+"""`gemelo camera mount`: where a camera stands, from points of a printed board that the arm's tool has touched.
+
+A camera that rides on a link, or one before which a link carries tags, is `camera_poses`'s.
+"""
 
 from __future__ import annotations
 
 import sys
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 import gemelo
-from schemas.cell import Mount
 from services.arm.frames.transforms import compose
+from services.cli import camera_poses
 from services.cli.camera_boards import bar_option, tag_board
 from services.cli.camera_images import from_bus, info_of, subject
 from services.cli.errors import CommandError, ExitCode, in_commands, usage
@@ -20,7 +22,7 @@ from services.cli.units import LENGTH, parse_quantity
 from services.vision.boards import Sighting, TagBoard
 from services.vision.calibration.touches import FEWEST_TOUCHES, TouchFit, fit_touches, spread_points
 from services.vision.camera_model import CameraModel, model_of
-from services.vision.rigid import Array, to_transform
+from services.vision.rigid import Array
 
 if TYPE_CHECKING:
     from gemelo import Arm
@@ -37,18 +39,16 @@ def add_options(parser: Parser) -> None:
     parser.add_argument("--points", type=positive_integer, default=4, metavar="N", help="tags to touch, 4 to 9 (4)")
     said = "of what touches, beyond the tool's frame along its z (the length of the jaws)"
     parser.add_argument("--tip", metavar="LENGTH", default="", help=said)
+    camera_poses.add_options(parser)
 
 
 def run(options: Options) -> ExitCode:
-    """Asks for one touch after the other, looks at the board, and writes camera.toml."""
+    """Goes to poses by itself, or asks for one touch after the other; looks at the board, and writes camera.toml."""
     camera, board = subject(options.camera), tag_board(options.bar)
+    if camera.record.parent or options.on:
+        return camera_poses.run(options, camera)
     if not FEWEST_TOUCHES <= options.points <= len(board.centres()):
         raise usage(f"--points {options.points} is not {FEWEST_TOUCHES} to {len(board.centres())}")
-    if camera.record.parent:
-        raise CommandError(
-            f'camera "{camera.name}" rides on {camera.record.parent}: touching a board tells where a camera stands, '
-            "not where one rides; nothing was written"
-        )
     robot = load_robot()
     tip = _tip(options.tip, robot)
     numbers = list(board.centres())
@@ -73,13 +73,8 @@ def run(options: Options) -> ExitCode:
             f"touches are {1e3 * fit.held_out:.1f} mm from where the others put them (at most "
             f"{1e3 * LARGEST_HELD_OUT:g}), and nothing was written: touch the middles of the tags again"
         )
-    pose = to_transform(fit.base_from_camera)
-    mount = Mount(
-        parent=robot.description.base_frame, position=_three(pose.translation), rotation=_four(pose.rotation),
-        held_out=fit.held_out, date=datetime.now(UTC).strftime("%Y-%m-%d"),
-    )  # fmt: skip
-    path = camera.write(mount=mount)
-    x, y, z = (1e3 * value for value in mount.position)
+    path = camera.write_mount(robot.description.base_frame, fit.base_from_camera, fit.held_out)
+    x, y, z = (1e3 * value for value in fit.base_from_camera[:3, 3])
     print(f"{camera.name} stands at {x:.0f} {y:.0f} {z:.0f} mm; touches left out are {1e3 * fit.held_out:.2f} mm off")
     print(f"written to {path}")
     return ExitCode.OK
@@ -121,13 +116,3 @@ def _fit(board: TagBoard, chosen: list[int], touched: Array, sighting: Sighting 
         return fit_touches(points, touched, sighting, model)
     except ValueError as error:
         raise CommandError(f"{error}; nothing was written") from error
-
-
-def _three(values: tuple[float, ...]) -> tuple[float, float, float]:
-    x, y, z = values
-    return x, y, z
-
-
-def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:
-    x, y, z, w = values
-    return x, y, z, w

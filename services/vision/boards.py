@@ -17,6 +17,7 @@ from services.vision.tag_pose import square
 from services.vision.tags import FAMILIES, GreyImage, doubled, find_tags, tag_modules
 
 BOARD_FAMILY = TagFamily.ARUCO_5X5_100  # of the markers between the chessboard's squares
+EVEN = 0.87  # of its clearest edge's contrast the faintest edge of a tag has, or it is partly hidden
 FEWEST_CORNERS = 8  # of a chessboard make a shot
 Square = tuple[float, float, float]  # left, lower edge, size [m] of what is black
 
@@ -29,6 +30,7 @@ class Sighting:
     pixels: Array  # (n, 2) [px]
     sigma: float = 0.05  # [px] standard deviation of a pixel's coordinate
     doubled: tuple[int, ...] = ()  # ids that were seen twice, and were not used
+    uneven: tuple[int, ...] = ()  # ids of tags of which something hides an edge, or lights it less; they were not used
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,10 @@ class TagBoard:
             for column in range(self.columns)
         }
 
+    def points(self) -> Array:
+        """(n, 3) [m] the corners of all its tags."""
+        return np.vstack([square(self.tag) + centre for centre in self.centres().values()])
+
     def squares(self) -> list[Square]:
         """All that is black, from the lower left corner of the board."""
         width, height = self.size
@@ -115,16 +121,21 @@ class TagBoard:
         return found
 
     def find(self, image: GreyImage, model: CameraModel | None = None) -> Sighting | None:
-        """The corners of the tags, those without whose id is seen twice; None where no tag of the board is seen."""
+        """The corners of the tags, without those whose id is seen twice or that are partly hidden; None where no tag of
+        the board is seen."""
         tags = find_tags(image, model, self.family)
         twice = doubled(tags)
         centres = self.centres()
-        seen = [tag for tag in tags if tag.id in centres and tag.id not in twice]
-        if not seen:
+        once = [tag for tag in tags if tag.id in centres and tag.id not in twice]
+        uneven = tuple(tag.id for tag in once if tag.evenness < EVEN)
+        seen = [tag for tag in once if tag.evenness >= EVEN]
+        if not once:
             return None
+        if not seen:
+            return Sighting(np.zeros((0, 3)), np.zeros((0, 2)), doubled=twice, uneven=uneven)
         points = np.vstack([square(self.tag) + centres[tag.id] for tag in seen])
         sigma = float(np.median([tag.sigma for tag in seen]))
-        return Sighting(points, np.vstack([tag.corners for tag in seen]), sigma, twice)
+        return Sighting(points, np.vstack([tag.corners for tag in seen]), sigma, twice, uneven)
 
 
 @dataclass(frozen=True)

@@ -53,6 +53,7 @@ class Tag:
     ideal: Array  # (4, 2) [px] without the lens's distortion
     sigma: float  # [px] standard deviation of a corner along either axis
     spread: float  # [px] of the least sharp edge
+    evenness: float = 1.0  # contrast of its faintest edge beside that of its clearest: low where something hides one
 
 
 @cache
@@ -95,8 +96,17 @@ def refined(image: Array, ids: Index, outlines: Array, model: CameraModel | None
     edge_sigma = 2.0 * np.hypot(lines.scatter, LEAST_NOISE).reshape(-1, 4) / np.sqrt(count)[:, None]
     blur = BLUR_ERROR * np.maximum(0.0, spread - SHARP)
     sigma = np.sqrt(np.mean(edge_sigma**2, axis=1) + blur**2 + SYSTEMATIC**2)
+    contrast = steps.contrast.reshape(-1, 4)
+    evenness = contrast.min(axis=1) / np.maximum(contrast.max(axis=1), LEAST_CONTRAST)
     return [
-        Tag(int(ids[index]), corners[index], ideal[index], float(sigma[index]), float(spread[index]))
+        Tag(
+            int(ids[index]),
+            corners[index],
+            ideal[index],
+            float(sigma[index]),
+            float(spread[index]),
+            float(evenness[index]),
+        )
         for index in np.flatnonzero(is_good)
     ]
 

@@ -12,7 +12,8 @@ from services.arm.model.description import Arm, load_arm
 from services.bench.vision.mounting import Trial, closed_form, level_trial, looking, six_joint_trial, tool_error
 from services.runtime.deployment import project_root
 from services.vision.boards import Sighting, TagBoard
-from services.vision.calibration.mount import Carrier, fit_mount
+from services.vision.calibration.mount import fit_mount
+from services.vision.calibration.reprojection import Carrier
 from services.vision.calibration.touches import fit_touches, spread_points
 from services.vision.camera_model import of_field_of_view
 from services.vision.rigid import apply, inverse, rigid
@@ -66,7 +67,7 @@ def test_what_an_arm_that_cannot_tilt_leaves_open_is_refused_by_name(rm1: Arm) -
     assert not fit.is_accepted
     assert fit.undetermined == (
         "the camera's height and the board's height on the link cannot be told apart: "
-        "measure the board's height and give it with --height",
+        "measure the board's height and give it with --tag-height",
     )
 
 

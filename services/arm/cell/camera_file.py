@@ -13,6 +13,7 @@ from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.robot_file import read_robot_data, read_text, where_of
 
 CAMERA_FILE = "camera.toml"
+MOUNT_BOARD = "mount_board"  # in the planning scene: the tags on the arm, while `gemelo camera mount` shows them
 HEADER = "# Measured by `gemelo camera calibrate` and `gemelo camera mount`: measure again instead of editing it.\n"
 REMEDY = "measure it again: gemelo camera calibrate, gemelo camera mount"
 

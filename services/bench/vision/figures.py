@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from services.bench.figures import Figure, NotMeasured, of_samples, quantile
-from services.bench.scenes import rm1
+from services.bench.scenes import parol6, rm1
 from services.bench.vision.images import (
     Conditions,
     Image,
@@ -21,11 +21,13 @@ from services.bench.vision.images import (
     render,
     tag_surface,
 )
+from services.bench.vision.mount_images import Setup, Sight, board_on_tool, camera_on_link, tag_on_level_tool, take
 from services.bench.vision.mounting import Trial, closed_form, level_trial, six_joint_trial, tool_error
 from services.bench.vision.naive import APRILTAG_SHIFT, METHODS, opencv_corners, opencv_pose
 from services.vision.boards import TagBoard
 from services.vision.boxes import colour_strength, coloured_regions, fit_box, region_centre
-from services.vision.calibration.mount import Carrier, fit_mount
+from services.vision.calibration.mount import fit_mount
+from services.vision.calibration.reprojection import Carrier
 from services.vision.camera_model import of_field_of_view
 from services.vision.rigid import Array, angle_between, rigid
 from services.vision.tag_pose import flat, plane_pose, tag_pose
@@ -33,7 +35,7 @@ from services.vision.tags import find_tags
 
 MODEL = of_field_of_view(np.radians(60.0), 640, 480)
 SIZE, DISTANCE = 0.03, 0.5  # [m]
-TAGS, FLIPS, BOXES, TRIALS, TIMED = 300, 1000, 60, 6, 100
+TAGS, FLIPS, BOXES, TRIALS, TIMED, IMAGED = 300, 1000, 60, 6, 100, 3
 FLIPPED = np.radians(15.0)
 EDGES = (0.03, 0.03, 0.03)  # [m] of the box
 RED = np.array([200.0, 40.0, 35.0])
@@ -193,6 +195,37 @@ def mount_mm() -> Figure:
     return of_share(
         ours, 0.5, 0.95, reference, "six joints, 15 poses, 9 tags, 0.3 px, exact lens, camera on link or base"
     )
+
+
+def mount_images_mm() -> Figure:
+    """Error at what the camera sees by where the wizard says that it stands [mm], on images from the poses it chooses:
+    parol6 with the camera on its wrist and with the board on its tool; `calibrateHandEye` from the same views."""
+    ours: list[float] = []
+    reference: dict[str, float] = {}
+    ways = {"camera on the wrist": camera_on_link(parol6()), "board on the tool": board_on_tool(parol6())}
+    for said, setup in (*ways.items(), ("rm1, tag on the tool, height given", tag_on_level_tool(rm1()))):
+        off, park = mount_images(setup)
+        reference |= {f"{said}, worst": max(off)}
+        reference |= {f"{said}, calibrateHandEye (Park), worst": max(park)} if park else {}
+        ours += off
+    note = "poses chosen by the wizard, rendered 640 x 480, noise 3, blur 0.6, exact lens and arm; rm1's among them"
+    return of_share(ours, 0.5, 1.0, reference, note)
+
+
+def mount_images(setup: Setup) -> tuple[list[float], list[float]]:
+    """[mm] of our own solutions and of Park's, one for each of several choices of poses."""
+    sight, carrier = Sight(setup), setup.carrier
+    ours, park = [], []
+    for seed in range(IMAGED):
+        taken = take(sight, setup.height if setup.arm.name == "rm1" else None, seed=seed)
+        fit = fit_mount(taken.views, sight.model, carrier, taken.belief.height)
+        if fit.faults:
+            raise NotMeasured("; ".join(fit.faults))
+        ours.append(tool_error(fit.parent_from_camera, sight.truth, carrier))
+        trial = Trial(list(taken.views), sight.truth, setup.carrier_from_board)
+        found = closed_form(trial, sight.model, carrier, cv2.CALIB_HAND_EYE_PARK)
+        park += [] if found is None else [tool_error(found, sight.truth, carrier)]
+    return ours, park
 
 
 def mount_error(trial: Trial, carrier: Carrier, height: float | None = None) -> float:

@@ -10,10 +10,9 @@ import numpy as np
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.vision.boards import Sighting, TagBoard
-from services.vision.calibration.mount import Carrier, View
+from services.vision.calibration.reprojection import Carrier, View
 from services.vision.camera_model import CameraModel
 from services.vision.rigid import Array, apply, inverse, rigid, step, turn
-from services.vision.tag_pose import square
 
 
 @dataclass(frozen=True)
@@ -33,17 +32,12 @@ def looking(position: Array, at: Array) -> Array:
     return rigid(np.stack((right, np.cross(forward, right), forward), axis=1), position)
 
 
-def board_points(board: TagBoard) -> Array:
-    """(n, 3) [m] all corners of its tags."""
-    return np.vstack([square(board.tag) + centre for centre in board.centres().values()])
-
-
 def six_joint_trial(
     model: CameraModel, carrier: Carrier, board: TagBoard, count: int, random: np.random.Generator,
     noise: float = 0.3, arm_error: float = 0.0, tilt: float = np.radians(30.0),
 ) -> Trial:  # fmt: skip
     """Poses of a tool that tilts freely by up to `tilt` [rad]; `noise` [px], `arm_error` 1 is 0.5 mm and 2 mrad."""
-    points = board_points(board)
+    points = board.points()
     if carrier is Carrier.CAMERA:
         camera = rigid(np.array([0.02, -0.03, 0.4]), np.array([0.03, -0.02, 0.04]))
         carried = rigid(np.array([0.0, 0.0, 0.3]), np.array([0.3, 0.05, 0.0]))
@@ -89,7 +83,7 @@ def level_trial(
 ) -> Trial:  # fmt: skip
     """Poses of rm1, which cannot tilt its tool: the camera stands, the board is on the tool and looks up."""
     kinematics = Kinematics(arm)
-    points = board_points(board)
+    points = board.points()
     camera = looking(np.array([0.62, -0.3, 0.62]), np.array([0.25, 0.0, 0.1]))
     carried = rigid(np.array([np.pi, 0.0, 0.0]), np.array([0.012, -0.008, -0.04]))
     views: list[View] = []

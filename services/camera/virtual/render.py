@@ -116,6 +116,8 @@ def _planes(faces: tuple[Face, ...]) -> tuple[Array, Array]:
 
 def _fill(target: _Target, face: Face, corners: Array, plane: Array, light: float) -> None:
     """Draws a face whose points p have `plane` @ p = 1, in the optical frame."""
+    if corners[:, 2].max() <= NEAR:
+        return
     rows, columns = _window(target.lens, corners)
     x, y = target.lens.x[rows, columns], target.lens.y[rows, columns]
     if not x.size:

@@ -16,6 +16,7 @@ from schemas.cell import ColourThing, TagPlace, TagRecord, TagThing, Thing
 from schemas.gripper import GripperState
 from schemas.joints import JointState
 from schemas.scene import PlanningScene
+from services.arm.cell.camera_file import MOUNT_BOARD
 from services.arm.cell.cell_file import Cell, grasp_width, height_of_frame
 from services.arm.cell.colours import RGB
 from services.arm.frames.transforms import (
@@ -146,8 +147,8 @@ class World:
         return found
 
     def _obstacles(self, links: Mapping[str, Rigid], scene: PlanningScene) -> list[Solid]:
-        """The scene's objects, without what is drawn by itself: things, and the jaws."""
-        own = {*self._parts, *JAWS}
+        """The scene's objects, without what is drawn by itself: things, the jaws, and tags on the arm."""
+        own = {*self._parts, *JAWS, MOUNT_BOARD}
         found = []
         for each in scene.objects:
             frame = links.get(each.frame, IDENTITY) if each.frame else IDENTITY

@@ -1,0 +1,68 @@
+"""What views of a board can tell of where a camera stands, by the rank of their Jacobian; what they cannot, by name."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from services.vision.calibration.reprojection import (
+    ARM_SIGMA,
+    KNOWN,
+    Carrier,
+    Problem,
+    State,
+    prior_slopes,
+    view_slopes,
+)
+from services.vision.rigid import Array
+
+LENGTH = 0.2  # [m] at which a turn counts as much as a step
+SCALE = np.tile([1.0 / LENGTH] * 3 + [1.0] * 3, 2)
+LARGEST_SIGMA = 0.01  # [m] of a direction that counts as determined
+LEAST_SHARE = 0.25  # of a direction that cannot be determined, for a name to be part of it
+
+
+def information(problem: Problem, state: State, index: int) -> Array:
+    """(12, 12) [1/m^2] what one view tells of camera and board, turns at `LENGTH`, whatever the arm's error in it is
+    (the Schur complement of that error)."""
+    known, arm = view_slopes(problem, state, index)
+    known = known * SCALE
+    between = known.T @ arm
+    own = arm.T @ arm + np.diag(ARM_SIGMA**-2.0)
+    return np.asarray(known.T @ known - between @ np.linalg.solve(own, between.T))
+
+
+def prior_information(problem: Problem) -> Array:
+    """(12, 12) [1/m^2] the same of what is known without any image."""
+    slopes = prior_slopes(problem) * SCALE
+    return np.asarray(slopes.T @ slopes)
+
+
+def determined(problem: Problem, state: State) -> tuple[float, tuple[str, ...]]:
+    """[m] of the least determined direction of camera and board, and a sentence for each that is not determined."""
+    views = [information(problem, state, index) for index in range(len(problem.views))]
+    strengths, directions = np.linalg.eigh(np.sum(views, axis=0) + prior_information(problem))
+    sigmas = 1.0 / np.sqrt(np.maximum(strengths, 1e-18))
+    loose = [direction for sigma, direction in zip(sigmas, directions.T, strict=True) if sigma > LARGEST_SIGMA]
+    return float(sigmas.max()), tuple(_sentence(problem.carrier, direction) for direction in loose)
+
+
+def _sentence(carrier: Carrier, direction: Array) -> str:
+    """What a direction of the unknowns that nothing determines is, and what to do."""
+    where = "on the link" if carrier is Carrier.BOARD else "in the base"
+    camera = ("turn about x", "turn about y", "turn about z", "x", "y", "height")
+    names = [f"the camera's {name}" for name in camera] + [f"the board's {name} {where}" for name in camera]
+    assert len(names) == KNOWN
+    strongest = np.abs(direction).max()
+    part = [name for name, share in zip(names, direction, strict=True) if abs(share) > LEAST_SHARE * strongest]
+    said = (
+        f"{', '.join(part[:-1])} and {part[-1]} cannot be told apart"
+        if len(part) > 1
+        else f"{part[0]} cannot be determined"
+    )
+    heights = {"the camera's height", f"the board's height {where}"}
+    remedy = (
+        "measure the board's height and give it with --tag-height"
+        if heights == set(part)
+        else "take poses that are tilted by 30 degrees about two axes, or touch points of a printed board"
+    )
+    return f"{said}: {remedy}"
