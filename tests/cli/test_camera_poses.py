@@ -32,6 +32,7 @@ from services.bench.vision.mounting import tool_error
 from services.cli import camera_poses
 from services.cli.errors import ExitCode
 from services.cli.main import run
+from services.cli.session import reported
 from services.vision.rigid import from_transform, step, to_transform
 from services.vision.tags import GreyImage
 
@@ -48,6 +49,7 @@ class Shown:
     went: list[tuple[float, ...]] = field(default_factory=list)
     hidden: set[int] = field(default_factory=set)  # of its motions: after these nothing is seen
     refused: set[int] = field(default_factory=set)
+    interrupted: int = 0  # of its motions: the one that a person stops with Ctrl-C
     carried: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -62,6 +64,8 @@ class Shown:
     def move(self, joints: dict[str, float], speed: float) -> None:
         assert 0.0 < speed <= 1.0
         self.went.append(tuple(joints.values()))
+        if len(self.went) == self.interrupted:
+            raise gemelo.Interrupted("the arm rests")
         if len(self.went) in self.refused:
             raise gemelo.Refused("refused: post is in the way")
         self.joints = dict(joints)
@@ -115,8 +119,9 @@ def show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
         shown = Shown(Sight(setup), setup.arm, setup.start)
 
         @contextmanager
-        def connected(robot: object) -> Iterator[Shown]:
-            yield shown
+        def connected(robot: gemelo.Robot) -> Iterator[Shown]:
+            with reported(robot):
+                yield shown
 
         monkeypatch.setattr(camera_poses, "connect_arm", connected)
         monkeypatch.setattr(camera_poses, "Eye", lambda arm, name: shown)
@@ -255,3 +260,13 @@ def test_a_link_that_is_none_is_named_with_the_nearest(show, capsys):
     show(board_on_tool(parol6()))
     assert run(["camera", "mount", "side", "--on", "tool_lnk", "--yes"]) is ExitCode.USAGE
     assert "tool_link" in capsys.readouterr().err
+
+
+def test_ctrl_c_ends_it_where_the_arm_rests_and_takes_the_board_out_of_the_plans(show, capsys):
+    shown, path = show(board_on_tool(parol6()))
+    shown.interrupted = 3
+    assert run(["camera", "mount", "side", "--on", "tool_link", "--poses", "6", "--yes"]) is ExitCode.CANCELLED
+    assert "the arm rests" in capsys.readouterr().err
+    assert len(shown.went) == 3
+    assert shown.carried == []
+    assert not path.with_name(CAMERA_FILE).exists()
