@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from schemas.camera import CameraInfo
 from schemas.cell import BoxThing, Colour, ColourThing, OnnxThing, TagRecord, TagThing
@@ -18,13 +18,20 @@ from services.arm.cell.cell_file import Cell, Tagged, height_of_frame
 from services.arm.cell.colours import RGB, nearest_colour
 from services.arm.frames.transforms import from_rpy
 from services.detector.user_models import Found, Standing, UserModel, standing
-from services.vision.boxes import BoxFit, ColourImage, colour_strength, coloured_regions, fit_box, raised
+from services.vision.boxes import (
+    BoxFit,
+    ColourImage,
+    colour_strength,
+    coloured_regions,
+    coloured_windows,
+    fit_box,
+    raised,
+)
 from services.vision.camera_model import CameraModel, model_of
 from services.vision.rigid import Array, from_transform, inverse, to_transform
 from services.vision.tag_pose import plane_pose, tag_pose
 from services.vision.tags import Tag, find_tags
-
-Mask = NDArray[np.bool_]
+from services.vision.windows import Mask, Window, halved, regions_of, windows_around
 
 # Tuning constants: chosen, where a line does not say measured.
 FLAT = 0.003  # [m] a tag so near to the height at which it would lie is taken to lie there
@@ -33,6 +40,7 @@ MOVED = 0.003  # [m] a fixed tag that is seen so far away from its place says th
 LARGEST_ERROR = 0.7  # [px] RMS of an outline that is a box; measured: 0.1 to 0.3 for boxes, above 1 for what is none
 LIKE_AREA = (0.75, 1.35)  # of a region to that of the box which was fitted to it
 STANDS_OUT = 28.0  # grey levels from the table's colour
+LEAST_AREA = 100  # [px] of what stands out
 LARGEST_SHARE = 0.08  # of the image that a box may take: what is larger is the arm
 
 
@@ -50,6 +58,15 @@ class View:
         if self.base_from_camera is None:
             return None
         return raised(inverse(self.base_from_camera), height)
+
+    @cached_property
+    def half(self) -> ColourImage:
+        """The image at half its size."""
+        return halved(self.image)
+
+    def within(self, window: Window) -> View:
+        """What the window shows of it."""
+        return replace(self, image=window.of(self.image), model=self.model.within(window))
 
 
 class Detector:
@@ -152,12 +169,14 @@ class Detector:
 
     def _colours(self, view: View) -> Iterator[Detection]:
         for colour, things in self._coloured.items():
-            strength = colour_strength(view.image, RGB[colour])
-            for region in coloured_regions(strength):
-                if nearest_colour(np.median(view.image[region], axis=0)) is colour:
-                    best = self._best_box(view, strength, region, things)
-                    if best is not None:
-                        yield self._box_item(view, *best, DetectionKind.COLOUR)
+            for window, core in coloured_windows(view.half, view.image.shape[:2], RGB[colour]):
+                part = view.within(window)
+                strength = colour_strength(part.image, RGB[colour])
+                for region in coloured_regions(strength):
+                    if region[core].any() and nearest_colour(np.median(part.image[region], axis=0)) is colour:
+                        best = self._best_box(part, strength, region, things)
+                        if best is not None:
+                            yield self._box_item(part, *best, DetectionKind.COLOUR, window)
 
     def _classes(self, view: View) -> Iterator[Detection]:
         """What the models of users find, as boxes of the things' size on the table."""
@@ -177,21 +196,22 @@ class Detector:
         """Boxes by nothing but that they have another colour than the table."""
         if not self._boxes:
             return
-        image = view.image.astype(np.float64)
-        table = np.median(image.reshape(-1, 3), axis=0)
-        away = np.linalg.norm(image - table, axis=2)
-        mask = (cv2.medianBlur(np.clip(away, 0.0, 255.0).astype(np.uint8), 3) > STANDS_OUT).astype(np.uint8)
-        count, labels, statistics, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-        for label in range(1, count):
-            area = int(statistics[label, cv2.CC_STAT_AREA])
-            region = labels == label
-            if area < 100 or area > LARGEST_SHARE * mask.size or _is_known(region, found):
-                continue
-            direction = np.median(image[region], axis=0) - table
-            strength = np.asarray((image - table) @ direction / (direction @ direction))
-            best = self._best_box(view, strength, region, self._boxes)
-            if best is not None:
-                yield self._box_item(view, *best, DetectionKind.BOX)
+        table, height, width = _median_colour(view.half), *view.image.shape[:2]
+        mask = _away(view.half, table) > STANDS_OUT
+        largest = LARGEST_SHARE * mask.size
+        for window, core in windows_around(mask, (height, width), LEAST_AREA // 8, largest):
+            part = view.within(window)
+            away = np.clip(_away(part.image, table), 0.0, 255.0).astype(np.uint8)
+            for region in regions_of(cv2.medianBlur(away, 3) > STANDS_OUT, LEAST_AREA):
+                if not region[core].any() or region.sum() > LARGEST_SHARE * height * width:
+                    continue
+                if _is_known(region, window, found):
+                    continue
+                direction = np.median(part.image[region], axis=0) - table
+                strength = np.asarray((part.image - table) @ direction / (direction @ direction))
+                best = self._best_box(part, strength, region, self._boxes)
+                if best is not None:
+                    yield self._box_item(part, *best, DetectionKind.BOX, window)
 
     def _best_box(
         self, view: View, strength: Array, region: Mask, things: Sequence[ColourThing | BoxThing]
@@ -204,7 +224,10 @@ class Detector:
         good = [(thing, fit) for thing, fit in fits if fit is not None and _is_box(fit, region)]
         return min(good, key=lambda each: each[1].error) if good else None
 
-    def _box_item(self, view: View, thing: ColourThing | BoxThing, fit: BoxFit, kind: DetectionKind) -> Detection:
+    def _box_item(
+        self, view: View, thing: ColourThing | BoxThing, fit: BoxFit, kind: DetectionKind, window: Window
+    ) -> Detection:
+        """`view` is what the `window` shows."""
         assert self._cell.table is not None
         plane = view.plane(self._cell.table)
         assert plane is not None
@@ -212,7 +235,7 @@ class Detector:
         return Detection(
             name=thing.name,
             kind=kind,
-            corners=_rows(fit.outline),
+            corners=_rows(fit.outline + np.array([window.left, window.top])),
             camera_from_thing=to_transform(pose),
             base_from_thing=_in_base(view, pose),
             is_located=True,
@@ -255,10 +278,22 @@ def _is_box(fit: BoxFit, region: Mask) -> bool:
     return fit.error < LARGEST_ERROR and LIKE_AREA[0] < float(region.sum()) / max(area, 1.0) < LIKE_AREA[1]
 
 
-def _is_known(region: Mask, found: Sequence[Detection]) -> bool:
-    """True if the middle of something that was found already lies in the region."""
+def _median_colour(image: ColourImage) -> Array:
+    """(3,) the median of each of an image's colours."""
+    counts = [np.bincount(image[..., channel].ravel(), minlength=256) for channel in range(3)]
+    return np.array([float(np.searchsorted(np.cumsum(each), each.sum() / 2.0)) for each in counts])
+
+
+def _away(image: ColourImage, colour: Array) -> Array:
+    """(h, w) the distance of each pixel's colour from `colour` (3,)."""
+    off = image.astype(np.float32) - colour.astype(np.float32)
+    return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", off, off)), dtype=np.float64)
+
+
+def _is_known(region: Mask, window: Window, found: Sequence[Detection]) -> bool:
+    """True if the middle of something that was found already lies in the region of the window."""
     for item in found:
-        column, row = np.rint(np.mean(item.corners, axis=0)).astype(int)
+        column, row = np.rint(np.mean(item.corners, axis=0)).astype(int) - (window.left, window.top)
         if 0 <= row < region.shape[0] and 0 <= column < region.shape[1] and region[row, column]:
             return True
     return False

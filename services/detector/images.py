@@ -17,10 +17,10 @@ def decoded(image: CameraImage) -> ColourImage:
     """(h, w, 3), red first; raises `NoPicture`."""
     match image.encoding:
         case "jpeg":
-            found = cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_COLOR) if image.data else None
+            found = cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_COLOR_RGB) if image.data else None
             if found is None:
                 raise NoPicture(f"an image of {len(image.data)} bytes is no JPEG")
-            return np.asarray(found[..., ::-1], dtype=np.uint8)
+            return np.asarray(found, dtype=np.uint8)
         case "rgb8" | "mono8" as encoding:
             channels = 3 if encoding == "rgb8" else 1
             if len(image.data) != image.width * image.height * channels:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.vision.camera_model import CameraModel
-from services.vision.edges import LEAST_NOISE, Index, find_steps, measure_steps
-from services.vision.rigid import Array, apply, rigid
+from services.vision.edges import LEAST_NOISE, Index, Measure, find_steps, measure_steps, middles
+from services.vision.rigid import Array, apply, rigid, solved
 from services.vision.tag_pose import flat, on_plane
+from services.vision.windows import Mask, Window, regions_of, windows_around
 
 ColourImage = NDArray[np.uint8]
 
@@ -20,12 +21,17 @@ LEAST_COLOUR = 40.0  # grey levels between the strongest and the weakest of a co
 MASK_SHARE = 0.35  # of the colour's own strength makes a pixel part of a thing
 LEAST_AREA = 60  # [px] of a thing
 POINTS = 20  # on each edge of the outline
+SHARES = np.linspace(0.12, 0.88, POINTS)  # of the edge, where they are
+LEAST_CONTRAST = 15.0  # hundredths of the strength, from the box to what is around it
 WIDE, NARROW = 5.0, 2.5  # [px] to either side of an edge, at first and at last
-ROUNDS = ((find_steps, WIDE), (find_steps, WIDE), (measure_steps, NARROW), (measure_steps, NARROW))
+STAGES = ((find_steps, WIDE, 1.0), (measure_steps, NARROW, 0.05))  # how, within what, and [px] that settle it
+MOST_ROUNDS = 2  # of a stage
+AGREEING_ROUNDS = 3  # that leave out what does not agree
 GOOD = 0.3  # [px] RMS of an outline that needs no other try; measured: 0.1 to 0.3
 EDGE_ERROR = 0.06  # [px] that all points of an edge have in common: aliasing, and rounded edges
 CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0.0, 1.0)])
-NUDGES = np.diag([1e-6, 1e-6, 3e-6])  # [m], [m], [rad] for differences
+NUDGES = np.array([1e-6, 1e-6, 3e-6])  # [m], [m], [rad] for differences
+AROUND = np.vstack((np.zeros(3), np.diag(NUDGES), -np.diag(NUDGES)))  # (7, 3) where the outline is looked at
 
 
 @dataclass(frozen=True)
@@ -59,16 +65,19 @@ def colour_strength(image: ColourImage, colour: Sequence[float] | Array) -> Arra
     return np.asarray(cv2.transform(image.astype(np.float32), weights[None].astype(np.float32)), dtype=np.float64)
 
 
-def coloured_regions(strength: Array) -> list[NDArray[np.bool_]]:
+def coloured_windows(
+    half: ColourImage, size: tuple[int, int], colour: Sequence[float] | Array
+) -> Iterator[tuple[Window, Mask]]:
+    """Where in the image of (height, width) `size` something may have the colour, by its `half`."""
+    return windows_around(colour_strength(half, colour) > MASK_SHARE, size, LEAST_AREA // 8, half.size)
+
+
+def coloured_regions(strength: Array) -> list[Mask]:
     """The masks (h, w) of what has the colour, the largest first."""
-    mask = (strength > MASK_SHARE).astype(np.uint8)
-    count, labels, statistics, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    areas = statistics[:, cv2.CC_STAT_AREA]
-    chosen = [label for label in range(1, count) if areas[label] >= LEAST_AREA]
-    return [labels == label for label in sorted(chosen, key=lambda label: -int(areas[label]))]
+    return regions_of(strength > MASK_SHARE, LEAST_AREA)
 
 
-def region_centre(region: NDArray[np.bool_], model: CameraModel, camera_from_plane: Array, height: float) -> Array:
+def region_centre(region: Mask, model: CameraModel, camera_from_plane: Array, height: float) -> Array:
     """Where (3,) [m] on the plane the middle of a region lies, if its middle is `height` [m] above the plane."""
     rows, columns = np.nonzero(region)
     middle = np.array([[columns.mean(), rows.mean()]])
@@ -81,7 +90,7 @@ def raised(camera_from_plane: Array, height: float) -> Array:
 
 
 def fit_box(
-    strength: Array, region: NDArray[np.bool_], model: CameraModel, camera_from_plane: Array, size: Sequence[float]
+    strength: Array, region: Mask, model: CameraModel, camera_from_plane: Array, size: Sequence[float]
 ) -> BoxFit | None:
     """The box of edges `size` (3,) [m] whose outline is that of `region`; None where no outline can be measured.
 
@@ -99,50 +108,82 @@ def _fit_from(
     values: Array, strength: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float]
 ) -> BoxFit | None:
     """From x, y [m] and turn [rad] near to which the box stands."""
-    for measure, reach in ROUNDS:
-        corners, ring = _outline(values, model, camera_from_plane, size)
-        starts, ends = corners[ring], corners[np.roll(ring, -1)]
-        along = ends - starts
-        lengths = np.linalg.norm(along, axis=1)
-        chosen = lengths > 2.0 * NARROW
-        if chosen.sum() < 3:
-            return None
-        normals = np.stack((along[:, 1], -along[:, 0]), axis=1)[chosen] / lengths[chosen, None]
-        shares = np.linspace(0.12, 0.88, POINTS)
-        points = starts[chosen][:, None] + shares[:, None] * along[chosen][:, None]
-        steps = measure(strength * 100.0, points, normals, np.full((int(chosen.sum()), 2), reach))
-        slope = _slopes(values, model, camera_from_plane, size, ring, shares)[:, chosen]
-        rows = np.einsum("pemk,ek->emp", slope, normals).reshape(-1, 3)
-        left = steps.offsets.ravel()
-        clear = np.repeat(-steps.contrast > 15.0, POINTS)
-        if clear.sum() < 2 * POINTS:
-            return None
-        weights = _weights(left, rows, clear)
-        change = np.linalg.lstsq(rows * weights[:, None], left * weights, rcond=None)[0]
-        values = values + change
-    off = (left - rows @ change)[weights > 0.0]
+    brightness = strength * 100.0
+    last: _Outline | None = None
+    for measure, reach, settled in STAGES:
+        for _ in range(MOST_ROUNDS):
+            last = _measured(values, brightness, model, camera_from_plane, size, measure, reach)
+            if last is None:
+                return None
+            values = values + last.change
+            if np.abs(last.rows @ last.change).max() < settled:
+                break
+    assert last is not None
+    off = (last.left - last.rows @ last.change)[last.weights > 0.0]
     error = float(np.sqrt(np.mean(off**2)))
-    independent = np.repeat(np.minimum(1.0, lengths[chosen] / POINTS), POINTS) * weights
-    normal = rows.T @ (rows * independent[:, None])
-    covariance = np.linalg.inv(normal) * (error**2 + LEAST_NOISE**2 + POINTS * EDGE_ERROR**2)
+    normal = last.rows.T @ (last.rows * last.independent[:, None])
+    variance = error**2 + LEAST_NOISE**2 + POINTS * EDGE_ERROR**2
+    covariance = np.asarray(np.linalg.inv(normal) * variance, dtype=np.float64)
     pose = flat(values)
     pose[2, 3] = size[2] / 2.0
-    corners, ring = _outline(values, model, camera_from_plane, size)
-    return BoxFit(pose, corners[ring], error, covariance)
+    corners = project_box(values, model, camera_from_plane, size)
+    return BoxFit(pose, corners[outline_of(corners)], error, covariance)
 
 
-def _weights(left: Array, rows: Array, clear: NDArray[np.bool_]) -> Array:
-    """1 for the points that agree with a common shift of the box, 0 for those that something else covers."""
+@dataclass(frozen=True)
+class _Outline:
+    """An outline's n points beside the image's edges."""
+
+    left: Array  # (n,) [px] from the outline to the edge, outwards
+    rows: Array  # (n, 3) [px/m], [px/m], [px/rad] by x, y and turn
+    weights: Array  # (n,) 1 for those that agree, else 0
+    independent: Array  # (n,) how many independent ones each stands for
+    change: Array  # (3,) of x, y [m] and turn [rad] that brings it to the edges
+
+
+def _measured(
+    values: Array, brightness: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float],
+    measure: Measure, reach: float,
+) -> _Outline | None:  # fmt: skip
+    """The outline of a box at `values`; None where it has too few edges that can be measured."""
+    around = project_boxes(values + AROUND, model, camera_from_plane, size)
+    ring = outline_of(around[0])
+    starts, ends = around[0][ring], around[0][_after(ring)]
+    along = ends - starts
+    lengths = np.linalg.norm(along, axis=1)
+    chosen = lengths > 2.0 * NARROW
+    if chosen.sum() < 3:
+        return None
+    normals = np.stack((along[:, 1], -along[:, 0]), axis=1)[chosen] / lengths[chosen, None]
+    points = starts[chosen][:, None] + SHARES[:, None] * along[chosen][:, None]
+    steps = measure(brightness, points, normals, np.full((int(chosen.sum()), 2), reach))
+    rows = np.einsum("pemk,ek->emp", _slopes(around, ring)[:, chosen], normals).reshape(-1, 3)
+    left = steps.offsets.ravel()
+    clear = np.repeat(-steps.contrast > LEAST_CONTRAST, POINTS)
+    if clear.sum() < 2 * POINTS:
+        return None
+    change, weights = _agreed(left, rows, clear)
+    independent = np.repeat(np.minimum(1.0, lengths[chosen] / POINTS), POINTS) * weights
+    return _Outline(left, rows, weights, independent, change)
+
+
+def _agreed(left: Array, rows: Array, clear: Mask) -> tuple[Array, Array]:
+    """The change (3,) of the box that most points agree with, and 1 for these, 0 for those that something else
+    covers."""
     weights = clear.astype(float)
-    for _ in range(3):
-        change = np.linalg.lstsq(rows * weights[:, None], left * weights, rcond=None)[0]
-        off = left - rows @ change
-        middle = np.median(np.abs(off[weights > 0.0]))
-        weights = (clear & (np.abs(off) <= 3.0 * max(1.4826 * middle, 0.1))).astype(float)
-    return weights
+    for _ in range(AGREEING_ROUNDS):
+        weighed = rows.T * weights
+        change = solved(weighed @ rows, weighed @ left)
+        off = np.abs(left - rows @ change)
+        middle = middles(off[weights > 0.0][None])[0]
+        before, weights = weights, (clear & (off <= 3.0 * max(1.4826 * middle, 0.1))).astype(float)
+        if (weights == before).all():
+            return change, weights
+    weighed = rows.T * weights
+    return solved(weighed @ rows, weighed @ left), weights
 
 
-def _seed(region: NDArray[np.bool_], model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Array:
+def _seed(region: Mask, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Array:
     """x, y [m] and turn [rad] of the smallest rectangle around the region, taken at half the height."""
     contour = max(cv2.findContours(region.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0], key=len)
     halfway = raised(camera_from_plane, size[2] / 2.0)
@@ -154,26 +195,35 @@ def _seed(region: NDArray[np.bool_], model: CameraModel, camera_from_plane: Arra
 
 def project_box(values: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Array:
     """The pixels (8, 2) of the box's corners."""
-    return model.project(apply(camera_from_plane @ flat(values), CORNERS * np.asarray(size)))
+    return np.asarray(project_boxes(values[None], model, camera_from_plane, size)[0], dtype=np.float64)
 
 
-def _outline(values: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> tuple[Array, Index]:
-    """The pixels (8, 2) of the corners, and which of them are the outline, clockwise in the image."""
-    corners = project_box(values, model, camera_from_plane, size)
+def project_boxes(values: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Array:
+    """The pixels (n, 8, 2) of the corners of boxes that stand at `values` (n, 3): x, y [m] and turn [rad]."""
+    x, y, z = (CORNERS * np.asarray(size)).T
+    cosine, sine = np.cos(values[:, 2:]), np.sin(values[:, 2:])
+    places = np.empty((len(values), len(CORNERS), 3))
+    places[..., 0] = values[:, :1] + cosine * x - sine * y
+    places[..., 1] = values[:, 1:2] + sine * x + cosine * y
+    places[..., 2] = z
+    return model.project(apply(camera_from_plane, places.reshape(-1, 3))).reshape(len(values), -1, 2)
+
+
+def outline_of(corners: Array) -> Index:
+    """Which of a box's corners (8, 2) [px] are its outline, clockwise in the image."""
     ring = cv2.convexHull(corners.astype(np.float32), clockwise=True, returnPoints=False)[:, 0].astype(np.intp)
     area = cv2.contourArea(corners[ring].astype(np.float32), oriented=True)
-    return corners, ring if area > 0.0 else ring[::-1]
+    return np.asarray(ring if area > 0.0 else ring[::-1], dtype=np.intp)
 
 
-def _slopes(
-    values: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float], ring: Index, shares: Array
-) -> Array:
-    """(3, edges, m, 2): how the points at `shares` (m,) of the outline's edges move with x, y and turn."""
-    moves = []
-    for nudge, length in zip(NUDGES, np.diag(NUDGES), strict=True):
-        ahead = project_box(values + nudge, model, camera_from_plane, size)
-        behind = project_box(values - nudge, model, camera_from_plane, size)
-        by = (ahead - behind) / (2.0 * length)
-        starts, ends = by[ring], by[np.roll(ring, -1)]
-        moves.append(starts[:, None] + shares[:, None] * (ends - starts)[:, None])
-    return np.array(moves)
+def _after(ring: Index) -> Index:
+    """Each one's successor on the ring."""
+    return np.concatenate((ring[1:], ring[:1]))
+
+
+def _slopes(around: Array, ring: Index) -> Array:
+    """(3, edges, m, 2): how the points at SHARES (m,) of the outline's edges move with x, y and turn, by the corners
+    `around` (7, 8, 2) the place."""
+    by = (around[1:4] - around[4:]) / (2.0 * NUDGES[:, None, None])
+    starts, ends = by[:, ring], by[:, _after(ring)]
+    return np.asarray(starts[:, :, None] + SHARES[:, None] * (ends - starts)[:, :, None])

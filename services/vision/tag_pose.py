@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.vision.camera_model import CameraModel
-from services.vision.rigid import Array, angle_between, apply, from_opencv, rigid, step
+from services.vision.rigid import Array, angle_between, apply, from_opencv, rigid, solved, step
 from services.vision.tags import Tag
 
 ROUNDS = 10
-SETTLED = 1e-8  # [m] and [rad] below which a step changes nothing any more
+SETTLING = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 1e-9)
+SETTLED = 1e-6  # [m] and [rad]: what is left after a step that is so small is far less
 SAME = np.radians(1.0)  # [rad] between two solutions that are one
 
 
@@ -46,9 +47,11 @@ def tag_pose(tag: Tag, model: CameraModel, size: float, normal: Array | None = N
     """The pose of a tag whose edge is `size` [m]; of the two solutions the one whose z is nearer to `normal` (3,), a
     direction of the camera frame, or without it the one that fits better."""
     corners = square(size)
-    solved = cv2.solvePnPGeneric(corners, tag.ideal, model.matrix, None, flags=cv2.SOLVEPNP_IPPE_SQUARE)
-    seeds = [from_opencv(turned, place) for turned, place in zip(solved[1], solved[2], strict=True)]
-    solutions = [fitted(corners, tag.ideal, model, seed) for seed in seeds]
+    found = cv2.solvePnPGeneric(corners, tag.ideal, model.matrix, None, flags=cv2.SOLVEPNP_IPPE_SQUARE)
+    solutions = [
+        from_opencv(*cv2.solvePnPRefineLM(corners, tag.ideal, model.matrix, None, *seed, SETTLING))
+        for seed in zip(found[1], found[2], strict=True)
+    ]
     errors = [rms(corners, tag.ideal, model, pose) for pose in solutions]
     order = np.argsort(errors)
     if normal is not None:
@@ -89,26 +92,6 @@ def moved(pose: Array, change: Array) -> Array:
     return np.asarray(after)
 
 
-def fitted(points: Array, ideal: Array, model: CameraModel, pose: Array) -> Array:
-    """The pose of least reprojection error near `pose`, by Levenberg and Marquardt's steps."""
-    damping, cost = 1e-6, float(np.sum(residuals(points, ideal, model, pose) ** 2))
-    for _ in range(ROUNDS):
-        slope = jacobian(points, model, pose)
-        normal = slope.T @ slope
-        gradient = slope.T @ residuals(points, ideal, model, pose)
-        change = np.asarray(-np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient), dtype=np.float64)
-        candidate = moved(pose, change)
-        now = float(np.sum(residuals(points, ideal, model, candidate) ** 2))
-        if now < cost:
-            is_done = cost - now < 1e-9 * cost
-            pose, cost, damping = candidate, now, damping / 10.0
-            if is_done:
-                break
-        else:
-            damping *= 100.0
-    return pose
-
-
 def rms(points: Array, ideal: Array, model: CameraModel, pose: Array) -> float:
     """[px] root of the mean squared distance between the points and where they are seen."""
     return float(np.sqrt(np.sum(residuals(points, ideal, model, pose) ** 2) / len(points)))
@@ -124,15 +107,15 @@ def covariance_of(points: Array, ideal: Array, model: CameraModel, pose: Array, 
 def plane_pose(tag: Tag, model: CameraModel, size: float, camera_from_plane: Array) -> tuple[Array, Array]:
     """The pose (4, 4) of a tag that lies face up on the plane z = 0 of `camera_from_plane`, and the covariance (3, 3)
     of its x, y [m] and turn [rad] on it."""
-    centre = on_plane(model.rays(tag.corners.mean(axis=0)[None]), camera_from_plane)[0]
-    upper = on_plane(model.rays(tag.corners[:2]), camera_from_plane)
-    east = upper[1] - upper[0]
-    values = np.array([centre[0], centre[1], np.arctan2(east[1], east[0])])
+    seen = on_plane((tag.ideal - model.centre) / model.focal, camera_from_plane)
+    x, y, _ = seen.mean(axis=0)
+    east = seen[1] - seen[0]
+    values = np.array([x, y, np.arctan2(east[1], east[0])])
     corners = square(size)
     for _ in range(ROUNDS):
         pose = camera_from_plane @ flat(values)
         slope = jacobian(corners, model, pose) @ flat_motions(camera_from_plane)
-        change = np.linalg.lstsq(slope, residuals(corners, tag.ideal, model, pose), rcond=None)[0]
+        change = solved(slope.T @ slope, slope.T @ residuals(corners, tag.ideal, model, pose))
         values = values - change
         if np.abs(change).max() < SETTLED:
             break

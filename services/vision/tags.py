@@ -6,7 +6,7 @@ centimetres in range; APRILTAG stands half a pixel off.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 
 from schemas.cell import TagFamily
 from services.vision.camera_model import CameraModel
-from services.vision.edges import LEAST_NOISE, Index, Lines, Steps, find_steps, fit_lines, measure_steps
+from services.vision.edges import LEAST_NOISE, Index, Lines, Measure, Steps, find_steps, fit_lines, measure_steps
 
 Array = NDArray[np.float64]
 GreyImage = NDArray[np.uint8]
-Measure = Callable[[Array, Array, Array, Array], Steps]
 
 FAMILIES = {  # OpenCV's dictionary, modules from edge to edge
     TagFamily.APRILTAG_36H11: (cv2.aruco.DICT_APRILTAG_36h11, 8),
@@ -30,12 +29,17 @@ FAMILIES = {  # OpenCV's dictionary, modules from edge to edge
     TagFamily.ARUCO_6X6_250: (cv2.aruco.DICT_6X6_250, 8),
 }
 DEFAULT_FAMILY = TagFamily.APRILTAG_36H11
+AFTER, BEFORE = np.array([1, 2, 3, 0]), np.array([3, 0, 1, 2])  # of each corner
 LEAST_CONTRAST = 12.0  # grey levels between a tag's border and the paper around it
 ROUNDS = (find_steps, measure_steps, measure_steps)
 LONGEST_REACH, SHORTEST_REACH = 3.0, 1.2  # [px] to either side of an edge
-REACH_SHARES = np.array([0.45, 0.9])  # of a module: the data begins one module inside, the paper ends one outside
-CORNER_SHARE = 2.5  # [px] next to a corner where the other edge is seen too
+# Of a module, inside and outside: the data begins one module inside, the paper ends one outside. Nearly the same on
+# both sides: a pixel's profile is no exact Gaussian step, and a window that is longer on one side is drawn to it.
+REACH_SHARES = np.array([0.45, 0.55])
+CORNER_SPREADS = 2.2  # of an edge, next to a corner: so far the other edge is seen too
+START_SPREAD, LEAST_SPREAD = 1.1, 0.6  # [px]
 POINTS, FEWEST_POINTS = 32, 4  # on an edge
+SHARES = np.linspace(0.0, 1.0, POINTS)
 LEAST_MODULE = 1.5  # [px] below which a tag is not measured
 LARGEST_SHIFT = 0.12  # of the diagonal, from OpenCV's outline
 SYSTEMATIC = 0.012  # [px] of a corner: aliasing of the pixels, and the data one module inside the edge
@@ -73,26 +77,29 @@ def find_tags(
         return ()
     corners = np.array(outlines, dtype=np.float64).reshape(-1, 4, 2)
     modules = FAMILIES[family][1]
-    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    lengths = np.linalg.norm(corners[:, AFTER] - corners, axis=2)
     is_large = lengths.min(axis=1) >= LEAST_MODULE * modules
     if not is_large.any():
         return ()
-    found = refined(image.astype(np.float64), ids.ravel()[is_large], corners[is_large], model, modules)
+    found = refined(image, ids.ravel()[is_large], corners[is_large], model, modules)
     return tuple(sorted(found, key=lambda tag: (tag.id, tuple(tag.corners[0]))))
 
 
-def refined(image: Array, ids: Index, outlines: Array, model: CameraModel | None, modules: int) -> list[Tag]:
+def refined(image: GreyImage, ids: Index, outlines: Array, model: CameraModel | None, modules: int) -> list[Tag]:
     """The tags with outlines (n, 4, 2), their corners where the lines through their edges meet; one that has an edge
     that cannot be measured is left out."""
     corners = ideal = outlines
+    spread = np.full(len(ids), START_SPREAD)
     for measure in ROUNDS:
-        lines, steps, count = edge_lines(image, corners, model, modules, measure)
+        margin = CORNER_SPREADS * np.maximum(spread, LEAST_SPREAD)
+        lines, steps, count = edge_lines(image, corners, model, modules, measure, margin)
         edges = np.arange(4 * len(ids), dtype=np.intp).reshape(-1, 4)
-        ideal = lines.crossings(np.roll(edges, 1, axis=1).ravel(), edges.ravel()).reshape(-1, 4, 2)
+        ideal = lines.crossings(edges[:, BEFORE].ravel(), edges.ravel()).reshape(-1, 4, 2)
         is_good = _plausible(ideal, corners if model is None else _ideal(model, corners), lines, steps)
         ideal = np.where(is_good[:, None, None], ideal, corners)
         corners = ideal if model is None else model.real(ideal.reshape(-1, 2)).reshape(-1, 4, 2)
-    spread = steps.spread.reshape(-1, 4).max(axis=1)
+        if measure is measure_steps:
+            spread = steps.spread.reshape(-1, 4).max(axis=1)
     edge_sigma = 2.0 * np.hypot(lines.scatter, LEAST_NOISE).reshape(-1, 4) / np.sqrt(count)[:, None]
     blur = BLUR_ERROR * np.maximum(0.0, spread - SHARP)
     sigma = np.sqrt(np.mean(edge_sigma**2, axis=1) + blur**2 + SYSTEMATIC**2)
@@ -126,24 +133,24 @@ def _plausible(ideal: Array, before: Array, lines: Lines, steps: Steps) -> NDArr
 
 
 def edge_lines(
-    image: Array, corners: Array, model: CameraModel | None, modules: int, measure: Measure
+    image: GreyImage, corners: Array, model: CameraModel | None, modules: int, measure: Measure, margin: Array
 ) -> tuple[Lines, Steps, Array]:
-    """The lines through the edges from corner i to i + 1 of tags (n, 4, 2), their steps, and how many independent
-    points an edge of each tag has (n,)."""
-    starts, ends = corners.reshape(-1, 2), np.roll(corners, -1, axis=1).reshape(-1, 2)
+    """The lines through the edges from corner i to i + 1 of tags (n, 4, 2) without `margin` (n,) [px] at both ends,
+    their steps, and how many independent points an edge of each tag has (n,)."""
+    starts, ends = corners.reshape(-1, 2), corners[:, AFTER].reshape(-1, 2)
     lengths = np.linalg.norm(ends - starts, axis=1)
     shortest = lengths.reshape(-1, 4).min(axis=1)
     module = np.repeat(shortest / modules, 4)
     reach = np.clip(module[:, None] * REACH_SHARES, SHORTEST_REACH, LONGEST_REACH)
     along = (ends - starts) / lengths[:, None]
     normals = np.stack((along[:, 1], -along[:, 0]), axis=1)  # outwards: the corners go clockwise in the image
-    margins = np.minimum(CORNER_SHARE / lengths, 0.25)
-    shares = margins[:, None] + np.linspace(0.0, 1.0, POINTS) * (1.0 - 2.0 * margins[:, None])
+    margins = np.minimum(np.repeat(margin, 4) / lengths, 0.25)
+    shares = margins[:, None] + SHARES * (1.0 - 2.0 * margins[:, None])
     points = starts[:, None, :] + shares[:, :, None] * (ends - starts)[:, None, :]
     steps = measure(image, points, normals, reach)
     found = points + steps.offsets[:, :, None] * normals[:, None, :]
     lines = fit_lines(found if model is None else _ideal(model, found))
-    return lines, steps, np.clip(shortest - 2.0 * CORNER_SHARE, FEWEST_POINTS, POINTS)
+    return lines, steps, np.clip(shortest - 2.0 * margin, FEWEST_POINTS, POINTS)
 
 
 def doubled(tags: Sequence[Tag]) -> tuple[int, ...]:

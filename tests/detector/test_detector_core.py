@@ -91,11 +91,18 @@ def test_every_thing_of_the_sample_cells_is_found_where_it_is(arm: Arm) -> None:
 
 
 def test_a_tag_that_does_not_lie_is_measured_in_space(rm1: Arm) -> None:
-    table = Table(rm1)
-    table.world.put("cup", ((0.26, 0.16, 0.09), from_rpy(0.0, 0.35, 0.2)))
-    (cup,) = [item for item in table.look().items if item.name == "cup"]
-    assert off(cup, table.truth()["cup"]) < 0.7e-3
-    assert cup.sigma > ON_PLANE  # it is less sure than on a plane
+    """At one place the virtual camera's coarse samples are the error, so it is asked at many."""
+    table, random, errors = Table(rm1), np.random.default_rng(1), []
+    table.world.on_joint_state(JointState(stamp=1, name=rm1.joint_names, position=rm1.named_states["folded"]))
+    for _ in range(30):
+        tilted = from_rpy(random.uniform(-0.35, 0.35), random.uniform(-0.35, 0.35), random.uniform(-3.0, 3.0))
+        table.world.put("cup", ((random.uniform(0.22, 0.32), random.uniform(-0.15, 0.15), 0.09), tilted))
+        for cup in (item for item in table.look().items if item.name == "cup"):
+            errors.append(off(cup, table.truth()["cup"]))
+            assert errors[-1] < 4.0 * cup.sigma
+            assert cup.sigma > ON_PLANE  # it is less sure than on a plane
+    assert len(errors) > 25
+    assert np.median(errors) < 0.6e-3
 
 
 def test_where_the_camera_stands_is_not_known_only_tags_are_found_and_in_its_own_frame(rm1: Arm) -> None:
