@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import get_args
 
 import msgspec
 
 from schemas.message import Message
 from services.cli.errors import CommandError, nearest, usage
 
+_UNIT = re.compile(r"\[[^\]]+\](?: or \[[^\]]+\])*")
 _PART = re.compile(r"([A-Za-z_][A-Za-z_0-9]*)((?:\[-?\d+\])*)")
 
 
@@ -43,10 +47,38 @@ class FieldPath:
                 value = fields[key]
         return value
 
+    @cached_property
+    def unit(self) -> str:
+        """As "m", or "rad or m", as the comment at the field's declaration says; empty where none does."""
+        kind: type[msgspec.Struct] = self._kind
+        unit = ""
+        for name in (key for key in self._keys if isinstance(key, str)):
+            unit = _declared_unit(kind, name)
+            declared = next((each.type for each in msgspec.structs.fields(kind) if each.name == name), None)
+            inner = next((each for each in (declared, *get_args(declared)) if _is_message(each)), None)
+            if inner is None:
+                break
+            kind = inner
+        return unit
+
     def _refuse(self, name: str, known: tuple[str, ...]) -> None:
         guess = nearest(name, known)
         hint = f'did you mean "{guess}"?' if guess else f"there is {', '.join(known) or 'none'}"
         raise usage(f'{self._kind.__name__} has no field "{name}": {hint}')
+
+
+def _is_message(kind: object) -> bool:
+    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
+
+
+def _declared_unit(kind: type[msgspec.Struct], name: str) -> str:
+    try:
+        source = inspect.getsource(kind)
+    except (OSError, TypeError):  # of a user's node, which has told its fields only
+        return ""
+    said = re.search(rf"^\s+{name}:[^#\n]*#([^\n]*)$", source, re.MULTILINE)
+    unit = _UNIT.search(said[1]) if said else None
+    return unit[0].replace("[", "").replace("]", "") if unit else ""
 
 
 def leaves(value: object, path: str = "") -> Iterator[tuple[str, object]]:
