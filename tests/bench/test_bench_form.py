@@ -21,6 +21,7 @@ ISSUE = (
     "ik_ms", "ik_success", "plan_success", "plan_python_ms", "path_length_ratio", "duration_ratio",
     "collision_checks_per_s", "state_check_us", "lin_ms", "jog_tick_us", "ledger", "stopping_distance",
     "arms_on_one_router", "handshake_ms",
+    "camera_cpu_percent", "detector_cpu_percent", "image_to_detection_ms", "record_cpu_percent", "record_mb_per_hour",
 )  # fmt: skip
 
 

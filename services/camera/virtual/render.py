@@ -26,6 +26,8 @@ EDGE_ON = 1e-12  # [m] from the camera to the plane of a face
 NEAR = 0.005  # [m] nothing nearer than this is seen
 GREYS = 256  # the first colours of the palette, for textures
 LIGHT = np.array([0.3, 0.2, 0.93])  # the direction to the lamp, in the base
+SHIFTS = 256  # [px] by which the field of noise is larger than an image: so many squared images differ
+SPREADING = 40503  # odd: neighbouring seeds give parts that lie far apart
 AMBIENT = 0.55  # of the brightness of a face that the lamp does not reach
 
 
@@ -219,9 +221,18 @@ def _glare(shape: tuple[int, ...], optics: Optics) -> Samples:
 
 
 def _with_noise(image: Image, noise: float, seed: int) -> Image:
-    """OpenCV's generator is several times as fast as numpy's, and its seed is global to the process."""
-    cv2.setRNGSeed(seed)
-    grain = np.empty(image.shape, np.int16)
-    cv2.randn(grain, (0.0,) * 3, (noise,) * 3)
-    noisy: Image = cv2.add(image, grain, dtype=cv2.CV_8U)
+    """With a part of one large field of noise, which is drawn once: the seed says which part."""
+    height, width = image.shape[:2]
+    field = _field_of_noise(height + SHIFTS, width + SHIFTS, noise)
+    row, column = divmod(seed * SPREADING % SHIFTS**2, SHIFTS)
+    noisy: Image = cv2.add(image, field[row : row + height, column : column + width], dtype=cv2.CV_8U)
     return noisy
+
+
+@lru_cache(maxsize=4)
+def _field_of_noise(height: int, width: int, noise: float) -> NDArray[np.int16]:
+    """OpenCV's generator is several times as fast as numpy's, and its seed is global to the process."""
+    cv2.setRNGSeed(1)
+    grain = np.empty((height, width, 3), np.int16)
+    cv2.randn(grain, (0.0,) * 3, (noise,) * 3)
+    return grain

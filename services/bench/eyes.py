@@ -1,0 +1,122 @@
+"""Figures of the eyes at work: what camera and detector cost at `RATE`, and how soon a detection follows its image.
+
+The camera hands on stored JPEGs of the sample cell, as it does those of a webcam; the virtual one, which also has to
+draw them, is a reference.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import psutil
+from msgspec.structs import replace
+
+from schemas.system import Parameter, SetParameter
+from schemas.topics import Request, camera_detections
+from services.bench.camera import CAMERA, virtual_camera
+from services.bench.figures import Figure, NotMeasured, of_samples, quantile
+from services.bench.scenes import rm1
+from services.bench.stack import cpu_seconds, families
+from services.runtime.deployment import load_deployment
+from services.runtime.node import Node
+from services.stack.stack import Stack
+
+SET_RATE = Request("@node/detector/parameters/set", SetParameter, Parameter, "detector", "", recorded=False)
+PROCESSES = ("router", "camera", "detector")
+RATE, USUAL = 15.0, 4.0  # [Hz] of the camera, and of the images that the detector looks at unless it is told
+IMAGES = 30  # that are stored
+SETTLE, WINDOW, WINDOWS = 3.0, 4.0, 5  # [s], [s]
+MOST, LATEST = 25.0, 20.0  # [% of a core] both together, [ms]
+SOURCE = 'kind = "folder"\npath = "images"\n'
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What was measured with one kind of camera."""
+
+    camera: list[float]  # [% of a core] of each window
+    detector: list[float]  # the same, every image looked at
+    usual: float  # [% of a core] of the detector at its usual rate
+    delays: list[float]  # [ms] from the image's stamp to the detection's arrival
+    rate: float  # [Hz] of detections
+
+
+def camera_cpu_percent() -> Figure:
+    """CPU [% of a core] of the camera's process that hands on JPEGs at 15 Hz; drawing them is the reference."""
+    handed, drawn = cost(is_virtual=False), cost(is_virtual=True)
+    together = quantile(handed.camera, 0.5) + quantile(handed.detector, 0.5)
+    note = f"640 x 480 at {RATE:g} Hz; with the detector that looks at every image {together:.1f}, the goal of both"
+    reference = {"virtual camera, nothing moves": quantile(drawn.camera, 0.5)}
+    figure = of_samples(handed.camera, reference=reference, note=note)
+    return replace(figure, goal=f"both <= {MOST:g}", met=together <= MOST)
+
+
+def detector_cpu_percent() -> Figure:
+    """CPU [% of a core] of the detector that looks at every image of the sample cell at 15 Hz: tags, colours, boxes."""
+    seen = cost(is_virtual=False)
+    note = f"{seen.rate:.1f} images a second looked at; 2 tagged and 2 coloured things, 2 fixed tags"
+    return of_samples(seen.detector, reference={f"at its usual {USUAL:g} a second": seen.usual}, note=note)
+
+
+def image_to_detection_ms() -> Figure:
+    """Time [ms] from an image's stamp to its detections in another process: camera, bus, detector, bus."""
+    delays = cost(is_virtual=False).delays
+    p95 = quantile(delays, 0.95)
+    figure = of_samples(delays, note=f"{len(delays)} images of the sample cell, through the router; p95 {p95:.3g}")
+    return replace(figure, goal=f"p95 <= {LATEST:g}", met=p95 <= LATEST)
+
+
+@cache
+def cost(is_virtual: bool) -> Cost:
+    """A stack of its own with one camera."""
+    with tempfile.TemporaryDirectory() as folder:
+        cell = _cell(Path(folder), is_virtual)
+        with Stack(processes=PROCESSES, environment={"GEMELO_ROBOT": "urdf/rm1", "GEMELO_CELL": str(cell)}) as stack:
+            deployment = load_deployment(None, stack.environment)
+            with Node("bench-eyes", deployment, robot="rm1") as node:
+                return _measured(stack, node)
+
+
+def _measured(stack: Stack, node: Node) -> Cost:
+    delays: list[float] = []
+    node.subscribe(camera_detections(CAMERA), lambda found: delays.append((time.time_ns() - found.stamp) * 1e-6))
+    processes = families(stack)
+    camera, detector = processes["camera"], processes["detector"]
+    node.wait(SETTLE)
+    (_, usual) = _shares(node, camera, detector)
+    node.call(SET_RATE, SetParameter(name="rate", value=4.0 * RATE))
+    node.wait(SETTLE)
+    delays.clear()
+    began = time.monotonic()
+    shares = [_shares(node, camera, detector) for _ in range(WINDOWS)]
+    rate = len(delays) / (time.monotonic() - began)
+    if not delays:
+        raise NotMeasured("no detection has come")
+    return Cost([each for each, _ in shares], [each for _, each in shares], usual, delays, rate)
+
+
+def _shares(node: Node, *families: list[psutil.Process]) -> list[float]:
+    """[% of a core] that each took in a window."""
+    before, began = [cpu_seconds(family) for family in families], time.monotonic()
+    node.wait(WINDOW)
+    lasted = time.monotonic() - began
+    return [100.0 * (cpu_seconds(family) - spent) / lasted for family, spent in zip(families, before, strict=True)]
+
+
+def _cell(folder: Path, is_virtual: bool) -> Path:
+    """The sample cell with a camera of `RATE`, as it is or of stored images; its path."""
+    text = (rm1().folder / "cell.toml").read_text("utf-8").replace("fps = 5.0", f"fps = {RATE}")
+    if not is_virtual:
+        camera, _ = virtual_camera()
+        (folder / "images").mkdir()
+        for index in range(IMAGES):
+            (folder / "images" / f"{index:03}.jpg").write_bytes(camera.read().data)
+        before, _, after = text.partition("[camera.source]\n")
+        text = f"{before}[camera.source]\n{SOURCE}\n{after[after.index('# Fixed tags') :]}"
+    path = folder / "cell.toml"
+    path.write_text(text, "utf-8")
+    return path
