@@ -101,7 +101,7 @@ def covariance_of(points: Array, ideal: Array, model: CameraModel, pose: Array, 
     """(6, 6) of a turn [rad] and a step [m], propagated from corners of `sigma` [px], or of what they are off."""
     slope = jacobian(points, model, pose)
     left = np.sum(residuals(points, ideal, model, pose) ** 2) / max(1, slope.shape[0] - 6)
-    return np.asarray(np.linalg.pinv(slope.T @ slope) * max(sigma**2, left))
+    return np.asarray(cv2.invert(slope.T @ slope, flags=cv2.DECOMP_SVD)[1] * max(sigma**2, left), dtype=np.float64)
 
 
 def plane_pose(tag: Tag, model: CameraModel, size: float, camera_from_plane: Array) -> tuple[Array, Array]:
@@ -111,16 +111,16 @@ def plane_pose(tag: Tag, model: CameraModel, size: float, camera_from_plane: Arr
     x, y, _ = seen.mean(axis=0)
     east = seen[1] - seen[0]
     values = np.array([x, y, np.arctan2(east[1], east[0])])
-    corners = square(size)
+    corners, motions = square(size), flat_motions(camera_from_plane)
     for _ in range(ROUNDS):
         pose = camera_from_plane @ flat(values)
-        slope = jacobian(corners, model, pose) @ flat_motions(camera_from_plane)
+        slope = jacobian(corners, model, pose) @ motions
         change = solved(slope.T @ slope, slope.T @ residuals(corners, tag.ideal, model, pose))
         values = values - change
         if np.abs(change).max() < SETTLED:
             break
     pose = camera_from_plane @ flat(values)
-    slope = jacobian(corners, model, pose) @ flat_motions(camera_from_plane)
+    slope = jacobian(corners, model, pose) @ motions
     return pose, np.asarray(np.linalg.inv(slope.T @ slope) * tag.sigma**2, dtype=np.float64)
 
 

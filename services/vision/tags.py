@@ -37,7 +37,8 @@ LONGEST_REACH, SHORTEST_REACH = 3.0, 1.2  # [px] to either side of an edge
 # both sides: a pixel's profile is no exact Gaussian step, and a window that is longer on one side is drawn to it.
 REACH_SHARES = np.array([0.45, 0.55])
 CORNER_SPREADS = 2.2  # of an edge, next to a corner: so far the other edge is seen too
-START_SPREAD, LEAST_SPREAD = 1.1, 0.6  # [px]
+START_SPREAD, LEAST_SPREAD = 0.8, 0.6  # [px]
+SETTLED = 0.1, 0.15  # [px] of the corners and of the spread: a round that changes less is the last
 POINTS, FEWEST_POINTS = 32, 4  # on an edge
 SHARES = np.linspace(0.0, 1.0, POINTS)
 LEAST_MODULE = 1.5  # [px] below which a tag is not measured
@@ -95,11 +96,15 @@ def refined(image: GreyImage, ids: Index, outlines: Array, model: CameraModel | 
         lines, steps, count = edge_lines(image, corners, model, modules, measure, margin)
         edges = np.arange(4 * len(ids), dtype=np.intp).reshape(-1, 4)
         ideal = lines.crossings(edges[:, BEFORE].ravel(), edges.ravel()).reshape(-1, 4, 2)
+        before = corners, spread
         is_good = _plausible(ideal, corners if model is None else _ideal(model, corners), lines, steps)
         ideal = np.where(is_good[:, None, None], ideal, corners)
         corners = ideal if model is None else model.real(ideal.reshape(-1, 2)).reshape(-1, 4, 2)
         if measure is measure_steps:
             spread = steps.spread.reshape(-1, 4).max(axis=1)
+            changes = [np.abs(now - was).max() for now, was in zip((corners, spread), before, strict=True)]
+            if changes[0] < SETTLED[0] and changes[1] < SETTLED[1]:
+                break
     edge_sigma = 2.0 * np.hypot(lines.scatter, LEAST_NOISE).reshape(-1, 4) / np.sqrt(count)[:, None]
     blur = BLUR_ERROR * np.maximum(0.0, spread - SHARP)
     sigma = np.sqrt(np.mean(edge_sigma**2, axis=1) + blur**2 + SYSTEMATIC**2)
