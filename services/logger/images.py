@@ -9,43 +9,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-import msgspec
-
 from schemas.camera import CameraImage, CameraInfo
 from schemas.message import Message, Vector
 from schemas.topics import LATCHED, LATEST, Delivery, Topic, camera_image, camera_info
 from services.recordings.foxglove import CAMERA, IMAGE
+from services.recordings.foxglove_schemas import Quaternion, Time, Vector3, time_of
 from services.runtime.node import Node
 
 PERIOD_SLACK = 0.2  # of the time between two images: one that comes so much early counts as on time
 SECOND = 1_000_000_000  # [ns]
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-
-
-class Time(msgspec.Struct, frozen=True, kw_only=True):
-    """A UNIX time."""
-
-    sec: int = 0
-    nsec: int = 0  # below 10^9
-
-
-class Vector3(msgspec.Struct, frozen=True, kw_only=True):
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-
-
-class Quaternion(msgspec.Struct, frozen=True, kw_only=True):
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    w: float = 1.0
+EPOCH = Time(sec=0, nsec=0)
 
 
 class CompressedImage(Message, frozen=True, kw_only=True):
     """A JPEG; in JSON its data are base64."""
 
-    timestamp: Time = Time()
+    timestamp: Time = EPOCH
     frame_id: str = ""
     data: bytes = b""
     format: str = "jpeg"
@@ -54,7 +34,7 @@ class CompressedImage(Message, frozen=True, kw_only=True):
 class CameraCalibration(Message, frozen=True, kw_only=True):
     """The pinhole model: distortion D of the model "plumb_bob", K (3, 3), R (3, 3) and P (3, 4) row by row."""
 
-    timestamp: Time = Time()
+    timestamp: Time = EPOCH
     frame_id: str = ""
     width: int = 0
     height: int = 0
@@ -68,11 +48,11 @@ class CameraCalibration(Message, frozen=True, kw_only=True):
 class CameraFrame(Message, frozen=True, kw_only=True):
     """Where the camera is."""
 
-    timestamp: Time = Time()
+    timestamp: Time = EPOCH
     parent_frame_id: str = ""
     child_frame_id: str = ""
-    translation: Vector3 = Vector3()
-    rotation: Quaternion = Quaternion()
+    translation: Vector3 = Vector3(x=0.0, y=0.0, z=0.0)
+    rotation: Quaternion = Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
 
 
 # A channel's schema is named after the message's class, and a viewer knows these by their full names.
@@ -104,11 +84,11 @@ class CameraRecorder:
         if PERIOD_SLACK * period < wait <= 2 * period:  # of a clock that was set back it is more
             return
         self._due = (self._due if abs(wait) < period else message.stamp) + period
-        yield self._image, CompressedImage(timestamp=_time(message.stamp), frame_id=self._frame, data=message.data)
+        yield self._image, CompressedImage(timestamp=time_of(message.stamp), frame_id=self._frame, data=message.data)
 
     def on_info(self, message: CameraInfo, now: int) -> Iterator[Recorded]:
         """Lens and pose; `now` in [ns] UNIX."""
-        at, k = _time(now), message.intrinsics
+        at, k = time_of(now), message.intrinsics
         if len(k) == 9:
             yield (
                 self._lens,
@@ -153,8 +133,3 @@ def _record(node: Node, name: str, rate: Callable[[], float], on_message: OnMess
 
 def _topic(key: str, kind: type[Message], delivery: Delivery, about: str) -> Topic[Any]:
     return Topic(key, kind, delivery, None, True, "logger", about)
-
-
-def _time(stamp: int) -> Time:
-    sec, nsec = divmod(max(stamp, 0), SECOND)
-    return Time(sec=sec, nsec=nsec)

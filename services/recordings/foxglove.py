@@ -9,7 +9,7 @@ from schemas.frames import FrameTransforms, RobotDescription
 from schemas.scene import PlanningScene
 from schemas.system import LogRecord
 from services.recordings import foxglove_schemas as fox
-from services.recordings.channels import LAST_STAMP, Channel, Entry, schema_of
+from services.recordings.channels import Channel, Entry, schema_of
 from services.recordings.foxglove_shapes import Drawn, drawn_links, drawn_object, pose_of
 
 FRAMES, STATIC_FRAMES, LOG = "foxglove/frames", "foxglove/static_frames", "foxglove/log"
@@ -55,16 +55,11 @@ class FoxgloveTwin:
 
     def _described(self, description: RobotDescription, entry: Entry) -> Iterator[Derived]:
         self.base, links = drawn_links(description.urdf)
-        at = _time(entry.stamp)
+        at = fox.time_of(entry.stamp)
         entities = tuple(_entity(at, f"link {drawn.frame}", drawn) for drawn in links)
         yield ARM, fox.SceneUpdate(deletions=(_all(at),), entities=entities)
         if self.scene is not None:
             yield from self.derived(self.scene)
-
-
-def _time(stamp: int) -> fox.Time:
-    sec, nsec = divmod(min(max(stamp, 0), LAST_STAMP), 1_000_000_000)
-    return fox.Time(sec=sec, nsec=nsec)
 
 
 def _frames(message: FrameTransforms) -> fox.FrameTransforms:
@@ -74,7 +69,7 @@ def _frames(message: FrameTransforms) -> fox.FrameTransforms:
             pose = pose_of(each.transform.translation, each.transform.rotation)
             found.append(
                 fox.FrameTransform(
-                    timestamp=_time(each.stamp), parent_frame_id=each.parent, child_frame_id=each.child,
+                    timestamp=fox.time_of(each.stamp), parent_frame_id=each.parent, child_frame_id=each.child,
                     translation=pose.position, rotation=pose.orientation,
                 )
             )  # fmt: skip
@@ -83,7 +78,7 @@ def _frames(message: FrameTransforms) -> fox.FrameTransforms:
 
 def _log(record: LogRecord) -> fox.Log:
     level = LEVELS.get(record.level, fox.LogLevel.UNKNOWN)
-    return fox.Log(timestamp=_time(record.stamp), level=level, message=record.text, name=record.node)
+    return fox.Log(timestamp=fox.time_of(record.stamp), level=level, message=record.text, name=record.node)
 
 
 def _all(at: fox.Time) -> fox.SceneEntityDeletion:
@@ -92,7 +87,7 @@ def _all(at: fox.Time) -> fox.SceneEntityDeletion:
 
 def _scene(scene: PlanningScene, stamp: int, base: str) -> fox.SceneUpdate:
     """The whole scene: what was there before goes."""
-    at = _time(stamp)
+    at = fox.time_of(stamp)
     drawn = ((each.name, drawn_object(each, base)) for each in scene.objects)
     entities = tuple(_entity(at, f"object {name}", each) for name, each in drawn if each is not None)
     return fox.SceneUpdate(deletions=(_all(at),), entities=entities)

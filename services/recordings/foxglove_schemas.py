@@ -11,6 +11,8 @@ from typing import Any
 
 import msgspec
 
+from services.recordings.channels import LAST_STAMP
+
 Empty = tuple[Any, ...]  # of primitives that are never drawn here
 
 
@@ -23,6 +25,12 @@ class Time(Record, frozen=True):
 
     sec: int
     nsec: int  # below 10^9
+
+
+def time_of(stamp: int) -> Time:
+    """The time of `stamp` [ns] UNIX."""
+    sec, nsec = divmod(min(max(stamp, 0), LAST_STAMP), 1_000_000_000)
+    return Time(sec=sec, nsec=nsec)
 
 
 class Duration(Record, frozen=True):
