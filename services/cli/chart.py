@@ -71,7 +71,7 @@ def _headline(curve: Curve, unit: str, colour: str) -> str:
 
 def _span(low: float, high: float) -> tuple[float, float]:
     """What the vertical axis shows."""
-    least = max(FLAT * max(abs(low), abs(high)), 1e-12)
+    least = FLAT * max(abs(low), abs(high)) or FLAT
     room = max(HEADROOM * (high - low), (least - (high - low)) / 2.0)
     return low - room, high + room
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import signal
 import sys
@@ -12,6 +13,7 @@ from types import FrameType
 from services.cli.errors import CommandError, ExitCode, usage
 
 UP_AND_CLEAR = "\x1b[{}F\x1b[J"
+COLOUR = re.compile("(\x1b\\[[0-9;]*m)")
 PLAIN_EVERY = 0.25  # of the whole motion
 CANCELLING = "cancelling: the arm slows down on its path (Ctrl-C again leaves without waiting)"
 ShowProgress = Callable[[float, float], None]  # elapsed [s], duration [s]
@@ -36,7 +38,7 @@ class LiveBlock:
             return
         columns, lines = shutil.get_terminal_size()
         # A line that wraps, or a block that scrolls, could not be drawn over.
-        shown = [line[: columns - 1] for line in text.splitlines()[: lines - 1]]
+        shown = [cut(line, columns - 1) for line in text.splitlines()[: lines - 1]]
         self._clear()
         print("\n".join(shown), flush=True)
         self._height = len(shown)
@@ -45,6 +47,18 @@ class LiveBlock:
         if self._height:
             print(UP_AND_CLEAR.format(self._height), end="", flush=True)
             self._height = 0
+
+
+def cut(line: str, columns: int) -> str:
+    """The first `columns` characters of a line; its colours take no room, and all of them are kept."""
+    parts, room = [], columns
+    for index, part in enumerate(COLOUR.split(line)):
+        if index % 2:
+            parts.append(part)
+        else:
+            parts.append(part[: max(room, 0)])
+            room -= len(part)
+    return "".join(parts)
 
 
 @contextmanager

@@ -20,7 +20,7 @@ from services.cli.errors import CommandError, ExitCode
 from services.cli.field_path import FieldPath
 from services.cli.main import run
 from services.cli.plot import Field, Plot, plot
-from services.cli.terminal import LiveBlock
+from services.cli.terminal import COLOUR, LiveBlock, cut
 from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
 from tests.runtime.support import spinning
@@ -165,6 +165,14 @@ def test_fields_of_several_topics_are_drawn_as_they_come(session, gateway, capsy
 def test_on_a_terminal_the_picture_is_drawn_again_and_again_in_colours(session, gateway, capsys) -> None:
     plot(session, [Field(JOINT_STATES, "position[0]")], 0.7, is_once=True, block=LiveBlock(is_live=True))
     assert capsys.readouterr().out.count("\x1b[J") >= 2
+
+
+@given(st.lists(st.sampled_from(["a", "⣀", " ", "\x1b[36m", "\x1b[0m"]), max_size=60), st.integers(0, 30))
+def test_a_line_is_cut_by_what_is_seen_of_it_and_no_colour_is_torn(parts: list[str], columns: int) -> None:
+    line = "".join(parts)
+    after = cut(line, columns)
+    assert COLOUR.sub("", after) == COLOUR.sub("", line)[:columns]
+    assert COLOUR.findall(after) == COLOUR.findall(line)
 
 
 class Depth(Message, frozen=True, kw_only=True):
