@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from gemelo.arguments import Target, ToolGoal
     from gemelo.arm import Arm
     from gemelo.connection import connect, robots
+    from gemelo.control import Control, Hold
     from gemelo.device import Device
     from gemelo.errors import Aborted, BadArgument, Canceled, Error, Interrupted, Lost, Refused
     from gemelo.gripping import Gripped
@@ -47,11 +48,13 @@ __all__ = [
     "BadArgument",
     "Canceled",
     "Configurations",
+    "Control",
     "Device",
     "DeviceMode",
     "Error",
     "GoalStatusCode",
     "Gripped",
+    "Hold",
     "HomingProgress",
     "HomingReport",
     "Interrupted",
@@ -85,6 +88,7 @@ MODULES = {
     "gemelo.arguments": ("Target", "ToolGoal"),
     "gemelo.arm": ("Arm",),
     "gemelo.connection": ("connect", "robots"),
+    "gemelo.control": ("Control", "Hold"),
     "gemelo.device": ("Device",),
     "gemelo.errors": ("Aborted", "BadArgument", "Canceled", "Error", "Interrupted", "Lost", "Refused"),
     "gemelo.gripping": ("Gripped",),

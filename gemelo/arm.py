@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import Self, Unpack
 
 from gemelo.arguments import Grip, Joints, Target, ToolGoal, Vector, Waypoint
+from gemelo.control import Control, Hold
 from gemelo.device import Device, reference_command
 from gemelo.errors import BadArgument
 from gemelo.frames import Frames
@@ -63,10 +64,10 @@ class Arm:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._requirement = Requirement(session)
-        self._frames, self._motions = Frames(session), Motions(session, self._requirement.check)
+        self._requirement, self._control = Requirement(session), Control(session)
+        self._frames, self._motions = Frames(session), Motions(session, self._require_motion)
         self._jogging, self._streaming = Jogging(session), Streaming(session)
-        self._scene, self._device = Scene(session), Device(session)
+        self._scene, self._device = Scene(session), Device(session, self._control.prepare)
         self._gripping, self._eyes = Gripping(session, self._scene), Eyes(session, self._scene)
 
     def __enter__(self) -> Self:
@@ -322,6 +323,39 @@ class Arm:
         """
         return self._scene
 
+    def _require_motion(self) -> None:
+        """Before every motion; raises `Refused`."""
+        self._control.prepare()
+        self._requirement.check()
+
+    # Who may move it
+
+    @property
+    def control(self) -> Control:
+        """Who alone may move the arm; without a holder everybody may.
+
+        >>> arm.control.held
+        False
+        """
+        return self._control
+
+    def take_control(self, name: str = "", *, force: bool = False) -> Hold:
+        """Takes control as `name` (of this node, if left out): until it is given back nobody else moves the arm.
+
+        A motion of somebody else comes to rest first. Raises `Refused` with the holder's name where there is one,
+        unless `force`. If this script dies, the arm comes to rest, and control is lost after 3 s (`control_grace`).
+
+        >>> with arm.take_control("ana"):
+        ...     try:
+        ...         with gemelo.connect() as other:
+        ...             other.move(named="left")
+        ...     except gemelo.Refused as refused:
+        ...         print(refused.check, refused.reason)
+        control ana holds control of rm1, since ... from node ...: ask for it, or run `gemelo control take --force`
+        """
+        self._control.take(name, force=force)
+        return Hold(self._control)
+
     # Where it goes
 
     def move(
@@ -575,7 +609,7 @@ class Arm:
             command = jog_command(self.description, joints, twist, frame)
         elif joints is not None or twist is not None or frame:
             raise BadArgument("jog by a command, or by joints= or twist=: not both")
-        self._requirement.check()
+        self._require_motion()
         if duration is None:
             return self._jogging.say(command)
         return self._jogging.hold(command, duration, on_progress)
@@ -598,7 +632,7 @@ class Arm:
         >>> for step in range(20):
         ...     arm.stream({"brazo_joint": arm.joints["brazo_joint"] + 0.002})
         """
-        self._requirement.check()
+        self._require_motion()
         self._streaming.say(joints)
 
     def grip(
@@ -623,6 +657,7 @@ class Arm:
         >>> print(arm.grip("close"))
         0... mm, there
         """
+        self._control.prepare()
         return self._gripping.go(to, max_effort, on_progress, is_cancelled)
 
     @property

@@ -51,8 +51,9 @@ class Device:
     ('IDLE', '')
     """
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, session: Session, prepare: Callable[[], None]) -> None:
+        """`prepare` is called before each command that is not a stop."""
+        self._session, self._prepare = session, prepare
 
     @property
     def status(self) -> DeviceStatus:
@@ -207,11 +208,13 @@ class Device:
         if isinstance(wanted, StopKind):
             answer = self._session.call(DEVICE_STOP, DeviceStopRequest(kind=wanted), TO_ANSWER)
         else:
+            self._prepare()
             answer = self._session.call(DEVICE_COMMAND, DeviceCommandRequest(command=wanted), TO_ANSWER)
         self._session.changed()
         if not answer.accepted:
             mode = f" (device mode {answer.mode.name})" if f"mode {answer.mode.name}" not in answer.reason else ""
-            raise Refused(f"{what} refused: {answer.reason}{mode}", check="device", subject=what, reason=answer.reason)
+            check, mode = (answer.check, "") if answer.check else ("device", mode)
+            raise Refused(f"{what} refused: {answer.reason}{mode}", check=check, subject=what, reason=answer.reason)
         if isinstance(wanted, ArmCommand):
             lead = max(joint.driver.enable_lead_ms for joint in self._session.description.joints) * 1e-3
             self._session.wait_for(lambda: False, lead)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from gemelo.arguments import Grip
 from gemelo.errors import Aborted, BadArgument, Canceled, Interrupted, Lost, Refused
+from gemelo.motion import check_of
 from gemelo.scene import Scene
 from gemelo.session import Session
 from gemelo.targets import number
@@ -131,7 +132,8 @@ class Gripping:
         try:
             handle = client.send(goal, lambda feedback: self._session.notify(), attached=True)
         except runtime.GoalRefused as error:
-            raise Refused(f"refused: {error}", check="gripper", code=error.code, reason=str(error)) from error
+            check = check_of(error, "gripper")
+            raise Refused(f"refused: {error}", check=check, code=error.code, reason=str(error)) from error
         except runtime.Refused as error:
             raise Refused(str(error)) from error
         except (runtime.NoAnswer, runtime.BusError) as error:

@@ -33,21 +33,23 @@ class Jogging:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._began = self._said = -math.inf  # [s] monotonic, of this jog's first and last command
+        self._heard: JogStatus | None = None  # the newest that is about this node, or about the arm
+        self._heard_at = -math.inf  # [s] monotonic
 
     def say(self, command: JogCommand) -> JogStatus | None:
         """Moves for 0.1 s; the planner's newest word on this jog. Raises `Refused` or `Lost`."""
         now = time.monotonic()
-        newest = self._session.latest(JOG_STATUS)
+        self._session.latest(JOG_STATUS, self._on_status)
         if now - self._said > PAUSE:
             self._began = now
         self._said = now
         node = self._session.node
         node.publisher(JOG).put(replace(command, stamp=node.now()))
-        heard = newest.message if newest.age() < now - self._began else None
+        heard = self._heard_since(self._began)
         if heard is None and now - self._began > ANSWER:
             raise Lost(SILENT)
         if heard is not None and not heard.active and heard.limited_by and now - self._began > PERIOD:
-            raise Refused(f"refused: {heard.limited_by}", check="jog", reason=heard.limited_by)
+            raise _refused(heard)
         return heard
 
     def hold(
@@ -72,20 +74,27 @@ class Jogging:
 
     def rest(self) -> JogStatus:
         """Waits until the planner leads no more; its last word."""
-        newest = self._session.latest(JOG_STATUS)
         began = self._began
 
         def is_at_rest() -> bool:
-            status = newest.message if newest.age() < time.monotonic() - began else None
+            status = self._heard_since(began)
             return status is not None and not status.active
 
-        if not self._session.wait_for(is_at_rest, REST) or newest.message is None:
-            is_silent = newest.age() > time.monotonic() - began
+        if not self._session.wait_for(is_at_rest, REST) or self._heard is None:
+            is_silent = self._heard_since(began) is None
             raise Lost(SILENT if is_silent else f"the planner does not say within {REST:g} s that the jog has ended")
         self._session.changed()
-        if newest.message.limited_by and not newest.message.limits:
-            raise Refused(f"refused: {newest.message.limited_by}", check="jog", reason=newest.message.limited_by)
-        return newest.message
+        if self._heard.limited_by and not self._heard.limits:
+            raise _refused(self._heard)
+        return self._heard
+
+    def _on_status(self, status: JogStatus) -> None:
+        if status.client in ("", self._session.node.name):
+            self._heard, self._heard_at = status, time.monotonic()
+
+    def _heard_since(self, began: float) -> JogStatus | None:
+        """The newest status, if it came after `began` [s] monotonic."""
+        return self._heard if self._heard_at > began else None
 
 
 class Streaming:
@@ -110,9 +119,15 @@ class Streaming:
         node.publisher(JOINT_TARGETS).put(JointTargets(stamp=node.now(), name=state.name, position=state.position))
 
     def _on_event(self, event: DeviceEvent) -> None:
-        """Only of the stream that runs: events of before may come late."""
+        """Only of the stream that runs, and not of another's: events of before may come late."""
+        if event.client not in ("", self._session.node.name):
+            return
         if event.event == "target_refused" and time.monotonic() - self._said < PAUSE:
             self._refused = event.detail
+
+
+def _refused(status: JogStatus) -> Refused:
+    return Refused(f"refused: {status.limited_by}", check=status.check or "jog", reason=status.limited_by)
 
 
 def jog_command(arm: Description, joints: Joints | None, twist: Vector | None, frame: str) -> JogCommand:

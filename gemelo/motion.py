@@ -11,6 +11,7 @@ from gemelo.planning import Plan, words_of
 from gemelo.session import Session
 from schemas.actions import GoalStatusCode
 from schemas.motion import (
+    FollowErrorCode,
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryGoal,
     FollowJointTrajectoryResult,
@@ -183,8 +184,9 @@ class Motion:
         try:
             self._handle = client.send(goal, lambda feedback: self._session.notify(), attached=not self.is_detached)
         except runtime.GoalRefused as error:
+            check = check_of(error, "execution")
             raise Refused(
-                f"refused by {client.action.server}: {error}", check="execution", code=error.code, reason=str(error)
+                f"refused by {client.action.server}: {error}", check=check, code=error.code, reason=str(error)
             ) from error
         except runtime.Refused as error:
             raise Refused(str(error)) from error
@@ -245,6 +247,11 @@ class Motion:
             f"{name} {error:+.2f}" for name, error in zip(result.joint_names, result.final_error, strict=False)
         )
         return f"{about} in {result.duration:.2f} s, final error [steps] {errors}>"
+
+
+def check_of(refused: runtime.GoalRefused, usual: str) -> str:
+    """The check that the gateway's refusal of a goal is about."""
+    return "control" if refused.code == FollowErrorCode.NOT_IN_CONTROL else usual
 
 
 class Motions:

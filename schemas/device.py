@@ -87,6 +87,7 @@ class DeviceEvent(Message, frozen=True, kw_only=True):
     device: str = ""
     event: str = ""
     detail: str = ""
+    client: str = ""  # the node that it is about; empty: everybody
 
 
 class DeviceCommandKind(IntEnum):
@@ -176,6 +177,7 @@ class DeviceCommandResponse(Message, frozen=True, kw_only=True):
     sent: bool = False  # it has left the gateway; where it was not accepted, what the device did is not known
     reason: str = ""
     mode: DeviceMode = DeviceMode.BOOT
+    check: str = ""  # "control": somebody else holds it, and the device was not asked
 
 
 class DeviceConfiguration(Message, frozen=True, kw_only=True):

@@ -22,6 +22,7 @@ class JointTargets(Message, frozen=True, kw_only=True):
     stamp: int = 0  # [ns] UNIX time of the sender
     name: tuple[str, ...] = ()
     position: Vector = ()  # [rad] or [m]
+    client: str = ""  # the node whose jogging they are, where the planner writes them; empty: the writer's own
 
 
 class StepErrors(Message, frozen=True, kw_only=True):

@@ -82,6 +82,7 @@ class FollowErrorCode(IntEnum):
     PREEMPTED = -11
     DEVICE_FAILED = -12
     SCENE_CHANGED = -13
+    NOT_IN_CONTROL = -14  # somebody else holds control
 
 
 class FollowJointTrajectoryResult(Message, frozen=True, kw_only=True):

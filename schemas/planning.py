@@ -329,3 +329,5 @@ class JogStatus(Message, frozen=True, kw_only=True):
     limited_by: str = ""  # the sentences of `limits`, or why there is no jogging; empty: nothing
     manipulability: float = 0.0
     limits: tuple[JogLimit, ...] = ()
+    client: str = ""  # the node that it is about, while somebody holds control; empty: everybody
+    check: str = ""  # "control": somebody else holds it

@@ -14,6 +14,10 @@ from schemas.topics import (
     ANY,
     CAMERA_TOPICS,
     CONTACTS,
+    CONTROL,
+    CONTROL_GIVE,
+    CONTROL_JOIN,
+    CONTROL_TAKE,
     DESCRIPTION,
     DEVICE_COMMAND,
     DEVICE_CONFIGURE,
@@ -85,13 +89,14 @@ EVERYTHING: tuple[AnyTopic, ...] = (*TOPICS, *OF_CAMERAS)
 RECORDED = tuple(topic for topic in TOPICS if topic.recorded) + OF_CAMERAS
 STOPS: tuple[AnyRequest, ...] = (DEVICE_STOP,)  # whoever may connect may stop the arm
 LOOKS: tuple[AnyRequest, ...] = (IK, FK, STATE_VALIDITY)  # answers that change nothing
-MOVES: tuple[AnyRequest, ...] = (PLAN, PLAN_CANCEL, SCENE_EDIT, DEVICE_COMMAND)
+CONTROLS: tuple[AnyRequest, ...] = (CONTROL_TAKE, CONTROL_JOIN, CONTROL_GIVE)
+MOVES: tuple[AnyRequest, ...] = (PLAN, PLAN_CANCEL, SCENE_EDIT, DEVICE_COMMAND, *CONTROLS)
 
 ROLES: tuple[Role, ...] = (
     Role("gateway", "trajectories to step knots", GATEWAY, reads=(JOINT_TARGETS, SCENE)),
     Role(
         "planner", "goals to verified trajectories, and jogging", "planner",
-        writes=(JOINT_TARGETS,), reads=(JOINT_STATES, GRIPPER_STATE, DEVICE_STATUS, JOG), asks=STOPS,
+        writes=(JOINT_TARGETS,), reads=(JOINT_STATES, GRIPPER_STATE, DEVICE_STATUS, JOG, CONTROL), asks=STOPS,
     ),
     Role("state_publisher", "joint states to frames", "state_publisher", reads=(JOINT_STATES,), asks=STOPS),
     Role("logger", "everything recorded to files", "logger", reads=RECORDED, asks=STOPS, hears_requests=True),
@@ -99,7 +104,7 @@ ROLES: tuple[Role, ...] = (
         "visualizer", "everything that is seen to Rerun", "visualizer",
         reads=(DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, DEVICE_STATE, DEVICE_STATUS, DEVICE_EVENTS,
                SENSORS, DEVICE_SHAFT, PLANNED_PATH, SCENE, GRIPPER_STATE, CONTACTS, STEP_LEDGER, STOPPING_DISTANCE,
-               LOG, *SEEN),
+               CONTROL, LOG, *SEEN),
         asks=STOPS,
     ),
     Role(

@@ -11,6 +11,7 @@ from enum import Enum
 from typing import Generic, TypeVar
 
 from schemas.camera import CameraImage, CameraInfo, CameraStatus
+from schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlState, ControlTake
 from schemas.detections import Detections
 from schemas.device import (
     CommandAck,
@@ -167,6 +168,7 @@ DEVICE_SHAFT = Topic(
 GRIPPER_STATE = Topic(
     "gripper_state", GripperState, LATEST, 10.0, True, GATEWAY, "the gripper's opening, and whether it presses"
 )
+CONTROL = Topic("control", ControlState, LATCHED, None, True, GATEWAY, "who alone may move the arm, if anybody")
 COMMANDS = Topic("commands", CommandChunk, EVERY, None, True, GATEWAY, "every chunk of knots sent to the device")
 COMMAND_ACKS = Topic("command_acks", CommandAck, EVERY, None, True, GATEWAY, "the device's answer to every chunk")
 GATEWAY_INPUTS = Topic(
@@ -184,7 +186,7 @@ TOPICS: tuple[Topic[Message], ...] = (
     DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, JOINT_TARGETS, FRAMES, STATIC_FRAMES, PLANNED_PATH,
     PLAN_PROGRESS, PLAN_INPUTS,
     SCENE, CONTACTS, JOG, JOG_STATUS, DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, DEVICE_CONFIGURATION,
-    SENSORS, DEVICE_SHAFT, GRIPPER_STATE, STEP_LEDGER, STOPPING_DISTANCE,
+    SENSORS, DEVICE_SHAFT, GRIPPER_STATE, STEP_LEDGER, STOPPING_DISTANCE, CONTROL,
     COMMANDS, COMMAND_ACKS, GATEWAY_INPUTS, LOG, STATISTICS, PARAMETER_CHANGES,
 )  # fmt: skip
 
@@ -251,6 +253,17 @@ DEVICE_ECHO = Request(
     "device/echo", EchoRequest, EchoResponse, GATEWAY, "what the wire to the device takes, there and back"
 )
 
+# Not recorded: the secret in them would stand in the recording, and on the key that tells of questions and answers.
+CONTROL_TAKE = Request(
+    "control/take", ControlTake, ControlAnswer, GATEWAY, "become the only one who may move the arm", recorded=False
+)
+CONTROL_JOIN = Request(
+    "control/join", ControlJoin, ControlAnswer, GATEWAY, "move the arm too, with the holder's secret", recorded=False
+)
+CONTROL_GIVE = Request(
+    "control/give", ControlGive, ControlAnswer, GATEWAY, "everybody may move the arm again", recorded=False
+)
+
 REQUESTS: tuple[Request[Message, Message], ...] = (
     PLAN,
     PLAN_CANCEL,
@@ -263,6 +276,9 @@ REQUESTS: tuple[Request[Message, Message], ...] = (
     DEVICE_CONFIGURE,
     DEVICE_INJECT,
     DEVICE_ECHO,
+    CONTROL_TAKE,
+    CONTROL_JOIN,
+    CONTROL_GIVE,
 )
 
 FOLLOW_JOINT_TRAJECTORY = Action(

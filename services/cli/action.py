@@ -11,7 +11,7 @@ from schemas.topics import ACTIONS, Action
 from services.cli.errors import CommandError, ExitCode, unknown, usage
 from services.cli.messages import dump, fields_of, message_of
 from services.cli.parser import Choices, Options, Parser
-from services.cli.session import Session, connect
+from services.cli.session import Session, connect, share_control
 from services.cli.terminal import CANCELLING, two_stage_interrupt
 from services.cli.text_table import table
 from services.runtime.errors import GoalRefused
@@ -51,6 +51,7 @@ def run_send_goal(options: Options) -> ExitCode:
     action = action_of(options.action)
     goal = message_of(action.goal, goal_text(options.goal))
     with connect() as session:
+        share_control(session)
         return send_goal(session, action, goal, options.feedback)
 
 

@@ -22,7 +22,7 @@ from schemas.topics import (
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options
 from services.cli.ra_intake import OUTPUT, RaIntake, Refused
-from services.cli.session import Session, connect
+from services.cli.session import Session, connect, share_control
 from services.runtime.errors import NoAnswer
 from services.runtime.errors import Refused as RefusedRequest
 
@@ -36,6 +36,7 @@ ENDS = ("target_refused", "hold", "fault", "estop", "rebooted")  # events after 
 def run(options: Options) -> ExitCode:
     """Until Ctrl-C."""
     with connect() as session:
+        share_control(session)
         listener = Listener(session)
         try:
             listener.run()

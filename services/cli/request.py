@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from schemas.message import Message
-from schemas.topics import ACTIONS, REQUESTS, Request
+from schemas.topics import ACTIONS, DEVICE_COMMAND, REQUESTS, Request
 from services.cli.errors import ExitCode, unknown
 from services.cli.field_path import FieldPath
 from services.cli.messages import dump, message_of
 from services.cli.node import information_of, living
 from services.cli.parser import Choices, Options, Parser, positive_integer
-from services.cli.session import Session, connect
+from services.cli.session import Session, connect, share_control
 from services.cli.text_table import table
 from services.cli.topic import echo, json_line, yaml_document
 from services.recordings.table import exchanges_of, goal_request_of
@@ -96,5 +96,7 @@ def asked_on(session: Session, name: str) -> Request[Any, Any]:
 
 def call(session: Session, request: Request[Message, Message], message: Message) -> ExitCode:
     """Sends `message` and prints the answer as YAML."""
+    if request.key == DEVICE_COMMAND.key:
+        share_control(session)
     print(dump(session.node.call(request, message, timeout=CALL_TIMEOUT)), end="")
     return ExitCode.OK

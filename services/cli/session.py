@@ -84,6 +84,13 @@ def connect(robot: Robot | None = None) -> Iterator[Session]:
         raise CommandError(str(error)) from error
 
 
+def share_control(session: Session) -> None:
+    """Shares the hold of control that another process of this user has on this host, if there is one."""
+    from gemelo.control import join_shared
+
+    join_shared(session.node, session.arm.name, session.deployment)
+
+
 def require_router(deployment: Deployment) -> None:
     """Raises `CommandError` where no router listens, before anything slow is loaded."""
     from gemelo import robot_files

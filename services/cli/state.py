@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from schemas.control import ControlState
 from schemas.device import DeviceState, DeviceStatus
 from schemas.joints import JointState, StepErrors
 from schemas.ledger import StepLedger, StoppingDistance
 from schemas.topics import (
+    CONTROL,
     DEVICE_STATE,
     DEVICE_STATUS,
     FRAMES,
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from services.arm.model.description import Arm
 
 PATIENCE = 2.0  # [s] for the first messages
+TO_HEAR_OF_CONTROL = 0.5  # [s] for what the gateway keeps for late joiners
 REFRESH = 0.2  # [s] of --watch
 
 
@@ -79,6 +82,7 @@ class Snapshot(msgspec.Struct, frozen=True):
     open_loop: bool = False  # the positions are what was sent: what was executed is not known
     ledger: StepLedger | None = None
     stopping: StoppingDistance | None = None
+    control: ControlState | None = None
 
 
 def snapshot(
@@ -90,6 +94,7 @@ def snapshot(
     tool: tuple[float, ...] | None,
     ledger: StepLedger | None = None,
     stopping: StoppingDistance | None = None,
+    control: ControlState | None = None,
 ) -> Snapshot:
     """The `Snapshot` of the messages received so far, None for one that was not; `tool` is (3,) [m] in the base
     frame."""
@@ -129,6 +134,7 @@ def snapshot(
         round_trip=device.round_trip if device else None,
         open_loop=is_open_loop,
         ledger=ledger,
+        control=control,
         stopping=stopping,
     )
 
@@ -150,7 +156,8 @@ def text_of(view: Snapshot) -> str:
     if view.online and view.reason:
         device += f"; {view.reason}"
     sent = f"\n\n{OPEN_LOOP}" if view.open_loop else ""
-    known = "".join(f"\n{line}" for line in (ledger_text(view.ledger), stopping_text(view.stopping)) if line)
+    notes = (ledger_text(view.ledger), stopping_text(view.stopping), control_text(view.control))
+    known = "".join(f"\n{line}" for line in notes if line)
     return f"{table(headings, rows)}{sent}\n\ntool {view.tool_frame}: {tool}{known}\ndevice {device}\nlink   {link}"
 
 
@@ -177,6 +184,13 @@ def stopping_text(stopping: StoppingDistance | None) -> str:
         f"stop   {1e3 * stopping.distance:.1f} mm in {stopping.duration:.2f} s at most if all is lost now "
         f"(noticed after {stopping.reaction:.2f} s)"
     )
+
+
+def control_text(control: ControlState | None) -> str:
+    """Who alone may move the arm; empty where nobody has taken control."""
+    if control is None or not control.held:
+        return ""
+    return f"control {control.name}, node {control.node} on {control.host}: nobody else moves the arm"
 
 
 def _percent(share: float | None) -> str:
@@ -209,6 +223,7 @@ class StateView:
         self._device = node.latest(DEVICE_STATE)
         self._status = node.latest(DEVICE_STATUS)
         self._ledger, self._stopping = node.latest(STEP_LEDGER), node.latest(STOPPING_DISTANCE)
+        self._control = node.latest(CONTROL)
         node.subscribe(FRAMES, self.frames.insert_all)
         node.subscribe(STATIC_FRAMES, lambda message: self.frames.insert_all(message, is_static=True))
 
@@ -221,6 +236,11 @@ class StateView:
         if status is not None and not status.open_loop:  # else there are no step errors
             parts.append(self._errors.message)
         return None not in parts and self.tool() is not None
+
+    @property
+    def knows_control(self) -> bool:
+        """True if it is known who holds control; a recording of before there was such a thing never says."""
+        return self._control.message is not None
 
     @property
     def is_empty(self) -> bool:
@@ -245,6 +265,7 @@ class StateView:
             self.tool(),
             self._ledger.message,
             self._stopping.message,
+            self._control.message,
         )
 
 
@@ -260,8 +281,10 @@ def state(session: Session, watch: bool, as_json: bool) -> ExitCode:
 
 def wait_for(session: Session, view: StateView) -> None:
     """Waits for all messages, at most `PATIENCE` [s]; raises `CommandError` if there is none at all."""
-    deadline = session.node.monotonic() + PATIENCE
-    while not view.is_complete and session.node.monotonic() < deadline:
+    began = session.node.monotonic()
+    while not view.is_complete and session.node.monotonic() < began + PATIENCE:
+        session.node.wait(0.02)
+    while not view.knows_control and session.node.monotonic() < began + TO_HEAR_OF_CONTROL:
         session.node.wait(0.02)
     if view.is_empty:
         silence = f"nothing heard of the arm in {PATIENCE:g} s: is stepper_gateway running? `gemelo node list`"

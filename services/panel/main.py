@@ -118,6 +118,7 @@ def _connected(config: Path | None, log: logging.Logger, stop: ShutdownRequest) 
     while not stop.is_set:
         try:
             arm = gemelo.connect(deployment=config, name=NAME, timeout=LOOK_FOR_TWIN)
+            arm.control.shares = False  # the page is for whoever opens it, not for whose process it is
             try:
                 assert arm.joints
                 arm.fk()

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from msgspec.structs import replace
+
 from schemas.joints import JointState
-from schemas.planning import JogCommand
-from schemas.topics import DEVICE_STATUS, FOLLOW_JOINT_TRAJECTORY, JOG, JOG_STATUS, JOINT_TARGETS
+from schemas.planning import JogCommand, JogStatus
+from schemas.topics import CONTROL, DEVICE_STATUS, FOLLOW_JOINT_TRAJECTORY, JOG, JOG_STATUS, JOINT_TARGETS
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.planner.collision.world import World
-from services.planner.jog.jog import PERIOD, Jog
+from services.planner.jog.jog import PERIOD, STATUS_PERIOD, Jog
 from services.runtime.actions.keys import status_topic
 from services.runtime.node import Node
 from services.runtime.topics import Latest
@@ -26,13 +28,19 @@ class JogService:
         self._node, self._arm, self._states, self._newest = node, arm, states, newest
         self._targets, self._status = node.publisher(JOINT_TARGETS), node.publisher(JOG_STATUS)
         self._goals = node.latest(status_topic(FOLLOW_JOINT_TRAJECTORY))
-        self._device = node.latest(DEVICE_STATUS)
+        self._device, self._control = node.latest(DEVICE_STATUS), node.latest(CONTROL)
+        self._client = ""  # the node that jogs
+        self._refused = -1.0e9  # [s] monotonic, when another was told last that it may not
         self._world: World | None = None
         self._jog: Jog | None = None
         self._is_ticking = False
-        node.subscribe(JOG, self._on_command)
+        node.subscribe_signed(JOG, self._on_command)
 
-    def _on_command(self, command: JogCommand) -> None:
+    def _on_command(self, command: JogCommand, writer: str) -> None:
+        """The gateway decides whose targets move the arm; here others are kept from disturbing the holder's jog."""
+        if reason := self._objection(writer):
+            return self._refuse(reason, writer)
+        self._client = writer
         self._in_newest_world().on_command(command, self._node.monotonic())
         if not self._is_ticking:
             self._is_ticking = True
@@ -50,14 +58,34 @@ class JogService:
             "" if device is None else device.reason,
         )
         if output.targets is not None:
-            self._targets.put(output.targets)
+            self._targets.put(replace(output.targets, client=self._client))
         if output.status is not None:
-            self._status.put(output.status)
+            self._status.put(replace(output.status, client=self._told_to))
         if output.said:
             node.log.warning(f"jog: {output.said}")
         if not jog.is_busy:
             self._is_ticking = False
             node.forget(self._tick)
+
+    def _objection(self, writer: str) -> str:
+        """Why `writer` may not jog, empty if it may."""
+        control = self._control.message
+        if control is None or not control.held or writer in control.members:
+            return ""
+        return f"{control.name} holds control, from node {control.node} on {control.host}: see `gemelo control who`"
+
+    @property
+    def _told_to(self) -> str:
+        """Whom a status is about: the node that jogs, where others may not; else all."""
+        control = self._control.message
+        return self._client if control is not None and control.held else ""
+
+    def _refuse(self, reason: str, writer: str) -> None:
+        now = self._node.monotonic()
+        if now - self._refused >= STATUS_PERIOD:
+            self._refused = now
+            stamp = self._node.now()
+            self._status.put(JogStatus(stamp=stamp, scale=0.0, limited_by=reason, client=writer, check="control"))
 
     @property
     def _goal_is_active(self) -> bool:

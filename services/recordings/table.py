@@ -37,7 +37,7 @@ class LivingTopic(Topic[Any]):
 def recorded_topics() -> tuple[Topic[Any], ...]:
     """Everything that is known to be recorded before any node has said a word."""
     rows = [topic for topic in TOPICS if topic.recorded]
-    asked = [exchanges_of(request) for request in REQUESTS]
+    asked = [exchanges_of(request) for request in REQUESTS if request.recorded]
     return (*rows, *asked, *(topic for action in ACTIONS for topic in action_topics(action)), NODES)
 
 

@@ -1,4 +1,4 @@
-"""Which goals have lost their client: an attached goal ends when the liveliness token of its client vanishes.
+"""Which clients are gone, by their liveliness tokens: an attached goal ends when that of its client vanishes.
 
 A router that goes away takes all tokens with it, so nothing is concluded while it is away, nor until the clients
 have had the time to come back to it.
@@ -6,7 +6,7 @@ have had the time to come back to it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from services.runtime.bus.interface import Declaration
@@ -71,6 +71,58 @@ class ClientWatch:
         for goal_id, _ in lost:
             self.forget(goal_id)
         return lost
+
+
+class Absence:
+    """For how long one client's token has been missing, as far as that can be known."""
+
+    def __init__(self, watch: Watch, is_connected: Callable[[], bool], client: str, now: float) -> None:
+        """Watches `client`'s token [key] from `now` [s monotonic] on; the client has time to be seen first."""
+        self._is_connected, self._was_away = is_connected, False
+        self._counts_from = now + FIRST_SIGHT  # [s] monotonic, before which nothing is concluded
+        self._missing_since: float | None = now
+        self._now = now
+        self._declaration = watch(client, self._on_token)
+
+    def seconds(self, now: float) -> float:
+        """[s] that the token is missing at `now` [s monotonic]; 0 while it is there, or while that is not known."""
+        self._now = now
+        if not self._is_connected():
+            self._was_away = True
+            return 0.0
+        if self._was_away:
+            self._was_away, self._counts_from = False, now + RETURN
+        if self._missing_since is None:
+            return 0.0
+        return max(0.0, now - max(self._missing_since, self._counts_from))
+
+    def close(self) -> None:
+        """Watches no more."""
+        self._declaration.close()
+
+    def _on_token(self, is_there: bool) -> None:
+        if is_there:
+            self._missing_since = None
+        elif self._missing_since is None:
+            self._missing_since = self._now
+
+
+class Absences:
+    """The absence of every client of a list that changes."""
+
+    def __init__(self, watch: Watch, is_connected: Callable[[], bool]) -> None:
+        self._watch, self._is_connected = watch, is_connected
+        self._of: dict[str, Absence] = {}
+
+    def seconds(self, clients: Iterable[str], now: float) -> dict[str, float]:
+        """[s] by client; those not named any more are not watched any more. `now` in [s] monotonic."""
+        wanted = tuple(clients)
+        for gone in self._of.keys() - set(wanted):
+            self._of.pop(gone).close()
+        for client in wanted:
+            if client not in self._of:
+                self._of[client] = Absence(self._watch, self._is_connected, client, now)
+        return {client: self._of[client].seconds(now) for client in wanted}
 
 
 def _is_lost(goal: Attached, now: float) -> bool:

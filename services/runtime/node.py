@@ -28,7 +28,7 @@ from services.runtime.actions.server import ActionServer, OnCancel, OnGoal
 from services.runtime.bus import identity
 from services.runtime.bus.connection import connect
 from services.runtime.bus.interface import Bus, Declaration
-from services.runtime.client_watch import ClientWatch
+from services.runtime.client_watch import Absences, ClientWatch
 from services.runtime.deployment import load_deployment, project_root, robot_name
 from services.runtime.endpoints import LoopStatistics, NodeEndpoints, info_request, interfaces_request
 from services.runtime.loop.loop import Loop
@@ -123,6 +123,14 @@ class Node:
         self._endpoints.subscriptions.append(subscription)
         return subscription
 
+    def subscribe_signed(self, topic: Topic[M], on_message: Callable[[M, str], object]) -> Subscription[M]:
+        """As `subscribe`; `on_message(message, writer)` is told the name of the node that wrote it, as that says."""
+        subscription = Subscription(
+            self._bus, self._loop, topic, lambda message: None, self.log.warning, False, None, on_message
+        )
+        self._endpoints.subscriptions.append(subscription)
+        return subscription
+
     def latest(self, topic: Topic[M]) -> Latest[M]:
         """The newest message of a topic, with its age."""
         latest = Latest(topic)
@@ -175,6 +183,15 @@ class Node:
         client = ActionClient(action, self._bus, self._loop, self.subscribe, self._identity.key)
         self._loop.every(ActionClient.TICK, client.tick)
         return client
+
+    def absences(self) -> Absences:
+        """Tells for how long the liveliness tokens of other nodes have been missing."""
+        return Absences(self._watch_alive, lambda: self._bus.is_connected)
+
+    @property
+    def token(self) -> str:
+        """The key of this node's own liveliness token."""
+        return self._identity.key
 
     def parameters(self, kind: type[P]) -> ParameterSet[P]:
         """Declares the fields of `kind`, with the values of the deployment file and of the command line."""

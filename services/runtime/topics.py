@@ -53,10 +53,14 @@ class Subscription(Generic[M]):
         warn: Warn,
         own: bool,
         batch: float | None,
+        on_signed: Callable[[M, str], object] | None = None,
     ) -> None:
-        """With `batch` [s] the messages are handled together, once in this time; with 0 each as it comes, but all."""
+        """With `batch` [s] the messages are handled together, once in this time; with 0 each as it comes, but all.
+
+        `on_signed` takes the place of `handler`, and is told the node that wrote the message too.
+        """
         self.topic = topic
-        self._handler, self._warn = handler, warn
+        self._handler, self._on_signed, self._warn = handler, on_signed, warn
         self._received, self._bad, self._lost_said = 0, 0, False
         self._loop = loop
         self._queue = self._queue_for(batch)
@@ -95,7 +99,10 @@ class Subscription(Generic[M]):
                 self._warn(f"{self.topic.key}: dropped a bad message: {error} (further ones are only counted)")
             return
         self._received += 1
-        self._handler(message)
+        if self._on_signed is not None:
+            self._on_signed(message, arrival.writer)
+        else:
+            self._handler(message)
 
     def _require_writer(self, arrival: Arrival) -> None:
         """Raises `BadMessage` for a latched message of a stranger, which would stay valid until the writer's next.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from services.arm.model.description import Arm
+from services.stepper_gateway.control.control_handler import ControlHandler
 from services.stepper_gateway.device.command_handler import CommandHandler
 from services.stepper_gateway.device.echoes import Echoes
 from services.stepper_gateway.device.gateway_device import GatewayDevice
@@ -38,6 +39,7 @@ class Components:
         self.sensors = SensorRelay(self.device)
         self.injections = InjectionHandler(self.device)
         self.echoes = Echoes(self.device)
+        self.control = ControlHandler(self, arm.name, session_id)
 
     def abort_all(self, reason: str, moment: Moment) -> None:
         """Nothing of what was under way is continued."""

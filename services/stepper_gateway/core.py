@@ -5,9 +5,19 @@ Every public method takes the present `Moment` and returns outputs in order.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from msgspec.structs import replace
 
-from schemas.device import DeviceCommandKind, DeviceCommandRequest, DeviceStatus, DeviceStopRequest, InjectRequest
+from schemas.control import ControlGive, ControlJoin, ControlTake
+from schemas.device import (
+    ConfigureResponse,
+    DeviceCommandKind,
+    DeviceCommandRequest,
+    DeviceStatus,
+    DeviceStopRequest,
+    InjectRequest,
+)
 from schemas.gripper import GripperCommandGoal
 from schemas.joints import JointTargets
 from schemas.motion import FollowJointTrajectoryGoal
@@ -16,6 +26,8 @@ from schemas.system import LogLevel
 from schemas.topics import DEVICE_STATUS
 from services.arm.model.description import Arm
 from services.stepper_gateway.components import Components
+from services.stepper_gateway.control.clients import Caller
+from services.stepper_gateway.control.control_handler import NOBODY
 from services.stepper_gateway.device.command_arguments import STOPS, kind_of
 from services.stepper_gateway.device.frame_handler import FrameHandler
 from services.stepper_gateway.device.gateway_device import status_of
@@ -24,7 +36,7 @@ from services.stepper_gateway.ledger.record import LedgerRecord
 from services.stepper_gateway.links.frames import BadFrame, Command, Heartbeat, Sync, encode
 from services.stepper_gateway.links.link import Kind, Received
 from services.stepper_gateway.moment import Moment
-from services.stepper_gateway.outputs import Output
+from services.stepper_gateway.outputs import Answer, Output
 from services.stepper_gateway.parameters import GatewayParameters
 
 REGULAR = {Heartbeat: Kind.HB, Sync: Kind.SYNC, Command: Kind.CMD}  # what the session sends by itself
@@ -88,11 +100,13 @@ class GatewayCore:
         return self._finish(moment)
 
     def on_goal(
-        self, goal_id: str, goal: FollowJointTrajectoryGoal, moment: Moment
+        self, goal_id: str, goal: FollowJointTrajectoryGoal, moment: Moment, caller: Caller = NOBODY
     ) -> tuple[GoalVerdict, list[Output]]:
         """A goal, to be accepted or refused at once."""
-        verdict = self._components.goals.accept(goal_id, goal, moment)
+        control = self._components.control
+        verdict = control.verdict(caller, moment) or self._components.goals.accept(goal_id, goal, moment)
         if verdict.accepted:
+            control.note_mover(caller)
             self._components.streaming.end_for_goal()
         return verdict, self._finish(moment)
 
@@ -102,9 +116,12 @@ class GatewayCore:
         self._components.command_handler.send_due(moment)
         return reason, self._finish(moment)
 
-    def on_grip(self, goal_id: str, goal: GripperCommandGoal, moment: Moment) -> tuple[GoalVerdict, list[Output]]:
+    def on_grip(
+        self, goal_id: str, goal: GripperCommandGoal, moment: Moment, caller: Caller = NOBODY
+    ) -> tuple[GoalVerdict, list[Output]]:
         """A goal of the gripper, to be accepted or refused at once."""
-        verdict = self._components.gripper.accept(goal_id, goal, moment)
+        control = self._components.control
+        verdict = control.verdict(caller, moment) or self._components.gripper.accept(goal_id, goal, moment)
         return verdict, self._finish(moment)
 
     def on_grip_cancel(self, goal_id: str, moment: Moment) -> tuple[str, list[Output]]:
@@ -124,13 +141,19 @@ class GatewayCore:
         """How many scenes had a version that no planner gives."""
         return self._components.goals.scenes.dropped
 
-    def on_targets(self, targets: JointTargets, moment: Moment) -> list[Output]:
-        """A streamed target."""
-        self._components.streaming.on_targets(targets, self._components.goals.is_active, moment)
+    def on_targets(self, targets: JointTargets, moment: Moment, caller: Caller = NOBODY) -> list[Output]:
+        """A streamed target; one that is refused for control's sake neither keeps nor ends the holder's stream."""
+        if self._components.control.permits_targets(caller, moment):
+            self._components.streaming.on_targets(targets, self._components.goals.is_active, moment)
         return self._finish(moment)
 
-    def on_command(self, request: DeviceCommandRequest, ticket: int, moment: Moment) -> list[Output]:
+    def on_command(
+        self, request: DeviceCommandRequest, ticket: int, moment: Moment, caller: Caller = NOBODY
+    ) -> list[Output]:
         """A person's command; its answer comes as an `Answer` with this ticket."""
+        if not self._components.control.permits_command(caller, ticket, moment):
+            return self._finish(moment)
+        self._components.control.note_mover(caller)
         if self._components.command_handler.ask(request, ticket, self._components.goals.is_active, moment):
             self._make_way_for(kind_of(request), moment)
         self._components.command_handler.send_due(moment)
@@ -145,8 +168,11 @@ class GatewayCore:
         self._components.command_handler.send_due(moment)
         return self._finish(moment)
 
-    def on_configure(self, ticket: int, moment: Moment) -> list[Output]:
+    def on_configure(self, ticket: int, moment: Moment, caller: Caller = NOBODY) -> list[Output]:
         """A person wants the device configured; the answer comes as an `Answer` with this ticket."""
+        if objection := self._components.control.objection(caller, moment):
+            self._components.out.put(Answer(ticket, ConfigureResponse(accepted=False, reason=objection)))
+            return self._finish(moment)
         self.device.configuration.ask(ticket, self.device.unreachable_reason(moment), moment)
         return self._finish(moment)
 
@@ -160,8 +186,31 @@ class GatewayCore:
         self._components.echoes.ask(ticket, moment)
         return self._finish(moment)
 
-    def step(self, moment: Moment) -> list[Output]:
-        """One turn of the control loop, 50 times a second; sends the heartbeat."""
+    def on_take_control(self, request: ControlTake, session: str, ticket: int, moment: Moment) -> list[Output]:
+        """`session` asks for control; the answer comes as an `Answer` with this ticket, as those of the next two."""
+        self._components.control.take(request, session, ticket, moment)
+        return self._finish(moment)
+
+    def on_join_control(self, request: ControlJoin, session: str, ticket: int, moment: Moment) -> list[Output]:
+        """`session` knows the holder's secret, and wants to move the arm too."""
+        self._components.control.join(request, session, ticket)
+        return self._finish(moment)
+
+    def on_give_control(self, request: ControlGive, ticket: int, moment: Moment) -> list[Output]:
+        """The holder gives control back."""
+        self._components.control.give(request, ticket)
+        return self._finish(moment)
+
+    @property
+    def watched_clients(self) -> tuple[str, ...]:
+        """Keys of the liveliness tokens whose absence `step` is to be told."""
+        return self._components.control.watched
+
+    def step(self, moment: Moment, absences: Mapping[str, float] | None = None) -> list[Output]:
+        """One turn of the control loop, 50 times a second; sends the heartbeat.
+
+        `absences` [s] of the tokens of `watched_clients`, by key: none are missing if not said otherwise.
+        """
         device = self.device
         period = moment.monotonic - self._stepped if self._stepped is not None else 0.0
         self._stepped = moment.monotonic
@@ -173,6 +222,7 @@ class GatewayCore:
         self._components.goals.step(moment, period)
         self._components.streaming.step(moment)
         self._components.stop_foreign_motion(moment)
+        self._components.control.step(absences or {}, moment)
         self._components.command_handler.step(moment)
         device.configuration.step(unreachable_reason, moment)
         self._components.injections.step(moment)
@@ -203,6 +253,7 @@ class GatewayCore:
     def _finish(self, moment: Moment) -> list[Output]:
         """Tell of the device's status where it has changed, and hand the outputs out."""
         self._components.command_handler.tell_listeners(moment)
+        self._components.control.tell(moment)
         status = status_of(self.device, moment)
         if self._told is None or replace(status, stamp=0) != self._told:
             self._told = replace(status, stamp=0)

@@ -11,11 +11,13 @@ from hashlib import blake2b
 
 import msgspec
 
+from schemas.control import ControlGive, ControlJoin, ControlTake
 from schemas.device import DeviceCommandRequest, DeviceStopRequest, InjectRequest
 from schemas.gripper import GripperCommandGoal
 from schemas.joints import JointTargets
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.scene import PlanningScene
+from services.stepper_gateway.control.clients import Caller
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
 from services.stepper_gateway.ledger.record import LedgerRecord
@@ -48,6 +50,8 @@ class Parameters(_Input, frozen=True):
 class Step(_Input, frozen=True):
     """One turn of the control loop."""
 
+    absences: dict[str, float] = {}  # [s] of liveliness tokens, by key
+
 
 class Link(_Input, frozen=True):
     """How the wire is, whenever something has happened on it."""
@@ -68,6 +72,7 @@ class Frame(_Input, frozen=True):
 class Goal(_Input, frozen=True):
     goal_id: str
     goal: FollowJointTrajectoryGoal
+    session: str = ""  # that asks, here and in the next ones
 
 
 class Cancel(_Input, frozen=True):
@@ -77,6 +82,7 @@ class Cancel(_Input, frozen=True):
 class Grip(_Input, frozen=True):
     goal_id: str
     goal: GripperCommandGoal
+    session: str = ""
 
 
 class GripCancel(_Input, frozen=True):
@@ -92,11 +98,13 @@ class Scene(_Input, frozen=True):
 
 class Targets(_Input, frozen=True):
     targets: JointTargets
+    node: str = ""  # that they come from
 
 
 class Command(_Input, frozen=True):
     ticket: int
     request: DeviceCommandRequest
+    session: str = ""
 
 
 class Stop(_Input, frozen=True):
@@ -106,6 +114,7 @@ class Stop(_Input, frozen=True):
 
 class Configure(_Input, frozen=True):
     ticket: int
+    session: str = ""
 
 
 class Inject(_Input, frozen=True):
@@ -117,9 +126,28 @@ class Echo(_Input, frozen=True):
     ticket: int
 
 
+class TakeControl(_Input, frozen=True):
+    """Its secret is sealed, as in the next two: who reads the recording cannot use it."""
+
+    ticket: int
+    request: ControlTake
+    session: str
+
+
+class JoinControl(_Input, frozen=True):
+    ticket: int
+    request: ControlJoin
+    session: str
+
+
+class GiveControl(_Input, frozen=True):
+    ticket: int
+    request: ControlGive
+
+
 Input = (
     Began | Parameters | Step | Link | Frame | Goal | Cancel | Grip | GripCancel | Scene | Targets | Command | Stop
-    | Configure | Inject | Echo
+    | Configure | Inject | Echo | TakeControl | JoinControl | GiveControl
 )  # fmt: skip
 Reply = GoalVerdict | str | None  # what is said at once
 
@@ -140,34 +168,40 @@ class Given(msgspec.Struct, frozen=True, array_like=True):
 def give(core: GatewayCore, given: Input, moment: Moment) -> tuple[Reply, list[Output]]:
     """Gives the core one input; what it says at once, and its outputs."""
     match given:
-        case Step():
-            return None, core.step(moment)
+        case Step(absences):
+            return None, core.step(moment, absences)
         case Link(connected, reason):
             return None, core.on_link(connected, reason, moment)
         case Frame(kind, payload, retained, arrival):
             return None, core.on_received(Received(kind, payload, retained, arrival), moment)
-        case Targets(targets):
-            return None, core.on_targets(targets, moment)
-        case Goal(goal_id, goal):
-            return core.on_goal(goal_id, goal, moment)
+        case Targets(targets, node):
+            return None, core.on_targets(targets, moment, Caller(node=node))
+        case Goal(goal_id, goal, session):
+            return core.on_goal(goal_id, goal, moment, Caller(session))
         case Cancel(goal_id):
             return core.on_cancel(goal_id, moment)
-        case Grip(goal_id, goal):
-            return core.on_grip(goal_id, goal, moment)
+        case Grip(goal_id, goal, session):
+            return core.on_grip(goal_id, goal, moment, Caller(session))
         case GripCancel(goal_id):
             return core.on_grip_cancel(goal_id, moment)
         case Scene(version, epoch):
             core.on_scene(PlanningScene(version=version, epoch=epoch))
-        case Command(ticket, request):
-            return None, core.on_command(request, ticket, moment)
+        case Command(ticket, request, session):
+            return None, core.on_command(request, ticket, moment, Caller(session))
         case Stop(ticket, request):
             return None, core.on_stop(request, ticket, moment)
-        case Configure(ticket):
-            return None, core.on_configure(ticket, moment)
+        case Configure(ticket, session):
+            return None, core.on_configure(ticket, moment, Caller(session))
         case Inject(ticket, request):
             return None, core.on_inject(request, ticket, moment)
         case Echo(ticket):
             return None, core.on_echo(ticket, moment)
+        case TakeControl(ticket, request, session):
+            return None, core.on_take_control(request, session, ticket, moment)
+        case JoinControl(ticket, request, session):
+            return None, core.on_join_control(request, session, ticket, moment)
+        case GiveControl(ticket, request):
+            return None, core.on_give_control(request, ticket, moment)
         case Parameters(parameters):
             core.set_parameters(parameters)
         case Began():

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from schemas.actions import GoalStatusCode
+from schemas.control import ControlAnswer
 from schemas.device import ConfigureResponse, DeviceCommandResponse, EchoResponse, InjectResponse
 from schemas.gripper import GripperCommandFeedback, GripperCommandResult
 from schemas.message import Message
@@ -15,7 +16,7 @@ from schemas.topics import Topic
 from services.stepper_gateway.ledger.record import LedgerRecord
 from services.stepper_gateway.links.link import Kind
 
-Response = DeviceCommandResponse | ConfigureResponse | InjectResponse | EchoResponse
+Response = DeviceCommandResponse | ConfigureResponse | InjectResponse | EchoResponse | ControlAnswer
 
 
 @dataclass(frozen=True, slots=True)

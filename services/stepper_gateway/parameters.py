@@ -48,4 +48,7 @@ class GatewayParameters(msgspec.Struct, frozen=True, kw_only=True):
     record_inputs: Annotated[
         bool, Meta(description="publish what the core is given, twice a second, so that a recording can be replayed")
     ] = True
+    control_grace: Annotated[
+        float, Meta(ge=0.5, le=60.0, description="[s] a holder of control may be gone until it loses it, at rest")
+    ] = 3.0
     feedback_rate: Annotated[float, Meta(ge=1.0, le=50.0, description="[Hz] of goal feedback")] = 20.0

@@ -6,6 +6,9 @@ import itertools
 import threading
 from typing import Any
 
+from msgspec.structs import replace
+
+from schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlTake
 from schemas.device import (
     ConfigureRequest,
     ConfigureResponse,
@@ -25,6 +28,9 @@ from schemas.motion import (
     FollowJointTrajectoryResult,
 )
 from schemas.topics import (
+    CONTROL_GIVE,
+    CONTROL_JOIN,
+    CONTROL_TAKE,
     DEVICE_COMMAND,
     DEVICE_CONFIGURE,
     DEVICE_ECHO,
@@ -40,6 +46,7 @@ from services.runtime.actions.server import ActionServer, GoalDecision, accept, 
 from services.runtime.node import Node
 from services.runtime.parameters import ParameterSet
 from services.runtime.requests.server import Pending
+from services.stepper_gateway.control.control import seal
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
 from services.stepper_gateway.input_log import InputLog
@@ -50,17 +57,20 @@ from services.stepper_gateway.inputs import (
     Configure,
     Echo,
     Frame,
+    GiveControl,
     Goal,
     Grip,
     GripCancel,
     Inject,
     Input,
+    JoinControl,
     Link,
     Parameters,
     Reply,
     Scene,
     Step,
     Stop,
+    TakeControl,
     Targets,
 )
 from services.stepper_gateway.ledger.ledger_file import LedgerFile
@@ -82,6 +92,7 @@ from services.stepper_gateway.outputs import (
 )
 from services.stepper_gateway.parameters import GatewayParameters
 
+JOGGER = "planner"  # the node that streams targets for others
 AT_ONCE = 16  # payloads handled before the loop looks at its deadline and for stops; chosen: about 1 ms
 
 Server = ActionServer[FollowJointTrajectoryGoal, FollowJointTrajectoryFeedback, FollowJointTrajectoryResult]
@@ -109,13 +120,17 @@ class Shell:
         self._tickets = itertools.count(1)
         self._server: Server = node.serve_action(FOLLOW_JOINT_TRAJECTORY, self._on_goal, self._on_cancel)
         self._gripper: Gripper = node.serve_action(GRIPPER_COMMAND, self._on_grip, self._on_grip_cancel)
-        node.subscribe(JOINT_TARGETS, self._on_targets)
+        self._absences = node.absences()
+        node.subscribe_signed(JOINT_TARGETS, self._on_targets)
         node.subscribe(SCENE, lambda scene: self._give(Scene(scene.version, scene.epoch)))
         self._commands = node.serve_later(DEVICE_COMMAND, self._on_command)
         node.serve_later(DEVICE_STOP, self._on_stop)
         node.serve_later(DEVICE_CONFIGURE, self._on_configure)
         node.serve_later(DEVICE_INJECT, self._on_inject)
         node.serve_later(DEVICE_ECHO, self._on_echo)
+        node.serve_later(CONTROL_TAKE, self._on_take_control)
+        node.serve_later(CONTROL_JOIN, self._on_join_control)
+        node.serve_later(CONTROL_GIVE, self._on_give_control)
 
     def use(self, link: links.Link) -> None:
         self._link = link
@@ -132,7 +147,8 @@ class Shell:
         if self._parameters.value is not self._told:
             self._told = self._parameters.value
             self._give(Parameters(self._told))
-        self._give(Step())
+        moment = self._moment()
+        self._give(Step(self._absences.seconds(self._core.watched_clients, moment.monotonic)))
         moment = self._moment()
         reason = self._core.not_ready(moment)
         self._node.set_ready(not reason, reason)
@@ -158,22 +174,23 @@ class Shell:
             self.wake()
 
     def _on_goal(self, goal_id: str, goal: FollowJointTrajectoryGoal) -> GoalDecision:
-        return _decision(self._give(Goal(goal_id, goal)))
+        return _decision(self._give(Goal(goal_id, goal, self._server.session_of(goal_id))))
 
     def _on_cancel(self, goal_id: str) -> str:
         return str(self._give(Cancel(goal_id)))
 
     def _on_grip(self, goal_id: str, goal: GripperCommandGoal) -> GoalDecision:
-        return _decision(self._give(Grip(goal_id, goal)))
+        return _decision(self._give(Grip(goal_id, goal, self._gripper.session_of(goal_id))))
 
     def _on_grip_cancel(self, goal_id: str) -> str:
         return str(self._give(GripCancel(goal_id)))
 
-    def _on_targets(self, targets: JointTargets) -> None:
-        self._give(Targets(targets))
+    def _on_targets(self, targets: JointTargets, writer: str) -> None:
+        """The planner's are those of whom it jogs for; of anybody else it does not count what they say of that."""
+        self._give(Targets(targets, targets.client or writer if writer == JOGGER else writer))
 
     def _on_command(self, request: DeviceCommandRequest, pending: Pending[DeviceCommandResponse]) -> None:
-        self._give(Command(self._ticket(pending), request))
+        self._give(Command(self._ticket(pending), request, pending.client))
 
     def _on_stop(self, request: DeviceStopRequest, pending: Pending[DeviceCommandResponse]) -> None:
         """What waits behind a stop was asked for before it, and must not move the arm after it."""
@@ -184,7 +201,7 @@ class Shell:
         self._give(Stop(self._ticket(pending), request))
 
     def _on_configure(self, _request: ConfigureRequest, pending: Pending[ConfigureResponse]) -> None:
-        self._give(Configure(self._ticket(pending)))
+        self._give(Configure(self._ticket(pending), pending.client))
 
     def _on_inject(self, request: InjectRequest, pending: Pending[InjectResponse]) -> None:
         self._give(Inject(self._ticket(pending), request))
@@ -197,6 +214,17 @@ class Shell:
         reply, outputs = self._inputs.give(given, self._moment())
         self._carry_out(outputs)
         return reply
+
+    def _on_take_control(self, request: ControlTake, pending: Pending[ControlAnswer]) -> None:
+        sealed = replace(request, secret=seal(request.secret))
+        self._give(TakeControl(self._ticket(pending), sealed, pending.client))
+
+    def _on_join_control(self, request: ControlJoin, pending: Pending[ControlAnswer]) -> None:
+        sealed = replace(request, secret=seal(request.secret))
+        self._give(JoinControl(self._ticket(pending), sealed, pending.client))
+
+    def _on_give_control(self, request: ControlGive, pending: Pending[ControlAnswer]) -> None:
+        self._give(GiveControl(self._ticket(pending), replace(request, secret=seal(request.secret))))
 
     def _ticket(self, pending: Pending[Any]) -> int:
         ticket = next(self._tickets)

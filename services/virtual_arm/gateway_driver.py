@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from schemas.actions import GoalStatusCode
+from schemas.control import ControlAnswer, ControlGive, ControlJoin, ControlTake
 from schemas.device import (
     ConfigureResponse,
     DeviceCommand,
@@ -33,8 +34,10 @@ from schemas.motion import (
     FollowJointTrajectoryResult,
     JointTrajectory,
 )
+from schemas.system import LogLevel
 from schemas.topics import Topic
 from services.arm.model.description import Arm
+from services.stepper_gateway.control.clients import Caller
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.device.command_arguments import KINDS
 from services.stepper_gateway.goals.goal_executor import GoalVerdict
@@ -56,7 +59,7 @@ from services.stepper_gateway.outputs import (
 )
 from services.stepper_gateway.parameters import GatewayParameters
 
-__all__ = ["GatewayDriver", "GatewayParameters", "Kind", "Moment", "asked"]
+__all__ = ["Caller", "GatewayDriver", "GatewayParameters", "Kind", "Moment", "asked"]
 
 Ended = tuple[GoalStatusCode, FollowJointTrajectoryResult]
 
@@ -78,7 +81,10 @@ class GatewayDriver(ABC):
         self.configured: dict[int, ConfigureResponse] = {}
         self.pressed: dict[int, InjectResponse] = {}
         self.echoed: dict[int, EchoResponse] = {}
+        self.controlled: dict[int, ControlAnswer] = {}  # by ticket
+        self.absences: dict[str, float] = {}  # [s] of liveliness tokens, by key
         self.log: list[str] = []
+        self.levels: list[LogLevel] = []  # of the lines of `log`
         self.kept: list[LedgerRecord] = []  # of the step ledger
         self._on_message = on_message
 
@@ -118,11 +124,16 @@ class GatewayDriver(ABC):
         """Names of all device events, oldest first."""
         return [event.event for event in self.published["device/events"]]
 
-    def goal(self, goal: FollowJointTrajectoryGoal | JointTrajectory, goal_id: str = "g") -> GoalVerdict:
+    def goal(
+        self,
+        goal: FollowJointTrajectoryGoal | JointTrajectory,
+        goal_id: str = "g",
+        caller: Caller = Caller(),  # noqa: B008 a tuple of texts
+    ) -> GoalVerdict:
         """Asks the gateway to follow a trajectory; returns its acceptance or refusal."""
         if isinstance(goal, JointTrajectory):
             goal = FollowJointTrajectoryGoal(trajectory=goal)
-        verdict, outputs = self.core.on_goal(goal_id, goal, self.moment)
+        verdict, outputs = self.core.on_goal(goal_id, goal, self.moment, caller)
         self.carry_out(outputs)
         return verdict
 
@@ -131,10 +142,16 @@ class GatewayDriver(ABC):
         assert self.run(seconds, lambda: goal_id in self.finished), f"{goal_id} has not ended"
         return self.finished[goal_id]
 
-    def grip(self, position: float, max_effort: float = 0.0, goal_id: str = "grip") -> GoalVerdict:
+    def grip(
+        self,
+        position: float,
+        max_effort: float = 0.0,
+        goal_id: str = "grip",
+        caller: Caller = Caller(),  # noqa: B008 a tuple of texts
+    ) -> GoalVerdict:
         """Asks the gripper to open or close to `position` [m]; returns its acceptance or refusal."""
         goal = GripperCommandGoal(position=position, max_effort=max_effort)
-        verdict, outputs = self.core.on_grip(goal_id, goal, self.moment)
+        verdict, outputs = self.core.on_grip(goal_id, goal, self.moment, caller)
         self.carry_out(outputs)
         return verdict
 
@@ -159,20 +176,22 @@ class GatewayDriver(ABC):
         """Streams a target [rad] or [m] for the joints named."""
         self.stream(JointTargets(name=tuple(positions), position=tuple(positions.values())))
 
-    def stream(self, targets: JointTargets) -> None:
-        """Hands the gateway one message of streamed targets."""
-        self.carry_out(self.core.on_targets(targets, self.moment))
+    def stream(self, targets: JointTargets, node: str = "") -> None:
+        """Hands the gateway one message of streamed targets of `node`."""
+        self.carry_out(self.core.on_targets(targets, self.moment, Caller(node=node)))
 
     def command(self, kind: DeviceCommandKind, ticket: int = 1, **positions: float) -> None:
         """Asks for the command of that number, with positions [rad] or [m] of the joints named."""
         self.ask(asked(kind, name=tuple(positions), position=tuple(positions.values())), ticket)
 
-    def ask(self, wanted: DeviceCommand | StopKind, ticket: int = 1) -> None:
+    def ask(self, wanted: DeviceCommand | StopKind, ticket: int = 1, session: str = "") -> None:
         """Asks for a command or a stop; its answer comes in `answers`."""
         if isinstance(wanted, StopKind):
             self.carry_out(self.core.on_stop(DeviceStopRequest(kind=wanted), ticket, self.moment))
         else:
-            self.carry_out(self.core.on_command(DeviceCommandRequest(command=wanted), ticket, self.moment))
+            self.carry_out(
+                self.core.on_command(DeviceCommandRequest(command=wanted), ticket, self.moment, Caller(session))
+            )
 
     def answer(self, wanted: DeviceCommand | StopKind, ticket: int = 1, seconds: float = 3.0) -> DeviceCommandResponse:
         """Asks for a command or a stop; returns its answer, at most `seconds` [s] later, after the next states."""
@@ -180,6 +199,16 @@ class GatewayDriver(ABC):
         assert self.run(seconds, lambda: ticket in self.answers), f"{wanted} is not answered"
         self.run(0.1)
         return self.answers.pop(ticket)
+
+    def control(self, request: ControlTake | ControlJoin | ControlGive, session: str, ticket: int = 1) -> None:
+        """Asks for control, a share of it, or gives it back; the answer comes in `controlled`."""
+        match request:
+            case ControlTake():
+                self.carry_out(self.core.on_take_control(request, session, ticket, self.moment))
+            case ControlJoin():
+                self.carry_out(self.core.on_join_control(request, session, ticket, self.moment))
+            case ControlGive():
+                self.carry_out(self.core.on_give_control(request, ticket, self.moment))
 
     def configure(self, seconds: float = 6.0) -> ConfigureResponse:
         """Sends the device its configuration; returns the answer, at most `seconds` [s] later."""
@@ -229,10 +258,13 @@ class GatewayDriver(ABC):
                     self.pressed[ticket] = response
                 case Answer(ticket, EchoResponse() as response):
                     self.echoed[ticket] = response
+                case Answer(ticket, ControlAnswer() as response):
+                    self.controlled[ticket] = response
                 case KeepLedger(record):
                     self.kept.append(record)
-                case LogLine(_, text):
+                case LogLine(level, text):
                     self.log.append(text)
+                    self.levels.append(level)
 
 
 def asked(kind: DeviceCommandKind, **fields: Any) -> DeviceCommand | StopKind:

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from schemas.control import ControlState
 from schemas.device import DeviceState, DeviceStatus, SensorReadings, ShaftPositions
 from schemas.joints import JointState, StepErrors
 from schemas.ledger import StepLedger, StoppingDistance
@@ -105,6 +106,10 @@ class Visualizer:
     def on_stopping_distance(self, message: StoppingDistance) -> None:
         """How far the tool goes if all is lost now."""
         self._panel_inputs = replace(self._panel_inputs, stopping=message)
+
+    def on_control(self, message: ControlState) -> None:
+        """Who alone may move the arm."""
+        self._panel_inputs = replace(self._panel_inputs, control=message)
 
     def on_planned_path(self, message: PlannedPath) -> None:
         """The planned path of the tool."""

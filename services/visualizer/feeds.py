@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from schemas.gripper import GripperState
 from schemas.topics import (
     CONTACTS,
+    CONTROL,
     DEVICE_EVENTS,
     DEVICE_SHAFT,
     DEVICE_STATE,
@@ -57,6 +58,7 @@ def feeds(core: Visualizer, arm: Arm, cameras: Sequence[str]) -> list[Feed]:
         Feed(DEVICE_SHAFT, core.on_shaft, True),
         Feed(STEP_LEDGER, core.on_step_ledger),
         Feed(STOPPING_DISTANCE, core.on_stopping_distance),
+        Feed(CONTROL, core.on_control),
         Feed(PLANNED_PATH, core.on_planned_path),
         Feed(SCENE, core.scene.on_scene),
         Feed(GRIPPER_STATE, on_gripper),

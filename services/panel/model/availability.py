@@ -11,6 +11,7 @@ from services.panel.model.readings import Readings
 Reason = tuple[str, str] | None  # key of the words, value; None: it can be done
 
 MOVING = (DeviceMode.RUN, DeviceMode.HOLD, DeviceMode.HOMING)
+OF_THE_HOLDER = ("move", "jog", "arm", "home", "reference", "reset", "resume", "output", "grip")
 FAULTY = (DeviceMode.FAULT, DeviceMode.ESTOP)
 
 
@@ -22,8 +23,18 @@ def reasons(arm: gemelo.Arm, readings: Readings) -> dict[str, Reason]:
         return dict.fromkeys((*CHECKS, "home", "inject"), gone)
     found = {name: check(state) for name, check in CHECKS.items()}
     found["home"] = _home(arm, state)
+    if (other := other_holder(arm, readings)) is not None:
+        found |= dict.fromkeys(OF_THE_HOLDER, ("other_in_control", other))
     found["inject"] = None if readings.status is not None and readings.status.virtual else ("not_virtual", "")
     return found
+
+
+def other_holder(arm: gemelo.Arm, readings: Readings) -> str | None:
+    """The name of who holds control of the arm, if that is neither nobody nor this page."""
+    control = readings.control
+    if control is None or not control.held or arm.node.name in control.members:
+        return None
+    return control.name
 
 
 def _move(state: DeviceState) -> Reason:

@@ -19,6 +19,7 @@ from services.panel.model.problems import Problem, problem_of
 from services.panel.model.readings import Bus
 from services.panel.model.teaching import Teaching
 
+PAGE = "the page"  # the holder's name, where the page has taken control
 KEPT = 30.0  # [s] that a problem stays on the page
 
 
@@ -156,6 +157,15 @@ class Operator:
     def set_speed(self, share: float) -> None:
         """Of everything that is played from now on."""
         self.guarded(lambda: self.arm.speed(share))
+
+    def take_control(self, force: bool = False) -> None:
+        """For everybody who has this page open; `force`: also from another holder."""
+        self.forget_problem()
+        self.guarded(lambda: self.arm.control.take(PAGE, force=force))
+
+    def give_control(self) -> None:
+        """Everybody may move the arm again."""
+        self.guarded(self.arm.control.give)
 
     def home(self, *joints: str) -> None:
         """All joints with a switch, or those named; `homing` says how far."""

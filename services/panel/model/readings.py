@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import gemelo
 from gemelo.device import fault_of
+from schemas.control import ControlState
 from schemas.device import DeviceState, DeviceStatus
 from schemas.gripper import GripperState
 from schemas.ledger import StepLedger, StoppingDistance
@@ -35,6 +36,7 @@ class Readings:
     gripper: GripperState | None
     ledger: StepLedger | None
     stopping: StoppingDistance | None
+    control: ControlState | None = None
 
     @property
     def is_live(self) -> bool:
@@ -58,6 +60,7 @@ class Bus:
         self._path, self._jog = node.latest(topics.PLANNED_PATH), node.latest(topics.JOG_STATUS)
         self._gripper = node.latest(topics.GRIPPER_STATE)
         self._ledger, self._stopping = node.latest(topics.STEP_LEDGER), node.latest(topics.STOPPING_DISTANCE)
+        self._control = node.latest(topics.CONTROL)
         self._log: deque[LogRecord] = deque(maxlen=LOG_LINES)
         node.subscribe(topics.LOG, self._log.append)
 
@@ -80,6 +83,7 @@ class Bus:
             gripper=self._gripper.message if not self._gripper.is_stale else None,
             ledger=self._ledger.message if not self._ledger.is_stale else None,
             stopping=self._stopping.message if not self._stopping.is_stale else None,
+            control=self._control.message,
         )
 
     @property

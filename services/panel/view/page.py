@@ -15,6 +15,7 @@ from services.panel.model.availability import reasons
 from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
 from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, read_browser, script_html
+from services.panel.view.control_box import ControlBox
 from services.panel.view.kit import Kit, Mirror, box, esc, picture, set_if_new, without_event
 from services.panel.view.pick_box import PickBox
 from services.panel.view.tabs.device import DeviceTab
@@ -69,6 +70,7 @@ class Page:
         set_if_new(self._hold, "visible", not is_held)
         set_if_new(self._resume, "visible", is_held)
         set_if_new(self._header, "content", self._header_text(readings))
+        self._control.refresh(readings)
         self._show_problem()
         self._move.refresh(readings)
         self._jog.refresh(readings)
@@ -115,6 +117,7 @@ class Page:
         self._speed.on_update(
             lambda event: self._operator.set_speed(event.target.value / 100.0) if event.client_id is not None else None
         )
+        self._control = ControlBox(kit)
         self._problem = kit.line()
         self._nearest = kit.button(words("take_nearest"), self._take_nearest, color="orange")
         self._read = kit.button(words("understood"), self._operator.forget_problem, color="gray")

@@ -32,6 +32,7 @@ class GoalRecord:
     response: GoalResponse
     status: GoalStatusCode = GoalStatusCode.ACCEPTED
     result: msgspec.Raw = field(default_factory=lambda: NIL)
+    session: str = ""  # that has sent it, as it says itself
     ended: float = 0.0  # [s] monotonic
     waiting: list[tuple[float, Pending[ResultResponse]]] = field(default_factory=list)  # until when, who
 

@@ -110,6 +110,10 @@ class ActionServer(Generic[G, F, R]):
         """Refuses the goals that have arrived by now and were not looked at yet."""
         self._goal_requests.refuse_waiting(reason)
 
+    def session_of(self, goal_id: str) -> str:
+        """The session that has sent a goal that is decided upon, or was accepted; empty where it did not say."""
+        return self._goals[goal_id].session
+
     @property
     def active(self) -> tuple[str, ...]:
         """The goals that have not ended, oldest first."""
@@ -124,10 +128,10 @@ class ActionServer(Generic[G, F, R]):
 
     def _answer_goal(self, request: GoalRequest, pending: Pending[GoalResponse]) -> None:
         known = self._goals.get(request.goal_id)
-        pending.reply(known.response if known else self._decide(request))
+        pending.reply(known.response if known else self._decide(request, pending.client))
         self._publish_status()
 
-    def _decide(self, request: GoalRequest) -> GoalResponse:
+    def _decide(self, request: GoalRequest, session: str) -> GoalResponse:
         if not request.goal_id:
             raise Refused(f"{self.action.key}: a goal needs an id", "bad request")
         try:
@@ -137,7 +141,8 @@ class ActionServer(Generic[G, F, R]):
         if self._cancelled_early.pop(request.goal_id, None) is not None:
             reason = "it was cancelled before it was looked at"
             return GoalResponse(accepted=False, reason=reason, stamp=time.time_ns())
-        goal = GoalRecord(request.goal_id, request.client, GoalResponse(accepted=True, stamp=time.time_ns()))
+        response = GoalResponse(accepted=True, stamp=time.time_ns())
+        goal = GoalRecord(request.goal_id, request.client, response, session=session)
         self._goals.add(goal)
         decision = refuse(0, "the server failed")
         try:

@@ -63,6 +63,11 @@ class AnswerReport:
 class Pending(Protocol[R_contra]):
     """A request, or several equal ones, that wait for their answer."""
 
+    @property
+    def client(self) -> str:
+        """The session that asks, as it says itself; of several the first."""
+        ...
+
     def reply(self, response: R_contra) -> None:
         """Only the first answer counts; from any thread."""
 
@@ -75,6 +80,7 @@ class PendingQuery(Generic[R]):
 
     def __init__(self, query: Query, report: AnswerReport | None = None) -> None:
         self._query, self._report = query, report
+        self.client = query.client
         self._is_answered = False
 
     def reply(self, response: R) -> None:
@@ -83,7 +89,7 @@ class PendingQuery(Generic[R]):
             self._is_answered = True
             self._query.reply(schema_of(type(response)), payload)
             if self._report is not None:
-                self._report.answered((self._query.client,), payload)
+                self._report.answered((self.client,), payload)
 
     def refuse(self, kind: str, message: str) -> None:
         if not self._is_answered:
@@ -91,7 +97,7 @@ class PendingQuery(Generic[R]):
             failure = Failure(kind=kind, message=message)
             self._query.fail(schema_of(Failure), to_payload(failure))
             if self._report is not None:
-                self._report.refused((self._query.client,), failure)
+                self._report.refused((self.client,), failure)
 
 
 class PendingGroup(Generic[R]):

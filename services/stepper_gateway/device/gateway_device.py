@@ -57,12 +57,21 @@ class GatewayDevice:
         return self.unreachable_reason(moment) or self.not_ready_reason() or self.commands.not_ready_reason()
 
     def event(
-        self, event: str, detail: str, moment: Moment, level: LogLevel = LogLevel.WARNING, log_text: str = ""
+        self,
+        event: str,
+        detail: str,
+        moment: Moment,
+        level: LogLevel = LogLevel.WARNING,
+        log_text: str = "",
+        client: str = "",
     ) -> None:
-        """Tell of something once, on the bus and in the log; there as `log_text`, where that is given."""
-        self.out.publish(
-            DEVICE_EVENTS, DeviceEvent(stamp=moment.unix, device=self.arm.device.name, event=event, detail=detail)
-        )
+        """Tell of something once, on the bus and in the log; there as `log_text`, where that is given.
+
+        `client` is the node that it is about, if not about everybody.
+        """
+        name = self.arm.device.name
+        told = DeviceEvent(stamp=moment.unix, device=name, event=event, detail=detail, client=client)
+        self.out.publish(DEVICE_EVENTS, told)
         self.out.log(level, log_text or (f"{event}: {detail}" if detail else event))
 
 

@@ -79,11 +79,15 @@ class GripperExecutor:
         """Let the jaws stay where they are; empty, or why there is nothing to cancel."""
         if self._grip is None or self._grip.goal_id != goal_id:
             return f"goal {goal_id} is not being carried out"
-        sending = self._jaws.stopping() if self._jaws is not None else None
-        if sending is not None:
-            self._commands.have_sent(*sending, None, moment)
+        self._keep_jaws(moment)
         self._end(GoalStatusCode.CANCELED, "cancelled", moment)
         return ""
+
+    def stop(self, reason: str, moment: Moment) -> None:
+        """Let the jaws stay where they are, and abort what was under way."""
+        if self._grip is not None:
+            self._keep_jaws(moment)
+            self._end(GoalStatusCode.ABORTED, reason, moment)
 
     def abort(self, reason: str, moment: Moment) -> None:
         """What was under way is not watched any more."""
@@ -116,6 +120,11 @@ class GripperExecutor:
         if moment.monotonic >= self._due and not self._device.unreachable_reason(moment):
             self._due = next_beat(self._due, moment.monotonic, PERIOD)
             self._device.out.publish(GRIPPER_STATE, self._state(self._jaws, moment))
+
+    def _keep_jaws(self, moment: Moment) -> None:
+        sending = self._jaws.stopping() if self._jaws is not None else None
+        if sending is not None:
+            self._commands.have_sent(*sending, None, moment)
 
     def _require(self, goal: GripperCommandGoal, moment: Moment) -> Jaws:
         if self._jaws is None or self._gripper is None:

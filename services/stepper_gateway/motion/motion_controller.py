@@ -82,6 +82,10 @@ class MotionController:
         stream = self.stream
         return stream is None or stream.is_abandoned or stream.is_finished
 
+    def is_still(self) -> bool:
+        """True if nothing of ours is under way to the device, in whatever mode it stands, and the last STOP is done."""
+        return not self.is_followable and (not self._awaits_stop or self.has_stopped())
+
     @property
     def slowdown_share(self) -> float:
         """Share of the time, 0 to 1, by which a goal may end later, because a person wants the arm slow."""

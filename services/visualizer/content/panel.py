@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from schemas.control import ControlState
 from schemas.device import DeviceMode, DeviceState, DeviceStatus, SensorReadings, ShaftPositions
 from schemas.device_faults import explain
 from schemas.joints import JointState, StepErrors
@@ -27,6 +28,7 @@ class PanelInputs:
     shaft: ShaftPositions | None = None
     ledger: StepLedger | None = None
     stopping: StoppingDistance | None = None
+    control: ControlState | None = None
     prismatic: frozenset[str] = frozenset()
 
 
@@ -34,6 +36,7 @@ def panel(inputs: PanelInputs, now: int) -> str:
     """Markdown; `now` in ns UNIX."""
     parts = (
         _heading(inputs, now),
+        _control(inputs),
         _open_loop(inputs),
         _lost(inputs),
         _device(inputs, now),
@@ -152,6 +155,15 @@ def _ledger(inputs: PanelInputs) -> str:
         f"tool error {1e3 * ledger.tool_error:.2f} mm, at most {1e3 * ledger.tool_bound:.2f} mm ({ledger.level:.0%}) · "
         f"**{_percent(ledger.arm_confidence)} sure** that no step is lost: {sure}"
     )
+
+
+def _control(inputs: PanelInputs) -> str:
+    """Who alone may move the arm."""
+    control = inputs.control
+    if control is None or not control.held:
+        return ""
+    name = control.name.replace("`", "'")
+    return f"control: `{name}` (node `{control.node}` on `{control.host}`): nobody else moves the arm"
 
 
 def _stopping(inputs: PanelInputs) -> str:
