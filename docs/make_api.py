@@ -20,6 +20,7 @@ SECTIONS = (  # title, names
     ("The step ledger", ("Ledger", "JointLedger", "Verification")),
     ("The scene", ("Scene", "load_mesh")),
     ("The device", ("Device",)),
+    ("Who may move the arm", ("Control", "Hold")),
     ("Errors", ("Error", "BadArgument", "Refused", "Aborted", "Canceled", "Lost", "Interrupted")),
     ("Units and poses", ("deg", "mm", "Pose")),
 )
@@ -81,7 +82,7 @@ def _members(owner: str, kind: type) -> Iterator[str]:
 
 def _variable(owner: str) -> str:
     """What a value of the class is called in the examples."""
-    return {"Scene": "arm.scene", "Device": "arm.device"}.get(owner, owner.lower())
+    return {"Scene": "arm.scene", "Device": "arm.device", "Control": "arm.control"}.get(owner, owner.lower())
 
 
 def _fields(kind: type) -> Iterator[str]:

@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Self, Unpack
 
 from gemelo.arguments import Grip, Joints, Target, ToolGoal, Vector, Waypoint
-from gemelo.control import Control, Hold
+from gemelo.control import Control, Hold, named_where_another_moves
 from gemelo.device import Device, reference_command
 from gemelo.errors import BadArgument
 from gemelo.frames import Frames
@@ -500,7 +500,8 @@ class Arm:
             request = request_of(self.description, target, self._frames.look_up)
         elif target:
             raise BadArgument(f"plan a request, or say where to: not both, as {next(iter(target))}= does")
-        return make_plan(self._session, request, target, on_progress)
+        with named_where_another_moves(self._control, self.name):
+            return make_plan(self._session, request, target, on_progress)
 
     def execute(
         self,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import secrets
-from contextlib import suppress
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
@@ -20,6 +22,7 @@ from services.runtime.node import Node
 TO_REST = 15.0  # [s] that the arm may take to come to rest, where another moves it
 TO_ANSWER = 2.0  # [s]
 TO_BE_TOLD = 2.0  # [s] from the answer to the topic that says the same
+MOVES = "moving start"  # the planner's check that the arm stands
 REMEDY = "arm.take_control()"
 
 
@@ -126,6 +129,8 @@ class Control:
 
         >>> arm.control.give_with(arm.control.take("ana"))
         """
+        if self._own is not None and self._own.secret == secret:
+            self._own = None
         self._require(self._session.call(CONTROL_GIVE, ControlGive(secret=secret), TO_ANSWER), "give")
         self._session.wait_for(lambda: not self.held, TO_BE_TOLD)
 
@@ -191,6 +196,23 @@ class Hold:
         >>> arm.take_control().give()
         """
         self._control.give()
+
+
+@contextmanager
+def named_where_another_moves(control: Control, robot: str) -> Iterator[None]:
+    """A plan that is refused because the arm moves: where another holds control, `Refused` with that one's name."""
+    try:
+        yield
+    except Refused as refused:
+        if refused.check != MOVES or control.may_move:
+            raise
+        state = control.state
+        clock = time.strftime("%H:%M:%S", time.gmtime(state.since // 1_000_000_000))
+        reason = (
+            f"{state.name} holds control of {robot}, since {clock} UTC, from node {state.node} on {state.host}, "
+            "and moves it: ask for it, or run `gemelo control take --force`"
+        )
+        raise Refused(f"refused: {reason}", check="control", subject=state.name, reason=reason) from refused
 
 
 def shared_secret(robot: str, deployment: Deployment) -> str:

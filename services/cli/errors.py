@@ -77,6 +77,7 @@ def require_name(kind: str, name: str, parts: Sequence[Input] | Sequence[Output]
 COMMAND_OF = (  # methods of `gemelo` that its sentences name, and the commands that do the same
     (r"arm\.device\.arm\(\)", "`gemelo device arm`"),
     (r"arm\.device\.reset\(\)", "`gemelo reset`"),
+    (r"arm\.take_control\(\)", "`gemelo control take`"),
     (r"arm\.home\(\)", "`gemelo home`"),
     (r"arm\.verify\(\)", "`gemelo verify`"),
     (r"arm\.reference\(\{\.\.\.\}\)", "`gemelo reference --joints NAME=...`"),

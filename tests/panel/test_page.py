@@ -211,6 +211,30 @@ def test_an_emergency_stop_is_shown_with_its_remedy_and_the_page_leads_out_of_it
     person.reads("At rest")
 
 
+def test_who_holds_control_is_shown_and_the_page_takes_it_gives_it_back_and_is_refused_by_name(
+    person: Person, arm: gemelo.Arm
+) -> None:
+    person.reads("Nobody holds control")
+    person.press("Take control")
+    person.reads("This page holds control")
+    until(lambda: arm.control.holder, lambda holder: holder == "the page")
+    with pytest.raises(gemelo.Refused, match="the page holds control of rm1"):
+        arm.move(named="left")
+    person.types(f"{ARM} [°]", 20)
+    person.press("Plan and execute")
+    arrives(arm, ARM, 20.0)
+    person.press("Give control back")
+    person.reads("Nobody holds control")
+    with arm.take_control("ana"):
+        person.reads("ana holds control (node ")
+        expect(person.button("Plan and execute")).to_be_disabled()
+        arm.move(named="home")
+        person.press("Take control from the holder")
+        until(lambda: arm.control.holder, lambda holder: holder == "the page")
+    person.press("Give control back")
+    until(lambda: arm.control.held, lambda held: not held)
+
+
 def test_a_planner_that_is_killed_is_named_and_planning_goes_on_when_it_is_back(
     person: Person, arm: gemelo.Arm, twin: Stack
 ) -> None:

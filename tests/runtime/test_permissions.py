@@ -337,6 +337,11 @@ def test_what_the_issue_says_of_the_roles_is_what_the_tables_give():
     moving = {"joint_targets", "jog", "plan", "device/command", "scene/edit", "follow_joint_trajectory/goal"}
     assert not of_a_viewer & moving
     assert "plan" not in MAY["viewer"].serves
+    control = {"control/take", "control/join", "control/give"}
+    assert [name for name in NAMES if MAY[name].asks & control] == ["panel", "operator", "script"]
+    assert [name for name in NAMES if MAY[name].serves & control] == ["gateway"]
+    assert [name for name in NAMES if "control" in MAY[name].publishes] == ["gateway"]
+    assert not any(f"@request/{key}" in may.subscribes | may.publishes for key in control for may in MAY.values())
     assert not any(key.startswith("device/") for key in MAY["planner"].publishes | MAY["planner"].serves)
     assert [name for name in NAMES if "joint_states" in MAY[name].publishes] == ["gateway"]
     assert all("device/stop" in may.asks for name, may in MAY.items() if name != "gateway")

@@ -139,6 +139,7 @@ ENGLISH: dict[str, str] = {
     "remove_program": "Delete the program",
     "not_saved": "Not saved yet.",
     "checking": "Planning every leg ...",
+    "check_control": "Somebody else holds control",
     "check_ok": "The whole program can run: {duration} s.",
     "choose_step": "Choose a step first.",
     "choose_name": "Something is not chosen: there is none yet, or none of that kind.",

@@ -139,6 +139,7 @@ SPANISH: dict[str, str] = {
     "remove_program": "Borrar el programa",
     "not_saved": "Aún sin guardar.",
     "checking": "Planificando cada tramo ...",
+    "check_control": "El mando lo tiene otra persona",
     "check_ok": "Todo el programa se puede ejecutar: {duration} s.",
     "choose_step": "Elija primero un paso.",
     "choose_name": "Falta elegir algo: aún no hay ninguno, o ninguno de esa clase.",
