@@ -179,6 +179,20 @@ def test_a_gripper_goal_of_others_is_refused_by_name() -> None:
     assert rig.grip(0.0, caller=session_of(ANA)).code is not FollowErrorCode.NOT_IN_CONTROL
 
 
+def test_a_forced_take_leaves_the_jaws_where_they_are_and_ends_their_goal_with_the_reason() -> None:
+    rig = held_by_ana()
+    assert rig.grip(0.05, caller=session_of(ANA)).accepted
+    assert rig.finish_grip()[0] is GoalStatusCode.SUCCEEDED
+    assert rig.grip(0.0, caller=session_of(ANA)).accepted
+    rig.run(0.05)
+    rig.control(take(BEN, force=True), BEN.session, 2)
+    status, result = rig.finish_grip(seconds=0.1)
+    assert status is GoalStatusCode.ABORTED
+    assert "ben (node cli-2 on desk-2) takes control" in result.error_string
+    assert rig.run(1.0, lambda: 2 in rig.controlled)
+    assert rig.controlled[2].accepted
+
+
 def test_a_second_take_is_refused_by_name() -> None:
     rig = held_by_ana()
     rig.control(take(BEN), BEN.session, 2)
