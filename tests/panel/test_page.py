@@ -220,15 +220,11 @@ def test_who_holds_control_is_shown_and_the_page_takes_it_gives_it_back_and_is_r
     until(lambda: arm.control.holder, lambda holder: holder == "the page")
     with pytest.raises(gemelo.Refused, match="the page holds control of rm1"):
         arm.move(named="left")
-    person.types(f"{ARM} [°]", 20)
-    person.press("Plan and execute")
-    arrives(arm, ARM, 20.0)
     person.press("Give control back")
     person.reads("Nobody holds control")
     with arm.take_control("ana"):
         person.reads("ana holds control (node ")
         expect(person.button("Plan and execute")).to_be_disabled()
-        arm.move(named="home")
         person.press("Take control from the holder")
         until(lambda: arm.control.holder, lambda holder: holder == "the page")
     person.press("Give control back")

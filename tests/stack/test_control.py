@@ -169,7 +169,10 @@ def test_a_command_after_the_dashes_runs_under_control_and_its_exit_code_counts(
 def test_a_terminal_from_which_control_was_forced_says_who_has_it(
     stack: Stack, ben: gemelo.Arm, tmp_path: Path
 ) -> None:
-    with taking(stack, tmp_path) as holder, ben.take_control("ben", force=True):
+    with taking(stack, tmp_path) as holder:
+        moved = command(stack, tmp_path, "move", "--joints", f"brazo_joint={far(ben)}rad")
+        assert moved.returncode == 0, moved.stderr
+        ben.take_control("ben", force=True)
         _, errors = holder.communicate(timeout=10.0)
         assert holder.returncode == 1
         assert "control is lost: ben holds control of rm1" in errors
@@ -177,6 +180,7 @@ def test_a_terminal_from_which_control_was_forced_says_who_has_it(
         assert told.returncode == 1
         assert "ben holds control of rm1" in told.stderr
         assert command(stack, tmp_path, "stop").returncode == 0
+    ben.control.give()
 
 
 def test_a_frozen_terminal_loses_control_and_says_so_when_it_wakes(
