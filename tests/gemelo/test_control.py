@@ -22,7 +22,7 @@ from schemas.joints import JointTargets
 from schemas.message import encode
 from schemas.motion import FollowErrorCode, FollowJointTrajectoryGoal
 from schemas.system import Failure
-from schemas.topics import CONTROL, CONTROL_TAKE, DEVICE_EVENTS, FOLLOW_JOINT_TRAJECTORY, LOG
+from schemas.topics import CONTROL, CONTROL_TAKE, DEVICE_EVENTS, FOLLOW_JOINT_TRAJECTORY, GATEWAY_INPUTS, LOG
 from services.arm.model.description import load_arm
 from services.cli.control import describe
 from services.runtime.actions.keys import goal_request
@@ -33,6 +33,7 @@ from services.runtime.errors import GoalRefused
 from services.runtime.node import Node
 from services.runtime.process.shutdown import ShutdownRequest
 from services.stepper_gateway.core import GatewayCore
+from services.stepper_gateway.inputs import Began, unpacked
 from services.stepper_gateway.ledger.ledger_file import LedgerFile
 from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.shell import Shell
@@ -65,7 +66,8 @@ class Lab:
             closing(LedgerFile(self._folder / f"run{self._gateways}", "rm1", node.log.warning))
         )
         core = GatewayCore(self.description, self._gateways, parameters.value)
-        self._spin = spinning(node, Shell(node, core, parameters, ledger).step)
+        self.shell = Shell(node, core, Began(self._gateways, parameters.value), parameters, ledger)
+        self._spin = spinning(node, self.shell.step)
         self._spin.__enter__()
         self._stack.callback(self.stop_gateway)
         return node
@@ -74,6 +76,7 @@ class Lab:
         spin, self._spin = self._spin, None
         if spin is not None:
             spin.__exit__(None, None, None)
+            self.shell.finish()
             self.gateway.close()
 
     def node(self, name: str) -> Node:
@@ -204,6 +207,13 @@ def test_the_secret_is_never_published_nor_recorded_nor_logged(lab: Lab) -> None
     control_file.write(control_file.path_of("rm1", lab.deployment), secret, "Ana")
     refusal(lambda: ben.speed(0.5))
     ana.control.give()
+    inputs = []
+    ana.node.subscribe(GATEWAY_INPUTS, inputs.append)
+    lab.stop_gateway()
+    assert until(lambda: inputs)
+    given = repr([each for message in inputs for each in unpacked(message.inputs)])
+    assert given.count("TakeControl(") == given.count("JoinControl(") == given.count("GiveControl(") == 1
+    assert secret not in given
     assert seen
     assert not any(secret.encode() in payload for payload in seen)
     assert not any(secret in line for line in lab.log)
