@@ -200,7 +200,8 @@ class VirtualArm(GatewayDriver):
             if self.now_us == self._next_beat:
                 self._next_beat += PERIOD
                 if self.gateway_is_on and self.loop_is_on:
-                    self.carry_out(self.core.step(self.moment, self.absences))
+                    absent = (self.absences,) if self.absences else ()
+                    self.carry_out(self.core.step(self.moment, *absent))
         if self._device_runs:
             self.path.append(self.device.commanded_steps)
 

@@ -107,8 +107,8 @@ def test_a_core_with_another_lead_is_found_in_what_it_sends(monkeypatch):
 def test_a_core_that_logs_another_word_is_found_by_its_digest(monkeypatch):
     sent = GatewayCore.on_goal
 
-    def other(core, goal_id, goal, moment):
-        verdict, outputs = sent(core, goal_id, goal, moment)
+    def other(core, goal_id, goal, moment, *more):
+        verdict, outputs = sent(core, goal_id, goal, moment, *more)
         return verdict, [*outputs, LogLine(LogLevel.INFO, "another word")]
 
     monkeypatch.setattr(GatewayCore, "on_goal", other)
@@ -120,8 +120,8 @@ def test_a_core_that_logs_another_word_is_found_by_its_digest(monkeypatch):
 def test_another_result_of_a_goal_is_named_by_its_field(monkeypatch):
     step = GatewayCore.step
 
-    def other(core, moment):
-        return [renamed(each) if isinstance(each, GoalFinished) else each for each in step(core, moment)]
+    def other(core, moment, *more):
+        return [renamed(each) if isinstance(each, GoalFinished) else each for each in step(core, moment, *more)]
 
     def renamed(ended):
         return GoalFinished(ended.goal_id, ended.status, msgspec.structs.replace(ended.result, error_string="another"))
@@ -136,7 +136,9 @@ def test_a_core_that_says_nothing_any_more_is_found(monkeypatch):
     """Of a LATEST topic the recorder may lack what was said, but the core must not lack what was recorded."""
     step = GatewayCore.step
     monkeypatch.setattr(
-        GatewayCore, "step", lambda core, moment: [each for each in step(core, moment) if not is_gripper(each)]
+        GatewayCore,
+        "step",
+        lambda core, moment, *more: [each for each in step(core, moment, *more) if not is_gripper(each)],
     )
     found = replay(RECORDINGS / "stepper_gateway.mcap", GATEWAY).difference
     assert (found.topic, found.replayed) == ("gripper_state", "(nothing)")
