@@ -16,9 +16,11 @@ from pathlib import Path
 from schemas.deployment import Deployment, PathsSection, RouterSection
 from services.runtime.bus.interface import Bus
 from services.runtime.bus.zenoh_bus import router_answers
+from services.runtime.bus.zenoh_config import router_config
 from services.runtime.node import Node
 
 ROOT = Path(__file__).parents[2]
+ZENOHD = "GEMELO_TEST_ZENOHD"  # the path of a zenohd that takes the router's place; see deploy/try_zenohd
 
 
 def free_port() -> int:
@@ -47,8 +49,17 @@ def hear(node: Node, is_true: Callable[[], object], timeout: float = 5.0) -> boo
     return True
 
 
+def zenohd(port: int, folder: Path, configuration: str = "") -> list[str]:
+    """How zenohd is started on 127.0.0.1, with a configuration file or with that of the open router."""
+    if not configuration:
+        file = folder / "zenohd.json5"
+        file.write_text(str(router_config("127.0.0.1", port)))
+        configuration = str(file)
+    return [os.environ[ZENOHD], "-c", configuration]
+
+
 class RouterProcess:
-    """`gemelo-router` as a user starts it."""
+    """`gemelo-router` as a user starts it, or the zenohd that the environment names."""
 
     def __init__(self, folder: Path) -> None:
         self.port = free_port()
@@ -61,6 +72,8 @@ class RouterProcess:
 
     def start(self) -> None:
         command = [sys.executable, "-m", "services.runtime.router"]
+        if os.environ.get(ZENOHD):
+            command = zenohd(self.port, self.folder, self.environ.get("GEMELO_ROUTER_CONFIGURATION", ""))
         self.process = subprocess.Popen(command, cwd=ROOT, env=self.environ, stderr=subprocess.PIPE, text=True)
         assert until(lambda: router_answers("127.0.0.1", self.port), 10.0)
 
