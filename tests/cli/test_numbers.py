@@ -112,6 +112,8 @@ OPTIONS = (
     Option("device monitor --duration {}", TIME, "options.duration"),
     Option("collision fit urdf/rm1 --bulge {}", LENGTH, "options.bulge"),
     Option("collision fit urdf/rm1 --meshes --within {}", LENGTH, "options.within"),
+    Option("collision matrix urdf/rm1 --always-within {}", LENGTH, "options.always_within"),
+    Option("plot joint_states.position[0] --window {}", TIME, "options.window"),
 )
 
 
