@@ -52,6 +52,7 @@ def hear(node: Node, is_true: Callable[[], object], timeout: float = 5.0) -> boo
 def zenohd(port: int, folder: Path, configuration: str = "") -> list[str]:
     """How zenohd is started on 127.0.0.1, with a configuration file or with that of the open router."""
     if not configuration:
+        folder.mkdir(parents=True, exist_ok=True)
         file = folder / "zenohd.json5"
         file.write_text(str(router_config("127.0.0.1", port)))
         configuration = str(file)
