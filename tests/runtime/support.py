@@ -144,9 +144,11 @@ def spinning(node: Node, step: Callable[[int], object] = lambda now: None, rate:
 
     thread = threading.Thread(target=run, name=node.name)
     thread.start()
-    yield node
-    node.stop()
-    thread.join(timeout=3.0)
+    try:
+        yield node
+    finally:
+        node.stop()
+        thread.join(timeout=3.0)
     assert not thread.is_alive(), "the loop did not stop"
     assert not failures, failures
 

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schemas.actions import GoalStatusCode
-from schemas.device import DeviceMode
+from schemas.device import DeviceCommandKind, DeviceMode
+from schemas.joints import JointState
 from schemas.topics import DEVICE_EVENTS, JOINT_STATES
 from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits
@@ -65,6 +66,41 @@ def test_a_stream_that_falls_silent_brakes_to_rest_and_does_not_go_on_to_the_sta
     rig.run(2.0)
     assert rig.device.mode == DeviceMode.IDLE
     assert_within_limits(rig)
+
+
+def silenced() -> VirtualArm:
+    """An arm that still decelerates after its targets have fallen silent, nearly at rest."""
+    rig = VirtualArm().ready()
+    while rig.position[0] < 0.1:
+        rig.target(brazo_joint=2.5)
+        rig.run(0.1)
+    assert rig.run(2.0, lambda: rig.device.mode == DeviceMode.HOLD and newest(rig).velocity[0] < 0.05)
+    return rig
+
+
+def newest(rig: VirtualArm) -> JointState:
+    return rig.messages(JOINT_STATES)[-1]
+
+
+def test_a_goal_waits_for_an_arm_that_comes_to_rest_after_its_targets() -> None:
+    rig = silenced()
+    assert rig.goal(move(newest(rig).position, (0.2, 0.2, 0.05))).accepted
+    assert rig.finish()[0] == GoalStatusCode.SUCCEEDED
+    assert rig.position[0] == pytest.approx(0.2, abs=0.001)
+    assert_within_limits(rig)
+
+
+def test_a_persons_stop_of_an_arm_that_comes_to_rest_ends_the_goal_that_waits_and_refuses_others() -> None:
+    rig = silenced()
+    goal = move(newest(rig).position, (0.2, 0.2, 0.05))
+    assert rig.goal(goal).accepted
+    rig.command(DeviceCommandKind.STOP)
+    assert rig.finish()[0] == GoalStatusCode.ABORTED
+    assert "holds" in rig.goal(goal).reason
+    assert rig.run(1.0, lambda: rig.device.mode == DeviceMode.IDLE)
+    rested = rig.device.steps
+    rig.run(1.0)
+    assert rig.device.steps == rested
 
 
 def test_the_stream_begins_again_after_silence() -> None:

@@ -52,9 +52,10 @@ class GatewayDevice:
         """Why the device, though it can be reached, cannot start a motion; empty if it can."""
         return self.configuration.mismatch_reason() or not_ready_reason(self.arm, self.state)
 
-    def refusal(self, moment: Moment) -> str:
-        """Why no motion may be started now, empty if one may."""
-        return self.unreachable_reason(moment) or self.not_ready_reason() or self.commands.not_ready_reason()
+    def refusal(self, moment: Moment, is_coming_to_rest: bool = False) -> str:
+        """Why no motion may be started now, or `is_coming_to_rest`: as soon as the device rests; empty if one may."""
+        not_ready = self.configuration.mismatch_reason() if is_coming_to_rest else self.not_ready_reason()
+        return self.unreachable_reason(moment) or not_ready or self.commands.not_ready_reason()
 
     def event(
         self,

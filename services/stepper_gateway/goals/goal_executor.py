@@ -68,7 +68,7 @@ class GoalExecutor:
     def accept(self, goal_id: str, goal: FollowJointTrajectoryGoal, moment: Moment) -> GoalVerdict:
         """Accept and start a goal, or say why not."""
         controller = self._controller
-        if reason := self._device.refusal(moment):
+        if reason := self._device.refusal(moment, controller.comes_to_rest()):
             return GoalVerdict(False, FollowErrorCode.DEVICE_FAILED, reason)
         try:
             if self._current is not None and self._current.ending is not None:

@@ -55,6 +55,7 @@ class MotionController:
         self._stop_asked = -1.0e9  # [s] monotonic
         self._stopped_us = -1  # device time of its answer to the latest STOP
         self._awaits_stop = False
+        self._is_silenced = False  # the latest STOP is ours, because targets fell silent
         self.held = (0, "")  # the stream that the device has held last, and why, in its own words
 
     @property
@@ -85,6 +86,14 @@ class MotionController:
     def is_still(self) -> bool:
         """True if nothing of ours is under way to the device, in whatever mode it stands, and the last STOP is done."""
         return not self.is_followable and (not self._awaits_stop or self.has_stopped())
+
+    def comes_to_rest(self) -> bool:
+        """True if the device decelerates because streamed targets fell silent, and a new motion may wait for its rest.
+
+        Not after a person's STOP: what was asked for before it must not move the arm behind it.
+        """
+        is_stopping = self._awaits_stop and not self.has_stopped()
+        return self._is_silenced and is_stopping and self._device.session.mode in MOVING and not self.is_held
 
     @property
     def slowdown_share(self) -> float:
@@ -150,18 +159,24 @@ class MotionController:
         stream = self.stream
         if self.is_resting() or stream is None:
             return MotionStart.at_rest(self.rest_position())
+        if self.comes_to_rest():
+            return self._swept(Knot.at_rest(self.rest_position()), [])
         last = stream.log.last
         start = last if self.transmission.is_open else Knot.at_rest(last.position)
         ahead = stream.log.knots_between(stream.played_us(moment.monotonic, self._device.session.clock), stream.end_us)
+        return self._swept(start, ahead)
+
+    def _swept(self, start: Knot, ahead: list[Knot]) -> MotionStart:
+        """From `start`, having been where the arm was lately, and going through the knots `ahead`."""
         rows = [position for _, position in self._history] + [knot.position for knot in ahead]
         columns = list(zip(*rows, strict=True))
         return MotionStart(start, tuple(map(min, columns)), tuple(map(max, columns)), self.transmission.is_open)
 
-    def stop(self, moment: Moment) -> None:
-        """Decelerate along the path and forget the rest of it."""
+    def stop(self, moment: Moment, is_silence: bool = False) -> None:
+        """Decelerate along the path and forget the rest of it; `is_silence`: because streamed targets fell silent."""
         stream = self.stream.id if self.stream is not None else 0
         self.transmission.abandon()
-        self._holds = False
+        self._holds, self._is_silenced = False, is_silence
         self._stop_asked, self._stopped_us, self._awaits_stop = moment.monotonic, -1, True
         timeout = self._device.parameters.command_timeout
         self._device.commands.ask(DeviceCommandKind.STOP, moment, timeout, stream=stream)

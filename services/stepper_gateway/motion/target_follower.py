@@ -64,7 +64,7 @@ class TargetFollower:
     def _fall_silent(self, moment: Moment) -> None:
         """Decelerate now, not behind what has been sent; a stream that rests ends with its last knot."""
         if self._targets.is_active and not self._targets.is_resting:
-            self._controller.stop(moment)
+            self._controller.stop(moment, is_silence=True)
             self._targets.end()
         self._targets.fall_silent()
 
