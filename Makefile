@@ -5,8 +5,16 @@ MAKEFLAGS += --no-print-directory
 bin := .venv/bin
 # On every core at once; then the tests that start processes, a file on each core; then browsers, and what watches processes in time.
 side_by_side := $(addprefix tests/,arm bench chaos demo firmware logger planner robot_import schemas stepper_gateway urdf visualizer)
-one_by_one := tests/panel tests/stack
-file_by_file := $(filter-out $(side_by_side) $(one_by_one),$(patsubst %/,%,$(wildcard tests/*/)))
+folders := $(filter-out $(side_by_side) tests/panel tests/stack,$(patsubst %/,%,$(wildcard tests/*/)))
+# Of the whole stacks those that hold steps, words and files against what they should be: they wait, but measure no time.
+patient := $(patsubst %,tests/stack/test_%.py,black_box camera camera_mount clocks_apart configuration control device imported_arm locked_broker \
+	my_own_arm old_dialects picks plan_files planning provisioning serial_wire several_arms six_joints)
+one_by_one := tests/panel $(filter-out $(patient),$(wildcard tests/stack/test_*.py))
+# The longest files begin first: one that begins last leaves the other cores idle.
+longest := $(patsubst %,tests/%.py,gemelo/test_programs_on_the_stack examples/test_on_both_arms stack/test_picks gemelo/test_docstrings \
+	stack/test_device stack/test_camera_mount stack/test_clocks_apart stack/test_control examples/test_pick_and_place \
+	gemelo/test_arm_on_the_stack gemelo/test_unwatched stack/test_six_joints stack/test_several_arms)
+file_by_file := $(longest) $(filter-out $(longest),$(patient) $(sort $(shell find $(folders) -name 'test_*.py')))
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' Makefile | column -t -s '|'

@@ -51,3 +51,30 @@ def test_a_few_failures_are_run_once_more_alone(run, failures, code, again, expe
     assert done.stdout.count("FAILED ") == failures
     if is_repeated:
         assert done.stdout.splitlines()[-1].endswith("--last-failed-no-failures none tests/a tests/b")
+
+
+def test_files_begin_in_the_order_in_which_they_are_given(tmp_path, pytestconfig):
+    (tmp_path / "deploy").mkdir()
+    shutil.copy(pytestconfig.rootpath / "deploy/run_tests", tmp_path / "deploy")
+    (tmp_path / ".venv").symlink_to(pytestconfig.rootpath / ".venv")
+    note = "open('order', 'a').write(__name__[-3:] + ' ')"
+    (tmp_path / "test_one.py").write_text(f"def test_long(): {note}\n")
+    (tmp_path / "test_two.py").write_text("".join(f"def test_short_{number}(): {note}\n" for number in range(3)))
+    program = tmp_path / "nproc"
+    program.write_text("#!/bin/sh\necho 1\n")  # one core, one worker
+    program.chmod(0o755)
+    environment = {"PATH": f"{tmp_path}:/usr/bin:/bin"}
+    command = [str(tmp_path / "deploy/run_tests"), "loadfile", "test_one.py", "test_two.py"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60.0)
+    assert done.returncode == 0, done.stdout
+    assert (tmp_path / "order").read_text() == "one two two two "
+
+
+def test_every_file_of_tests_is_run_by_make_test_once(pytestconfig):
+    root = pytestconfig.rootpath
+    recipe = subprocess.run(["make", "-n", "test"], cwd=root, capture_output=True, text=True, timeout=20.0, check=True)
+    given = [line.split()[2:] for line in recipe.stdout.splitlines() if line.startswith("deploy/run_tests ")]
+    assert len(given) == 3
+    paths = [root / path for stage in given for path in stage]
+    files = [file for path in paths for file in (path.rglob("test_*.py") if path.is_dir() else [path])]
+    assert sorted(files) == sorted((root / "tests").rglob("test_*.py"))
