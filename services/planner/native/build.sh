@@ -35,18 +35,32 @@ exact="-O3 -ffp-contract=off -fno-math-errno -fno-exceptions -fno-rtti -Wno-psab
 warnings="-Wall -Wextra -Wconversion -Wshadow ${CI:+-Werror}"
 system="-isystem $nanobind/../include -isystem $nanobind/../ext/robin_map/include -isystem $headers"
 objects="$build/nanobind.o $build/module.o $build/vector.o $build/plain.o"
+has_avx2=$($compiler -dM -E -x c++ /dev/null | grep -o -m 1 __x86_64__ || true)
+[ -z "$has_avx2" ] || objects="$objects $build/avx2.o"
 
-$compiler $common $exact $warnings -c "$here/src/kernel.cpp" -o "$build/vector.o"
-$compiler $common $exact $warnings -fno-tree-vectorize -DGEMELO_PLAIN_LANES -c "$here/src/kernel.cpp" -o "$build/plain.o"
-if $compiler -dM -E -x c++ /dev/null | grep -q __x86_64__; then
-    $compiler $common $exact $warnings -mavx2 -c "$here/src/kernel.cpp" -o "$build/avx2.o"
-    objects="$objects $build/avx2.o"
-fi
-$compiler $common -O3 -ffp-contract=off $warnings $system -c "$here/src/module.cpp" -o "$build/module.o"
-[ "$(cat "$build/nanobind.stamp" 2>/dev/null)" = "$stamp" ] && [ -f "$build/nanobind.o" ] || {
-    $compiler $common -Os -w -fno-strict-aliasing $system -c "$nanobind/nb_combined.cpp" -o "$build/nanobind.o"
-    printf '%s\n' "$stamp" >"$build/nanobind.stamp"
+kernel() { # NAME OPTION...
+    name=$1
+    shift
+    $compiler $common $exact $warnings "$@" -c "$here/src/kernel.cpp" -o "$build/$name.o"
 }
+kernels() {
+    kernel vector
+    kernel plain -fno-tree-vectorize -DGEMELO_PLAIN_LANES
+    [ -z "$has_avx2" ] || kernel avx2 -mavx2
+}
+module() {
+    $compiler $common -O3 -ffp-contract=off $warnings $system -c "$here/src/module.cpp" -o "$build/module.o"
+    [ "$(cat "$build/nanobind.stamp" 2>/dev/null)" = "$stamp" ] && [ -f "$build/nanobind.o" ] || {
+        $compiler $common -Os -w -fno-strict-aliasing $system -c "$nanobind/nb_combined.cpp" -o "$build/nanobind.o"
+        printf '%s\n' "$stamp" >"$build/nanobind.stamp"
+    }
+}
+# Two at once, which is what a small machine has cores and memory for.
+(set -e && kernels) &
+first=$!
+(set -e && module) &
+wait $! || { wait $first || true; exit 1; }
+wait $first || exit 1
 # Written beside and then renamed: a process that has the old one loaded keeps it.
 fresh=$library.$$
 trap 'rm -f "$fresh"' EXIT
