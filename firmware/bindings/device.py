@@ -11,9 +11,8 @@ import msgspec
 
 from firmware.bindings.firmware_slot import FirmwareSlot, firmware_calls
 from firmware.bindings.frames import OUTPUTS, InputLevels, OutFrame, PinChange, PlatformRequest
-from firmware.bindings.horn import horn_record
 from firmware.bindings.library import LIBRARY, MAX_JOINTS, PART_SIZE, REASON_SIZE, SnapshotRecord, load_library
-from firmware.bindings.motor import MotorError, motor_record
+from firmware.bindings.motor import MotorError, horn_record, motor_record
 from schemas.device import DeviceMode
 from schemas.device_config import DeviceConfig, config_text
 from schemas.robot import Gripper, Motor, ServoGripper

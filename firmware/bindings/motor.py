@@ -1,11 +1,16 @@
-"""The virtual motor: what a device's joint hangs on, and one alone that pulses are given to by hand."""
+"""The virtual motor and servo: what a joint and a gripper hang on; and one motor that pulses are given to by hand."""
 
 from __future__ import annotations
 
 import ctypes as c
+from collections.abc import Sequence
 
-from firmware.bindings.library import MAX_CURVE, MotorRecord, load_library
-from schemas.robot import Motor
+from firmware.bindings.library import MAX_CURVE, HornRecord, MotorRecord, load_library
+from schemas.device_config import UNUSED, SensorConfig
+from schemas.robot import Motor, ServoGripper
+from services.arm.model.gripper import METRES, pulse_speed
+
+MARGIN = 1.25  # a servo turns faster than it is asked to
 
 
 class MotorError(ValueError):
@@ -25,6 +30,19 @@ def motor_record(motor: Motor) -> MotorRecord:
     record.speed[:count], record.torque[:count] = curve.speed, curve.torque
     record.inertia, record.friction = curve.inertia, curve.friction
     return record
+
+
+def horn_record(gripper: ServoGripper, sensors: Sequence[SensorConfig], unit: str = "mm") -> HornRecord:
+    """The core's form of a servo; `unit` is that of the sensor that reads the opening."""
+    names = [sensor.name for sensor in sensors]
+    return HornRecord(
+        speed_us_s=pulse_speed(gripper) * MARGIN,
+        open_us=gripper.open_us,
+        closed_us=gripper.closed_us,
+        open_value=gripper.open / METRES[unit],
+        closed_value=gripper.closed / METRES[unit],
+        sensor=names.index(gripper.sensor) if gripper.sensor in names else UNUSED,
+    )
 
 
 class VirtualMotor:

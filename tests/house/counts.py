@@ -1,0 +1,162 @@
+"""The house in figures: `python -m tests.house.counts` prints them; test_house.py holds those that may not grow."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+ROOMS = ("docs", "examples", "firmware", "gemelo", "schemas", "services", "tests")
+FRAGMENT = 40  # lines: a shorter file with one importer is a part of it
+NUMBERS = {"float", "Array", "NDArray"}
+UNITLESS = ("dimensionless", "share", "fraction", "ratio", "scale", "unit", "pixel")
+
+
+@dataclass(frozen=True)
+class Module:
+    """One Python file; `name` as it is imported."""
+
+    path: Path
+    name: str
+    text: str = field(repr=False)
+
+    @property
+    def lines(self) -> int:
+        return len(self.text.splitlines())
+
+    @cached_property
+    def tree(self) -> ast.Module:
+        return ast.parse(self.text)
+
+    @property
+    def is_product(self) -> bool:
+        return "tests" not in self.path.parts
+
+    def functions(self) -> Iterator[int]:
+        """The lines of each."""
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                yield (node.end_lineno or node.lineno) - node.lineno + 1
+
+    def imported(self) -> Iterator[tuple[str, str]]:
+        """Each module, and what of it, that is imported when it runs, at its top or later; not what types need."""
+        waiting: list[ast.AST] = [self.tree]
+        while waiting:
+            node = waiting.pop()
+            if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+                continue
+            if isinstance(node, ast.Import):
+                yield from ((alias.name, "") for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                yield from ((node.module, f"{node.module}.{alias.name}") for alias in node.names)
+            waiting += ast.iter_child_nodes(node)
+
+
+def modules(root: Path = ROOT) -> dict[str, Module]:
+    """Every Python file of the house, by its name."""
+    found = {}
+    for path in sorted(path for room in ROOMS for path in (root / room).rglob("*.py")):
+        parts = path.relative_to(root).with_suffix("").parts
+        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        found[name] = Module(path.relative_to(root), name, path.read_text())
+    return found
+
+
+def imports(house: dict[str, Module]) -> dict[str, set[str]]:
+    """The modules of the house that each imports; of a package's module that module alone."""
+    found = {}
+    for name, module in house.items():
+        others = {part if part in house else whole for whole, part in module.imported()}
+        found[name] = {other for other in others if other in house and other != name}
+    return found
+
+
+def circles(edges: dict[str, set[str]]) -> list[set[str]]:
+    """Modules that import one another over any number of steps."""
+    reached = {name: _reached(edges, name) for name in edges}
+    found = [{name, *(other for other in reached[name] if name in reached[other])} for name in edges]
+    return [circle for place, circle in enumerate(found) if len(circle) > 1 and circle not in found[:place]]
+
+
+def _reached(edges: dict[str, set[str]], start: str) -> set[str]:
+    seen: set[str] = set()
+    waiting = [start]
+    while waiting:
+        new = edges[waiting.pop()] - seen
+        seen |= new
+        waiting += new
+    return seen
+
+
+def fragments(house: dict[str, Module]) -> dict[str, str]:
+    """Files of the product under `FRAGMENT` lines that one other file imports, and no table names; with that one."""
+    edges = imports(house)
+    found = {}
+    for name, module in house.items():
+        importers = [other for other in house if name in edges[other]]
+        is_short = module.is_product and module.lines < FRAGMENT and module.path.name != "__init__.py"
+        if is_short and len(importers) == 1 and not is_named(house, name):
+            found[name] = importers[0]
+    return found
+
+
+def is_named(house: dict[str, Module], name: str) -> bool:
+    """True if a table of its package names it, as "module:function", to load it when it is used."""
+    package, _, own = name.rpartition(".")
+    return any(f'"{own}:' in module.text for other, module in house.items() if other.rpartition(".")[0] == package)
+
+
+def without_unit(module: Module) -> Iterator[str]:
+    """Public functions of numbers whose docstring has neither a unit or shape in brackets nor a word for none."""
+    waiting: list[tuple[str, ast.AST]] = [("", module.tree)]
+    while waiting:
+        within, node = waiting.pop()
+        for each in ast.iter_child_nodes(node):
+            if isinstance(each, ast.ClassDef) and not each.name.startswith("_"):
+                waiting.append((f"{within}{each.name}.", each))
+            elif isinstance(each, ast.FunctionDef) and not each.name.startswith("_") and _is_numeric(each):
+                text = ast.get_docstring(each) or ""
+                if "[" not in text and "(" not in text and not any(word in text for word in UNITLESS):
+                    yield f"{module.name}.{within}{each.name}"
+
+
+def _is_numeric(function: ast.FunctionDef) -> bool:
+    arguments = [*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs]
+    notes = [each.annotation for each in arguments] + [function.returns]
+    return any(isinstance(node, ast.Name) and node.id in NUMBERS
+               for note in notes if note for node in ast.walk(note))  # fmt: skip
+
+
+def spread(values: list[int]) -> str:
+    """Median, 90th percentile and largest."""
+    ordered = sorted(values)
+    return f"median {ordered[len(ordered) // 2]}, p90 {ordered[int(0.9 * (len(ordered) - 1))]}, at most {ordered[-1]}"
+
+
+def main() -> int:
+    """The figures, of the product and of its tests."""
+    house = modules()
+    for title, is_product in (("product", True), ("tests", False)):
+        part = [module for module in house.values() if module.is_product is is_product]
+        lines = [module.lines for module in part]
+        short = [module for module in part if module.lines < FRAGMENT and module.path.name != "__init__.py"]
+        print(
+            f"{title}: {len(part)} files, {sum(lines)} lines; under {FRAGMENT} lines, __init__ left out: {len(short)}"
+        )
+        print(f"  lines of a file: {spread([count for count in lines if count > 1])}")
+        print(f"  lines of a function: {spread([count for module in part for count in module.functions()])}")
+    numeric = [name for module in house.values() if module.is_product for name in without_unit(module)]
+    print(f"circles of imports: {len(circles(imports(house)))}")
+    print(f"fragments: {fragments(house) or 0}")
+    print(f"public functions of numbers without a unit: {len(numeric)}")
+    if "--names" in sys.argv:
+        print(*numeric, sep="\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
