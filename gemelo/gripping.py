@@ -66,7 +66,10 @@ class Gripping:
     def go(
         self, to: Grip, max_effort: float, on_progress: OnGripping | None, is_cancelled: IsCancelled | None = None
     ) -> Gripped:
-        """Sends the goal and waits; attaches and detaches in the scene. Raises `Refused`, `Aborted`, `Lost`."""
+        """Sends the goal of at most `max_effort` [N] and waits; attaches and detaches in the scene.
+
+        Raises `Refused`, `Aborted`, `Lost`.
+        """
         gripper = self._gripper()
         position = opening_of(gripper, to)
         if isinstance(gripper, ServoGripper) and self._is_virtual() and not self._holds():

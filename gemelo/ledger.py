@@ -81,7 +81,7 @@ class Requirement:
         self.level = 0.0
 
     def require(self, level: float) -> None:
-        """Refuses at once, and from now on before every motion, below `level`; 0 requires nothing any more."""
+        """Refuses at once, and from now on before every motion, below `level`, a share; 0 requires nothing any more."""
         if not 0.0 <= level <= 1.0:
             raise BadArgument(f"confidence={level:g} is no probability: it is 0 to 1, as 0.95")
         self.level = level

@@ -80,7 +80,7 @@ class Hand:
     is_cancelled: Callable[[], bool]
 
     def move(self, joints: Mapping[str, float]) -> None:
-        """Plans and goes there."""
+        """Plans and goes to the joints [rad] or [m]."""
         self._follow(self.arm.plan(joints=joints))
 
     def go_straight(self, height: float) -> None:

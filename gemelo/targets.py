@@ -112,7 +112,7 @@ def joint_state(arm: Description, joints: Joints, owner: str) -> JointState:
 
 
 def named_joints(arm: Description, joints: Joints, owner: str) -> dict[str, float]:
-    """Finite numbers by the names of the arm's joints; raises `BadArgument`."""
+    """Finite numbers [rad] or [m] by the names of the arm's joints; raises `BadArgument`."""
     if not isinstance(joints, Mapping):
         values = vector(owner, joints, len(arm.joints), "one for every joint")
         return dict(zip(arm.joint_names, values, strict=True))
@@ -125,7 +125,7 @@ def named_joints(arm: Description, joints: Joints, owner: str) -> dict[str, floa
 
 
 def number(owner: str, value: float) -> float:
-    """A finite number; raises `BadArgument`."""
+    """A finite number, in the unit of its owner; raises `BadArgument`."""
     try:
         found = float(value)
     except (TypeError, ValueError):
@@ -136,7 +136,7 @@ def number(owner: str, value: float) -> float:
 
 
 def vector(owner: str, values: Iterable[float], size: int, what: str) -> tuple[float, ...]:
-    """`size` finite numbers; raises `BadArgument`."""
+    """`size` finite numbers, in the unit of their owner; raises `BadArgument`."""
     try:
         found = tuple(values)
     except TypeError:

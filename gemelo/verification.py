@@ -71,7 +71,7 @@ def verify(arm: Arm, names: Iterable[str], run: Callable[[Plan], object], tell: 
 
 
 def trip_of(arm: Description, names: Iterable[str], referenced: Sequence[bool], at: Mapping[str, float]) -> Trip:
-    """How each joint can be verified from where it stands; raises `BadArgument`, or `Refused` where none can."""
+    """How each joint can be verified from `at` [rad] or [m]; raises `BadArgument`, or `Refused` where none can."""
     trip, known = Trip(), dict(zip(arm.joint_names, referenced, strict=False))
     for name in tuple(names) or arm.joint_names:
         if name not in arm.joint_names:

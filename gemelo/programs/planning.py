@@ -27,7 +27,7 @@ def plan_leg(arm: Arm, leg: Leg, points: Mapping[str, Point], start: Mapping[str
 
 
 def target_of(arm: Arm, leg: Leg, points: Mapping[str, Point], start: Mapping[str, float] | None) -> Target:
-    """The arguments of `arm.plan`."""
+    """The arguments of `arm.plan`, from the joints `start` [rad] or [m]."""
     *before, last = [cast(MotionStep, step) for step in leg.steps]
     target = _goal(arm, last, points, start)
     if before:

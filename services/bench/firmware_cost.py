@@ -43,7 +43,7 @@ def cost() -> Cost:
 
 
 def instructions(what: str, prototype: dict[str, float]) -> Figure:
-    """The number of instructions of one "tick" or "slot" with 6 joints in a plain move; means and maxima are
+    """[instructions] of one "tick" or "slot" with 6 joints in a plain move; means and maxima are
     references, as are the numbers in `prototype`."""
     measured = cost()
     means = {f"{joints} joints mean": measured.figures[f"{what}_{joints}_mean"] for joints in (3, 6)}

@@ -87,7 +87,7 @@ def compared(name: str, fits: Fits) -> dict[str, float]:
 
 
 def plans_solved(name: str, arm: Arm, fits: Fits) -> dict[str, float]:
-    """In % of problems between boxes, with the arm of one shape for each link and with the bounded one."""
+    """[%] of problems between boxes solved, with the arm of one shape for each link and with the bounded one."""
     solids = with_meshes(arm)
     scene = crowded()
     problems = requests(solids, scene)

@@ -79,6 +79,7 @@ class Load:
 
     @property
     def of_one_arm(self) -> float:
+        """[%] of a core for each arm."""
         return self.gateway + self.device + (self.router + self.broker) / self.arms
 
 

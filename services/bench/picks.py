@@ -60,7 +60,7 @@ class Trial:
 
 
 def draw_cell(robot: str, seed: int, folder: Path) -> tuple[Path, list[tuple[float, float, float]]]:
-    """A cell.toml with the sample's camera, four things and `PLACES` places; and where `POSTS` obstacles stand."""
+    """A cell.toml with the sample's camera, four things and `PLACES` places; and where [m] `POSTS` obstacles stand."""
     draw, table = random.Random(seed), TABLES[robot]
     spots: list[tuple[float, float]] = []
     while len(spots) < 4 + PLACES + POSTS:

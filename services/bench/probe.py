@@ -42,7 +42,7 @@ class Pulse(NamedTuple):
 
 
 def joint_of(speed: float, acceleration: float, *, dir_setup_us: int = 5, inverted: bool = False) -> JointConfig:
-    """A joint with limits in steps/s and steps/s^2 and the widest position range."""
+    """A joint with limits [steps/s] and [steps/s^2] and the widest position range."""
     return JointConfig(
         name="q", lower_q8=-(1 << 30), upper_q8=1 << 30, max_velocity_q8=round(speed * FINE),
         max_acceleration_q8=min(round(acceleration * FINE), (1 << 31) - 1), dir_setup_us=dir_setup_us,

@@ -103,7 +103,7 @@ def _set_off(rig: VirtualArm, rng: random.Random) -> float:
 
 
 def smooth_move(arm: Arm, start: Vector, end: Vector, slower: float) -> JointTrajectory:
-    """From rest to rest along a quintic in time, `slower` times as long as the limits allow."""
+    """From rest to rest (n,) along a quintic in time, `slower` times, dimensionless, as long as the limits allow."""
     duration = 0.2
     for joint, a, b in zip(arm.joints, start, end, strict=True):
         span = abs(b - a)

@@ -77,7 +77,7 @@ def trials(
 
 
 def trial(planner: Planner, problem: Problem, planner_id: str, allowed: float = ALLOWED) -> Trial:
-    """Plans one problem."""
+    """Plans one problem within `allowed` [s]."""
     request = request_of(problem, planner.arm, planner.kinematics, planner_id, allowed)
     began, before = time.perf_counter(), time.process_time()
     response = planner.plan(request, None, clock=time.perf_counter)

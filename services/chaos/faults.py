@@ -77,6 +77,8 @@ def thawed(name: str) -> Heal:
 
 
 def injected(what: str, value: tuple[float, float] = (1.0, 1.0), on_joint: bool = False) -> Begin:
+    """What a person's hand does: `what` with a value between both, in the unit of `device/inject`."""
+
     def begin(site: Site, random: Random) -> str:
         target = random.choice(site.arm.joint_names) if on_joint else ""
         amount = random.uniform(*value)

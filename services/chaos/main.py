@@ -61,7 +61,7 @@ def chosen_faults(words: Sequence[str]) -> tuple[Fault, ...]:
 
 
 def unfit(minutes: float, faults: Sequence[Fault], words: Sequence[str]) -> str:
-    """Why chaos cannot run as it was asked for, or ""."""
+    """Why chaos cannot run for `minutes` [min] as it was asked for, or ""."""
     if not 0.0 < minutes < float("inf"):
         return f"--minutes {minutes}: it must be above 0"
     if not faults:

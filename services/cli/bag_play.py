@@ -54,12 +54,12 @@ def add_options(parser: Parser) -> None:
 
 
 def rate_argument(text: str) -> float:
-    """An argument's type: a finite number above 0."""
+    """An argument's type: a finite factor of the recorded speed, above 0; dimensionless."""
     return _number(text, lambda value: value > 0.0, "write how many times real time, as 0.5 or 2")
 
 
 def start_argument(text: str) -> float:
-    """An argument's type: a finite number of 0 or more."""
+    """An argument's type: a finite time [s] of 0 or more."""
     return _number(text, lambda value: value >= 0.0, "write seconds after the beginning, as 12.5")
 
 

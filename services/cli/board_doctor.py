@@ -79,7 +79,7 @@ def run(options: Options) -> ExitCode:
 
 
 def listen(line: Line, baud: int, seconds: float) -> Heard:
-    """Everything that comes in `seconds`, or until gemelo's firmware answers; it is asked meanwhile."""
+    """Everything that comes in `seconds` [s], or until gemelo's firmware answers; it is asked meanwhile."""
     packets, data = PacketDecoder(), bytearray()
     deadline, ask = time.monotonic() + seconds, 0.0
     while (now := time.monotonic()) < deadline:

@@ -24,7 +24,7 @@ class Curve(NamedTuple):
 
     @property
     def values(self) -> list[float]:
-        """The finite ones."""
+        """The finite ones, in the unit of the curve."""
         return [value for _, value in self.points if math.isfinite(value)]
 
 

@@ -85,7 +85,7 @@ def press(arm: Arm, word: str, rest: Sequence[str]) -> ExitCode:
 
 
 def number(text: str, what: str) -> float:
-    """A finite number of `what`; raises `CommandError` otherwise."""
+    """A finite number of `what`, in its unit; raises `CommandError` otherwise."""
     try:
         value = float(text)
     except ValueError:

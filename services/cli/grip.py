@@ -61,7 +61,7 @@ def opening(text: str) -> Grip:
 
 
 def grip(arm: Arm, to: Grip, max_effort: float, as_json: bool) -> ExitCode:
-    """Opens or closes the gripper and prints how it has ended; raises `CommandError` if it has not."""
+    """Opens or closes the gripper with at most `max_effort` [N] and prints how; raises `CommandError` if it has not."""
     is_live = sys.stderr.isatty() and not as_json
 
     def show(feedback: GripperCommandFeedback) -> None:

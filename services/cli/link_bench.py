@@ -92,7 +92,7 @@ def _trip(answer: EchoResponse, is_first: bool) -> float | None:
 
 
 def swinging(session: Session, assignment: str) -> Callable[[float], None]:
-    """Streams a sine about where the joint is; raises `CommandError` for a joint or amount that is none."""
+    """Streams a sine about where the joint is, at each time [s]; raises `CommandError` where it is none."""
     ((name, amount),) = parse_joints([assignment], session.arm.joints).items()
     states, targets = session.node.latest(JOINT_STATES), session.node.publisher(JOINT_TARGETS)
     deadline = session.node.monotonic() + PATIENCE
@@ -138,7 +138,7 @@ def text_of(result: Result, folder: Path) -> str:
 
 
 def write_csv(path: Path, trips: Sequence[float | None], rate: float) -> None:
-    """One row per question; the round trip is empty where it was lost."""
+    """One row per question, of `rate` [1/s]; the round trip [s] is empty where it was lost."""
     with path.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow(("number", "asked_s", "round_trip_ms"))
@@ -147,7 +147,7 @@ def write_csv(path: Path, trips: Sequence[float | None], rate: float) -> None:
 
 
 def plot(trips: Sequence[float | None]) -> str:
-    """The round trips over their numbers, as SVG; lost ones are red at the top."""
+    """The round trips [s] over their numbers, as SVG; lost ones are red at the top."""
     width, height = SIZE
     top = max((1e3 * trip for trip in trips if trip is not None), default=1.0) or 1.0
     across, down = (width - 2 * EDGE) / max(1, len(trips) - 1), (height - 2 * EDGE) / top

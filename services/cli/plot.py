@@ -79,7 +79,7 @@ class Field:
         self.unit = self._field.unit
 
     def numbers(self, message: Message) -> Iterator[tuple[str, float]]:
-        """Each number of this part of a message with its name; raises `CommandError` where there is none."""
+        """Each number of this part of a message, in its unit, with its name; raises `CommandError` without one."""
         found = False
         for path, value in leaves(self._field.of(message)):
             if isinstance(value, bool | int | float):
@@ -140,7 +140,7 @@ def plot(
     session: Session, fields: list[Field], window: float, is_once: bool = False, count: int | None = None,
     block: LiveBlock | None = None,
 ) -> ExitCode:  # fmt: skip
-    """Draws until Ctrl-C, until the window is full or until `count` messages have come; the last picture stays."""
+    """Draws until Ctrl-C, until the window [s] is full or until `count` messages have come; the last picture stays."""
     node, curves, block = session.node, Plot(window), block or LiveBlock()
     heard, drawn, faults = 0, 0.0, list[CommandError]()
 

@@ -119,7 +119,7 @@ def _listen(session: Session) -> Heard:
 
 
 def echo(session: Session, target: str, source: str, rate: float, count: int | None, as_json: bool) -> ExitCode:
-    """Prints the pose of `source` in `target`; raises `CommandError` where a frame is unknown."""
+    """Prints the pose of `source` in `target`, `rate` [1/s] times; raises `CommandError` where a frame is unknown."""
     known = heard(session)
     for name in (target, source):
         if name not in known.buffer.frames:
@@ -214,6 +214,7 @@ class Arrivals:
         self.delays: deque[float] = deque(maxlen=1000)
 
     def add(self, now: float, delay: float) -> None:
+        """A sample that came at `now` [s] monotonic, `delay` [s] old."""
         self.times.append(now)
         self.delays.append(delay)
 

@@ -28,6 +28,7 @@ class Figures(NamedTuple):
 
     @property
     def seconds(self) -> float:
+        """[s] between the two."""
         return max(1e-3, (self.now.stamp - self.before.stamp) / 1e9)
 
     def received(self) -> dict[str, float]:

@@ -45,7 +45,7 @@ MOST_NAMED = 3  # findings about pairs, and about plans
 
 
 def trial(arm: Arm, seconds: float = SECONDS) -> list[Finding]:
-    """What keeps plans from succeeding, by name; empty where they do."""
+    """What keeps plans from succeeding within `seconds` [s], by name; empty where they do."""
     planner = Planner(arm)
     planner.prepare()
     deadline = Deadline(time.monotonic, seconds, time.monotonic())

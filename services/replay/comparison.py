@@ -53,7 +53,7 @@ class Comparison:
         return False
 
     def differ(self, topic: str, sequence: int, at: float, path: str, was: object, now: object) -> None:
-        """Keeps the first difference."""
+        """Keeps the first difference, `at` [s]."""
         if self.difference is None:
             self.difference = Difference(
                 topic=topic, sequence=sequence, at=at, path=path, recorded=_short(was), replayed=_short(now)
@@ -61,7 +61,7 @@ class Comparison:
 
 
 def differing(recorded: Message, replayed: Message | None, tolerance: float = 0.0) -> Differing | None:
-    """The path of the first field that differs, and both values; None where none does."""
+    """The path of the first field that differs by more than the share `tolerance`, and both values; None if none."""
     if replayed is None:
         return "", recorded, ABSENT
     return _differing("", msgspec.to_builtins(recorded), msgspec.to_builtins(replayed), tolerance)

@@ -56,7 +56,7 @@ class Replayed(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def speed(self) -> float:
-        """Times real time."""
+        """Ratio to real time."""
         return self.recorded_s / self.replayed_s
 
 

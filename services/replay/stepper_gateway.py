@@ -88,7 +88,7 @@ class GatewayAgain:
                 yield self._recorded.at(given.unix), given
 
     def give(self, at: float, given: Given) -> None:
-        """One input."""
+        """One input, `at` [s]."""
         self._count, self._last = self._count + 1, given.unix
         if isinstance(given.input, Began):
             self._begin(given.unix, given.input)

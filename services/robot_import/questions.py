@@ -94,7 +94,7 @@ def whole(text: str) -> int:
 
 
 def number(text: str) -> float:
-    """A finite one; raises ValueError."""
+    """A finite one, in the unit of its question; raises ValueError."""
     try:
         value = float(text)
     except ValueError:
@@ -105,7 +105,7 @@ def number(text: str) -> float:
 
 
 def above_zero(text: str) -> float:
-    """Raises ValueError."""
+    """A number above 0, in the unit of its question; raises ValueError."""
     value = number(text)
     if not value > 0.0:
         raise ValueError("it must be above 0")

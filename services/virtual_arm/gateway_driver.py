@@ -156,7 +156,7 @@ class GatewayDriver(ABC):
         return verdict
 
     def finish_grip(self, goal_id: str = "grip", seconds: float = 10.0) -> tuple[GoalStatusCode, GripperCommandResult]:
-        """Lets time pass until the gripper's goal has ended; returns status and result, which are forgotten here."""
+        """Lets up to `seconds` [s] pass until the gripper's goal has ended; its status and result, forgotten here."""
         assert self.run(seconds, lambda: goal_id in self.gripped), f"{goal_id} has not ended"
         return self.gripped.pop(goal_id)
 

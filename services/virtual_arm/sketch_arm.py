@@ -24,7 +24,7 @@ STEP = 0.005  # [s] of virtual time
 
 
 def ra_arm(message_time: float = 2.0) -> Arm:
-    """rm1 behind a sketch."""
+    """rm1 behind a sketch that takes `message_time` [s] for a message."""
     arm = rm1()
     device = msgspec.structs.replace(arm.device, dialect=Dialect.RA, message_time=message_time)
     return heard_by_the_board(replace(arm, device=device))
@@ -65,6 +65,7 @@ class SketchArm(GatewayDriver):
         self.device.receive(kind, payload, self.moment.monotonic)
 
     def run(self, seconds: float, until: Callable[[], bool] | None = None) -> bool:
+        """Lets `seconds` [s] pass, or less: until `until`; whether that came true."""
         end = self.now + seconds
         while self.now < end:
             if until is not None and until():

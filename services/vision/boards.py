@@ -159,7 +159,7 @@ class Scale:
 
 
 def tag_squares(number: int, family: TagFamily, left: float, lower: float, size: float) -> list[Square]:
-    """The black modules of a tag whose lower left corner is given."""
+    """The black modules of a tag of `size` [m] whose lower left corner [m] is given."""
     modules: NDArray[np.bool_] = tag_modules(number, family)
     count = len(modules)
     module = size / count

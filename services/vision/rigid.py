@@ -42,7 +42,7 @@ def step(vector: Array) -> Array:
 
 
 def inverse(matrix: Array) -> Array:
-    """b_T_a of a_T_b."""
+    """b_T_a (4, 4) of a_T_b."""
     back = matrix[:3, :3].T
     return rigid(back, -back @ matrix[:3, 3])
 

@@ -111,7 +111,10 @@ def is_named(house: dict[str, Module], name: str) -> bool:
 
 
 def without_unit(module: Module) -> Iterator[str]:
-    """Public functions of numbers whose docstring has neither a unit or shape in brackets nor a word for none."""
+    """Public functions of numbers whose docstring has neither a unit or shape in brackets nor a word for none.
+
+    A method without a docstring does what the method of its interface says.
+    """
     waiting: list[tuple[str, ast.AST]] = [("", module.tree)]
     while waiting:
         within, node = waiting.pop()
@@ -119,8 +122,10 @@ def without_unit(module: Module) -> Iterator[str]:
             if isinstance(each, ast.ClassDef) and not each.name.startswith("_"):
                 waiting.append((f"{within}{each.name}.", each))
             elif isinstance(each, ast.FunctionDef) and not each.name.startswith("_") and _is_numeric(each):
-                text = ast.get_docstring(each) or ""
-                if "[" not in text and "(" not in text and not any(word in text for word in UNITLESS):
+                text = ast.get_docstring(each)
+                if text is None and within:
+                    continue
+                if not any(word in (text or "").lower() for word in ("[", "(", *UNITLESS)):
                     yield f"{module.name}.{within}{each.name}"
 
 

@@ -33,6 +33,10 @@ def test_nothing_of_the_product_imports_a_test(house):
     assert [name for name in product if any(not house[other].is_product for other in edges[name])] == []
 
 
+def test_every_public_function_of_numbers_says_its_units_or_shapes(house):
+    assert [name for each in house.values() if each.is_product for name in without_unit(each)] == []
+
+
 def module(name: str, *lines: str) -> tuple[str, Module]:
     return name, Module(Path(f"{name}.py"), name, "\n".join(lines))
 

@@ -27,15 +27,15 @@ class DeviceClock:
         self._real, self._device_us, self._ppm = real, float(device_us), 0.0
 
     def at(self, real: float) -> int:
-        """Device time at that real time; never below zero."""
+        """Device time [us] at the real time [s]; never below zero."""
         return max(0, int(self._exact(real)))
 
     def drift(self, real: float, ppm: float) -> None:
-        """From now on the clock is fast by `ppm`."""
+        """From the real time [s] on the clock is fast by `ppm`, in millionths."""
         self._device_us, self._real, self._ppm = self._exact(real), real, ppm
 
     def restart(self, real: float) -> None:
-        """Count from zero again; the quartz is the same."""
+        """Count from zero again at the real time [s]; the quartz is the same."""
         self._real, self._device_us = real, 0.0
 
     def _exact(self, real: float) -> float:

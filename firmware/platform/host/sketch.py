@@ -51,7 +51,7 @@ class AustinStepper:
         self._plan()
 
     def step(self, now: float) -> None:
-        """The step that is due."""
+        """The step that is due at `now` [s]."""
         self.position += self._direction
         self._last = now
         self._plan()
@@ -114,7 +114,7 @@ class Sketch:
         self._inbox.append(payload)
 
     def advance(self, now: float) -> list[tuple[str, bytes]]:
-        """Let time pass; the messages that were published."""
+        """Let time pass until `now` [s]; the messages that were published."""
         said: list[tuple[str, bytes]] = []
         while self.is_on and self._free <= now:
             at = max(self._free, self._now)
@@ -157,7 +157,7 @@ class Sketch:
             motor.move(self.steps(message[ramp.name], ramp))
 
     def steps(self, degrees: float, ramp: Ramp) -> int:
-        """What it makes of so many degrees, with the floats of an ESP32."""
+        """The steps that it makes of `degrees` [deg], with the floats of an ESP32."""
         exact = _single(_single(_single(degrees) * _single(float(ramp.steps_per_turn))) / 360.0)
         return int(exact) if self.truncates else math.floor(exact + 0.5)
 

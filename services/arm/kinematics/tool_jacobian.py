@@ -23,7 +23,7 @@ class ToolJacobian:
         self._drivers = [_driver(arm, joint) for joint in self._chain]  # of each: index of the motor, and its factor
 
     def tool(self, positions: Sequence[float]) -> Point:
-        """The tool's position."""
+        """The tool's position [m] at the joint positions [rad] or [m]."""
         return self._frames(positions)[-1][0]
 
     def columns(self, positions: Sequence[float]) -> tuple[Point, ...]:

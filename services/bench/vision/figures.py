@@ -73,7 +73,7 @@ def common_views() -> tuple[View, ...]:
 
 
 def of_share(samples: list[float], goal: float, share: float, reference: dict[str, float], note: str) -> Figure:
-    """A figure whose goal is an upper bound of a quantile."""
+    """A figure whose `goal`, in its unit, is an upper bound of the quantile `share`."""
     figure = of_samples(samples, reference=reference, note=note)
     value = quantile(samples, share)
     return replace(figure, goal=f"p{100 * share:.0f} <= {goal:g}", met=value <= goal, note=f"{note}; p95 {value:.3g}")

@@ -120,14 +120,14 @@ class Sight:
         return from_transform(self.info.parent_from_camera)
 
     def image(self, joints: Array) -> GreyImage:
-        """One image of the arm there."""
+        """One image of the arm at joints [rad] or [m]."""
         state = JointState(stamp=1, name=self.setup.arm.joint_names, position=tuple(joints.tolist()))
         self._world.on_joint_state(state)
         image = self._camera.image(self._world.snapshot())
         return np.asarray(cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY), dtype=np.uint8)
 
     def sighting(self, joints: Array, images: int = 1) -> Sighting:
-        """The board from there; ValueError where it is not seen."""
+        """The board from joints [rad] or [m]; ValueError where it is not seen."""
         board = self.setup.board
         fewest = 4 * min(4, len(board.centres()))
         return without_hidden(
@@ -146,7 +146,7 @@ class Taken:
 
 
 def take(sight: Sight, height: float | None = None, count: int = POSES, seed: int = 0) -> Taken:
-    """Looks from the start, chooses poses by that, and looks from them."""
+    """Looks from the start, chooses poses by that, with the board at `height` [m], and looks from them."""
     setup = sight.setup
     at = link_pose(setup.arm, setup.link)
     start = np.array(setup.start)
@@ -170,7 +170,7 @@ def limits_of(arm: Arm) -> tuple[Array, Array]:
 
 
 def standing(arm: Arm) -> Callable[[Array], bool]:
-    """Whether the arm may stand at joint values, by its links alone and the height of its tool."""
+    """Whether the arm may stand at joint values [rad] or [m], by its links alone and the height of its tool."""
     kinematics = Kinematics(arm)
 
     def may_stand(joints: Array) -> bool:

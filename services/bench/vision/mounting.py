@@ -81,7 +81,10 @@ def level_trial(
     arm: Arm, model: CameraModel, board: TagBoard, count: int, random: np.random.Generator,
     noise: float = 0.3, joint_noise: float = 0.0,
 ) -> Trial:  # fmt: skip
-    """Poses of rm1, which cannot tilt its tool: the camera stands, the board is on the tool and looks up."""
+    """Poses of rm1, which cannot tilt its tool: the camera stands, the board is on the tool and looks up.
+
+    `noise` [pixels] of each corner, `joint_noise` [rad] of each joint.
+    """
     kinematics = Kinematics(arm)
     points = board.points()
     camera = looking(np.array([0.62, -0.3, 0.62]), np.array([0.25, 0.0, 0.1]))
@@ -115,7 +118,7 @@ def tool_error(found: Array, truth: Array, carrier: Carrier) -> float:
 
 
 def closed_form(trial: Trial, model: CameraModel, carrier: Carrier, method: int) -> Array | None:
-    """parent_from_camera by one of OpenCV's methods; None where it gives none."""
+    """parent_from_camera (4, 4) by one of OpenCV's methods; None where it gives none."""
     poses = [v.base_from_link if carrier is Carrier.CAMERA else inverse(v.base_from_link) for v in trial.views]
     boards = []
     for view in trial.views:

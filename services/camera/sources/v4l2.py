@@ -69,7 +69,7 @@ class V4l2Camera:
         self._configure(self._capture)
 
     def read(self) -> Frame:
-        """Waits for the next image; raises `CameraFault` where none comes."""
+        """Waits for the next image (h, w, 3); raises `CameraFault` where none comes."""
         assert self._capture is not None, "open it first"
         is_there, data = self._capture.read()
         if not is_there:

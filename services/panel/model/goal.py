@@ -64,7 +64,7 @@ class GoalSolver:
         return any(self.rings)
 
     def set_joints(self, joints: Mapping[str, float], source: int = -1) -> None:
-        """All joints, or some; the goal shows them at once, and is checked right after."""
+        """All joints [rad] or [m], or some; the goal shows them at once, and is checked right after."""
         with self._news:
             joints = {**self.goal.joints, **joints}
             self.goal = replace(self.goal, joints=joints, version=self.goal.version + 1, source=source)

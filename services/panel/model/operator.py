@@ -155,7 +155,7 @@ class Operator:
         self.guarded(self.teaching.stop)
 
     def set_speed(self, share: float) -> None:
-        """Of everything that is played from now on."""
+        """The share of full speed of everything that is played from now on."""
         self.guarded(lambda: self.arm.speed(share))
 
     def take_control(self, force: bool = False) -> None:

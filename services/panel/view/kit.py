@@ -36,7 +36,7 @@ class Kit:
         return handle
 
     def held(self, label: str, action: Callable[[], object], *, rate: float, needs: str = "") -> viser.GuiButtonHandle:
-        """`action` is called `rate` times a second while the button is held."""
+        """`action` is called `rate` [1/s] times while the button is held."""
         handle = self.gui.add_button(label, color="gray")
         handle.on_hold(without_event(action), callback_hz=rate)
         if needs:

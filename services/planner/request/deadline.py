@@ -62,7 +62,7 @@ class Deadline:
             raise DeadlinePassed
 
     def extended(self, part: float) -> Deadline:
-        """A deadline later by `part` of the time allowed, for the answer to one that has passed."""
+        """A deadline later by `part`, a share of the time allowed, for the answer to one that has passed."""
         return replace(self, allowed=(1.0 + part) * self.allowed)
 
     def share(self, part: float) -> Deadline:

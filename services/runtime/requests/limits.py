@@ -43,7 +43,7 @@ class TokenBucket:
         return True
 
     def is_full(self, now: float) -> bool:
-        """True if nothing was taken for long enough that the bucket is as good as new."""
+        """True if until `now` [s] nothing was taken for long enough that the bucket is as good as new."""
         self._refill(now)
         return self._tokens >= self._rate.burst
 

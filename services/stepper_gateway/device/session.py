@@ -222,7 +222,7 @@ class DeviceSession:
         return self._beat
 
     def is_fresh(self, moment: Moment, timeout: float) -> bool:
-        """True if a state has arrived within `timeout` seconds."""
+        """True if a state has arrived within `timeout` [s]."""
         return self.link_up and moment.monotonic - self.state_arrival <= timeout
 
     @property

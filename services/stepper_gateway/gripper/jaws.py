@@ -30,11 +30,11 @@ class Jaws(ABC):
 
     @abstractmethod
     def require(self, position: float) -> None:
-        """Raises `GoalRejected` for an opening that it cannot have."""
+        """Raises `GoalRejected` for an opening [m] that it cannot have."""
 
     @abstractmethod
     def sending(self, position: float) -> Sending:
-        """The command that opens or closes it to there."""
+        """The command that opens or closes it to `position` [m]."""
 
     @abstractmethod
     def stopping(self) -> Sending | None:
@@ -50,7 +50,7 @@ class Jaws(ABC):
 
     @abstractmethod
     def is_overruled(self, position: float) -> bool:
-        """True if the device does not go to `position` any more."""
+        """True if the device does not go to `position` [m] any more."""
 
 
 class ServoJaws(Jaws):

@@ -56,7 +56,7 @@ class JointWatch:
         return self._after(evidence, moved, load)
 
     def unwatched(self, evidence: Evidence, steps: float) -> Evidence:
-        """The evidence after so many steps that nobody has seen."""
+        """The evidence after so many `steps` [steps] that nobody has seen."""
         return self._after(evidence, steps, self.hardest) if steps else evidence
 
     def in_time(self, seconds: float) -> float:

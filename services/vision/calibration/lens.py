@@ -112,7 +112,7 @@ def tilts(camera_from_board: Sequence[Array]) -> Array:
 
 
 def tilt_advice(camera_from_board: Sequence[Array]) -> tuple[str, ...]:
-    """Which tilts no shot has."""
+    """Which tilts no shot has, each camera_from_board (4, 4)."""
     found = tilts(camera_from_board)
     reached = (found[:, 0].max(), -found[:, 0].min(), found[:, 1].max(), -found[:, 1].min())
     return tuple(

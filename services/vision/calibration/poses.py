@@ -51,12 +51,12 @@ class Belief:
     height: float | None = None  # [m] as of `fit_mount`
 
     def camera_from_board(self, base_from_link: Array) -> Array:
-        """Where the camera has the board before it."""
+        """(4, 4) where the camera has the board before it."""
         motion = base_from_link if self.carrier is Carrier.BOARD else inverse(base_from_link)
         return inverse(self.camera) @ motion @ self.board
 
     def is_seen(self, camera_from_board: Array) -> bool:
-        """True if all of the board is in the image, large enough, and turned to the camera."""
+        """True if all of the board at (4, 4) is in the image, large enough, and turned to the camera."""
         placed = apply(camera_from_board, self.points)
         away = placed.mean(axis=0)
         slant = -float(camera_from_board[:3, 2] @ away) / float(np.linalg.norm(away))
@@ -71,7 +71,7 @@ class Belief:
         return bool(is_within and module > SMALLEST_MODULE)
 
     def seeing(self, base_from_link: Array, sighting: Sighting) -> Belief:
-        """The same with the board where one view shows it, the camera being where it is taken to be."""
+        """The same with the board where one view from (4, 4) shows it, the camera being where it is taken to be."""
         motion = base_from_link if self.carrier is Carrier.BOARD else inverse(base_from_link)
         return replace(self, board=inverse(motion) @ self.camera @ board_in_camera(sighting, self.model))
 
@@ -86,7 +86,7 @@ class Belief:
         return Problem((), self.model, self.carrier, self.height)
 
     def view(self, base_from_link: Array) -> View:
-        """What the camera would see."""
+        """What the camera would see from base_from_link (4, 4)."""
         pixels = self.model.project(apply(self.camera_from_board(base_from_link), self.points))
         return View(base_from_link, Sighting(self.points, pixels, SIGMA))
 

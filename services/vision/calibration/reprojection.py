@@ -52,7 +52,7 @@ class Problem:
     ideal: tuple[Array, ...] = field(default=())  # (n, 2) [px] of each view without distortion
 
     def motion(self, index: int) -> Array:
-        """G of a view."""
+        """G (4, 4) of a view."""
         pose = self.views[index].base_from_link
         return pose if self.carrier is Carrier.BOARD else inverse(pose)
 
@@ -76,13 +76,13 @@ class State:
 
 
 def problem_of(views: Sequence[View], model: CameraModel, carrier: Carrier, height: float | None = None) -> Problem:
-    """The problem of these views."""
+    """The problem of these views, with the `height` [m] of the board where it is known."""
     ideal = tuple(model.ideal(view.sighting.pixels) for view in views)
     return Problem(tuple(views), model, carrier, height, ideal)
 
 
 def exact_arm(camera: Array, board: Array, count: int) -> State:
-    """Of an arm that is where its joints say, in `count` views."""
+    """Of an arm that is where its joints say, in `count` views; camera and board (4, 4)."""
     return State(camera, board, (np.eye(4),) * count)
 
 

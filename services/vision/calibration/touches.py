@@ -90,7 +90,7 @@ def board_in_camera(sighting: Sighting, model: CameraModel) -> Array:
 
 
 def spread_points(corners: Sequence[Array], count: int) -> list[int]:
-    """Which `count` of the points to touch: those that lie farthest from one another, the first one first."""
+    """Which `count` of the points (3,) [m] to touch: those that lie farthest from one another, the first one first."""
     chosen = [0]
     places = np.array(corners)
     while len(chosen) < min(count, len(places)):

@@ -20,10 +20,10 @@ class ForeignDevice(Protocol):
     """A device that is given the time [s] and says what is to go over its own wire."""
 
     def receive(self, kind: Kind, payload: bytes, now: float) -> None:
-        """A frame of the gateway's."""
+        """A frame of the gateway's, at `now` [s] monotonic."""
 
     def advance(self, now: float) -> list[bytes]:
-        """What is to be written now."""
+        """What is to be written at `now` [s] monotonic."""
 
     def take(self) -> list[Report]:
         """What the gateway is to hear."""
@@ -36,7 +36,7 @@ class Heard(NamedTuple):
 
 
 class FrameFor(NamedTuple):
-    """A frame of the gateway's."""
+    """A frame of the gateway's, at `now` [s] monotonic."""
 
     kind: Kind
     payload: bytes

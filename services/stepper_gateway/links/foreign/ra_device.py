@@ -43,7 +43,7 @@ class RaDevice:
         return tuple(self._sender.sent)
 
     def receive(self, kind: Kind, payload: bytes, now: float) -> None:
-        """A frame of the gateway's."""
+        """A frame of the gateway's, at `now` [s] monotonic."""
         before = self._stand_in.steps
         self._stand_in.advance(now)
         moved = self._stand_in.steps
@@ -53,7 +53,7 @@ class RaDevice:
             self._sender.rebase(placed)
 
     def hear(self, topic: str, payload: bytes, retained: bool, now: float) -> None:
-        """A message of the sketch. What is retained may be of a dead one; what cannot be read is said at times."""
+        """A message of the sketch at `now` [s]. One retained may be of a dead sketch; what is unreadable is told."""
         if retained:
             return
         read = ra_messages.read_states if topic == ra_messages.STATES else ra_messages.read_sensors
@@ -66,7 +66,7 @@ class RaDevice:
         self._tell(values, now)
 
     def advance(self, now: float) -> list[bytes]:
-        """Let time pass; what is to be published on ra/juntas now."""
+        """Let time pass until `now` [s] monotonic; what is to be published on ra/juntas then."""
         self._stand_in.advance(now)
         if now - self._heard > SILENCE * self._telemetry_time:
             self._miss(now)

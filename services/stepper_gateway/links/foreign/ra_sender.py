@@ -30,7 +30,7 @@ class RaSender:
         return self._heard >= self._due
 
     def heard(self, now: float) -> None:
-        """A word of the sketch: it lives; for what it was silent longer than usual, its motors stood."""
+        """A word of the sketch at `now` [s]: it lives; for what it was silent longer than usual, its motors stood."""
         silence = now - self._heard
         if not self.is_done and silence > self._longest_gap:
             self._due += silence

@@ -46,7 +46,7 @@ class StandIn:
         self.start(steps, False, now)
 
     def start(self, steps: Sequence[int], referenced: bool, now: float) -> None:
-        """Begin anew, as after a reset, at these steps; no path goes on."""
+        """Begin anew at `now` [s], as after a reset, at these steps; no path goes on."""
         self._zero = self._advanced = now
         self._is_stopping = False
         self._device = Device(self._config, self._new_boot(), steps=steps, referenced=referenced)
@@ -80,7 +80,7 @@ class StandIn:
         self._device.report_status()
 
     def receive(self, kind: Kind, payload: bytes, now: float) -> None:
-        """A frame of the gateway's; `BadFrame` is left to the core, which counts it."""
+        """A frame of the gateway's at `now` [s]; `BadFrame` is left to the core, which counts it."""
         self.advance(now)
         if kind is Kind.CONFIG:
             return self._device.receive_config(payload)
@@ -89,7 +89,7 @@ class StandIn:
         self._device.receive(payload if kind is not Kind.CMD else self._command(payload))
 
     def advance(self, now: float) -> None:
-        """Let time pass."""
+        """Let time pass until `now` [s] monotonic."""
         until = self.device_us(now)
         if now - self._advanced > STALL:
             self._device.stand_still(max(0, until - LAST_SLOTS))
@@ -97,7 +97,7 @@ class StandIn:
         self._advanced = max(self._advanced, now)
 
     def answer_sync(self, sync: Sync, now: float) -> None:
-        """Answer a question for the clock now, later than it came: with what the board's own wire took."""
+        """Answer a question for the clock at `now` [s], later than it came: with what the board's own wire took."""
         t_us = self.device_us(now)
         self._reports.append(
             (Kind.SYNC_R, encode(SyncReply(boot_id=self._device.boot_id, t0=sync.t0, t1=t_us, t2=t_us)))

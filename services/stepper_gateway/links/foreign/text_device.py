@@ -37,7 +37,7 @@ class TextDevice:
         self._reports: list[Report] = []
 
     def receive(self, kind: Kind, payload: bytes, now: float) -> None:
-        """A frame of the gateway's; a question for the clock is answered when the board has answered a line."""
+        """A frame of the gateway's at `now` [s]; a question for the clock waits until the board answers a line."""
         if kind is Kind.SYNC and self._stand_in.is_referenced:
             try:
                 question = decode(payload)
@@ -49,7 +49,7 @@ class TextDevice:
         self._stand_in.receive(kind, payload, now)
 
     def hear(self, data: bytes, now: float) -> None:
-        """Bytes of the board's."""
+        """Bytes of the board's, at `now` [s] monotonic."""
         for answer in self._reader.feed(data):
             is_first = self.exchange.on_answer(answer, now)
             self._asked_at = None
@@ -61,7 +61,7 @@ class TextDevice:
                 self._questions.clear()
 
     def advance(self, now: float) -> list[bytes]:
-        """Let time pass; the lines to write now."""
+        """Let time pass until `now` [s] monotonic; the lines to write then."""
         self._stand_in.advance(now)
         self._watch(now)
         if not self._stand_in.is_referenced:

@@ -67,7 +67,7 @@ class TextExchange:
         return next(reversed(self._lines.values())) if self._lines else None
 
     def sent(self, payload: bytes, now: float) -> int:
-        """A new line goes out; its number."""
+        """A new line goes out at `now` [s]; its number."""
         seq, self._seq = self._seq, (self._seq + 1) % SEQ_MODULUS
         before = self.newest
         if before is not None and not before.is_answered and now - before.latest > self.patience:
@@ -80,7 +80,7 @@ class TextExchange:
         return seq
 
     def on_answer(self, answer: Answer, now: float) -> bool:
-        """True if it is the first answer to a line."""
+        """True if it, which came at `now` [s], is the first answer to a line."""
         self.heard = now
         line = self._lines.get(answer.seq)
         if line is None:
@@ -102,7 +102,7 @@ class TextExchange:
         return True
 
     def again(self, now: float) -> bytes | None:
-        """The newest line, if its answer is late and it may be repeated."""
+        """The newest line, if its answer is late at `now` [s] and it may be repeated."""
         for line in list(self._lines.values())[:-1]:
             if not line.is_answered and now - line.latest > MOST_PATIENCE:
                 self._lose(line)
