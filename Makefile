@@ -6,10 +6,11 @@ bin := .venv/bin
 # On every core at once; then the tests that start processes, a file on each core; then browsers, and what watches processes in time.
 side_by_side := $(addprefix tests/,arm bench chaos demo firmware logger planner robot_import schemas stepper_gateway urdf visualizer)
 folders := $(filter-out $(side_by_side) tests/panel tests/stack,$(patsubst %/,%,$(wildcard tests/*/)))
-# Of the whole stacks those that hold steps, words and files against what they should be: they wait, but measure no time.
-patient := $(patsubst %,tests/stack/test_%.py,black_box camera camera_mount clocks_apart configuration control device imported_arm locked_broker \
-	my_own_arm old_dialects picks plan_files planning provisioning serial_wire several_arms six_joints)
-one_by_one := tests/panel $(filter-out $(patient),$(wildcard tests/stack/test_*.py))
+# Of the page and of whole stacks those that open no browser and measure no time: they hold steps, words and files.
+patient := $(patsubst %,tests/panel/test_%.py,cameras model own_pages picks) $(patsubst %,tests/stack/test_%.py,black_box \
+	camera camera_mount clocks_apart configuration control device imported_arm locked_broker my_own_arm old_dialects picks \
+	plan_files planning provisioning serial_wire several_arms six_joints)
+one_by_one := $(filter-out $(patient),$(wildcard tests/panel/test_*.py tests/stack/test_*.py))
 # The longest files begin first: one that begins last leaves the other cores idle.
 longest := $(patsubst %,tests/%.py,gemelo/test_programs_on_the_stack examples/test_on_both_arms stack/test_picks gemelo/test_docstrings \
 	stack/test_device stack/test_camera_mount stack/test_clocks_apart stack/test_control examples/test_pick_and_place \
