@@ -8,15 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from schemas.deployment import Deployment, PathsSection
 from schemas.joints import JointState
 from schemas.planning import JogCommand, NamedGoal, PlanCode, PlanRequest, PlanResponse
 from schemas.topics import JOG, JOG_STATUS, JOINT_STATES, JOINT_TARGETS, PLAN
 from services.arm.model.description import Arm
-from services.planner.main import run
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
+from tests.planner.planning_node import beside_a_planner
 
 TURN = JogCommand(name=("brazo_joint",), velocity=(0.3,))
 PATIENCE = 20.0  # [s]
@@ -46,22 +43,8 @@ class Follower:
 
 @pytest.fixture
 def follower(tmp_path: Path, rm1: Arm) -> Iterator[Follower]:
-    network, stop = MemoryNetwork(), ShutdownRequest()
-    deployment = Deployment(paths=PathsSection(run=str(tmp_path)))
-
-    def serve() -> None:
-        with Node("planner", deployment, bus=MemoryBus(network), stop=stop) as node:
-            run(node, deployment)
-
-    thread = threading.Thread(target=serve)
-    thread.start()
-    try:
-        with Node("follower", deployment, bus=MemoryBus(network), stop=ShutdownRequest()) as node:
-            yield Follower(node, rm1)
-    finally:
-        stop.set()
-        thread.join(10.0)
-        assert not thread.is_alive()
+    with beside_a_planner(tmp_path, "follower", ends_within=10.0) as node:
+        yield Follower(node, rm1)
 
 
 def test_commands_lead_the_arm_and_silence_ends_it(follower: Follower):

@@ -2,42 +2,23 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from schemas.deployment import Deployment, PathsSection
 from schemas.joints import JointState
 from schemas.planning import FkRequest, IkRequest, NamedGoal, PlanCode, PlanRequest, PoseGoal
 from schemas.topics import FK, IK, JOINT_STATES, PLAN, PLANNED_PATH
 from services.arm.model.description import Arm
-from services.planner.main import run
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
+from tests.planner.planning_node import beside_a_planner
 
 
 @pytest.fixture
 def asker(tmp_path: Path) -> Iterator[Node]:
-    """A node beside a running planner."""
-    network, stop = MemoryNetwork(), ShutdownRequest()
-    deployment = Deployment(paths=PathsSection(run=str(tmp_path)))
-
-    def serve() -> None:
-        with Node("planner", deployment, bus=MemoryBus(network), stop=stop) as node:
-            run(node, deployment)
-
-    thread = threading.Thread(target=serve)
-    thread.start()
-    try:
-        with Node("asker", deployment, bus=MemoryBus(network), stop=ShutdownRequest()) as node:
-            yield node
-    finally:
-        stop.set()
-        thread.join(5.0)
-        assert not thread.is_alive()
+    with beside_a_planner(tmp_path) as node:
+        yield node
 
 
 def tell(asker: Node, arm: Arm) -> None:

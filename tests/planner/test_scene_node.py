@@ -5,13 +5,11 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import msgspec
 import pytest
 
-from schemas.deployment import Deployment, PathsSection
 from schemas.frames import Transform
 from schemas.joints import JointState
 from schemas.planning import JointGoal, PlanCode, PlanRequest, PlanResponse, PointToPoint
@@ -31,41 +29,18 @@ from schemas.scene import (
 from schemas.topics import CONTACTS, JOINT_STATES, PLAN, SCENE, SCENE_EDIT
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
-from services.planner.main import run
 from services.planner.scene.scene_file import load_scene, save_scene
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
+from tests.planner.planning_node import beside_a_planner
 
 WAIT = 5.0  # [s]
 LONG_WAIT = 60.0  # [s]
 GOAL = PlanRequest(goal=JointGoal(name=("brazo_joint",), position=(1.2,)), motion=PointToPoint())
 
 
-@contextmanager
-def planning(folder: Path) -> Iterator[Node]:
-    """A node beside a running planner."""
-    network, stop = MemoryNetwork(), ShutdownRequest()
-    deployment = Deployment(paths=PathsSection(run=str(folder)))
-
-    def serve() -> None:
-        with Node("planner", deployment, bus=MemoryBus(network), stop=stop) as node:
-            run(node, deployment)
-
-    thread = threading.Thread(target=serve)
-    thread.start()
-    try:
-        with Node("asker", deployment, bus=MemoryBus(network), stop=ShutdownRequest()) as node:
-            yield node
-    finally:
-        stop.set()
-        thread.join(LONG_WAIT)
-        assert not thread.is_alive()
-
-
 @pytest.fixture
 def asker(tmp_path: Path) -> Iterator[Node]:
-    with planning(tmp_path) as node:
+    with beside_a_planner(tmp_path, ends_within=LONG_WAIT) as node:
         yield node
 
 
@@ -167,11 +142,11 @@ def test_attaching_needs_to_know_where_the_arm_is(asker: Node, rm1: Arm) -> None
 
 
 def test_a_restart_has_the_scene_as_it_was(tmp_path: Path, rm1: Arm) -> None:
-    with planning(tmp_path) as asker:
+    with beside_a_planner(tmp_path, ends_within=LONG_WAIT) as asker:
         edit(asker, SceneAdd(object=block(rm1)))
         before = asker.latest(SCENE)
         asker.wait(0.2)
-    with planning(tmp_path) as asker:
+    with beside_a_planner(tmp_path, ends_within=LONG_WAIT) as asker:
         after = asker.latest(SCENE)
         refused = plan(asker, rm1)
         asker.wait(0.2)
@@ -183,7 +158,7 @@ def test_a_restart_has_the_scene_as_it_was(tmp_path: Path, rm1: Arm) -> None:
 
 def test_a_damaged_file_is_kept_aside_and_the_planner_serves(tmp_path: Path, rm1: Arm) -> None:
     (tmp_path / "scene.json").write_text('{"objects": [')
-    with planning(tmp_path) as asker:
+    with beside_a_planner(tmp_path, ends_within=LONG_WAIT) as asker:
         assert plan(asker, rm1).code is PlanCode.SUCCESS
         assert (tmp_path / "scene.json.damaged").read_text() == '{"objects": ['
         assert edit(asker, SceneAdd(object=block(rm1))).version == 1
@@ -192,7 +167,7 @@ def test_a_damaged_file_is_kept_aside_and_the_planner_serves(tmp_path: Path, rm1
 def test_what_does_not_fit_the_arm_is_left_out_and_the_rest_stays(tmp_path: Path, rm1: Arm) -> None:
     lost = SceneObject(name="lost", shape=SphereShape(radius=0.1), frame="no_link", attached=True)
     save_scene(tmp_path / "scene.json", PlanningScene(version=5, objects=(block(rm1), lost)))
-    with planning(tmp_path) as asker:
+    with beside_a_planner(tmp_path, ends_within=LONG_WAIT) as asker:
         scene = asker.latest(SCENE)
         assert edit(asker, SceneRemove(name="lost")).reason == 'there is no object "lost"; known are block'
         asker.wait(0.1)

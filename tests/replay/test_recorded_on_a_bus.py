@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from pathlib import Path
 
 import pytest
 
-from schemas.deployment import Deployment, PathsSection
 from schemas.frames import Transform
 from schemas.gripper import GripperState
 from schemas.joints import JointState
@@ -16,17 +14,15 @@ from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest
 from schemas.scene import SceneAdd, SceneClear, SceneObject, SceneRequest, SphereShape
 from schemas.topics import DESCRIPTION, GRIPPER_STATE, PLAN, SCENE_EDIT
 from services.arm.model.description import load_arm
-from services.planner.main import run
 from services.recordings.channels import Entry
 from services.recordings.mcap_file import McapFile
 from services.recordings.table import recorded_topics
 from services.replay.main import replay, text_of
 from services.replay.planner import PLANS, TOPICS, UNPLANNED
-from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
-from services.runtime.process.shutdown import ShutdownRequest
 from services.state_publisher.main import describe
+from tests.planner.planning_node import beside_a_planner
 
 PATIENCE = 60.0  # [s]
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")
@@ -36,22 +32,8 @@ READY = PlanRequest(goal=NamedGoal(name="ready"), start=HOME, allowed_time=30.0)
 
 @pytest.fixture
 def planner(tmp_path: Path):
-    network, stop = MemoryNetwork(), ShutdownRequest()
-    deployment = Deployment(paths=PathsSection(run=str(tmp_path)))
-
-    def serve() -> None:
-        with Node("planner", deployment, bus=MemoryBus(network), stop=stop) as node:
-            run(node, deployment)
-
-    thread = threading.Thread(target=serve)
-    thread.start()
-    try:
-        with Node("person", deployment, bus=MemoryBus(network), stop=ShutdownRequest()) as node:
-            yield node
-    finally:
-        stop.set()
-        thread.join(PATIENCE)
-        assert not thread.is_alive()
+    with beside_a_planner(tmp_path, "person", ends_within=PATIENCE) as node:
+        yield node
 
 
 class Recorder:

@@ -36,7 +36,7 @@ class Heard(NamedTuple):
 
 
 class FrameFor(NamedTuple):
-    """A frame of the gateway's, at `now` [s] monotonic."""
+    """A frame of the gateway's."""
 
     kind: Kind
     payload: bytes
