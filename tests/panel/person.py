@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, Locator, ViewportSize, expect
 T = TypeVar("T")
 
 PATIENCE = 60_000.0  # [ms] a loaded machine draws a picture in seconds
+OPENING = 180_000.0  # [ms] and compiles its shaders in a minute
 SCALE = 0.5  # of a picture's pixels to those of the page: a processor draws a quarter of them
 CONTROLS = 450  # [pixels] of the page
 BLUE = (45, 140, 255)  # of the gizmo's arrow along z
@@ -46,7 +47,7 @@ class Person:
     def open(self) -> None:
         """Until the state is live and drawn."""
         self.page.goto(self._address)
-        expect(self.page.locator("[data-gemelo-sent]")).to_be_attached(timeout=PATIENCE)
+        expect(self.page.locator("[data-gemelo-sent]")).to_be_attached(timeout=OPENING)
         expect(self.page.get_by_role("tab").first).to_be_visible(timeout=PATIENCE)
 
     def tab(self, name: str) -> None:

@@ -2,7 +2,9 @@
 
 Space is Stop wherever the focus is but in a text field: a focused button would else be pressed by it, and a number
 field would swallow it. The arrow keys hold the jog buttons that name them. Once a second the browser's language, its
-wish for dark colours, its frame rate and the newest header that it has drawn come back through a hidden text field.
+wish for dark colours, its frame rate and the newest header that it has drawn come back through a hidden text field; a
+click into the image of a camera does at once. A press and its release are taken for the click, since the image may have
+been replaced by the next one between the two.
 The tabs stand closer, so that all of them have room in one row. A file that is too large is not sent at all.
 """
 
@@ -14,7 +16,9 @@ from dataclasses import dataclass
 import msgspec
 
 CHANNEL = "gemelo-browser"  # how the hidden field's text begins
+CAMERA_MARK = "data-gemelo-camera"  # the attribute of a camera's image that names the camera
 LARGEST_UPLOAD = 20_000_000  # [bytes] chosen: the planner takes 500,000 triangles, which are 25 MB
+DRAGGED = 6  # [pixels] of the page from the press to the release, from which on it was no click
 STOP_SIGN = "■"  # how the Stop button's text begins, in every language
 
 SCRIPT = """
@@ -50,6 +54,22 @@ SCRIPT = """
     release(e.code);
   }, true);
   window.addEventListener('blur', () => Object.keys(held).forEach(release));
+  let pressed = null, clicked = null, clicks = 0;
+  window.addEventListener('pointerdown', (e) => {
+    const camera = e.isPrimary && !e.button && e.target.getAttribute && e.target.getAttribute('CAMERA_MARK');
+    if (!camera) { pressed = null; return; }
+    const box = e.target.getBoundingClientRect();
+    pressed = {x: e.clientX, y: e.clientY, at: {camera: camera,
+      x: (e.clientX - box.left) / box.width, y: (e.clientY - box.top) / box.height}};
+  }, true);
+  window.addEventListener('pointercancel', () => { pressed = null; }, true);
+  window.addEventListener('pointerup', (e) => {
+    if (pressed && Math.hypot(e.clientX - pressed.x, e.clientY - pressed.y) < DRAGGED) {
+      clicks += 1;
+      clicked = {...pressed.at, number: clicks};
+    }
+    pressed = null;
+  }, true);
   let tooLarge = 0;
   window.addEventListener('change', (e) => {
     const size = e.target.files && e.target.files.length ? e.target.files[0].size : 0;
@@ -59,7 +79,7 @@ SCRIPT = """
     tooLarge = size;
   }, true);
   const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;
-  let frames = 0, began = performance.now(), rate = 0, told = '';
+  let frames = 0, began = performance.now(), rate = 0, told = '', toldClicks = 0;
   const tell = () => {
     frames += 1;
     const now = performance.now();
@@ -68,11 +88,12 @@ SCRIPT = """
     const sent = (document.querySelector('[data-gemelo-sent]') || {dataset: {}}).dataset.gemeloSent || '';
     if (field) {
       field.parentElement.parentElement.parentElement.parentElement.style.display = 'none';
-      if (sent !== told) {
+      if (sent !== told || clicks !== toldClicks) {
         told = sent;
+        toldClicks = clicks;
         set.call(field, 'CHANNEL ' + JSON.stringify({sent: Number(sent), language: navigator.language, rate: rate,
           dark: matchMedia('(prefers-color-scheme: dark)').matches, width: innerWidth, height: innerHeight,
-          too_large: tooLarge}));
+          too_large: tooLarge, clicked: clicked}));
         tooLarge = 0;
         field.dispatchEvent(new Event('input', {bubbles: true}));
       }
@@ -82,6 +103,16 @@ SCRIPT = """
   tell();
 })()
 """
+
+
+@dataclass(frozen=True)
+class Click:
+    """A place in the image of a camera."""
+
+    camera: str
+    x: float  # from 0 at the left to 1
+    y: float  # from 0 at the top to 1
+    number: int  # of the click, counted since the browser has loaded the page
 
 
 @dataclass(frozen=True)
@@ -95,12 +126,20 @@ class Browser:
     width: int = 0  # [pixels]
     height: int = 0
     too_large: int = 0  # [bytes] of a file that it was asked to upload and did not
+    clicked: Click | None = None  # the newest
 
 
 def script_html() -> str:
     """An invisible element whose loading fails, and so runs the script: viser puts no other code on the page."""
     script = SCRIPT
-    for name, value in (("STOP_SIGN", STOP_SIGN), ("CHANNEL", CHANNEL), ("LARGEST_UPLOAD", str(LARGEST_UPLOAD))):
+    values = {
+        "STOP_SIGN": STOP_SIGN,
+        "CHANNEL": CHANNEL,
+        "CAMERA_MARK": CAMERA_MARK,
+        "LARGEST_UPLOAD": str(LARGEST_UPLOAD),
+        "DRAGGED": str(DRAGGED),
+    }
+    for name, value in values.items():
         script = script.replace(name, value)
     return f'<img src="data:," alt="" style="display:none" onerror="{html.escape(script, quote=True)}">'
 

@@ -103,11 +103,6 @@ def note(content: str) -> str:
     return f'<div style="margin:0 0.9em 0.5em;font-size:0.8em;opacity:0.75">{content}</div>' if content else ""
 
 
-def picture(address: str, caption: str) -> str:
-    """An image with its caption; `address` is one of data."""
-    return f'<img src="{esc(address)}" style="width:100%;display:block" alt="{esc(caption)}">{note(esc(caption))}'
-
-
 def box(content: str, color: str) -> str:
     """A coloured box that stands out, on light and on dark."""
     return (

@@ -15,9 +15,9 @@ from services.panel.model.availability import reasons
 from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
 from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, read_browser, script_html
+from services.panel.view.camera_box import CameraBox
 from services.panel.view.control_box import ControlBox
-from services.panel.view.kit import Kit, Mirror, box, esc, picture, set_if_new, without_event
-from services.panel.view.pick_box import PickBox
+from services.panel.view.kit import Kit, Mirror, box, esc, set_if_new, without_event
 from services.panel.view.tabs.device import DeviceTab
 from services.panel.view.tabs.jog import JogTab
 from services.panel.view.tabs.move import MoveTab
@@ -76,22 +76,13 @@ class Page:
         self._jog.refresh(readings)
         self._device.refresh(readings)
         self._scene.refresh(readings)
-        self._show_cameras()
-        if self._picks is not None:
-            self._picks.refresh()
+        self._cameras.refresh()
         self._teach.refresh(readings)
         self._programs.refresh(readings)
         pose = self._world.tool_pose
         self._state.refresh(readings, self.browser, self.lag, (*pose.position, *pose.orientation))
         if readings.state is not None:
             self._shown_speed.show(round(100.0 * readings.state.speed))
-
-    def _show_cameras(self) -> None:
-        """The newest image of each camera, below the scene."""
-        for name, line in self._cameras.items():
-            address = self._operator.cameras.address(name)
-            if address:
-                set_if_new(line, "content", picture(address, name))
 
     def close(self) -> None:
         """Takes away what it has put into the scene."""
@@ -134,9 +125,7 @@ class Page:
             self._programs = ProgramsTab(kit)
         with tabs.add_tab(words("tab_scene")):
             self._scene = SceneTab(kit, self._world)
-            self._cameras = {name: kit.line() for name in self._operator.cameras.names}
-            picks = self._operator.picks
-            self._picks = PickBox(kit) if picks.things and picks.places else None
+            self._cameras = CameraBox(kit)
         with tabs.add_tab(words("tab_state")):
             self._state = StateTab(kit)
             self._settings(look)
@@ -189,13 +178,16 @@ class Page:
         browser = read_browser(text)
         if browser is None:
             return
-        self.browser = browser
+        previous, self.browser = self.browser, browser
+        if browser.clicked is not None and previous is not None and browser.clicked != previous.clicked:
+            self._cameras.point(browser.clicked)
         if browser.too_large:
             self._operator.guarded(lambda: require_small(browser.too_large, self._words))
         if 0.0 < browser.rate < SLOW and not self._is_plain:
             self._is_plain = True
             self.client.scene.configure_default_lights(cast_shadow=False)
-        self.lag = max(0.0, time.monotonic() - self._began - browser.sent / 1000.0)
+        if previous is None or browser.sent != previous.sent:
+            self.lag = max(0.0, time.monotonic() - self._began - browser.sent / 1000.0)
         if not self._was_chosen:
             self._was_chosen = True
             self._wanted = Look(language_of(browser.language), browser.dark)

@@ -1,4 +1,4 @@
-"""Picking on the page: which thing, to which place, and how it goes; below the images of the cameras."""
+"""Picking on the page: which thing, to which place, and how it goes; below the images, where a click chooses."""
 
 from __future__ import annotations
 
@@ -19,10 +19,19 @@ class PickBox:
             self._lines = kit.line()
             kit.reasons(move=words("pick_this"))
 
+    @property
+    def thing(self) -> str:
+        """The one that is chosen."""
+        return str(self._thing.value)
+
+    def choose(self, thing: str) -> None:
+        """One of the cell's things."""
+        set_if_new(self._thing, "value", thing)
+
     def refresh(self) -> None:
         """What was seen, or what the pick is at."""
         set_if_new(self._lines, "content", note("<br>".join(esc(line) for line in self._picks.lines)))
 
     def _pick(self) -> None:
         self._kit.operator.forget_problem()
-        self._picks.pick(str(self._thing.value), str(self._place.value))
+        self._picks.pick(self.thing, str(self._place.value))

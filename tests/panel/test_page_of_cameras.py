@@ -1,0 +1,79 @@
+"""The page of an arm with a camera: a click into the image chooses what is picked, and one on nothing says so."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Locator, expect
+
+from schemas.topics import camera_detections
+from services.stack.stack import Stack
+from tests.gemelo.conftest import BROKER, NEEDED
+from tests.panel.person import PATIENCE, Person, until
+
+CAMERA = "overhead"
+WIDTH, HEIGHT = 640.0, 480.0  # [px] of its images
+
+
+@pytest.fixture(scope="module")
+def twin(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
+    environment = {"GEMELO_ROBOT": "urdf/rm1", "GEMELO_CELL": "urdf/rm1/cell.toml"}
+    processes = (*NEEDED, "camera", "detector", "panel")
+    out = tmp_path_factory.mktemp("out")
+    with (
+        Stack(broker=BROKER, out=out, processes=processes, environment=environment) as stack,
+        pytest.MonkeyPatch.context() as patch,
+    ):
+        for name, value in stack.deployment.items():
+            patch.setenv(name, value)
+        yield stack
+
+
+def shown_image(person: Person) -> Locator:
+    person.tab("Scene")
+    image = person.page.locator(f"img[data-gemelo-camera={CAMERA}]")
+    expect(image).to_be_visible(timeout=PATIENCE)
+    image.scroll_into_view_if_needed()
+    return image
+
+
+def clicks(person: Person, image: Locator, x: float, y: float) -> None:
+    """At a place of the image, in its pixels; slowly, so that the next image may come before the release."""
+    box = image.bounding_box()
+    assert box is not None
+    person.page.mouse.move(box["x"] + x / WIDTH * box["width"], box["y"] + y / HEIGHT * box["height"])
+    person.page.mouse.down()
+    person.page.wait_for_timeout(700.0)
+    person.page.mouse.up()
+
+
+def test_a_click_on_a_thing_in_the_image_chooses_it_and_pick_this_picks_it(person: Person, arm) -> None:
+    arm.move(named="folded")
+    newest = arm.node.latest(camera_detections(CAMERA))
+
+    def places() -> dict[str, tuple[float, float]]:
+        items = newest.message.items if newest.message is not None else ()
+        return {
+            item.name: tuple(sum(c[axis] for c in item.corners) / len(item.corners) for axis in (0, 1))
+            for item in items
+        }
+
+    seen = until(places, lambda found: {"cup", "red_block", "blue_block", "tag 100"} <= set(found))
+    image = shown_image(person)
+    expect(person.page.locator("svg text", has_text="cup")).to_be_attached(timeout=PATIENCE)
+    for name in ("red_block", "cup", "blue_block"):
+        clicks(person, image, *seen[name])
+        person.reads(f"{name} is chosen.")
+        until(lambda: person.field("Thing").input_value(), lambda value, name=name: value == name)
+    clicks(person, image, 0.02 * WIDTH, 0.98 * HEIGHT)
+    person.reads("Nothing is detected there; the nearest thing is")
+    clicks(person, image, *seen["tag 100"])
+    person.reads("tag 100 is no thing of the cell file")
+    assert person.field("Thing").input_value() == "blue_block"
+    clicks(person, image, *seen["cup"])
+    person.reads("cup is chosen.")
+    assert not any(item.attached for item in arm.scene.objects.values())
+    person.chooses("Place", "bin")
+    person.press("Pick this")
+    person.reads("cup is at bin")
