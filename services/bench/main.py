@@ -62,6 +62,7 @@ FIGURES = {
     "image_to_pose_ms": Row("vision.figures:image_to_pose_ms", "ms"),
     "mount_mm": Row("vision.figures:mount_mm", "mm"),
     "mount_images_mm": Row("vision.figures:mount_images_mm", "mm"),
+    "mount_touch_mm": Row("vision.touching:mount_touch_mm", "mm"),
     "camera_cpu_percent": Row("eyes:camera_cpu_percent", "% of one core"),
     "detector_cpu_percent": Row("eyes:detector_cpu_percent", "% of one core"),
     "image_to_detection_ms": Row("eyes:image_to_detection_ms", "ms"),

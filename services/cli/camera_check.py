@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,6 +11,7 @@ import numpy as np
 import gemelo
 from gemelo.targets import FULL
 from services.cli.camera_images import Subject, subject
+from services.cli.camera_tip import ask_offset, step_floor, tip_length, tip_option
 from services.cli.errors import CommandError, ExitCode, in_commands, usage
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.session import connect_arm, load_robot
@@ -47,8 +47,7 @@ def add_options(parser: Parser) -> None:
     parser.add_argument("camera", metavar="CAMERA", nargs="?", default="", help="of the cell file; its first one")
     parser.add_argument("--above", metavar="LENGTH", default=ABOVE, help=f"between tip and tag ({ABOVE})")
     parser.add_argument("--tags", type=positive_integer, default=MOST_TAGS, metavar="N", help="at most (6)")
-    said = "of what points, beyond the tool's frame along its z (the length of the jaws)"
-    parser.add_argument("--tip", metavar="LENGTH", default="", help=said)
+    tip_option(parser)
 
 
 def run(options: Options) -> ExitCode:
@@ -58,9 +57,7 @@ def run(options: Options) -> ExitCode:
     if above < 0.004:
         raise usage(f"--above {options.above} is less than 4 mm: a tip that near may touch")
     robot = load_robot()
-    gripper = robot.description.gripper
-    jaws = gripper.jaw[2] if gripper is not None and gripper.jaw is not None else 0.0
-    tip = parse_quantity(options.tip, LENGTH, "--tip") if options.tip else jaws
+    tip = tip_length(options.tip, robot)
     with connect_arm(robot) as arm:
         try:
             pointings = [*_pointings(arm, camera, above + tip, options.tags)]
@@ -83,7 +80,9 @@ def _pointings(arm: Arm, camera: Subject, height: float, most: int) -> Iterator[
                 arm.move(position=(x, y, z + height))
             else:
                 arm.move(position=(x, y, z + height), along=DOWN)
-            yield Pointing(each, _asked(each.name), step_floor(arm))
+            question = f"how far beside the middle of {each.name} is the tip, along x and y of the base?"
+            said = ask_offset(f"{question} `1.5mm -0.4mm`; Enter: not at all")
+            yield Pointing(each, said, step_floor(arm))
 
 
 @contextmanager
@@ -95,36 +94,6 @@ def _in_scene(arm: Arm, camera: str) -> Iterator[tuple[Seen, ...]]:
     finally:
         for name in set(arm.scene.objects) - before:
             arm.scene.remove(name)
-
-
-def _asked(name: str) -> tuple[float, float]:
-    """[m] as a person says them."""
-    while True:
-        question = f"how far beside the middle of {name} is the tip, along x and y of the base?"
-        print(f"{question} `1.5mm -0.4mm`; Enter: not at all", flush=True)
-        line = sys.stdin.readline()
-        if not line:
-            raise CommandError("there is nobody to look: this command asks a person")
-        words = line.split()
-        if not words:
-            return 0.0, 0.0
-        try:
-            x, y = (parse_quantity(word, LENGTH, "it") for word in words)
-        except (CommandError, ValueError) as error:
-            print(f"two lengths are wanted, as 1.5mm -0.4mm ({error})")
-            continue
-        return x, y
-
-
-def step_floor(arm: Arm) -> float:
-    """[m] by which the tool may be off as it stands now, with half a step of every joint: root of the squares."""
-    joints = {name: arm.joints[name] for name in arm.joint_names}
-    here = np.array(arm.fk(joints).position)
-    moved = []
-    for joint in arm.description.joints:
-        half = 0.5 / joint.steps.per_unit
-        moved.append(np.array(arm.fk({**joints, joint.name: joints[joint.name] + half}).position) - here)
-    return float(np.sqrt(np.sum(np.square(moved))))
 
 
 def report(camera: Subject, pointings: list[Pointing]) -> Accuracy:

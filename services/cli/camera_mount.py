@@ -6,6 +6,7 @@ A camera that rides on a link, or one before which a link carries tags, is `came
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,11 +16,12 @@ from services.arm.frames.transforms import compose
 from services.cli import camera_poses
 from services.cli.camera_boards import bar_option, tag_board
 from services.cli.camera_images import from_bus, info_of, subject
+from services.cli.camera_tip import ask_offset, step_floor, tip_length, tip_option
 from services.cli.errors import CommandError, ExitCode, in_commands, usage
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.session import connect, connect_arm, load_robot
-from services.cli.units import LENGTH, parse_quantity
-from services.vision.boards import Sighting, TagBoard
+from services.vision.boards import Sighting
+from services.vision.calibration.shots import one_of
 from services.vision.calibration.touches import FEWEST_TOUCHES, TouchFit, fit_touches, spread_points
 from services.vision.camera_model import CameraModel, model_of
 from services.vision.rigid import Array
@@ -28,17 +30,20 @@ if TYPE_CHECKING:
     from gemelo import Arm
 
 LARGEST_HELD_OUT = 0.002  # [m] above which the touches are not believed
-IMAGES = 10  # of which the first that shows enough of the board is taken
+TOUCHES = 9  # unless a person wants fewer; measured (`mount_touch_mm`): 4 leave half as much again
+IMAGES = 10  # whose mean is taken of those that show enough of the board
 ENOUGH_TAGS = 4
+COARSE = 0.0004  # [m] chosen: with larger steps a person is told that the tip cannot be led nearer
 
 
 def add_options(parser: Parser) -> None:
     """Adds the camera, the printed scale, how many points, and the tip that touches."""
     parser.add_argument("camera", metavar="CAMERA", nargs="?", default="", help="of the cell file; its first one")
     bar_option(parser)
-    parser.add_argument("--points", type=positive_integer, default=4, metavar="N", help="tags to touch, 4 to 9 (4)")
-    said = "of what touches, beyond the tool's frame along its z (the length of the jaws)"
-    parser.add_argument("--tip", metavar="LENGTH", default="", help=said)
+    parser.add_argument(
+        "--points", type=positive_integer, default=TOUCHES, metavar="N", help="corners to touch, 4 to 36 (9)"
+    )
+    tip_option(parser)
     camera_poses.add_options(parser)
 
 
@@ -47,31 +52,30 @@ def run(options: Options) -> ExitCode:
     camera, board = subject(options.camera), tag_board(options.bar)
     if camera.record.parent or options.on:
         return camera_poses.run(options, camera)
-    if not FEWEST_TOUCHES <= options.points <= len(board.centres()):
-        raise usage(f"--points {options.points} is not {FEWEST_TOUCHES} to {len(board.centres())}")
+    points = board.points()
+    if not FEWEST_TOUCHES <= options.points <= len(points):
+        raise usage(f"--points {options.points} is not {FEWEST_TOUCHES} to {len(points)}")
     robot = load_robot()
-    tip = _tip(options.tip, robot)
-    numbers = list(board.centres())
-    chosen = [numbers[index] for index in spread_points([board.centres()[each] for each in numbers], options.points)]
-    print("lay the board flat where the camera sees it, within the arm's reach, and do not move it any more")
+    tip = tip_length(options.tip, robot)
+    chosen = spread_points(list(points), options.points)
+    names = [board.corner_name(index) for index in chosen]
+    print("lay the board flat where the camera sees it, within the arm's reach, and do not move it any more;")
+    print("upper and lower are as you read the page")
     with connect_arm(robot) as arm:
-        touched = np.array([_touch(arm, number, tip) for number in chosen])
+        touched = np.array([_touch(arm, name, tip) for name in names])
     _ask("now lead the arm out of the image")
     with connect(robot) as session:
         model = model_of(info_of(session, camera.name))
-        sighting = None
-        for _, image in zip(range(IMAGES), from_bus(session, camera.name), strict=False):
-            sighting = board.find(image, model)
-            if sighting is not None and len(sighting.points) >= 4 * ENOUGH_TAGS:
-                break
-    fit = _fit(board, chosen, touched, sighting, model)
+        images = zip(range(IMAGES), from_bus(session, camera.name), strict=False)
+        found = [board.find(image, model) for _, image in images]
+    fit = _fit(points[chosen], touched, found, model)
     for index in fit.outliers:
         off = 1e3 * fit.errors[index]
-        print(f"the touch of tag {chosen[index]} does not agree with the others ({off:.1f} mm), and was left out")
+        print(f"the touch of {names[index]} does not agree with the others ({off:.1f} mm), and was left out")
     if fit.held_out > LARGEST_HELD_OUT:
         raise CommandError(
             f"touches are {1e3 * fit.held_out:.1f} mm from where the others put them (at most "
-            f"{1e3 * LARGEST_HELD_OUT:g}), and nothing was written: touch the middles of the tags again"
+            f"{1e3 * LARGEST_HELD_OUT:g}), and nothing was written: touch the corners again"
         )
     path = camera.write_mount(robot.description.base_frame, fit.base_from_camera, fit.held_out)
     x, y, z = (1e3 * value for value in fit.base_from_camera[:3, 3])
@@ -80,15 +84,21 @@ def run(options: Options) -> ExitCode:
     return ExitCode.OK
 
 
-def _touch(arm: Arm, number: int, tip: float) -> tuple[float, float, float]:
-    """Where [m] the tip was when the person said that it touches."""
-    _ask(f"bring the tip onto the middle of tag {number} (`gemelo jog`, or the page)")
+def _touch(arm: Arm, corner: str, tip: float) -> tuple[float, float, float]:
+    """Where [m] the corner is, by where the tip was when the person said that it touches."""
+    print(f"bring the tip onto {corner} (`gemelo jog`, or the page)")
+    beside = ask_offset(
+        "Enter when it is there; or, where the arm's steps end beside it, how far the tip is beside it along "
+        "x and y of the base: `1.5mm -0.4mm`"
+    )
     try:
-        pose = arm.pose()
+        pose, floor = arm.pose(), step_floor(arm)
     except gemelo.Error as error:
         raise CommandError(in_commands(str(error))) from error
-    point = compose((pose.position, pose.orientation), ((0.0, 0.0, tip), (0.0, 0.0, 0.0, 1.0)))[0]
-    print(f"  {1e3 * point[0]:.1f} {1e3 * point[1]:.1f} {1e3 * point[2]:.1f} mm")
+    x, y, z = compose((pose.position, pose.orientation), ((0.0, 0.0, tip), (0.0, 0.0, 0.0, 1.0)))[0]
+    point = x - beside[0], y - beside[1], z
+    coarse = f"; the arm's steps end up to {1e3 * floor:.1f} mm beside" if floor > COARSE and not any(beside) else ""
+    print(f"  {1e3 * point[0]:.1f} {1e3 * point[1]:.1f} {1e3 * point[2]:.1f} mm{coarse}")
     return point
 
 
@@ -98,21 +108,14 @@ def _ask(text: str) -> None:
         raise CommandError("there is nobody to touch the board: this command asks a person; nothing was written")
 
 
-def _tip(text: str, robot: gemelo.Robot) -> float:
-    if text:
-        return parse_quantity(text, LENGTH, "--tip")
-    gripper = robot.description.gripper
-    return gripper.jaw[2] if gripper is not None and gripper.jaw is not None else 0.0
-
-
-def _fit(board: TagBoard, chosen: list[int], touched: Array, sighting: Sighting | None, model: CameraModel) -> TouchFit:
-    if sighting is None or len(sighting.points) < 4 * ENOUGH_TAGS:
-        seen = 0 if sighting is None else len(sighting.points) // 4
+def _fit(points: Array, touched: Array, found: Sequence[Sighting | None], model: CameraModel) -> TouchFit:
+    enough = [each for each in found if each is not None and len(each.points) >= 4 * ENOUGH_TAGS]
+    if not enough:
+        seen = max((len(each.points) // 4 for each in found if each is not None), default=0)
         raise CommandError(
             f"the camera sees {seen} tags of the board, at least {ENOUGH_TAGS} are needed; nothing was written"
         )
-    points = np.array([board.centres()[number] for number in chosen])
     try:
-        return fit_touches(points, touched, sighting, model)
+        return fit_touches(points, touched, one_of(enough, 4 * ENOUGH_TAGS), model)
     except ValueError as error:
         raise CommandError(f"{error}; nothing was written") from error

@@ -18,6 +18,7 @@ from services.vision.tags import FAMILIES, GreyImage, doubled, find_tags, tag_mo
 
 BOARD_FAMILY = TagFamily.ARUCO_5X5_100  # of the markers between the chessboard's squares
 EVEN = 0.87  # of its clearest edge's contrast the faintest edge of a tag has, or it is partly hidden
+CORNERS = ("upper left", "upper right", "lower right", "lower left")  # of a tag, in the order of `square`
 FEWEST_CORNERS = 8  # of a chessboard make a shot
 Square = tuple[float, float, float]  # left, lower edge, size [m] of what is black
 
@@ -110,6 +111,11 @@ class TagBoard:
     def points(self) -> Array:
         """(n, 3) [m] the corners of all its tags."""
         return np.vstack([square(self.tag) + centre for centre in self.centres().values()])
+
+    def corner_name(self, index: int) -> str:
+        """What the corner is called that is the so manieth of `points`, on the upright page."""
+        number = list(self.centres())[index // len(CORNERS)]
+        return f"the {CORNERS[index % len(CORNERS)]} corner of tag {number}"
 
     def squares(self) -> list[Square]:
         """All that is black, from the lower left corner of the board."""

@@ -30,6 +30,7 @@ from services.cli.camera_boards import CHESS_BOARD, TAG_BOARD
 from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.vision.boards import picture
+from services.vision.calibration.touches import spread_points
 from services.vision.camera_model import model_of
 from services.vision.pages import BAR, POINT, page_of
 from services.vision.rigid import apply, from_transform, inverse, rigid, turn
@@ -169,8 +170,12 @@ def test_touched_tags_tell_where_the_camera_stands_and_bad_ones_write_nothing(
     image = VirtualCamera(record, record.source, exact, world.snapshot).image(world.snapshot())
     grey = cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY)
     random = np.random.default_rng(1)
-    chosen = [200, 208, 202, 206]
-    tips = [BOARD_AT + TAG_BOARD.centres()[number] + random.normal(0.0, off, 3) for number in chosen]
+    outer = ["the upper left corner of tag 200", "the lower right corner of tag 208"]
+    outer += ["the upper right corner of tag 202", "the lower left corner of tag 206"]
+    chosen = spread_points(list(TAG_BOARD.points()), 9)
+    beside = np.array([0.0015, -0.0004, 0.0])  # where the arm's steps end, as the person says for the first
+    tips = [BOARD_AT + TAG_BOARD.points()[index] + random.normal(0.0, off, 3) for index in chosen]
+    tips[0] = tips[0] + beside
     gripper = rm1.gripper
     assert gripper is not None
     assert gripper.jaw is not None
@@ -182,12 +187,14 @@ def test_touched_tags_tell_where_the_camera_stands_and_bad_ones_write_nothing(
 
     for name in ("connect", "connect_arm"):
         monkeypatch.setattr(camera_mount, name, connected)
-    monkeypatch.setattr(camera_mount, "from_bus", lambda session, name: iter([grey]))
+    monkeypatch.setattr(camera_mount, "from_bus", lambda session, name: iter([grey] * 3))
+    monkeypatch.setattr(camera_mount, "step_floor", lambda arm: 0.0016)
     monkeypatch.setattr(camera_mount, "info_of", lambda session, name: exact)
-    monkeypatch.setattr("sys.stdin", io.StringIO("\n" * 5))
+    monkeypatch.setattr("sys.stdin", io.StringIO("1.5mm -0.4mm\n" + "\n" * len(chosen)))
     assert run(["camera", "mount", "overhead"]) is code
     said = capsys.readouterr()
-    assert [int(each) for each in re.findall(r"middle of tag (\d+)", said.out)] == chosen
+    assert re.findall(r"the tip onto (.*) \(", said.out)[:4] == outer
+    assert said.out.count("the arm's steps end up to 1.6 mm beside") == len(chosen) - 1
     if code is not ExitCode.OK:
         assert "nothing was written" in said.err
         assert not cell.with_name(CAMERA_FILE).exists()
@@ -210,6 +217,6 @@ def test_with_nobody_at_the_keyboard_nothing_is_measured(
     monkeypatch.setattr(camera_mount, "connect_arm", connected)
     monkeypatch.setattr("sys.stdin", io.StringIO(""))
     assert run(["camera", "mount", "overhead"]) is ExitCode.FAILED
-    assert "nobody to touch the board" in capsys.readouterr().err
+    assert "nobody to look" in capsys.readouterr().err
     assert run(["camera", "mount", "overhead", "--points", "3"]) is ExitCode.USAGE
     assert run(["camera", "mount", "elsewhere"]) is ExitCode.USAGE
