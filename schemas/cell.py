@@ -147,7 +147,7 @@ class OnnxThing(ThingRecord, frozen=True, kw_only=True, tag_field="kind", tag="o
     """A class of the user's own model, in the layout of YOLO."""
 
     model: str  # an .onnx file, relative to the cell file
-    label: Annotated[int, Meta(ge=0)]  # number of the class
+    label: Annotated[int, Meta(ge=0)] | Annotated[str, Meta(min_length=1)]  # number of the class, or its name
     box: Edges  # [m] about
     threshold: Annotated[float, Meta(gt=0.0, lt=1.0)] = 0.5
     input: Annotated[int, Meta(ge=32, le=4096)] = 640  # [px] edge of the square image that it was exported with

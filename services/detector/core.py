@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +18,7 @@ from schemas.frames import Transform
 from services.arm.cell.cell_file import Cell, Tagged, height_of_frame
 from services.arm.cell.colours import RGB, nearest_colour
 from services.arm.frames.transforms import from_rpy
-from services.detector.user_models import Found, Standing, UserModel, standing
+from services.detector.user_models import BadModel, Found, Standing, UserModel, standing
 from services.vision.boxes import (
     BoxFit,
     ColourImage,
@@ -75,11 +76,8 @@ class Detector:
     def __init__(self, cell: Cell, models: Mapping[Path, UserModel] | None = None) -> None:
         """`models` by their files; things of others are not looked for."""
         self._cell = cell
-        self._modelled: dict[Path, list[OnnxThing]] = {}
-        for thing in cell.things:
-            if isinstance(thing, OnnxThing) and cell.path_of(thing.model) in (models or {}):
-                self._modelled.setdefault(cell.path_of(thing.model), []).append(thing)
         self._models = models or {}
+        self._modelled = _by_model(cell, self._models)
         self._tagged = {(each.family, each.id): each for each in cell.all_tags}
         self._coloured: dict[Colour, list[ColourThing]] = {}
         for thing in cell.things:
@@ -184,10 +182,10 @@ class Detector:
         plane = view.plane(self._cell.table)
         assert plane is not None
         for path, things in self._modelled.items():
-            found = self._models[path].look(view.image, min(thing.threshold for thing in things))
-            for thing in things:
+            found = self._models[path].look(view.image, min(thing.threshold for _, thing in things))
+            for label, thing in things:
                 for each in found:
-                    if each.label == thing.label and each.score >= thing.threshold:
+                    if each.label == label and each.score >= thing.threshold:
                         place = standing(each, view.model, plane, thing.box)
                         if place is not None:
                             yield _class_item(view, thing, each, plane, place)
@@ -241,6 +239,17 @@ class Detector:
             is_located=True,
             sigma=float(np.hypot(fit.sigma, view.mount_error)),
         )
+
+
+def _by_model(cell: Cell, models: Mapping[Path, UserModel]) -> dict[Path, list[tuple[int, OnnxThing]]]:
+    """The things of each model's file with the number of their class; not those of a class that it does not have."""
+    found: dict[Path, list[tuple[int, OnnxThing]]] = {}
+    for thing in cell.things:
+        if isinstance(thing, OnnxThing) and cell.path_of(thing.model) in models:
+            with suppress(BadModel):
+                label = models[cell.path_of(thing.model)].number_of(thing.label)
+                found.setdefault(cell.path_of(thing.model), []).append((label, thing))
+    return found
 
 
 def _class_item(view: View, thing: OnnxThing, found: Found, plane: Array, place: Standing) -> Detection:

@@ -77,9 +77,12 @@ def read_models(cell: Cell, warn: Callable[[str], object]) -> dict[Path, UserMod
 
     found: dict[Path, UserModel] = {}
     for thing in cell.things:
-        if isinstance(thing, OnnxThing) and cell.path_of(thing.model) not in found:
+        if isinstance(thing, OnnxThing):
+            path = cell.path_of(thing.model)
             try:
-                found[cell.path_of(thing.model)] = UserModel(cell.path_of(thing.model), thing.input)
+                if path not in found:
+                    found[path] = UserModel(path, thing.input)
+                found[path].number_of(thing.label)
             except BadModel as error:
                 warn(f'thing "{thing.name}" is not looked for: {error}')
     return found

@@ -14,6 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from services.detector.onnx_header import Header, NotOnnx, read_header
 from services.vision.boxes import ColourImage, project_box, raised
 from services.vision.camera_model import CameraModel
 from services.vision.rigid import Array
@@ -22,6 +23,8 @@ from services.vision.tag_pose import flat, on_plane
 GREY = 114  # of the border around an image that is not square, as YOLO is trained
 SAME = 0.45  # overlap from which on two boxes of a class are one
 MOST_FINAL = 1_000  # boxes of a model that suppresses doubles itself
+MOST_NAMED = 20  # classes in a sentence
+SLACK = 1e-3  # of a score beyond 0 and 1, by rounding
 PIXELS = 2.0  # [px] standard deviation of a side of a box; chosen
 LIKE_SIZE = (0.6, 1.6)  # of a found box's edges to those of the thing where it would stand
 TURNS = np.linspace(0.0, np.pi, 12, endpoint=False)  # [rad] that are tried
@@ -56,14 +59,37 @@ class UserModel:
     def __init__(self, path: Path, size: int) -> None:
         """`size` [px]: the edge of the square image that it takes."""
         self._path, self._size = path, size
+        header = _required_header(path, size)
+        self._names, self._is_open = header.names, not all(header.sizes[1:])
+        self._classes = 0  # 0: its layout does not tell
         try:
             self._net = cv2.dnn.readNetFromONNX(str(path))
         except cv2.error as error:
-            raise BadModel(f"{path} cannot be read by OpenCV: {_first_line(error)}; export it with opset 12") from error
-        self.look(np.full((size, size, 3), GREY, dtype=np.uint8), 0.99)
+            remedy = self._if_open() or f"{_first_line(error)}; export it with opset 12"
+            raise BadModel(f"{path} cannot be read by OpenCV: {remedy}") from error
+        self._require_shares(self._run(np.full((size, size, 3), GREY, dtype=np.uint8))[1])
+
+    def number_of(self, label: int | str) -> int:
+        """Of the class that is called or numbered so; raises `BadModel` where the model has none."""
+        known = ", ".join(f"{number} {name}" for number, name in sorted(self._names.items())[:MOST_NAMED])
+        if isinstance(label, str):
+            found = [number for number, name in self._names.items() if name == label]
+            if not self._names:
+                raise BadModel(f'{self._path} does not say the names of its classes: write the number for "{label}"')
+            if not found:
+                raise BadModel(f'{self._path} has no class "{label}"; it has {known}')
+            return found[0]
+        if (self._names and label not in self._names) or label >= self._classes > 0:
+            said = known or f"{self._classes}, counted from 0"
+            raise BadModel(f"{self._path} has no class {label}; it has {said}")
+        return label
 
     def look(self, image: ColourImage, threshold: float) -> list[Found]:
         """What is in `image` (h, w, 3; red first) with at least that score; raises `BadModel`."""
+        return _without_doubles(*self._run(image), threshold)
+
+    def _run(self, image: ColourImage) -> tuple[Array, Array]:
+        """(n, 4) sides [px of the image], and (n, classes) scores."""
         scale = self._size / max(image.shape[:2])
         small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
         square = np.full((self._size, self._size, 3), GREY, dtype=np.uint8)
@@ -72,12 +98,16 @@ class UserModel:
             self._net.setInput(cv2.dnn.blobFromImage(square, 1.0 / 255.0))
             said = np.asarray(self._net.forward(), dtype=np.float64)
         except cv2.error as error:
-            raise BadModel(
-                f"{self._path} does not take images of {self._size} x {self._size} pixels ({_first_line(error)}): "
-                "write the size that it was exported with as `input` of the thing"
-            ) from error
+            remedy = self._if_open() or "write the size that it was exported with as `input` of the thing"
+            size = f"{self._path} does not take images of {self._size} x {self._size} pixels ({_first_line(error)})"
+            raise BadModel(f"{size}: {remedy}") from error
         sides, scores = self._boxes(said)
-        return _without_doubles((sides + 0.5) / scale - 0.5, scores, threshold)
+        return (sides + 0.5) / scale - 0.5, scores
+
+    def _if_open(self) -> str:
+        """Of many models that leave the size of their images open OpenCV cannot work out the shapes within."""
+        said = f"it leaves the size of its images open; export it for one, with `dynamic=False imgsz={self._size}`"
+        return said if self._is_open else ""
 
     def _boxes(self, said: Array) -> tuple[Array, Array]:
         """(n, 4) sides [px of the square], and (n, classes) scores."""
@@ -87,13 +117,55 @@ class UserModel:
             labels = np.clip(table[:, 5].astype(int), 0, None)
             return table[:, :4], np.eye(int(labels.max()) + 1)[labels] * table[:, 4:5]
         if 4 < rows < columns:
+            self._require_classes(rows - 4)
             return _sides(table[:4].T), table[4:].T
         if 5 < columns < rows:
+            self._require_classes(columns - 5)
             return _sides(table[:, :4]), table[:, 5:] * table[:, 4:5]
         raise BadModel(
             f"{self._path} answers with numbers of shape {tuple(said.shape)}: a layout of YOLO is (1, 4 + classes, n), "
             "(1, n, 5 + classes) or (1, n, 6)"
         )
+
+    def _require_classes(self, scores: int) -> None:
+        """Models of outlines, poses and turned boxes say more numbers a box than they have classes."""
+        self._classes = scores
+        if self._names and len(self._names) != scores:
+            raise BadModel(
+                f"{self._path} says {scores} scores for each box and names {len(self._names)} classes: one that "
+                "detects is wanted, not one of outlines, poses or turned boxes"
+            )
+
+    def _require_shares(self, scores: Array) -> None:
+        if not np.isfinite(scores).all() or scores.min(initial=0.0) < -SLACK or scores.max(initial=0.0) > 1.0 + SLACK:
+            raise BadModel(
+                f"{self._path} answers with scores from {scores.min():.3g} to {scores.max():.3g}: those of YOLO are "
+                "from 0 to 1; export it with its last layer"
+            )
+
+
+def _required_header(path: Path, size: int) -> Header:
+    """What the file says of itself; raises `BadModel` where it takes no square images of `size` [px]."""
+    try:
+        header = read_header(path)
+    except (OSError, NotOnnx) as error:
+        raise BadModel(f"{path} cannot be read by OpenCV: it is no ONNX file ({error})") from error
+    if len(header.sizes) != 4:
+        raise BadModel(f"{path} takes an input of {len(header.sizes)} dimensions: (1, 3, height, width) is wanted")
+    _, channels, height, width = header.sizes
+    if channels not in (0, 3):
+        raise BadModel(f"{path} takes images of {channels} channels: 3 are wanted, red first")
+    edges = {height, width} - {0}
+    if len(edges) > 1:
+        raise BadModel(
+            f"{path} takes images of {width} x {height} pixels: export it for square ones, with `imgsz={size}`"
+        )
+    if edges and edges != {size}:
+        (edge,) = edges
+        raise BadModel(
+            f"{path} takes images of {edge} x {edge} pixels, not {size}: write `input = {edge}` in the thing"
+        )
+    return header
 
 
 def standing(found: Found, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Standing | None:

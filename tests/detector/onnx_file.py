@@ -50,12 +50,19 @@ def node(kind: str, inputs: list[str], output: str, **attributes: int | list[int
 
 
 def value_info(name: str, shape: tuple[int, ...]) -> bytes:
-    dims = b"".join(field(1, field(1, size)) for size in shape)
+    """A size of 0 is left open, under a name."""
+    dims = b"".join(field(1, field(1, size) if size else field(2, "open")) for size in shape)
     return field(1, name) + field(2, field(1, field(1, FLOAT) + field(2, dims)))
 
 
-def red_finder(path: Path, size: int, layout: str = "v8") -> Path:
-    """Writes a model for images of `size` x `size` pixels: centre and extent of what is red, by its moments."""
+def red_finder(
+    path: Path, size: int, layout: str = "v8", names: str = "", said: tuple[int, ...] = (), gain: float = 0.01
+) -> Path:
+    """Writes a model for images of `size` x `size` pixels: centre and extent of what is red, by its moments.
+
+    `names` is what it says of its classes, `said` the sizes that it says its images have; with a negative `gain` its
+    scores are negative.
+    """
     grid = np.arange(size, dtype=np.float32)
     constants = {
         "redness": np.array([1.0, -0.5, -0.5], np.float32).reshape(1, 3, 1, 1),
@@ -64,7 +71,7 @@ def red_finder(path: Path, size: int, layout: str = "v8") -> Path:
         "y": np.broadcast_to(grid[:, None], (1, 1, size, size)).copy(),
         "little": np.full((1, 1, 1, 1), 1e-6, np.float32),
         "twelve": np.full((1, 1, 1, 1), 12.0, np.float32),
-        "hundredth": np.full((1, 1, 1, 1), 0.01, np.float32),
+        "hundredth": np.full((1, 1, 1, 1), gain, np.float32),
         "flat": np.array([1, 5, 1], np.int64),
         "nothing": np.zeros((1, 5, BOXES - 1), np.float32),
     }
@@ -95,6 +102,7 @@ def red_finder(path: Path, size: int, layout: str = "v8") -> Path:
     shape = (1, 5, BOXES) if layout == "v8" else (1, BOXES, 5)
     graph = b"".join(field(1, each) for each in nodes) + field(2, "red")
     graph += b"".join(field(5, tensor(name, values)) for name, values in constants.items())
-    graph += field(11, value_info("image", (1, 3, size, size))) + field(12, value_info("said", shape))
-    path.write_bytes(field(1, 7) + field(8, field(1, "") + field(2, 11)) + field(7, graph))
+    graph += field(11, value_info("image", said or (1, 3, size, size))) + field(12, value_info("said", shape))
+    metadata = field(14, field(1, "task") + field(2, "detect")) + field(14, field(1, "names") + field(2, names))
+    path.write_bytes(field(1, 7) + field(8, field(1, "") + field(2, 11)) + field(7, graph) + metadata)
     return path

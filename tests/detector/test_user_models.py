@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -90,12 +91,50 @@ def test_what_is_no_model_is_named_and_the_others_are_looked_for(table: Table, t
 
 
 @pytest.mark.parametrize(
-    ("size", "layout", "sentence"), [(64, "v8", "write the size"), (SIZE, "turned", "a layout of YOLO")]
+    ("size", "model", "sentence"),
+    [
+        (64, {}, "takes images of 320 x 320 pixels, not 64: write `input = 320`"),
+        (SIZE, {"layout": "turned"}, "a layout of YOLO"),
+        (SIZE, {"said": (0, 3, 0, 0)}, "leaves the size of its images open.*`dynamic=False imgsz=320`"),
+        (SIZE, {"said": (1, 1, SIZE, SIZE)}, "images of 1 channels"),
+        (SIZE, {"said": (1, 3, SIZE, 640)}, "takes images of 640 x 320 pixels: export it for square ones"),
+        (SIZE, {"said": (1, 512)}, "an input of 2 dimensions"),
+        (SIZE, {"names": "{0: 'red', 1: 'blue'}"}, "1 scores for each box and names 2 classes: one that detects"),
+        (SIZE, {"gain": -1e5}, "scores from -0.* to 0: those of YOLO are from 0 to 1"),
+    ],
 )
-def test_a_wrong_size_and_a_wrong_layout_are_said(tmp_path: Path, size: int, layout: str, sentence: str) -> None:
-    path = red_finder(tmp_path / "red.onnx", SIZE, layout)
+def test_what_a_model_is_not_fit_for_is_said_with_the_remedy(
+    tmp_path: Path, size: int, model: dict[str, Any], sentence: str
+) -> None:
+    path = red_finder(tmp_path / "red.onnx", SIZE, **model)
     with pytest.raises(BadModel, match=sentence):
         UserModel(path, size)
+
+
+def test_a_thing_may_name_its_class_where_the_model_says_the_names(table: Table, tmp_path: Path) -> None:
+    path = red_finder(tmp_path / "red.onnx", SIZE, names="{0: 'red block'}")
+    table.detector = looking(table, replace(thing(path), label="red block"))
+    assert "red_block" in names(table.look())
+
+
+@pytest.mark.parametrize(
+    ("said", "label", "sentence"),
+    [
+        ("{0: 'red block'}", "red", 'no class "red"; it has 0 red block'),
+        ("{0: 'red block'}", 3, "no class 3; it has 0 red block"),
+        ("", 3, "no class 3; it has 1, counted from 0"),
+        ("", "red", 'does not say the names of its classes: write the number for "red"'),
+    ],
+)
+def test_a_class_that_the_model_does_not_have_is_refused_and_the_others_are_looked_for(
+    table: Table, tmp_path: Path, said: str, label: int | str, sentence: str
+) -> None:
+    told: list[str] = []
+    wanted = replace(thing(red_finder(tmp_path / "red.onnx", SIZE, names=said)), label=label)
+    table.detector = looking(table, wanted, told.append)
+    assert sentence in told[0]
+    assert "red_block" not in names(table.look())
+    assert "cup" in names(table.look())
 
 
 def test_doubles_of_a_class_are_one_and_classes_stay_apart() -> None:
