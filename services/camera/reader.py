@@ -6,6 +6,8 @@ import threading
 import time
 from collections.abc import Callable
 
+import cv2
+
 from schemas.camera import CameraCondition
 from services.camera.sources.source import CameraFault, Frame, Source
 
@@ -59,6 +61,8 @@ class Reader:
                 self._put(fault)
                 if fault.condition is CameraCondition.ENDED:
                     self._stop.set()
+            except (OSError, cv2.error) as error:  # as a folder that is being removed while it is read
+                self._put(CameraFault(CameraCondition.REFUSED, f'camera "{self._thread.name}": {error}'))
             finally:
                 self._source.close()
             self._stop.wait(RETRY)

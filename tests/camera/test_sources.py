@@ -63,7 +63,8 @@ def device(tmp_path: Path) -> Path:
 
 
 def camera(device: Path, capture: PretendCapture, **settings: float) -> V4l2Camera:
-    return V4l2Camera(RECORD, V4l2Source(device=str(device), **settings), lambda path: capture)  # type: ignore[arg-type]
+    source = V4l2Source(device=str(device), **settings)  # type: ignore[arg-type]
+    return V4l2Camera(RECORD, source, lambda path: capture, lambda path: "")
 
 
 def fault_of(source: V4l2Camera | FolderOfImages | Video, what: str = "open") -> CameraFault:
@@ -120,9 +121,21 @@ def test_a_device_that_is_not_there_is_missing_and_one_that_goes_silent_is_unplu
 
 
 def test_a_real_capture_of_what_is_no_camera_is_refused(device: Path) -> None:
-    fault = fault_of(V4l2Camera(RECORD, V4l2Source(device=str(device))))
+    fault = fault_of(V4l2Camera(RECORD, V4l2Source(device=str(device)), what_else=lambda path: ""))
     assert fault.condition is CameraCondition.REFUSED
     assert "gives no images" in str(fault)
+
+
+@pytest.mark.parametrize("path", ["/dev/null", "/dev/tty", "/dev/zero", "a pipe", "a folder", "a file"])
+def test_a_path_that_is_no_camera_is_refused_by_name_before_it_is_opened(path: str, tmp_path: Path) -> None:
+    (tmp_path / "a folder").mkdir()
+    (tmp_path / "a file").write_bytes(b"")
+    os.mkfifo(tmp_path / "a pipe")
+    path = path if path.startswith("/") else str(tmp_path / path)
+    fault = fault_of(V4l2Camera(RECORD, V4l2Source(device=path), capture=pytest.fail))
+    what = Path(path).name if " " in path and "pipe" not in path else "another device"
+    assert fault.condition is CameraCondition.REFUSED
+    assert f"{path} is {what}, no camera: write the device as `gemelo camera list` prints it" in str(fault)
 
 
 def test_the_program_that_has_the_camera_is_named(device: Path) -> None:
@@ -236,6 +249,53 @@ def test_a_source_that_goes_comes_back_by_itself(pictures: Path, reading: tuple[
     assert fault.condition is CameraCondition.MISSING
     shutil.move(pictures.with_name("away"), pictures)
     assert isinstance(next_of(reader, woken, Frame), Frame)
+
+
+@pytest.mark.parametrize("error", [PermissionError(13, "Permission denied"), cv2.error("no memory")])
+def test_a_source_that_fails_in_a_way_of_its_own_is_named_and_tried_again(
+    pictures: Path, error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, errors = FolderOfImages.read, [error]
+
+    def read(self: FolderOfImages) -> Frame:
+        if errors:
+            raise errors.pop()
+        return real(self)
+
+    monkeypatch.setattr(FolderOfImages, "read", read)
+    woken = threading.Semaphore(0)
+    reader = Reader(FolderOfImages(RECORD, pictures, loop=True), woken.release, "webcam")
+    reader.start()
+    try:
+        fault = next_of(reader, woken, CameraFault)
+        assert isinstance(fault, CameraFault)
+        assert str(fault).startswith('camera "webcam": ')
+        assert fault.condition is CameraCondition.REFUSED
+        assert isinstance(next_of(reader, woken, Frame), Frame)
+    finally:
+        reader.stop()
+
+
+def test_a_video_that_is_removed_while_it_is_played_goes_on_and_is_missing_when_it_is_opened_again(video: Path) -> None:
+    source = Video(RECORD, video, loop=True)
+    source.open()
+    source.read()
+    video.unlink()
+    for _ in range(5):  # more than it has: from its beginning again
+        assert source.read().width == 64
+    source.close()
+    assert fault_of(source).condition is CameraCondition.MISSING
+
+
+def test_a_single_picture_that_is_removed_is_missing_and_comes_back(pictures: Path) -> None:
+    path = pictures / "1.jpg"
+    content, source = path.read_bytes(), Video(RECORD, pictures / "1.jpg", loop=True)
+    source.open()
+    source.read()
+    path.unlink()
+    assert fault_of(source, "read").condition is CameraCondition.MISSING
+    path.write_bytes(content)
+    assert source.read().data == content
 
 
 def test_a_slow_reader_gets_the_newest_image_only_and_is_woken_once(

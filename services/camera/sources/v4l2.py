@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -21,6 +22,7 @@ MJPG = cv2.VideoWriter.fourcc(*"MJPG")
 START_OF_JPEG = b"\xff\xd8"
 OLDEST = 1_000_000_000  # [ns] a driver's time that is further back is none
 PROCESSES = Path("/proc")
+VIDEO_MAJOR = 81  # of the kernel's video devices (Documentation/admin-guide/devices.txt)
 
 
 class Capture(Protocol):
@@ -49,9 +51,16 @@ class V4l2Camera:
     period = 0.0
     is_live = True
 
-    def __init__(self, record: CameraRecord, source: V4l2Source, capture: Callable[[str], Capture] = open_device):
+    def __init__(
+        self,
+        record: CameraRecord,
+        source: V4l2Source,
+        capture: Callable[[str], Capture] = open_device,
+        what_else: Callable[[str], str] | None = None,
+    ) -> None:
+        """`what_else`: what a path is that is no video device; empty for one that is."""
         self._record, self._source = record, source
-        self._open_capture = capture
+        self._open_capture, self._what_else = capture, what_else or kind_of
         self._capture: Capture | None = None
         self._is_jpeg = False
 
@@ -60,6 +69,11 @@ class V4l2Camera:
         path = os.path.realpath(self._source.device)
         if not os.path.exists(path):
             raise self._fault(CameraCondition.MISSING, f"there is no {self._source.device}: plug it in; {LIST}")
+        if other := self._what_else(path):
+            remedy = (
+                'write the device as `gemelo camera list` prints it; pictures and videos are of kind "folder" or "file"'
+            )
+            raise self._fault(CameraCondition.REFUSED, f"{self._source.device} is {other}, no camera: {remedy}")
         if not os.access(path, os.R_OK | os.W_OK):
             remedy = "sudo usermod -aG video $USER, then log in again"
             raise self._fault(CameraCondition.REFUSED, f"no permission for {path}: {remedy}")
@@ -140,6 +154,17 @@ class V4l2Camera:
 
 
 LIST = "`gemelo camera list` prints what there is"
+
+
+def kind_of(path: str) -> str:
+    """What it is where it is no video device of Linux; empty where it is one, or is gone."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return ""
+    if stat.S_ISCHR(found.st_mode):
+        return "" if os.major(found.st_rdev) == VIDEO_MAJOR else "another device"
+    return "a folder" if stat.S_ISDIR(found.st_mode) else "a file" if stat.S_ISREG(found.st_mode) else "another device"
 
 
 def capture_stamp(driver: float, monotonic: int, now: int) -> int:
