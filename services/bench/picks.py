@@ -32,7 +32,6 @@ POST = (0.025, 0.025, 0.1)  # [m]
 TO_TELL = 10.0  # [s] in which the camera tells where things are now, as it does every second
 FLOOR = {"rm1": 1.65e-3, "parol6": 0.2e-3}  # [m] the nearest full step of the joints, at its worst place
 MM = 1e3
-SEED = 1
 GOAL = Goal(p99=0.5)  # [mm] of what is beyond the floor
 
 
@@ -126,7 +125,9 @@ def picks(robot: str, count: int, seed: int) -> tuple[Trial, ...]:
             place = draw.choice([each for each in cell.places if each.name not in taken.values()])
             reason = _reason_of(arm, thing, place.name, TABLES[robot].aside)
             off = None
-            if not reason:
+            if reason:
+                print(f"bench: {robot}, seed {seed}, {thing} to {place.name}: {reason}", flush=True)
+            else:
                 taken[thing] = place.name
                 ended = arm.node.now()
                 arm.wait_for(partial(_is_since, truth, ended), TO_TELL)
@@ -136,9 +137,9 @@ def picks(robot: str, count: int, seed: int) -> tuple[Trial, ...]:
     return tuple(trials)
 
 
-def pick_mm(count: int) -> Figure:
+def pick_mm(count: int, seed: int) -> Figure:
     """Distance [mm] on the table from where things are to where they were to be put, beyond the arm's step floor."""
-    every = {robot: picks(robot, count, SEED) for robot in TABLES}
+    every = {robot: picks(robot, count, seed) for robot in TABLES}
     samples = [
         max(0.0, trial.off - FLOOR[robot]) * MM for robot, trials in every.items() for trial in trials
         if trial.off is not None
@@ -150,13 +151,15 @@ def pick_mm(count: int) -> Figure:
     return of_samples(samples, GOAL, reference, "floor: 1.65 mm of rm1, 0.2 mm of parol6; virtual camera and arm")
 
 
-def pick_success(count: int) -> Figure:
+def pick_success(count: int, seed: int) -> Figure:
     """Picks [%] that were carried out; all others were refused with a reason, which the note counts."""
-    trials = [trial for robot in TABLES for trial in picks(robot, count, SEED)]
+    trials = [trial for robot in TABLES for trial in picks(robot, count, seed)]
     reasons = Counter(trial.reason.split(":")[0] for trial in trials if trial.off is None)
     done = 100.0 * sum(trial.off is not None for trial in trials) / len(trials)
     said = ", ".join(f"{number} {reason}" for reason, number in reasons.most_common()) or "none"
-    return of_samples([done], None, {}, f"{len(trials)} picks on both arms among obstacles; not carried out: {said}")
+    return of_samples(
+        [done], None, {}, f"{len(trials)} picks on both arms among obstacles, seed {seed}; not carried out: {said}"
+    )
 
 
 def _reason_of(arm: gemelo.Arm, thing: str, place: str, aside: str) -> str:

@@ -8,8 +8,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from services.bench import main
 from services.bench.figures import Figure, Goal, NotMeasured, guarded, of_samples, quantile, report_of, text_of
 from services.bench.main import FIGURES, function_of
+from services.bench.stack import Stacks
 
 ISSUE = (
     "chunk_ack_tls_ms",
@@ -86,3 +88,11 @@ def test_quantiles_are_samples():
     samples = [float(n) for n in range(1, 101)]
     assert (quantile(samples, 0.5), quantile(samples, 0.99)) == (50.0, 99.0)
     assert quantile([7.0], 0.99) == 7.0
+
+
+def test_a_figure_that_draws_is_given_how_many_and_by_which_seed(monkeypatch: pytest.MonkeyPatch):
+    asked = []
+    monkeypatch.setattr(main, "function_of", lambda row: lambda *each: asked.append(each) or of_samples([1.0]))
+    for name in ("pick_mm", "plan_any_ms", "plan_ms"):
+        main.measured(main.FIGURES[name], Stacks(), 7, 3)
+    assert asked == [(7, 3), (7,), ()]

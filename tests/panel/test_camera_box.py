@@ -50,8 +50,9 @@ def opened(server: viser.ViserServer, places: tuple[str, ...]):
         handlers[f"camera/{name}/detections"](Detections(camera=name, items=items))
         handlers[f"camera/{name}/image"](CameraImage(camera=name, width=640, height=480, data=b"0"))
     return SimpleNamespace(
-        box=box, picks=box._picks, html=lambda: " ".join(each.content for each in lines), handlers=handlers
-    )
+        box=box, picks=box._picks, html=lambda: " ".join(each.content for each in lines), handlers=handlers,
+        pictures=pictures,
+    )  # fmt: skip
 
 
 def clicks(page, x: float, y: float, camera: str = "above") -> None:
