@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Locator, ViewportSize, expect
 T = TypeVar("T")
 
 PATIENCE = 60_000.0  # [ms] a loaded machine draws a picture in seconds
-OPENING = 180_000.0  # [ms] and compiles its shaders in a minute
+OPENING = 300_000.0  # [ms] and compiles its shaders in a minute or more
 SCALE = 0.5  # of a picture's pixels to those of the page: a processor draws a quarter of them
 CONTROLS = 450  # [pixels] of the page
 BLUE = (45, 140, 255)  # of the gizmo's arrow along z
