@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,15 +29,25 @@ ATTACHED_SHARE = 1.0 / 40.0  # of an attached thing's longest side may be bulge:
 MOST_KNOWN = 2048  # obstacles that are kept: those of a scene before a change and after it
 MOST_SPHERES = 1500  # of a link: those of rm1 and parol6 together have less
 OBSTACLES = 64  # the first obstacle's number in a contact: kMaxParts
+HAIR = 1e-4  # [m] a sphere's least radius
 ROUNDING = 2e-5  # [m] for every metre of reach: a float has 24 bits; measured: native/README.md
 
 
 @dataclass(frozen=True)
 class Held:
-    """An attachment and its compiled part."""
+    """An attachment and its compiled part, and what is surely in it."""
 
     attachment: Attachment
     cover: SphereCover
+    part: motion.Part
+    core: motion.Part | None
+
+
+class Named(NamedTuple):
+    """A part of the world: a link, or what is attached to one."""
+
+    name: str
+    link: str
     part: motion.Part
 
 
@@ -48,8 +59,7 @@ class CompiledScene:
     names: tuple[str, ...]  # of the parts: links, then what is attached
     shapes: tuple[CollisionShape, ...]
     held: Mapping[str, Held]
-    bulge: float  # [m] that spheres may be nearer at most than what they cover
-    least: float  # [m] the smallest sphere's radius
+    cores: motion.World | None  # of the spheres less what they bulge: what touches these surely touches
 
     def name_of(self, number: int) -> str:
         """Of a part or an obstacle, by its number in a contact."""
@@ -66,6 +76,7 @@ class Assembly:
         self._frames = frames_of(arm)
         self._chain = motion.chain(self._frames.links, self._frames.numbers, len(arm.joints))
         self._links = {link: self._part(link, shapes[link], cover) for link, cover in self.covers.items()}
+        self._cores = {link: self._core(link, shapes[link], cover) for link, cover in self.covers.items()}
 
     def hold(self, attachment: Attachment) -> Held:
         """The attachment with its spheres; raises ValueError for an unknown link or a shape without an end."""
@@ -74,34 +85,52 @@ class Assembly:
         if attachment.name in self._links:
             raise ValueError(f'"{attachment.name}" is the name of a link; give what is attached another one')
         cover = cover_shapes(attachment.shapes, _bulge(attachment.shapes))
-        return Held(attachment, cover, self._part(attachment.link, attachment.shapes, cover))
+        link, shapes = attachment.link, attachment.shapes
+        return Held(attachment, cover, self._part(link, shapes, cover), self._core(link, shapes, cover))
 
     def compiled_scene(self, shapes: Sequence[CollisionShape], held: Mapping[str, Held]) -> CompiledScene:
         """Links, then what is attached; raises ValueError for two obstacles of one name or an unknown name."""
         _require_distinct(shapes)
-        parts = [(link, link, part) for link, part in self._links.items()]
-        parts += [(name, one.attachment.link, one.part) for name, one in held.items()]
-        names = tuple(name for name, _, _ in parts)
+        parts = [Named(link, link, part) for link, part in self._links.items()]
+        parts += [Named(name, one.attachment.link, one.part) for name, one in held.items()]
+        cores = [Named(link, link, core) for link, core in self._cores.items() if core is not None]
+        cores += [Named(name, one.attachment.link, one.core) for name, one in held.items() if one.core is not None]
+        names = tuple(part.name for part in parts)
+        _require_known(shapes, names)
+        world = self._world(parts, shapes, held)
+        sure = self._world(cores, shapes, held) if cores else None
+        return CompiledScene(world, names, tuple(shapes), dict(held), sure)
+
+    def _world(
+        self, parts: Sequence[Named], shapes: Sequence[CollisionShape], held: Mapping[str, Held]
+    ) -> motion.World:
+        names = [part.name for part in parts]
         pairs = [
             (first, second)
             for first in range(len(parts))
             for second in range(first + 1, len(parts))
-            if self._is_checked(parts[first][:2], parts[second][:2], held)
+            if self._is_checked(parts[first], parts[second], held)
         ]
         obstacles = [_obstacle(shape, _bits(shape, names)) for shape in shapes]
         both = np.array(pairs, dtype=np.int32).reshape(-1, 2)
-        world = motion.world(self._chain, [part for _, _, part in parts], both, obstacles)
-        covers = [*self.covers.values(), *(one.cover for one in held.values())]
-        bulge = max(cover.bulge for cover in covers) + 2.0 * self._rounding()
-        least = min(float(cover.spheres[:, 3].min()) for cover in covers)
-        return CompiledScene(world, names, tuple(shapes), dict(held), bulge, least)
+        return motion.world(self._chain, [part.part for part in parts], both, obstacles)
 
     def _part(self, link: str, shapes: Sequence[CollisionShape], cover: SphereCover) -> motion.Part:
         """A link's solids and their spheres in its frame, larger by what floats lose on an arm of this reach."""
+        return self._part_of(link, shapes, cover.spheres, self._rounding())
+
+    def _core(self, link: str, shapes: Sequence[CollisionShape], cover: SphereCover) -> motion.Part | None:
+        """As `_part`, of spheres that are wholly inside the link's shapes whatever floats lose; None if there are none:
+        its largest sphere reaches no deeper than the spheres may bulge."""
+        less = cover.bulge + self._rounding()
+        deep = cover.spheres[cover.spheres[:, 3] > less + HAIR]
+        return self._part_of(link, shapes, deep, -less) if len(deep) else None
+
+    def _part_of(self, link: str, shapes: Sequence[CollisionShape], covering: Array, wider: float) -> motion.Part:
         frame, pose = self._frames.places[link]
-        spheres = cover.spheres.copy()
+        spheres = covering.copy()
         spheres[:, :3] = spheres[:, :3] @ pose[:3, :3].T + pose[:3, 3]
-        spheres[:, 3] += self._rounding()
+        spheres[:, 3] += wider
         solids = [obstacle_of(shape, pose @ shape.matrix, self._rounding()) for shape in shapes]
         return motion.part(frame, np.ascontiguousarray(spheres), solids)
 
@@ -110,9 +139,9 @@ class Assembly:
         steps = np.linalg.norm(self._frames.numbers[:, 9:12], axis=1)
         return ROUNDING * max(1.0, float(steps.sum() + self._frames.numbers[:, 14].sum()))
 
-    def _is_checked(self, one: tuple[str, str], other: tuple[str, str], held: Mapping[str, Held]) -> bool:
-        """(name, link) of two parts that a joint can move apart; an attachment says itself what it touches."""
-        (name, link), (second_name, second_link) = one, other
+    def _is_checked(self, one: Named, other: Named, held: Mapping[str, Held]) -> bool:
+        """True for two parts that a joint can move apart; an attachment says itself what it touches."""
+        (name, link, _), (second_name, second_link, _) = one, other
         if self._frames.places[link][0] == self._frames.places[second_link][0]:
             return False
         for attached, touched in ((name, second_name), (second_name, name)):
@@ -153,12 +182,16 @@ def _require_distinct(shapes: Sequence[CollisionShape]) -> None:
             raise ValueError(f'the scene has "{name}" twice')
 
 
+def _require_known(shapes: Sequence[CollisionShape], names: Sequence[str]) -> None:
+    for shape in shapes:
+        for name in shape.touching:
+            if name not in names:
+                raise ValueError(f'"{name}" is neither a link with a collision shape nor attached: {", ".join(names)}')
+
+
 def _bits(shape: CollisionShape, names: Sequence[str]) -> int:
-    """A bit for each part that may touch the shape."""
-    for name in shape.touching:
-        if name not in names:
-            raise ValueError(f'"{name}" is neither a link with a collision shape nor attached: {", ".join(names)}')
-    return sum(1 << names.index(name) for name in shape.touching)
+    """A bit for each of these parts that may touch the shape."""
+    return sum(1 << names.index(name) for name in shape.touching if name in names)
 
 
 def _bulge(shapes: Sequence[CollisionShape]) -> float:

@@ -120,12 +120,11 @@ class NativePlanner:
 
         None where there is none, or where only the true shapes can tell.
         """
-        compiled_scene = self._scene
-        margin = self.margin - compiled_scene.bulge  # [m] below 0: by how much spheres are in one another
-        if margin + compiled_scene.least <= 0.0:
+        cores = self._scene.cores
+        if cores is None:
             return None
         verdict, configuration = motion.look(
-            compiled_scene.world, self._kernel, self._rows(rows), 1, margin, FINEST, math.inf, None
+            cores, self._kernel, self._rows(rows), 1, self.margin, FINEST, math.inf, None
         )
         return configuration if verdict == TOUCHING else None
 

@@ -25,8 +25,10 @@ Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
 BULGE = 0.005  # [m] measured: spheres, time and free share for 3, 5 and 10 mm are in README.md
 FINENESS = 0.75  # a surface cell's edge as a share of the bulge; its ball must be smaller than the smallest sphere
-MESH_FINENESS = 0.4  # the same for a mesh: half a cell's diagonal is lost on either side of its surface
-MOST_MESH_CELLS = 48  # along a mesh's longest side; a larger mesh has larger cells, and more bulge
+MESH_FINENESS = 0.28  # the same for a mesh: half a cell's diagonal is lost on either side of its surface
+MESH_LOOK = 32  # cells along a mesh's longest side, by which the size of the others is chosen
+MOST_MESH_CELLS = 150_000  # of a mesh; a larger one has larger cells, and more bulge
+MOST_CANDIDATES = 15_000  # centres of spheres; else of those at the surface, then of all, one in eight is tried
 LEVELS = 3  # times that cells are halved from the coarsest to those at the surface
 DEEP = 2.5  # balls deep: such a cell is not halved
 MEDIAL = 0.9  # the slope of the depth below which a point has several nearest ones on the surface
@@ -94,8 +96,7 @@ def mesh_cover(vertices: Array, faces: NDArray[np.int32], bulge: float = BULGE) 
 
     The bulge [m] is larger for a large mesh, and is a bound here: of a cell at the surface only the cell is known.
     """
-    longest = float(np.ptp(vertices, axis=0).max())
-    pitch = max(MESH_FINENESS * bulge, longest / MOST_MESH_CELLS)
+    pitch = _mesh_pitch(vertices, faces, MESH_FINENESS * bulge)
     bulge = max(bulge, pitch / MESH_FINENESS)
     rows = motion.solid_cells(vertices, faces, pitch)
     radius = 0.5 * math.sqrt(3.0) * pitch
@@ -103,17 +104,33 @@ def mesh_cover(vertices: Array, faces: NDArray[np.int32], bulge: float = BULGE) 
     depths = np.where(promised > 0.0, promised + radius, np.where(promised < 0.0, -radius, 0.0))
     cells = with_radii(rows[:, :3], np.full(len(rows), radius * (1.0 + 1e-9)))
     middle = _medial_cells(rows[:, :3], depths, pitch)
+    is_second = (_lattice_places(rows[:, :3], pitch) % 2 == 0).all(axis=1)
+    for of_kind in (depths <= 0.0, depths > 0.0):  # the axis of what is round may lie between every second ones
+        if np.count_nonzero(middle) > MOST_CANDIDATES:
+            middle &= is_second | ~of_kind
     candidates = with_radii(rows[middle, :3], depths[middle] + bulge)
     return SphereCover(_chosen(cells, candidates, bulge - radius), bulge)
 
 
+def _mesh_pitch(vertices: Array, faces: NDArray[np.int32], least: float) -> float:
+    """[m] the edge of a mesh's cells: `least`, or as much more as leaves no more than `MOST_MESH_CELLS` of them."""
+    look = float(np.ptp(vertices, axis=0).max()) / MESH_LOOK
+    count = len(motion.solid_cells(vertices, faces, look)) if look > least else 0
+    return max(least, look * math.cbrt(count / MOST_MESH_CELLS))
+
+
 def _medial_cells(centres: Array, depths: Array, pitch: float) -> NDArray[np.bool_]:
     """(m,) True for the cells (m, 3) of a lattice, `pitch` [m] apart, that are at the medial axis, as in `medial`."""
-    places = tuple(np.rint((centres - centres.min(axis=0)) / pitch).astype(int).T + 1)
+    places = tuple(_lattice_places(centres, pitch).T + 1)
     field = np.full([int(place.max()) + 2 for place in places], depths.min() - pitch)
     field[places] = depths
     slopes: Array = np.linalg.norm(np.gradient(field, pitch), axis=0)
     return np.asarray(slopes[places] < MEDIAL)
+
+
+def _lattice_places(centres: Array, pitch: float) -> NDArray[np.int_]:
+    """(m, 3) the places, from 0, of cells (m, 3) of a lattice, `pitch` [m] apart."""
+    return np.asarray(np.rint((centres - centres.min(axis=0)) / pitch).astype(int))
 
 
 def _chosen(cells: Array, candidates: Array, least: float) -> Array:

@@ -140,3 +140,22 @@ def test_a_curve_is_looked_at_where_it_goes():
     path = FreePath(np.array(around), np.array(around), Effort(0.0, 0.0, 0.0, 0, 0))
     rows, _, _ = path.at(np.linspace(0.0, path.spans, 500))
     assert min(truth.distance(row) for row in rows) > core.margin
+
+
+def test_a_link_that_bulges_much_leaves_no_doubt_about_what_touches_the_others():
+    arm = load("rm1")
+    core, other = NativePlanner(arm), NativePlanner(arm, bulge=0.03)
+    crate = CollisionShape("crate", ShapeKind.BOX, (0.2, 0.2, 0.4), ((0.35, 0.0, 0.2), UPRIGHT))
+    rng = np.random.default_rng(2)
+    sure = 0
+    for planner in (core, other):
+        planner.set_scene([crate])
+    truth = Truth(arm, [crate])
+    limits = np.array([(joint.lower, joint.upper) for joint in arm.joints]).T
+    for start, goal in pairwise(rng.uniform(*limits, (60, len(arm.joints)))):
+        touching = other.touching([start, goal])
+        if touching is not None:
+            sure += 1
+            assert truth.distance(touching) < core.margin + UNSURE
+            assert not core.edge_free(start, goal)
+    assert sure > 5
