@@ -20,6 +20,7 @@ from services.arm.device.device_config import device_config
 from services.arm.model.description import Arm
 from services.planner.request.refusals import PlanRefused
 from services.planner.timing.profile import joint_limits, straight_line
+from services.planner.verification import feasibility
 from services.planner.verification.feasibility import (
     feasible_scale,
     margins,
@@ -187,3 +188,11 @@ def test_a_plan_of_hours_is_looked_at_in_little_memory(rm1: Arm) -> None:
         tracemalloc.stop()
     assert max(margin.peak_rate / margin.rate_limit for margin in found) < 0.01  # a knot is rounded to 1/256 step
     assert peak < 200e6  # [bytes]
+
+
+def test_compiled_and_in_python_the_peaks_are_the_same_to_the_bit(rm1: Arm, monkeypatch: pytest.MonkeyPatch):
+    for goal in (FAR, (-0.7, 0.3, 1.0), (0.0, 0.0, 0.0)):
+        compiled = step_stream(rm1, line(rm1, goal)).peaks
+        with monkeypatch.context() as hidden:
+            hidden.setattr(feasibility, "IS_BUILT", False)
+            assert np.array_equal(step_stream(rm1, line(rm1, goal)).peaks, compiled)

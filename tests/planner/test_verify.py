@@ -12,6 +12,7 @@ from services.arm.model.description import Arm
 from services.planner.collision.clearance import first_collision
 from services.planner.core import Planner
 from services.planner.timing.profile import joint_limits, straight_line
+from services.planner.verification import verify
 from services.planner.verification.verify import BadTrajectory, require_ends, require_within_limits, sample
 
 START, GOAL = (0.0, 0.0, 0.0), (1.0, -0.5, 0.1)
@@ -55,6 +56,17 @@ def test_a_position_beyond_its_limit_is_named(rm1: Arm):
     beyond = straight_line(rm1.joint_names, START, (0.0, 3.0, 0.0), joint_limits(rm1))
     with pytest.raises(BadTrajectory, match=r'position of "antebrazo_joint" is 3 at'):
         require_within_limits(rm1, sample(beyond), joint_limits(rm1))
+
+
+def test_compiled_and_in_python_the_samples_are_the_same_to_the_bit_and_jerks_to_rounding(
+    trajectory: JointTrajectory, monkeypatch: pytest.MonkeyPatch
+):
+    compiled = sample(trajectory)
+    monkeypatch.setattr(verify, "IS_BUILT", False)
+    python = sample(trajectory)
+    for name in ("times", "positions", "velocities", "accelerations"):
+        assert np.array_equal(getattr(compiled, name), getattr(python, name)), name
+    assert np.allclose(compiled.jerks, python.jerks, rtol=1e-12, atol=0.0)
 
 
 def test_wrong_ends_are_refused(trajectory: JointTrajectory):

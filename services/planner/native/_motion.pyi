@@ -87,4 +87,13 @@ def plan(
     cancel: CancelFlag | None,
     enough: int,
 ) -> Plan: ...
+def quintics(
+    stamps: Array,
+    positions: Array,
+    velocities: Array,
+    accelerations: Array,
+    times: Array,
+    index: NDArray[np.int64],
+) -> tuple[Array, Array, Array, Array]: ...
+def peak_rates(start: Array, square: Array, cube: Array, shares: Array, knot: float) -> Array: ...
 def centres(world: World, kernel: Kernel, rows: Array) -> NDArray[np.float32]: ...

@@ -22,6 +22,13 @@ from services.planner.request.refusals import PlanRefused
 from services.planner.timing.profile import LONGEST
 from services.planner.verification.verify import at_times
 
+try:
+    from services.planner.native.binding import motion
+except ImportError:  # not built for this interpreter, or hidden: the same in numpy
+    IS_BUILT = False
+else:
+    IS_BUILT = True
+
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
@@ -34,7 +41,8 @@ FULL = 1.0 + 1e-3  # knots are rounded to 1/256 step, so a profile that touches 
 MOST_KNOTS = 30_000  # that are looked at at once
 SLOWEST = 0.01  # time scale below which slowing down is no remedy
 HALVINGS = 24
-SHARES = (np.arange(1, round(KNOT / SLOT) + 1) * SLOT / KNOT)[None, :, None]  # of the time between two knots
+PLACES = np.arange(1, round(KNOT / SLOT) + 1, dtype=np.float64) * SLOT / KNOT  # of slots between two knots, 0 to 1
+SHARES: Array = PLACES[None, :, None]
 
 
 @dataclass(frozen=True)
@@ -63,6 +71,14 @@ class StepStream:
         speed = SHARES * (SHARES * (3.0 / (KNOT * Q8) * self.cube) + 2.0 / (KNOT * Q8) * self.square)
         speed += self.start / (KNOT * Q8)
         return np.asarray(speed.reshape(-1, speed.shape[2]))
+
+    @cached_property
+    def peaks(self) -> Array:
+        """(n,) [steps/s] the largest rate of each joint, forwards or backwards."""
+        if not IS_BUILT:
+            return np.asarray(np.maximum(self.rates.max(axis=0), -self.rates.min(axis=0)))
+        start, square, cube = (np.ascontiguousarray(part[:, 0]) for part in (self.start, self.square, self.cube))
+        return motion.peak_rates(start, square, cube, PLACES, KNOT * Q8)
 
     @cached_property
     def accelerations(self) -> Array:
@@ -195,8 +211,7 @@ def _can(arm: Arm, trajectory: JointTrajectory) -> bool:
 
 
 def _margin(arm: Arm, joint: Joint, index: int, stream: StepStream) -> StepMargin:
-    rates = stream.rates[:, index]
-    peak = max(float(rates.max()), -float(rates.min()))
+    peak = float(stream.peaks[index])
     limit, by = _rate_limit(arm, joint)
     share, torque = peak / limit, _torque_share(joint, index, stream)
     if torque > share:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,13 @@ from numpy.typing import NDArray
 from schemas.motion import JointTrajectory
 from services.arm.model.description import Arm
 from services.planner.timing.profile import JointLimits
+
+try:
+    from services.planner.native.binding import motion
+except ImportError:  # not built for this interpreter, or hidden: the same in numpy
+    IS_BUILT = False
+else:
+    IS_BUILT = True
 
 Array = NDArray[np.float64]
 
@@ -57,15 +65,28 @@ def at_times(trajectory: JointTrajectory, times: Array) -> Samples:
 
 def _columns(trajectory: JointTrajectory) -> tuple[Array, Array, Array, Array]:
     """Stamps (m,) [s], positions, velocities and accelerations (m, n)."""
-    stamps = np.array([point.time_from_start for point in trajectory.points])
-    p = np.array([point.positions for point in trajectory.points])
-    v = np.array([point.velocities for point in trajectory.points])
-    a = np.array([point.accelerations for point in trajectory.points])
+    points = trajectory.points
+    stamps = np.array([point.time_from_start for point in points])
+    p = _rows(len(points), (point.positions for point in points))
+    v = _rows(len(points), (point.velocities for point in points))
+    a = _rows(len(points), (point.accelerations for point in points))
     return stamps, p, v, a
+
+
+def _rows(count: int, rows: Iterable[tuple[float, ...]]) -> Array:
+    """(count, n): much faster than numpy makes an array of tuples."""
+    return np.fromiter(chain.from_iterable(rows), dtype=np.float64).reshape(count, -1)
 
 
 def _evaluate(columns: tuple[Array, Array, Array, Array], times: Array, index: NDArray[np.int64]) -> Samples:
     """At `times` (m,) [s], each in the segment `index` (m,) (Biagiotti and Melchiorri 2008, section 2.1)."""
+    if not IS_BUILT:
+        return _evaluate_in_python(columns, times, index)
+    times, (stamps, p, v, a) = np.ascontiguousarray(times), columns
+    return Samples(times, *motion.quintics(stamps, p, v, a, times, np.ascontiguousarray(index, dtype=np.int64)))
+
+
+def _evaluate_in_python(columns: tuple[Array, Array, Array, Array], times: Array, index: NDArray[np.int64]) -> Samples:
     stamps, p, v, a = columns
     dt = np.diff(stamps)[index][:, None]
     u = (times - stamps[index])[:, None] / dt
