@@ -119,6 +119,7 @@ class Deployment(DeploymentRecord, frozen=True, kw_only=True):
 
     robot: str = "urdf/rm1"
     cell: str = ""  # cell.toml: cameras, things and places around the arm; empty: none
+    arms: str = ""  # folder with a deployment for each arm that shares this one's viewer; empty: it has one of its own
     router: RouterSection = RouterSection()
     device: DeviceKind = DeviceKind.VIRTUAL
     wire: Wire = Wire.MQTT  # how the gateway reaches the device

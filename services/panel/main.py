@@ -17,6 +17,7 @@ import gemelo
 from schemas.deployment import Deployment
 from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
+from services.panel.view.arm_pages import arm_pages
 from services.panel.view.own_pages import own_pages_only
 from services.panel.view.page import Page
 from services.panel.view.world import World
@@ -37,6 +38,7 @@ class Panel:
     def __init__(self, arm: gemelo.Arm, deployment: Deployment, log: logging.Logger) -> None:
         self._arm, self._log = arm, log
         self._pages: dict[int, Page] = {}
+        self._arms = arm_pages(deployment)
         self._lock = threading.Lock()
         self.operator = Operator(arm)
         with contextlib.redirect_stdout(None), own_pages_only(deployment.panel.host):  # without its own greeting
@@ -78,7 +80,7 @@ class Panel:
             return list(self._pages.values())
 
     def _open(self, client: viser.ClientHandle) -> None:
-        page = Page(client, self.operator, self._world)
+        page = Page(client, self.operator, self._world, self._arms)
         with self._lock:
             self._pages[client.client_id] = page
         self._log.info(f"browser {client.client_id} is here; {len(self._present())} in all")

@@ -79,6 +79,15 @@ def deployment_of_arm(name: str, environ: Mapping[str, str] | None = None) -> Pa
     return file if "/" not in name and file.is_file() else None
 
 
+def deployments_beside(deployment: Deployment) -> tuple[Deployment, ...]:
+    """Of all arms that share this one's viewer, itself among them, in the order of their pages; empty where none do.
+
+    Raises `DeploymentError`.
+    """
+    files = Path(deployment.arms).glob("*.toml") if deployment.arms else ()
+    return tuple(sorted((load_deployment(file, {}) for file in files), key=lambda each: each.panel.port))
+
+
 def forget_arms(common: Deployment) -> None:
     """Several arms that were started before are no more."""
     shutil.rmtree(Path(common.paths.run) / ARMS, ignore_errors=True)
@@ -177,8 +186,8 @@ def _with_absolute_paths(deployment: Deployment, root: Path) -> Deployment:
     mqtt = _with_absolute(deployment.mqtt, MQTT_FILES, root)
     router = _with_absolute(deployment.router, ROUTER_FILES, root)
     robot = str(root / deployment.robot)
-    cell = str(root / deployment.cell) if deployment.cell else ""
-    return msgspec.structs.replace(deployment, robot=robot, cell=cell, router=router, mqtt=mqtt, paths=paths)
+    cell, arms = (str(root / each) if each else "" for each in (deployment.cell, deployment.arms))
+    return msgspec.structs.replace(deployment, robot=robot, cell=cell, arms=arms, router=router, mqtt=mqtt, paths=paths)
 
 
 def _with_absolute(section: S, names: tuple[str, ...], root: Path) -> S:

@@ -17,7 +17,7 @@ from services.hosts.quoting import Value, toml
 from services.runtime.deployment import ARMS
 
 HEADER = "# Written by `make up ARMS=...`, of deploy/local.toml and of the environment then.\n\n"
-SHARED = ("router", "broker")  # processes that serve all arms
+SHARED = ("router", "broker", "viewer")  # processes that serve all arms
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,10 @@ class StackedArm:
 
 
 def stacked_arms(names: Sequence[str], common: Deployment, root: Path) -> tuple[StackedArm, ...]:
-    """The arms of urdf/, or of folders, each with its own page, view, recordings and readiness.
+    """The arms of urdf/, or of folders, each with its own page, recordings and readiness, all in one view.
 
-    The first has the ports of `common`, each further one the next. Raises `ConfigurationError` with every collision.
+    The first has the page's port of `common`, each further one the next. Raises `ConfigurationError` with every
+    collision.
     """
     folders = [_folder(name, root) for name in names]
     arms = [load_arm(folder) for folder in folders]
@@ -85,12 +86,12 @@ def _folder(name: str, root: Path) -> Path:
 
 
 def _deployment(common: Deployment, arm: Arm, folder: Path, all_folders: Sequence[Path], index: int) -> Deployment:
-    paths, viewer = common.paths, common.viewer
+    paths = common.paths
     return replace(
         common,
         robot=str(folder),
         cell=common.cell if _is_for(Path(common.cell), folder, all_folders) else "",
-        viewer=replace(viewer, port=viewer.port + index, web_port=viewer.web_port + index),
+        arms=str(folder_of(common)),
         panel=replace(common.panel, port=common.panel.port + index),
         paths=replace(paths, run=f"{paths.run}/{arm.name}", out=f"{paths.out}/{arm.name}"),
     )
@@ -135,12 +136,12 @@ def _same_ports(arms: Sequence[StackedArm], common: Deployment) -> Iterator[str]
     wanted = [(common.router.listening[1], "the router ([router] port)")]
     if common.mqtt.broker is not Broker.EXTERNAL:
         wanted.append((common.mqtt.listening[1], "the broker ([mqtt] port)"))
+    if common.viewer.mode is not ViewerMode.NONE:
+        wanted.append((common.viewer.port, "the viewer's data ([viewer] port)"))
+        wanted.append((common.viewer.web_port, "the view ([viewer] web_port)"))
     for index, each in enumerate(arms):
-        viewer, plus = each.deployment.viewer, f" + {index}" if index else ""
+        plus = f" + {index}" if index else ""
         wanted.append((each.deployment.panel.port, f"the page of {each.name} ([panel] port{plus})"))
-        if viewer.mode is not ViewerMode.NONE:
-            wanted.append((viewer.port, f"the viewer's data of {each.name} ([viewer] port{plus})"))
-            wanted.append((viewer.web_port, f"the view of {each.name} ([viewer] web_port{plus})"))
     seen: dict[int, str] = {}
     for port, who in wanted:
         if not 0 < port < 65536:
@@ -150,6 +151,11 @@ def _same_ports(arms: Sequence[StackedArm], common: Deployment) -> Iterator[str]
         seen.setdefault(port, who)
 
 
+def folder_of(common: Deployment) -> Path:
+    """Where the deployments of all arms stand."""
+    return Path(common.paths.run) / ARMS
+
+
 def file_of(common: Deployment, name: str) -> Path:
     """Where the deployment of an arm stands, for its processes and for `gemelo --robot`."""
-    return Path(common.paths.run) / ARMS / f"{name}.toml"
+    return folder_of(common) / f"{name}.toml"

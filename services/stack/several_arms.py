@@ -1,7 +1,8 @@
 """`python -m services.stack.several_arms NAME ...`: what `make up ARMS="rm1 parol6"` starts, as files.
 
-Prints the path of a process-compose file: router and broker once, and every other process of process-compose.yaml once
-for each arm, named <robot>-<process>. What cannot run together is refused before anything is written.
+Prints the path of a process-compose file: router, broker and viewer once, and every other process of
+process-compose.yaml once for each arm, named <robot>-<process>. What cannot run together is refused before anything is
+written.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ def compose_of(
 ) -> Process:
     """`single` is the content of process-compose.yaml; returns that of the file for `arms`."""
     processes: dict[str, Process] = {}
-    for name in SHARED:
+    for name in (each for each in SHARED if each not in left_out(common)):
         processes[name] = _placed(single["processes"][name], common.paths.out)
     for each in arms:
         processes |= _of_arm(single["processes"], each, common, environ)

@@ -15,7 +15,7 @@ from schemas.topics import ANY, DESCRIPTION, LOG
 from services.arm.cell.cell_file import deployed_cell
 from services.arm.model.description import load_arm
 from services.runtime.application import service
-from services.runtime.deployment import project_root
+from services.runtime.deployment import deployments_beside, project_root, robot_name
 from services.runtime.node import Node
 from services.runtime.node_clock import NodeClock
 from services.runtime.process.priority import step_behind
@@ -24,6 +24,8 @@ from services.visualizer.feeds import feeds
 from services.visualizer.model.mesh_files import missing_meshes, scene_mesh
 from services.visualizer.model.triangle_meshes import TriangleMesh
 from services.visualizer.model.urdf import parse_urdf, tool_link
+from services.visualizer.render.arms_layout import SharedView
+from services.visualizer.render.layout import ArmLayout
 from services.visualizer.render.outputs import Outputs, VisualizerParameters
 
 BATCH_RATE = 10.0  # [Hz]
@@ -34,7 +36,8 @@ def run(node: Node, deployment: Deployment) -> None:
     root = project_root()
     cameras = deployed_cell(deployment).camera_names
     parameters = node.parameters(VisualizerParameters).value
-    outputs = Outputs(deployment.viewer, root / deployment.robot, root, parameters, cameras)
+    shared = _shared_view(node, deployment, parameters)
+    outputs = Outputs(deployment.viewer, root / deployment.robot, root, parameters, cameras, shared)
     visualizer: Visualizer | None = None
 
     def on_description(message: RobotDescription) -> None:
@@ -58,6 +61,21 @@ def run(node: Node, deployment: Deployment) -> None:
     node.subscribe(DESCRIPTION, on_description)
     node.spin(step, rate=BATCH_RATE)
     outputs.close()
+
+
+def _shared_view(node: Node, deployment: Deployment, parameters: VisualizerParameters) -> SharedView | None:
+    """The view of several arms on this machine; None where this one has a viewer of its own."""
+    layouts = []
+    for each in deployments_beside(deployment):
+        arm = load_arm(Path(each.robot))
+        try:
+            model = parse_urdf(arm.urdf_path.read_text(encoding="utf-8"))
+        except ValueError as error:
+            node.log.error(f"{arm.name} is left out of the view of all arms, as it cannot be drawn: {error}")
+            continue
+        cameras = deployed_cell(each).camera_names
+        layouts.append(ArmLayout(model, parameters.window, parameters.trail, cameras, arm.name))
+    return SharedView(robot_name(deployment), tuple(layouts)) if layouts else None
 
 
 def _visualizer(

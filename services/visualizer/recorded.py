@@ -37,7 +37,7 @@ from services.visualizer.model.triangle_meshes import TriangleMesh
 from services.visualizer.model.urdf import parse_urdf, tool_link
 from services.visualizer.program.rerun_program import rerun_binary, start, stop
 from services.visualizer.program.screenshot import LOOPBACK, free_port, save_screenshot
-from services.visualizer.render.layout import Moment
+from services.visualizer.render.layout import ArmLayout, Moment, blueprint
 from services.visualizer.render.sink import APPLICATION, Sink
 from services.visualizer.viewer import address, resolved
 
@@ -67,7 +67,8 @@ def write_view(file: Path, rrd: Path, shadow: Path) -> Incident | None:
     rrd.parent.mkdir(parents=True, exist_ok=True)
     stream.save(rrd)
     moment = None if incident is None else Moment(incident.stamp, story_text(incident))
-    sink = Sink(stream, core.model, shadow, WINDOW, WINDOW, cameras, moment)
+    layout = blueprint(ArmLayout(core.model, WINDOW, WINDOW, cameras), moment)
+    sink = Sink(stream, core.model, shadow, layout, story="" if moment is None else moment.story)
     drawn = 0
     for row in reader.rows(taken.__contains__):
         if row.message.log_time - drawn > BATCH:

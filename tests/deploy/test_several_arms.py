@@ -15,7 +15,13 @@ from hypothesis import strategies as st
 
 from schemas.deployment import Deployment, DeviceKind, MqttSection, PanelSection, PathsSection, ViewerMode, Wire
 from schemas.errors import ConfigurationError
-from services.runtime.deployment import deployment_of_arm, load_deployment, project_root
+from services.runtime.deployment import (
+    deployment_of_arm,
+    deployments_beside,
+    load_deployment,
+    project_root,
+    robot_name,
+)
 from services.stack.arms import deployment_file, file_of, stacked_arms
 from services.stack.several_arms import compose_of, main, write
 from services.stack.start_check import main as start_check
@@ -48,12 +54,12 @@ def refusal(names, common) -> str:
     return str(raised.value)
 
 
-def test_each_arm_has_ports_recordings_and_readiness_of_its_own_and_all_share_router_and_broker(common):
+def test_each_arm_has_a_page_recordings_and_readiness_of_its_own_and_all_share_router_broker_and_view(common):
     first, second = (each.deployment for each in stacked_arms(BOTH, common, ROOT))
     assert (first.router, first.mqtt) == (second.router, second.mqtt) == (common.router, common.mqtt)
     assert (first.panel.port, second.panel.port) == (8088, 8089)
-    assert (first.viewer.port, second.viewer.port) == (9876, 9877)
-    assert (first.viewer.web_port, second.viewer.web_port) == (9090, 9091)
+    assert first.viewer == second.viewer == common.viewer
+    assert first.arms == second.arms == f"{common.paths.run}/arms"
     for name, each in zip(BOTH, (first, second), strict=True):
         assert each.paths.out == f"{common.paths.out}/{name}"
         assert each.paths.run == f"{common.paths.run}/{name}"
@@ -87,8 +93,8 @@ def test_two_boards_at_one_cable_are_refused_and_virtual_lines_are_each_arms_own
     [
         (7446, "the router ([router] port)", "the page of parol6 ([panel] port + 1)"),
         (1883, "the broker ([mqtt] port)", "the page of rm1 ([panel] port)"),
-        (9875, "the viewer's data of rm1 ([viewer] port)", "the page of parol6 ([panel] port + 1)"),
-        (9091, "the page of rm1 ([panel] port)", "the view of parol6 ([viewer] web_port + 1)"),
+        (9875, "the viewer's data ([viewer] port)", "the page of parol6 ([panel] port + 1)"),
+        (9089, "the view ([viewer] web_port)", "the page of parol6 ([panel] port + 1)"),
     ],
 )
 def test_two_on_one_port_are_refused_and_both_are_named(common, port, one, other):
@@ -113,15 +119,17 @@ def test_a_cell_file_in_the_folder_of_an_arm_is_that_arms_alone_and_any_other_is
     assert [each.deployment.cell for each in stacked_arms(BOTH, shared, ROOT)] == [shared.cell] * 2
 
 
-def test_every_process_of_the_single_stack_runs_once_for_each_arm_and_router_and_broker_once(common):
+def test_every_process_of_the_single_stack_runs_once_for_each_arm_and_router_broker_and_viewer_once(common):
     arms = stacked_arms(BOTH, common, ROOT)
     made = compose_of(SINGLE, arms, common, {})["processes"]
-    of_each = set(SINGLE["processes"]) - {"router", "broker", "about", "camera", "detector"}  # there is no cell
-    assert set(made) == {"router", "broker", "about"} | {f"{arm}-{name}" for arm in BOTH for name in of_each}
+    once = {"router", "broker", "viewer", "about"}
+    of_each = set(SINGLE["processes"]) - once - {"camera", "detector"}  # there is no cell
+    assert set(made) == once | {f"{arm}-{name}" for arm in BOTH for name in of_each}
     assert set(made["about"]["depends_on"]) == set(made) - {"about"}
     assert made["about"]["command"].endswith("deploy/welcome rm1 parol6")
     for name, process in made.items():
         assert set(process["depends_on"]) <= set(made) - {name}
+    assert set(made["parol6-visualizer"]["depends_on"]) == {"router", "viewer"}
 
 
 def test_what_would_only_stand_aside_is_left_out(common):
@@ -151,6 +159,16 @@ def test_process_compose_takes_the_file_and_a_process_gets_its_arms_deployment_w
     assert seen.robot == str(ROOT / "urdf/parol6")
     assert seen.panel.port == 18089
     assert seen.paths.run == str(tmp_path / "run $HOME/parol6")
+
+
+def test_every_arm_knows_all_that_share_its_view_in_the_order_of_their_pages(common):
+    assert deployments_beside(common) == ()
+    arms = stacked_arms(("rm1", "parol6"), common, ROOT)
+    write(arms, common, ROOT, {})
+    for each in arms:
+        beside = deployments_beside(each.deployment)
+        assert [robot_name(one) for one in beside] == ["rm1", "parol6"]
+        assert each.deployment in beside
 
 
 texts = st.text(st.characters(blacklist_categories=("Cc", "Cs", "Zl", "Zp", "Cf", "Co", "Cn")), max_size=20).filter(

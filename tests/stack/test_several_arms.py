@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import time
 import urllib.request
@@ -15,11 +16,14 @@ from services.recordings.reader import RecordingReader
 from services.runtime.deployment import deployment_of_arm
 from services.runtime.robots import robots_on
 from services.stack.stack import Stack, free_ports
+from services.visualizer.program.rerun_program import rerun_binary
 from tests.stack.gemelo import gemelo
 from tests.stack.person import Operator, jumps
 
 ARMS = ("rm1", "parol6")
 OF_EACH = ("virtual_esp32", "stepper_gateway", "state_publisher", "planner", "logger", "visualizer", "panel")
+WANTED = ("/rm1/world/measured/base_link/", "/rm1/joints/brazo_joint/position/executed",
+          "/parol6/world/measured/base_link/", "/parol6/joints/joint_6/step_error")  # fmt: skip
 
 
 class OneOf:
@@ -44,11 +48,13 @@ def two_free_ports() -> int:
 
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory):
-    names = ("router", "broker", *(f"{arm}/{name}" for arm in ARMS for name in OF_EACH))
+    names = ("router", "broker", "viewer", *(f"{arm}/{name}" for arm in ARMS for name in OF_EACH))
     page = {"GEMELO_PANEL_PORT": str(two_free_ports())}
     command = ("make", "up", f"ARMS={' '.join(ARMS)}")
     out = tmp_path_factory.mktemp("out")
-    with Stack(command=command, processes=names, environment=page, out=out, ready_timeout=120.0) as running:
+    with Stack(
+        command=command, processes=names, environment=page, out=out, viewer="web", ready_timeout=120.0
+    ) as running:
         yield running
 
 
@@ -97,6 +103,30 @@ def test_the_end_of_the_start_says_where_each_page_is_and_they_are_there(stack):
         assert f"http://127.0.0.1:{port}" in stack.console()
         with urllib.request.urlopen(f"http://127.0.0.1:{port}", timeout=5.0) as page:
             assert page.status == 200
+
+
+def test_one_viewer_shows_both_arms_in_one_recording(stack):
+    port, web = (stack.deployment[f"GEMELO_VIEWER_{key}"] for key in ("PORT", "WEB_PORT"))
+    said = stack.console()
+    assert len(re.findall(r"see \w+ +http", said)) == 1, said
+    assert f"see them  http://127.0.0.1:{web}/" in said
+    viewer = f"rerun+http://127.0.0.1:{port}/proxy"
+    picked, end = Path(stack.out) / "seen.rrd", time.monotonic() + 30.0
+    watching = subprocess.Popen([rerun_binary(), viewer, "--save", picked], stderr=subprocess.DEVNULL)
+    try:
+        while not all(wanted in printed(picked) for wanted in WANTED):
+            assert time.monotonic() < end, printed(picked)[-2000:]
+            time.sleep(0.5)
+    finally:
+        watching.kill()
+        watching.wait()
+    assert set(re.findall(r'Recording,\s+"gemelo",\s+"(.*)"', printed(picked))) == {"arms-live"}
+
+
+def printed(recording: Path) -> str:
+    """What is in a recording of Rerun's, as its program says it; a file that is being written ends anywhere."""
+    command = [rerun_binary(), "rrd", "print", recording]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60.0).stdout
 
 
 def test_one_stop_for_all_and_the_recordings_are_apart(stack, people):

@@ -15,6 +15,7 @@ from schemas.planning import PlannedPath
 from schemas.system import LogLevel, LogRecord
 from services.visualizer.core import Visualizer
 from services.visualizer.model.urdf import parse_urdf
+from services.visualizer.render.layout import ArmLayout, blueprint
 from services.visualizer.render.sink import APPLICATION, Sink
 
 START = 1_795_000_000_000_000_000
@@ -133,7 +134,7 @@ def recording(tmp_path_factory, model) -> Path:
     stream = rr.RecordingStream(APPLICATION, recording_id="synthetic")
     stream.save(str(path))
     core = Visualizer(model, "rm1", "efector_link")
-    sink = Sink(stream, model, path.parent, window=20.0, trail=20.0)
+    sink = Sink(stream, model, path.parent, blueprint(ArmLayout(model, 20.0, 20.0)))
     synthetic(core, sink, 22.0)
     sink.close()
     return path

@@ -19,7 +19,7 @@ from services.visualizer.content.cameras import CameraView
 from services.visualizer.content.updates import Frustum, Labels, Outlines, Picture
 from services.visualizer.core import Visualizer
 from services.visualizer.program.rerun_program import rerun_binary
-from services.visualizer.render.layout import blueprint
+from services.visualizer.render.layout import ArmLayout, blueprint
 from services.visualizer.render.sink import APPLICATION, Sink
 
 NOW = 1_795_000_000_000_000_000
@@ -116,7 +116,7 @@ def test_image_outlines_frustum_and_dots_are_in_a_recording(model, tmp_path: Pat
     path = tmp_path / "cameras.rrd"
     stream = rr.RecordingStream(APPLICATION, recording_id="cameras")
     stream.save(str(path))
-    sink = Sink(stream, model, tmp_path, 20.0, 20.0, ("above",))
+    sink = Sink(stream, model, tmp_path, blueprint(ArmLayout(model, 20.0, 20.0, ("above",))))
     sink.write(core.step(NOW))
     core.cameras.on_detections(Detections(camera="above"))
     sink.write(core.step(NOW + TENTH))
@@ -133,6 +133,6 @@ def test_every_camera_has_a_view_of_its_own_and_without_one_the_layout_is_as_eve
             return [origin for inner in node.contents for origin in origins(inner)]
         return [str(getattr(node, "origin", ""))]
 
-    with_cameras = origins(blueprint(model, 20.0, 20.0, ("above", "hand")).root_container)
-    without = origins(blueprint(model, 20.0, 20.0).root_container)
+    with_cameras = origins(blueprint(ArmLayout(model, 20.0, 20.0, ("above", "hand"))).root_container)
+    without = origins(blueprint(ArmLayout(model, 20.0, 20.0)).root_container)
     assert [each for each in with_cameras if each not in without] == ["cameras/above", "cameras/hand"]

@@ -2,57 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import rerun as rr
-import rerun.blueprint as rrb
 
 from services.visualizer.content import entities
 from services.visualizer.content.updates import Tint
 from services.visualizer.model.urdf import parse_urdf
-from services.visualizer.render.layout import blueprint
+from services.visualizer.render.layout import ArmLayout, blueprint
 from services.visualizer.render.sink import Sink
-
-
-class Listener:
-    """A recording stream that keeps what it is told."""
-
-    def __init__(self) -> None:
-        self.said: dict[str, list[Any]] = {}
-        self.sent: list[tuple[str, list[int]]] = []
-
-    def log(self, entity: str, *things: Any, static: bool = False) -> None:
-        self.said.setdefault(entity, []).extend(things)
-
-    def send_columns(self, entity: str, index: list[Any], columns: Any) -> None:
-        (column,) = columns
-        self.sent.append((entity, column.as_arrow_array().values.to_pylist()))
-
-    def send_blueprint(self, layout: rrb.Blueprint) -> None:
-        self.layout = layout
-
-
-def views(node: Any) -> Iterator[Any]:
-    if isinstance(node, rrb.Container):
-        for inner in node.contents:
-            yield from views(inner)
-    else:
-        yield node
+from tests.visualizer.listener import Listener, views
 
 
 @pytest.fixture
 def named(model) -> dict[str, str]:
     """Origin of each view -> its name."""
-    return {view.origin: view.name for view in views(blueprint(model, window=20.0, trail=20.0).root_container)}
+    return {view.origin: view.name for view in views(blueprint(ArmLayout(model, 20.0, 20.0)).root_container)}
 
 
 @pytest.fixture
 def said(model, tmp_path: Path) -> dict[str, list[Any]]:
     listener = Listener()
-    Sink(listener, model, tmp_path, window=20.0, trail=20.0)
+    Sink(listener, model, tmp_path, blueprint(ArmLayout(model, 20.0, 20.0)))
     return listener.said
 
 
@@ -105,7 +78,8 @@ def test_meshes_keep_the_colours_of_their_files_but_in_fault(rm1_folder):
 def colors_in(model, folder: Path, mode: str) -> list[int]:
     """0xRRGGBBAA of every visual of the measured arm in a mode of the device."""
     listener = Listener()
-    Sink(listener, model, folder, window=20.0, trail=20.0).write([Tint(entities.MEASURED, 0, mode)])
+    layout = blueprint(ArmLayout(model, 20.0, 20.0))
+    Sink(listener, model, folder, layout).write([Tint(entities.MEASURED, 0, mode)])
     return [
         color for entity, columns in listener.sent if entity.startswith(f"{entities.MEASURED}/") for color in columns
     ]

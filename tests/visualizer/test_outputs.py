@@ -11,8 +11,11 @@ from rerun.experimental import ViewerClient
 from schemas.deployment import ViewerMode, ViewerSection
 from schemas.joints import JointState
 from services.visualizer.content import entities
+from services.visualizer.core import Visualizer
 from services.visualizer.program.rerun_program import environment, rerun_binary
 from services.visualizer.program.screenshot import free_port
+from services.visualizer.render.arms_layout import SharedView
+from services.visualizer.render.layout import ArmLayout
 from services.visualizer.render.outputs import Outputs, VisualizerParameters
 
 START = 1_795_000_000_000_000_000
@@ -33,9 +36,9 @@ def headless_viewer(port):
 
 
 class Rig:
-    def __init__(self, core, folder, viewer, **parameters):
+    def __init__(self, core, folder, viewer, shared=None, **parameters):
         self.core = core
-        self.outputs = Outputs(viewer, folder, folder, VisualizerParameters(**parameters))
+        self.outputs = Outputs(viewer, folder, folder, VisualizerParameters(**parameters), shared=shared)
         self.batch = 0
         self.slowest = 0.0
 
@@ -56,15 +59,15 @@ class Rig:
             time.sleep(0.1)
 
 
-def shows_the_arm(url):
-    """Whether the viewer there has a recording with the static and the moving parts of the arm."""
+def shows_the_arm(url, root=""):
+    """Whether the viewer there has a recording with the static and the moving parts of the arm, under `root`."""
     try:
         schema = ViewerClient.connect(url).get_recording_schema(paths_only=True)
     except (RuntimeError, ValueError, ConnectionError):
         return False
     text = str(schema)
-    visual = f"/{entities.MEASURED}/base_link/brazo_link/visual_0"
-    return visual in text and f"/{entities.executed('brazo_joint')}" in text
+    visual = f"{root}/{entities.MEASURED}/base_link/brazo_link/visual_0"
+    return visual in text and f"{root}/{entities.executed('brazo_joint')}" in text
 
 
 def test_a_viewer_that_comes_back_is_told_everything_again(core, tmp_path):
@@ -80,6 +83,29 @@ def test_a_viewer_that_comes_back_is_told_everything_again(core, tmp_path):
     rig.outputs.close()
     assert time.monotonic() - began < 5.0
     assert rig.slowest < 1.0
+
+
+def test_several_arms_meet_in_one_recording_of_one_viewer_and_one_that_comes_back_is_in_it_again(model, tmp_path):
+    viewer = ViewerSection(mode=ViewerMode.WEB, port=free_port())
+    arms = tuple(ArmLayout(model, 20.0, 20.0, robot=name) for name in ("left", "right"))
+
+    def arm(name):
+        return Rig(Visualizer(model, name, "efector_link"), tmp_path, viewer, shared=SharedView(name, arms))
+
+    rigs = [arm("left"), arm("right")]
+    with headless_viewer(viewer.port) as url:
+        for rig in rigs:
+            rig.step_until(lambda rig=rig: not rig.step())
+        for rig, root in zip(rigs, ("left", "right"), strict=True):
+            rig.step_until(lambda root=root: shows_the_arm(url, f"/{root}"))
+        rigs[0].outputs.close()
+        again = arm("left")
+        again.step_until(lambda: not again.step())
+        again.step_until(lambda: shows_the_arm(url, "/left"))
+        state = ViewerClient.connect(url).get_state()
+        assert len(state.recordings) == 1, state
+        rigs[1].outputs.close()
+        again.outputs.close()
 
 
 def test_without_a_viewer_only_the_recording_is_written(core, tmp_path):

@@ -33,6 +33,7 @@ from services.visualizer.core import Visualizer
 from services.visualizer.model.mesh_files import scene_mesh
 from services.visualizer.model.visual_model import VisualModel
 from services.visualizer.program.rerun_program import rerun_binary
+from services.visualizer.render.layout import ArmLayout, blueprint
 from services.visualizer.render.sink import APPLICATION, Sink
 
 NOW = 1_795_000_000_000_000_000
@@ -190,7 +191,7 @@ def test_scene_and_contacts_reach_the_recording(model, tmp_path):
     stream = rr.RecordingStream(APPLICATION, recording_id="scene")
     stream.save(str(path))
     core = Visualizer(model, "rm1", "efector_link")
-    sink = Sink(stream, model, tmp_path, window=20.0, trail=20.0)
+    sink = Sink(stream, model, tmp_path, blueprint(ArmLayout(model, 20.0, 20.0)))
     core.scene.on_scene(PlanningScene(objects=(TABLE, CUP, SceneObject(name="box 1", shape=SphereShape(radius=0.1)))))
     core.scene.on_contacts(touching(("efector_link", "table")))
     sink.write(core.step(NOW))

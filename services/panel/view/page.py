@@ -14,6 +14,7 @@ from schemas.device import DeviceMode
 from services.panel.model.availability import reasons
 from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
+from services.panel.view.arm_pages import ArmPage, arms_line
 from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, read_browser, script_html
 from services.panel.view.camera_box import CameraBox
 from services.panel.view.control_box import ControlBox
@@ -46,8 +47,11 @@ class Look:
 class Page:
     """Built anew when the language or the colours change."""
 
-    def __init__(self, client: viser.ClientHandle, operator: Operator, world: World) -> None:
-        self.client, self._operator, self._world = client, operator, world
+    def __init__(
+        self, client: viser.ClientHandle, operator: Operator, world: World, arms: tuple[ArmPage, ...] = ()
+    ) -> None:
+        """`arms` are all that have a page, where there are several."""
+        self.client, self._operator, self._world, self._arms = client, operator, world, arms
         self.browser: Browser | None = None
         self.lag = float("nan")  # [s] from a header that was sent to the word that it is drawn
         self._began = time.monotonic()
@@ -99,6 +103,8 @@ class Page:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(WIDTH)
         kit.line(script_html())
+        if self._arms:
+            kit.line(arms_line(self._arms, self._operator.arm.name, words))
         self._header = kit.line()
         kit.button(f"{STOP_SIGN} {words('stop')}", self._operator.stop, color="red")
         self._hold = kit.button(words("hold"), self._operator.arm.hold, color="gray", needs="hold")

@@ -2,6 +2,7 @@
 
 ENGLISH: dict[str, str] = {
     # always there
+    "arms": "Arms",
     "stop": "STOP (space bar)",
     "hold": "Hold",
     "resume": "Resume",

@@ -2,6 +2,7 @@
 
 SPANISH: dict[str, str] = {
     # always there
+    "arms": "Brazos",
     "stop": "PARAR (barra espaciadora)",
     "hold": "Pausar",
     "resume": "Continuar",

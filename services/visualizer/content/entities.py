@@ -1,4 +1,4 @@
-"""The entity paths of the viewer."""
+"""The entity paths of the viewer; of several arms in one view, each has all of its own under its robot's name."""
 
 from __future__ import annotations
 
@@ -16,6 +16,13 @@ MODE = "device/mode"
 PANEL = "device/panel"
 LOG = "log"
 STORY = "story"
+JOINTS = "joints"
+BAND = ("+0.5 step", "-0.5 step")  # names of the series around a step error
+
+
+def under(robot: str, entity: str) -> str:
+    """The entity of that robot among several; without a name it is the only one."""
+    return f"{part(robot)}/{entity}" if robot else entity
 
 
 def attached(root: str, link: str) -> str:
@@ -54,7 +61,7 @@ def believed(camera: str) -> str:
 
 def position(joint: str) -> str:
     """Two series: commanded, executed."""
-    return f"joints/{joint}/position"
+    return f"{JOINTS}/{joint}/position"
 
 
 def commanded(joint: str) -> str:
@@ -67,7 +74,7 @@ def executed(joint: str) -> str:
 
 def error(joint: str) -> str:
     """Three series: the step error and both edges of its band."""
-    return f"joints/{joint}/step_error"
+    return f"{JOINTS}/{joint}/step_error"
 
 
 def shaft(joint: str) -> str:

@@ -1,4 +1,4 @@
-"""The layout (blueprint) of the view: the arm, its joints, its step errors and the device, on one screen."""
+"""The layout (blueprint) of one arm's view: the arm, its joints, its step errors and the device, on one screen."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from services.visualizer.model.visual_model import VisualJoint, VisualModel
 
 TIMELINE = entities.TIMELINE
 JOINTS_PER_PAGE = 3  # rows of plots that stay readable
+SCENE = "measured (solid), commanded (blue), planned arm and way (cyan), what touches (red) [m]"
 
 
 LEAD, FOLLOW = 5.0, 2.0  # [s] before and after a moment that are played again and again
@@ -27,35 +28,129 @@ class Moment:
     story: str  # Markdown
 
 
-def blueprint(
-    model: VisualModel, window: float, trail: float, cameras: tuple[str, ...] = (), moment: Moment | None = None
-) -> rrb.Blueprint:
-    """The layout for this arm and its cameras, live or around a moment; `window` and `trail` in [s]."""
-    scene = rrb.Vertical(
-        _scene_and_cameras(model, trail, cameras),
-        rrb.Horizontal(_panel(), rrb.Vertical(_modes(window), _log(), row_shares=[5, 9]), column_shares=[11, 8]),
-        row_shares=[17, 10],
-        name="Twin",
-    )
+@dataclass(frozen=True)
+class ArmLayout:
+    """The views of one arm and its cameras; `window` and `trail` in [s].
+
+    `robot` is its name where several arms share the viewer, and empty where it has one of its own.
+    """
+
+    model: VisualModel
+    window: float
+    trail: float
+    cameras: tuple[str, ...] = ()
+    robot: str = ""
+
+    def whole(self, moment: Moment | None = None) -> rrb.Container:
+        """Everything of the arm, live or around a moment."""
+        scene = rrb.Vertical(
+            self._scene_and_cameras(),
+            rrb.Horizontal(self._panel(), rrb.Vertical(self.modes(), self.log(), row_shares=[5, 9]),
+                           column_shares=[11, 8]),
+            row_shares=[17, 10],
+            name="Twin",
+        )  # fmt: skip
+        return rrb.Horizontal(scene, self._beside(moment), column_shares=[11, 9], name=self.robot or None)
+
+    def scene(self, name: str = "") -> rrb.Spatial3DView:
+        """The arm in its planning scene; `name` is its heading if not the usual one."""
+        model = self.model
+        size, waist = max(model.reach, 2.1 * model.height), 0.6 * model.height  # an arm that stands needs a step back
+        return rrb.Spatial3DView(
+            origin=self.at(entities.WORLD),
+            name=name or f"Twin: {SCENE}",
+            line_grid=rrb.LineGrid3D(visible=True, spacing=0.1, color=palette.GRID),
+            background=rrb.Background(kind="SolidColor", color=palette.BACKGROUND),
+            eye_controls=rrb.EyeControls3D(
+                kind="Orbital",
+                position=(0.86 * size, -0.72 * size, waist + 0.47 * size),
+                look_target=(0.24 * size, 0.0, waist),
+                eye_up=(0.0, 0.0, 1.0),
+            ),
+            overrides={self.at(entities.TRAIL): rrb.VisibleTimeRanges([last(self.trail)])},
+        )
+
+    def modes(self, name: str = "Mode of the device") -> rrb.StateTimelineView:
+        """The device's modes over time."""
+        return rrb.StateTimelineView(
+            origin=self.at(entities.MODE), name=name, time_view=rrb.TimeAxis(view_range=past(self.window))
+        )
+
+    def log(self, name: str = "Log") -> rrb.TextLogView:
+        """What the nodes and the device say."""
+        # The lines begin with their time of day; the column would show only the century.
+        hidden = TimelineColumn(TIMELINE, visible=False)
+        columns = rrb.TextLogColumns(timeline_columns=[hidden], text_log_columns=["LogLevel", "Body"])
+        return rrb.TextLogView(origin=self.at(entities.LOG), name=name, columns=columns)
+
+    def at(self, entity: str) -> str:
+        """The entity where this arm has it."""
+        return entities.under(self.robot, entity)
+
+    def _beside(self, moment: Moment | None) -> rrb.Container:
+        """The joints; above them what happened, where that is told."""
+        if moment is None:
+            return self._joints()
+        story = rrb.TextDocumentView(origin=self.at(entities.STORY), name="What happened")
+        return rrb.Vertical(story, self._joints(), row_shares=[3, 4])
+
+    def _scene_and_cameras(self) -> rrb.Spatial3DView | rrb.Container:
+        """The scene; beside it the images where there are cameras."""
+        views = [
+            rrb.Spatial2DView(
+                origin=self.at(entities.camera_picture(name)), name=f"Camera {name}: found things (green)"
+            )
+            for name in self.cameras
+        ]
+        if not views:
+            return self.scene()
+        return rrb.Horizontal(self.scene(), rrb.Vertical(*views), column_shares=[3, 2])
+
+    def _joints(self) -> rrb.Container:
+        moving = self.model.moving
+        pages = [moving[first : first + JOINTS_PER_PAGE] for first in range(0, len(moving), JOINTS_PER_PAGE)]
+        grids = [self._page(page) for page in pages]
+        return grids[0] if len(grids) == 1 else rrb.Tabs(*grids, name="Joints")
+
+    def _page(self, joints: tuple[VisualJoint, ...]) -> rrb.Container:
+        name = " · ".join(joint.name for joint in joints)
+        rows = [rrb.Horizontal(self._position(joint, joint is joints[0]), self._error(joint)) for joint in joints]
+        return rrb.Vertical(*rows, name=name)
+
+    def _position(self, joint: VisualJoint, has_legend: bool) -> rrb.TimeSeriesView:
+        return self._plot(entities.position(joint.name), f"{joint.name} · position [{unit(joint)}]", has_legend)
+
+    def _error(self, joint: VisualJoint) -> rrb.TimeSeriesView:
+        return self._plot(entities.error(joint.name), f"{joint.name} · step error [steps]", False)
+
+    def _plot(self, entity: str, name: str, has_legend: bool) -> rrb.TimeSeriesView:
+        return rrb.TimeSeriesView(
+            origin=self.at(entity),
+            name=name,
+            axis_x=rrb.TimeAxis(view_range=past(self.window)),
+            plot_legend=rrb.PlotLegend("LeftTop", visible=has_legend),
+            time_ranges=[last(self.window)],
+        )
+
+    def _panel(self) -> rrb.TextDocumentView:
+        return rrb.TextDocumentView(origin=self.at(entities.PANEL), name="Device")
+
+
+def blueprint(arm: ArmLayout, moment: Moment | None = None) -> rrb.Blueprint:
+    """The layout of a view with one arm, live or around a moment."""
+    return on_one_screen(arm.whole(moment), time_panel(moment))
+
+
+def on_one_screen(content: rrb.Container, time: rrb.TimePanel) -> rrb.Blueprint:
+    """Without the panels in which a view is built."""
     return rrb.Blueprint(
-        rrb.Horizontal(scene, _beside(model, window, moment), column_shares=[11, 9]),
-        _time_panel(moment),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        auto_views=False,
-        auto_layout=False,
-    )
+        content, time, rrb.BlueprintPanel(state="hidden"), rrb.SelectionPanel(state="hidden"),
+        auto_views=False, auto_layout=False,
+    )  # fmt: skip
 
 
-def _beside(model: VisualModel, window: float, moment: Moment | None) -> rrb.Container:
-    """The joints; above them what happened, where that is told."""
-    if moment is None:
-        return _joints(model, window)
-    story = rrb.TextDocumentView(origin=entities.STORY, name="What happened")
-    return rrb.Vertical(story, _joints(model, window), row_shares=[3, 4])
-
-
-def _time_panel(moment: Moment | None) -> rrb.TimePanel:
+def time_panel(moment: Moment | None = None) -> rrb.TimePanel:
+    """At the newest data, or around a moment."""
     if moment is None:
         return rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="following")
     around = rr.encodings.AbsoluteTimeRange(min=moment.stamp - int(LEAD * 1e9), max=moment.stamp + int(FOLLOW * 1e9))
@@ -64,89 +159,12 @@ def _time_panel(moment: Moment | None) -> rrb.TimePanel:
     )
 
 
-def _scene_and_cameras(model: VisualModel, trail: float, cameras: tuple[str, ...]) -> rrb.Spatial3DView | rrb.Container:
-    """The scene; beside it the images where there are cameras."""
-    views = [
-        rrb.Spatial2DView(origin=entities.camera_picture(name), name=f"Camera {name}: found things (green)")
-        for name in cameras
-    ]
-    if not views:
-        return _scene(model, trail)
-    return rrb.Horizontal(_scene(model, trail), rrb.Vertical(*views), column_shares=[3, 2])
-
-
-def _scene(model: VisualModel, trail: float) -> rrb.Spatial3DView:
-    size, waist = max(model.reach, 2.1 * model.height), 0.6 * model.height  # an arm that stands needs a step back
-    return rrb.Spatial3DView(
-        origin=entities.WORLD,
-        name="Twin: measured (solid), commanded (blue), planned arm and way (cyan), what touches (red) [m]",
-        line_grid=rrb.LineGrid3D(visible=True, spacing=0.1, color=palette.GRID),
-        background=rrb.Background(kind="SolidColor", color=palette.BACKGROUND),
-        eye_controls=rrb.EyeControls3D(
-            kind="Orbital",
-            position=(0.86 * size, -0.72 * size, waist + 0.47 * size),
-            look_target=(0.24 * size, 0.0, waist),
-            eye_up=(0.0, 0.0, 1.0),
-        ),
-        overrides={entities.TRAIL: rrb.VisibleTimeRanges([_last(trail)])},
-    )
-
-
-def _joints(model: VisualModel, window: float) -> rrb.Container:
-    moving = model.moving
-    pages = [moving[first : first + JOINTS_PER_PAGE] for first in range(0, len(moving), JOINTS_PER_PAGE)]
-    grids = [_page(page, window) for page in pages]
-    return grids[0] if len(grids) == 1 else rrb.Tabs(*grids, name="Joints")
-
-
-def _page(joints: tuple[VisualJoint, ...], window: float) -> rrb.Container:
-    name = " · ".join(joint.name for joint in joints)
-    rows = [rrb.Horizontal(_position(joint, window, joint is joints[0]), _error(joint, window)) for joint in joints]
-    return rrb.Vertical(*rows, name=name)
-
-
-def _position(joint: VisualJoint, window: float, has_legend: bool) -> rrb.TimeSeriesView:
-    return _plot(entities.position(joint.name), f"{joint.name} · position [{unit(joint)}]", window, has_legend)
-
-
-def _error(joint: VisualJoint, window: float) -> rrb.TimeSeriesView:
-    return _plot(entities.error(joint.name), f"{joint.name} · step error [steps]", window, False)
-
-
-def _plot(origin: str, name: str, window: float, has_legend: bool) -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(
-        origin=origin,
-        name=name,
-        axis_x=rrb.TimeAxis(view_range=_range(window)),
-        plot_legend=rrb.PlotLegend("LeftTop", visible=has_legend),
-        time_ranges=[_last(window)],
-    )
-
-
-def _panel() -> rrb.TextDocumentView:
-    return rrb.TextDocumentView(origin=entities.PANEL, name="Device")
-
-
-def _modes(window: float) -> rrb.StateTimelineView:
-    return rrb.StateTimelineView(
-        origin=entities.MODE, name="Mode of the device", time_view=rrb.TimeAxis(view_range=_range(window))
-    )
-
-
-def _log() -> rrb.TextLogView:
-    # The lines begin with their time of day; the column would show only the century.
-    hidden = TimelineColumn(TIMELINE, visible=False)
-    return rrb.TextLogView(
-        origin=entities.LOG,
-        name="Log",
-        columns=rrb.TextLogColumns(timeline_columns=[hidden], text_log_columns=["LogLevel", "Body"]),
-    )
-
-
-def _range(window: float) -> rr.TimeRange:
+def past(window: float) -> rr.TimeRange:
+    """The last `window` [s], for an axis."""
     relative = rr.TimeRangeBoundary.cursor_relative
     return rr.TimeRange(start=relative(seconds=-window), end=relative(seconds=0.0))
 
 
-def _last(window: float) -> rrb.VisibleTimeRange:
-    return rrb.VisibleTimeRange(TIMELINE, range=_range(window))
+def last(window: float) -> rrb.VisibleTimeRange:
+    """The last `window` [s], for what is shown."""
+    return rrb.VisibleTimeRange(TIMELINE, range=past(window))

@@ -13,7 +13,11 @@ from msgspec import Meta
 from schemas.deployment import ViewerMode, ViewerSection
 from services.visualizer.core import Visualizer
 from services.visualizer.program.viewer_connection import ViewerConnection
+from services.visualizer.render.arms_layout import SharedView, arms_blueprint
+from services.visualizer.render.layout import ArmLayout, blueprint
 from services.visualizer.render.sink import APPLICATION, Sink
+
+SHARED_RECORDING = "arms-live"  # the same of every arm, or the viewer would show them one at a time
 
 
 class VisualizerParameters(msgspec.Struct, frozen=True, kw_only=True):
@@ -25,7 +29,10 @@ class VisualizerParameters(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Outputs:
-    """One stream per sink; a viewer that is new is told everything from the start."""
+    """One stream per sink; a viewer that is new is told everything from the start.
+
+    A viewer may be `shared` with other arms; a recording is this arm's alone.
+    """
 
     def __init__(
         self,
@@ -34,10 +41,12 @@ class Outputs:
         root: Path,
         parameters: VisualizerParameters,
         cameras: tuple[str, ...] = (),
+        shared: SharedView | None = None,
     ) -> None:
         self._connection = None if viewer.mode is ViewerMode.NONE else ViewerConnection(viewer.host, viewer.port)
         self._folder, self._cameras = robot, cameras
         self._parameters = parameters
+        self._shared = shared
         self._recording_path = root / parameters.recording_path if parameters.recording_path else None
         self._viewer: Sink | None = None
         self._recording: Sink | None = None
@@ -62,18 +71,20 @@ class Outputs:
         if self._viewer is not None and self._connection is not None and self._connection.is_alive:
             with suppress(RuntimeError):  # it may end while we hand over
                 self._viewer.close(timeout=1.0)
+        if self._connection is not None:
+            self._connection.close()
 
     def _open_recording(self, core: Visualizer) -> None:
         if self._recording_path is None or self._recording is not None or self._problem:
             return
-        stream = self._stream(core)
+        stream = rr.RecordingStream(APPLICATION, recording_id=_own_recording(core))
         try:
             self._recording_path.parent.mkdir(parents=True, exist_ok=True)
             stream.save(str(self._recording_path))
         except (OSError, RuntimeError) as error:
             self._problem = f"cannot write the recording {self._recording_path}: {error}"
             return
-        self._recording = self._sink(stream, core)
+        self._recording = self._own_sink(stream, core)
 
     def _follow_viewer(self, core: Visualizer, monotonic: float) -> None:
         if self._connection is None:
@@ -81,14 +92,21 @@ class Outputs:
         if self._viewer is not None and not self._connection.is_alive:
             self._viewer = None
         if self._viewer is None and self._connection.is_new(monotonic):
-            stream = self._stream(core)
-            stream.connect_grpc(self._connection.url)
-            self._viewer = self._sink(stream, core)
+            self._viewer = self._viewers_sink(self._connection.url, core)
             core.restart()
 
-    def _stream(self, core: Visualizer) -> rr.RecordingStream:
-        return rr.RecordingStream(APPLICATION, recording_id=f"{core.model.name}-live")
+    def _viewers_sink(self, url: str, core: Visualizer) -> Sink:
+        recording_id = _own_recording(core) if self._shared is None else SHARED_RECORDING
+        stream = rr.RecordingStream(APPLICATION, recording_id=recording_id)
+        stream.connect_grpc(url)
+        if self._shared is None:
+            return self._own_sink(stream, core)
+        return Sink(stream, core.model, self._folder, arms_blueprint(self._shared.arms), self._shared.robot)
 
-    def _sink(self, stream: rr.RecordingStream, core: Visualizer) -> Sink:
-        window, trail = self._parameters.window, self._parameters.trail
-        return Sink(stream, core.model, self._folder, window, trail, self._cameras)
+    def _own_sink(self, stream: rr.RecordingStream, core: Visualizer) -> Sink:
+        layout = ArmLayout(core.model, self._parameters.window, self._parameters.trail, self._cameras)
+        return Sink(stream, core.model, self._folder, blueprint(layout))
+
+
+def _own_recording(core: Visualizer) -> str:
+    return f"{core.model.name}-live"

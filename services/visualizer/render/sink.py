@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
 
 from services.visualizer.content import entities, palette
 from services.visualizer.content.updates import (
@@ -30,7 +31,7 @@ from services.visualizer.content.updates import (
 from services.visualizer.model.mesh_files import mesh_path
 from services.visualizer.model.triangle_meshes import TriangleMesh, primitive_mesh
 from services.visualizer.model.visual_model import Visual, VisualJoint, VisualModel
-from services.visualizer.render.layout import TIMELINE, Moment, blueprint
+from services.visualizer.render.layout import TIMELINE
 
 APPLICATION = "gemelo"
 FRUSTUM_LENGTH = 0.12  # [m] from the camera to the picture that is drawn in the scene
@@ -45,22 +46,22 @@ class Sink:
         stream: rr.RecordingStream,
         model: VisualModel,
         folder: Path,
-        window: float,
-        trail: float,
-        cameras: tuple[str, ...] = (),
-        moment: Moment | None = None,
+        layout: rrb.Blueprint,
+        robot: str = "",
+        story: str = "",
     ) -> None:
-        """`window` [s] of the plots and `trail` [s] of the tool's path; `folder` holds the robot's meshes.
+        """`folder` holds the robot's meshes; `robot` is its name where several arms are in the stream.
 
-        `cameras` are those that have a view of their images; a `moment` is what a recording is opened at.
+        A `story` in Markdown is what is told of a recording.
         """
         self._stream = stream
         self._model = model
         self._folder = folder  # of the robot: meshes stand relative to it
+        self._robot = robot
         self._send_static()
-        if moment is not None:
-            stream.log(entities.STORY, rr.TextDocument(moment.story, media_type="text/markdown"), static=True)
-        stream.send_blueprint(blueprint(model, window, trail, cameras, moment))
+        if story:
+            self._static(entities.STORY, rr.TextDocument(story, media_type="text/markdown"))
+        stream.send_blueprint(layout)
 
     def write(self, updates: list[Update]) -> None:
         """Send a batch."""
@@ -145,35 +146,41 @@ class Sink:
     def _log(self, entity: str, time: int, *components: rr.AsComponents) -> None:
         self._stream.set_time(TIMELINE, timestamp=np.datetime64(time, "ns"))
         for component in components:
-            self._stream.log(entity, component)
+            self._stream.log(self._at(entity), component)
         self._stream.reset_time()
 
     def _send(self, entity: str, times: Times, columns: rr.ComponentColumnList) -> None:
         index = rr.TimeColumn(TIMELINE, timestamp=times.astype("datetime64[ns]"))
-        self._stream.send_columns(entity, [index], columns)
+        self._stream.send_columns(self._at(entity), [index], columns)
+
+    def _static(self, entity: str, *components: rr.AsComponents) -> None:
+        """What holds at all times."""
+        self._stream.log(self._at(entity), *components, static=True)
+
+    def _at(self, entity: str) -> str:
+        return entities.under(self._robot, entity)
 
     def _send_static(self) -> None:
-        log = self._stream.log
-        log(entities.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        self._static(entities.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         for root, is_ghost in ((entities.MEASURED, False), (entities.COMMANDED, True)):
             self._send_arm(root, is_ghost)
-        log(entities.PATH, rr.LineStrips3D.from_fields(colors=[palette.PATH], radii=[0.0022]), static=True)
-        log(entities.TRAIL, rr.LineStrips3D.from_fields(colors=[palette.TRAIL], radii=[0.0012]), static=True)
+        self._static(entities.PATH, rr.LineStrips3D.from_fields(colors=[palette.PATH], radii=[0.0022]))
+        self._static(entities.TRAIL, rr.LineStrips3D.from_fields(colors=[palette.TRAIL], radii=[0.0012]))
         for joint in self._model.moving:
             self._send_styles(joint)
         names = list(palette.MODES)
-        log(entities.MODE, rr.StateConfiguration(values=names, labels=names, colors=list(palette.MODES.values())),
-            static=True)  # fmt: skip
+        modes = rr.StateConfiguration(values=names, labels=names, colors=list(palette.MODES.values()))
+        self._static(entities.MODE, modes)
 
     def _send_arm(self, root: str, is_ghost: bool) -> None:
         for joint in self._model.joints:
             pose = rr.Transform3D(translation=joint.translation, quaternion=joint.rotation)
-            self._stream.log(f"{root}/{self._model.paths[joint.child]}", pose, static=not joint.is_moving)
+            self._stream.log(self._at(f"{root}/{self._model.paths[joint.child]}"), pose, static=not joint.is_moving)
         for entity, visual in self._visuals(root):
             pose = rr.Transform3D(translation=visual.translation, quaternion=visual.rotation)
             drawn = self._drawn(visual, palette.GHOST if is_ghost else None)
             if drawn is not None:
-                self._stream.log(entity, pose, drawn, static=True)
+                self._static(entity, pose, drawn)
 
     def _visuals(self, root: str) -> Iterator[tuple[str, Visual]]:
         """Every visual with the entity that it has under `root`."""
@@ -194,13 +201,13 @@ class Sink:
     def _send_styles(self, joint: VisualJoint) -> None:
         self._style(entities.commanded(joint.name), [("commanded", palette.COMMANDED, 4.0)])
         self._style(entities.executed(joint.name), [("executed", palette.EXECUTED, 1.5)])
-        band = [("+0.5 step", palette.BAND, 1.5), ("-0.5 step", palette.BAND, 1.5)]
+        band = [(name, palette.BAND, 1.5) for name in entities.BAND]
         self._style(entities.error(joint.name), [("commanded - executed", palette.ERROR, 1.5), *band])
         self._style(entities.shaft(joint.name), [("lost steps: true shaft - counter", palette.SHAFT, 1.5)])
 
     def _style(self, entity: str, series: list[tuple[str, palette.Color, float]]) -> None:
         names, colors, widths = zip(*series, strict=True)
-        self._stream.log(entity, rr.SeriesLines(colors=colors, widths=widths, names=names), static=True)
+        self._static(entity, rr.SeriesLines(colors=colors, widths=widths, names=names))
 
 
 def _solid(mesh: TriangleMesh, color: palette.Rgba | None) -> rr.Mesh3D:
