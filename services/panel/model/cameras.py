@@ -49,7 +49,7 @@ class CameraPictures:
         return self._pictures.get(camera, NONE)
 
     def pointed_at(self, camera: str, x: float, y: float, things: Collection[str]) -> Pointed:
-        """What is meant by a place in its image: `x` and `y` from 0 to 1, from the upper left corner."""
+        """What is meant by a place in its image: `x` and `y` are shares, 0 to 1, from the upper left corner."""
         picture = self.picture(camera)
         return pointed_at(
             self._items(camera, picture.stamp), things, (x * picture.width, y * picture.height), NEAR * picture.width
