@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import imageio.v3 as imageio
 import numpy as np
-from playwright.sync_api import Browser, Locator, ViewportSize, expect
+from playwright.sync_api import Browser, Locator, Page, ViewportSize, expect
 
 T = TypeVar("T")
 
@@ -110,6 +110,22 @@ class Person:
         pixels = until(found, lambda seen: len(seen) > 10)
         row, column = pixels[pixels[:, 0] == pixels[:, 0].max()].mean(axis=0)
         return float(column) / SCALE, float(row) / SCALE - 5.0
+
+
+def place_in_image(page: Page, camera: str, x: float, y: float) -> tuple[float, float]:
+    """[pixels] of the page, of a place in a camera's image from 0 to 1; the image is replaced all the time, so its
+    element is asked once."""
+    found = page.evaluate(
+        """(camera) => {
+          const image = document.querySelector(`img[data-gemelo-camera="${camera}"]`);
+          image.scrollIntoView({block: 'center'});
+          const box = image.getBoundingClientRect();
+          return [box.left, box.top, box.width, box.height];
+        }""",
+        camera,
+    )
+    left, top, width, height = found
+    return left + x * width, top + y * height
 
 
 def until(look: Callable[[], T], is_so: Callable[[T], bool], patience: float = PATIENCE / 1000.0) -> T:

@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from schemas.camera import CameraImage
 from services.panel.view.browser import CHANNEL, read_browser, script_html
-from tests.panel.person import OPENING, PATIENCE, until
+from tests.panel.person import OPENING, PATIENCE, place_in_image, until
 from tests.panel.test_camera_box import opened
 
 JPEG = cv2.imencode(".jpg", np.full((480, 640, 3), 90, np.uint8))[1].tobytes()
@@ -68,11 +68,7 @@ def image(browser: Page, camera: str = "above"):
 
 def at(browser: Page, x: float, y: float, camera: str = "above") -> tuple[float, float]:
     """[pixels] of the page, of a pixel of the camera."""
-    found = image(browser, camera)
-    found.scroll_into_view_if_needed(timeout=PATIENCE)
-    box = found.bounding_box()
-    assert box is not None
-    return box["x"] + x / 640.0 * box["width"], box["y"] + y / 480.0 * box["height"]
+    return place_in_image(browser, camera, x / 640.0, y / 480.0)
 
 
 def source(browser: Page) -> bytes:

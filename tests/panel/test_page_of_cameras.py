@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Locator, expect
+from playwright.sync_api import expect
 
 from schemas.topics import camera_detections
 from services.runtime.deployment import project_root
 from services.stack.stack import Stack
 from tests.gemelo.conftest import BROKER, NEEDED
-from tests.panel.person import PATIENCE, Person, until
+from tests.panel.person import PATIENCE, Person, place_in_image, until
 
 CAMERA = "overhead"
 WIDTH, HEIGHT = 640.0, 480.0  # [px] of its images
@@ -35,19 +35,9 @@ def twin(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
         yield stack
 
 
-def shown_image(person: Person) -> Locator:
-    person.tab("Scene")
-    image = person.page.locator(f"img[data-gemelo-camera={CAMERA}]")
-    expect(image).to_be_visible(timeout=PATIENCE)
-    image.scroll_into_view_if_needed()
-    return image
-
-
-def clicks(person: Person, image: Locator, x: float, y: float) -> None:
+def clicks(person: Person, x: float, y: float) -> None:
     """At a place of the image, in its pixels; slowly, so that the next image may come before the release."""
-    box = image.bounding_box()
-    assert box is not None
-    person.page.mouse.move(box["x"] + x / WIDTH * box["width"], box["y"] + y / HEIGHT * box["height"])
+    person.page.mouse.move(*place_in_image(person.page, CAMERA, x / WIDTH, y / HEIGHT))
     person.page.mouse.down()
     person.page.wait_for_timeout(700.0)
     person.page.mouse.up()
@@ -65,18 +55,19 @@ def test_a_click_on_a_thing_in_the_image_chooses_it_and_pick_this_picks_it(perso
         }
 
     seen = until(places, lambda found: {"cup", "red_block", "blue_block", "tag 100"} <= set(found))
-    image = shown_image(person)
+    person.tab("Scene")
+    expect(person.page.locator(f"img[data-gemelo-camera={CAMERA}]")).to_be_visible(timeout=PATIENCE)
     expect(person.page.locator("svg text", has_text="cup")).to_be_attached(timeout=PATIENCE)
     for name in ("red_block", "cup", "blue_block"):
-        clicks(person, image, *seen[name])
+        clicks(person, *seen[name])
         person.reads(f"{name} is chosen.")
         until(lambda: person.field("Thing").input_value(), lambda value, name=name: value == name)
-    clicks(person, image, 0.02 * WIDTH, 0.98 * HEIGHT)
+    clicks(person, 0.02 * WIDTH, 0.98 * HEIGHT)
     person.reads("Nothing is detected there; the nearest thing is")
-    clicks(person, image, *seen["tag 100"])
+    clicks(person, *seen["tag 100"])
     person.reads("tag 100 is no thing of the cell file")
     assert person.field("Thing").input_value() == "blue_block"
-    clicks(person, image, *seen["cup"])
+    clicks(person, *seen["cup"])
     person.reads("cup is chosen.")
     assert not any(item.attached for item in arm.scene.objects.values())
     person.chooses("Place", "bin")
