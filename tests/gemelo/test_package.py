@@ -123,6 +123,10 @@ def test_a_name_that_there_is_not_is_an_attribute_error() -> None:
     ("environ", "said"),
     [
         ({"GEMELO_ROUTER_PORT": "1"}, "Lost: no router at 127.0.0.1:1: start the twin with `make up`"),
+        (
+            {"GEMELO_ROUTER_HOST": "192.0.2.1", "GEMELO_ROUTER_PORT": "1"},
+            "192.0.2.1:1: is that host on, does it answer",
+        ),
         ({"GEMELO_ROBOT": "urdf/nobody"}, "Error: "),
         ({"GEMELO_CONFIG": "nothing.toml"}, "nothing.toml: there is no such file"),
     ],

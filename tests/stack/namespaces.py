@@ -57,8 +57,9 @@ class Hosts:
         return f"{self._prefix}{host}"
 
     def command(self, host: str, *words: str) -> tuple[str, ...]:
-        """The command, run on that host."""
-        return ("ip", "netns", "exec", self.namespace(host), *words)
+        """The command, run on that host, which has its name too."""
+        named = ("unshare", "--uts", "sh", "-c", 'hostname "$0" && exec "$@"', host)
+        return ("ip", "netns", "exec", self.namespace(host), *named, *words)
 
     @contextlib.contextmanager
     def cut(self, host: str) -> Iterator[None]:

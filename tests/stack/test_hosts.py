@@ -8,6 +8,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 
@@ -36,6 +38,8 @@ address = "10.77.0.3"
 roles = ["operator", "viewer"]
 """
 CUT = 1.0  # [s]
+NODES = {"stepper_gateway": "cell", "state_publisher": "cell", "planner": "brain"}
+ON = NODES | {"virtual_esp32": "cell", "broker": "cell", "router": "brain"}
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +90,58 @@ def test_a_move_from_the_desk_goes_on_exactly_when_a_link_is_cut_and_healed(host
     assert {key: outcome[key] for key in ("status", "is_exact", "jumps", "positions_afterwards")} == {
         "status": "SUCCEEDED", "is_exact": True, "jumps": [], "positions_afterwards": 1,
     }  # fmt: skip
+
+
+def status(hosts, *, role: str = "viewer") -> tuple[int, dict[str, dict[str, object]]]:
+    """The exit code of `gemelo deploy status` at the desk, and what it says of each service."""
+    done = gemelo(hosts, "deploy", "status", site_file(hosts), "--json", role=role)
+    assert done.stdout, done.stderr
+    return done.returncode, {each["service"]: each for each in json.loads(done.stdout)}
+
+
+def site_file(hosts) -> str:
+    """As a person at the desk has it."""
+    return str(Path(hosts[1].sites["desk"].config).parent.with_name("lab.toml"))
+
+
+def until_all_are_ready(hosts) -> dict[str, dict[str, object]]:
+    end = time.monotonic() + 30.0
+    while (found := status(hosts))[0] != 0:
+        assert time.monotonic() < end, found
+    return found[1]
+
+
+def test_the_status_at_the_desk_has_every_service_with_its_host_its_version_and_its_clock(hosts):
+    found = until_all_are_ready(hosts)
+    assert {name: each["host"] for name, each in found.items()} == ON
+    assert all(each["standing"] == "ready" for each in found.values())
+    for name in NODES:
+        assert (found[name]["machine"], found[name]["version"]) == (ON[name], version("gemelo"))
+        assert found[name]["clock_bound"] > 0.0
+        assert abs(found[name]["clock_offset"]) <= found[name]["clock_bound"], "their clocks are one here"
+    table = gemelo(hosts, "deploy", "status", site_file(hosts), role="viewer").stdout
+    assert "all 6 are ready" in table
+
+
+def test_what_is_behind_a_cut_link_is_told_as_silent_and_all_are_ready_again_when_it_is_healed(hosts):
+    made, _ = hosts
+    with made.cut("cell"):
+        code, found = status(hosts)
+    assert code == 1
+    assert {name: each["standing"] for name, each in found.items()} == {
+        "stepper_gateway": "silent", "state_publisher": "silent", "virtual_esp32": "unknown", "broker": "unknown",
+        "planner": "ready", "router": "ready",
+    }  # fmt: skip
+    until_all_are_ready(hosts)
+
+
+def test_without_the_routers_host_the_status_names_the_address_that_does_not_answer(hosts):
+    made, _ = hosts
+    with made.cut("brain"):
+        done = gemelo(hosts, "deploy", "status", site_file(hosts))
+    assert done.returncode not in (0, 1)
+    assert "no router at 10.77.0.2:7447: is that host on, does it answer `ping 10.77.0.2` from here" in done.stderr
+    until_all_are_ready(hosts)
 
 
 def test_a_viewer_sees_the_arm_may_stop_it_and_cannot_move_it(hosts):
