@@ -38,6 +38,7 @@ TOPICS_REPLAYED = (GATEWAY_INPUTS, *SAID, *ENDED.values())
 OTHERS = "frames, results, answers and log lines"  # the outputs of one input that are not for the bus
 UNRECORDED = "messages before the recorder listened, after its end, or of a LATEST topic that it was not given"
 OUTSIDE = "recorded messages from before the core began, or after its last input that was kept"
+EARLIER = "messages of device/inputs of a stepper_gateway that began before the recording: its state is not known"
 CHECKSUMS = f"{OTHERS} with another checksum, which knows no tolerance"
 LATE = 1_000_000_000  # [ns] after which a message that was recorded must have been said again
 AHEAD = 256  # recorded messages among which a replayed one is looked for
@@ -67,25 +68,40 @@ class GatewayAgain:
         self._said = {topic.key: Said(topic, recorded.of(topic), comparison) for topic in SAID}
 
     def inputs(self) -> Iterator[tuple[float, Given]]:
-        """Each input with its time [s] in the recording, from the first beginning of a core on."""
+        """Each input with its time [s] in the recording, from the first beginning of a core on.
+
+        Of a core that began before the recording, or whose beginning is not in it, nothing can be said.
+        """
         before: GatewayInputs | None = None
-        for heard in self._recorded.require(GATEWAY_INPUTS):
+        for heard in self._from_the_first_beginning():
             message = heard.message
-            if before is None and message.number != 0:
+            follows = before is not None and message.session == before.session
+            expected = before.number + 1 if before is not None and follows else 0
+            if message.number != expected:
+                came = f"after {expected - 1} of the same process comes {message.number}" if follows else (
+                    f"those of a new process begin with {message.number}")  # fmt: skip
                 raise NotReplayable(
-                    f"{self._recorded.path}: it begins in the middle of the gateway's life (its {GATEWAY_INPUTS.key} "
-                    f"begin with number {message.number}), so the state of its core is not known; restart "
-                    "stepper_gateway while it is recorded, with its parameter record_inputs on"
-                )
-            if before is not None and message.session == before.session and message.number != before.number + 1:
-                raise NotReplayable(
-                    f"{self._recorded.path}: {GATEWAY_INPUTS.key} number {before.number + 1} is missing at "
-                    f"{heard.at:.3f} s (after {before.number} comes {message.number}): inputs were lost, or "
-                    "record_inputs was off; take another recording"
+                    f"{self._recorded.path}: {GATEWAY_INPUTS.key} number {expected} is missing at {heard.at:.3f} s "
+                    f"({came}): inputs were lost, or record_inputs was off; take another recording"
                 )
             before = message
             for given in self._unpacked(heard):
                 yield self._recorded.at(given.unix), given
+
+    def _from_the_first_beginning(self) -> Iterator[Heard[GatewayInputs]]:
+        """The messages but for those of a core that began before the recording."""
+        all_inputs = self._recorded.require(GATEWAY_INPUTS)
+        begins = next((place for place, heard in enumerate(all_inputs) if heard.message.number == 0), None)
+        if begins is None:
+            raise NotReplayable(
+                f"{self._recorded.path}: it begins in the middle of the gateway's life (its {GATEWAY_INPUTS.key} are "
+                f"number {all_inputs[0].message.number} to {all_inputs[-1].message.number}; number 0, with which the "
+                "core begins, is in an earlier file), so the state of its core is not known, and stepper_gateway is "
+                "not started anew in it: replay the file in which it starts, or restart stepper_gateway while it is "
+                "recorded, with its parameter record_inputs on"
+            )
+        self._comparison.aside[EARLIER] += begins
+        return iter(all_inputs[begins:])
 
     def give(self, at: float, given: Given) -> None:
         """One input, `at` [s]."""

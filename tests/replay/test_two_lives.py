@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from schemas.topics import DESCRIPTION, GATEWAY_INPUTS
 from services.recordings.channels import Entry
 from services.recordings.mcap_file import McapFile
 from services.replay.main import replay, text_of
-from services.replay.stepper_gateway import OUTSIDE
+from services.replay.recorded import NotReplayable
+from services.replay.stepper_gateway import EARLIER, OUTSIDE
 from services.state_publisher.main import describe
 from services.stepper_gateway.core import GatewayCore
 from services.stepper_gateway.input_log import InputLog
@@ -83,3 +86,37 @@ def test_a_message_that_the_first_life_never_said_is_found(tmp_path):
     entries.insert(entries.index(events[3]), events[2])  # the same one twice
     found = replay(recorded(tmp_path / "lives.mcap", entries), "stepper_gateway").difference
     assert (found.topic, found.sequence) == ("device/events", 3)
+
+
+def place_of(entry: Entry) -> tuple[int, int] | None:
+    """Session and number of a message of inputs."""
+    return (entry.message.session, entry.message.number) if entry.topic is GATEWAY_INPUTS else None
+
+
+def test_a_recording_that_begins_in_the_middle_is_replayed_from_the_first_restart_on(tmp_path):
+    entries: list[Entry] = []
+    Life(11, 0.0, entries).run(15.3)
+    second = Life(12, 20.0, entries)
+    second.run(12.0)
+    second.end()
+    later = [
+        entry for entry in entries if entry.arrival > UNIX + 5_000_000_000
+    ]  # the first core's beginning is not in it
+    later = [each for each in later if place_of(each) is None or place_of(each) > (11, 3)]
+    replayed = replay(recorded(tmp_path / "later.mcap", later), "stepper_gateway")
+    assert replayed.difference is None, text_of(replayed)
+    assert replayed.aside[EARLIER] == sum(e.topic is GATEWAY_INPUTS and e.message.session == 11 for e in later) > 0
+    assert replayed.alike["device/events"] == sum(
+        each.topic.key == "device/events" and each.arrival > UNIX + 20_000_000_000 for each in later
+    )
+
+
+def test_a_second_life_whose_beginning_is_missing_is_refused(tmp_path):
+    entries: list[Entry] = []
+    Life(11, 0.0, entries).run(15.3)
+    second = Life(12, 20.0, entries)
+    second.run(12.0)
+    second.end()
+    entries = [each for each in entries if place_of(each) != (12, 0)]
+    with pytest.raises(NotReplayable, match=r"number 0 is missing at .* \(those of a new process begin with 1\)"):
+        replay(recorded(tmp_path / "hole.mcap", entries), "stepper_gateway")
