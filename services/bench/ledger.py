@@ -42,6 +42,8 @@ POPULATIONS: dict[str, Weakness] = {  # share of the stated torque that a motor 
     "uniform 0.15 to 1.2": lambda rng: rng.uniform(0.15, 1.2),
     "log-normal about 0.6": lambda rng: rng.lognormvariate(-0.51, 0.5),
     "log-uniform 0.1 to 1.2": lambda rng: 0.1 * 12.0 ** rng.random(),
+    "1.2 times beta (2, 3)": lambda rng: 1.2 * rng.betavariate(2.0, 3.0),
+    "one in three 0.15, the others 1.0": lambda rng: 0.15 if rng.random() < 1.0 / 3.0 else 1.0,
 }
 
 

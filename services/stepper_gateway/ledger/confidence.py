@@ -8,7 +8,7 @@ S(x) = P(w > x) = 1 / (1 + (x / HALF)^STEEPNESS), the log-logistic law of surviv
 verifications have shown narrows it: after one without loss w > proven, after one with a loss w < refuted, so with the
 highest load since
 
-    P = (S(load) - S(refuted)) / (S(proven) - S(refuted)), 1 up to `proven` and 0 from `refuted` on.
+    P = (S(load) - S(refuted)) / (S(p) - S(refuted)) with p = PROOF * proven, 1 up to p and 0 from `refuted` on.
 
 exp(...): what the torque does not explain, at a constant rate: a hand on the arm, a cable, a loose coupling.
 
@@ -24,8 +24,8 @@ from msgspec import Struct
 from schemas.ledger import VerifiedBy
 
 HALF = 0.35  # load at which half of all motors would lose steps: less than stated, and the rotor's swing takes its part
-STEEPNESS = 3.5  # chosen: one motor in 8 fails at 0.2 of its stated torque, one in 80 at 0.1
-PROOF = 0.7  # of a load that a verification has proven: near pull-out a motor loses steps in one motion, not in all
+STEEPNESS = 3.0  # chosen: one motor in 6 fails at 0.2 of its stated torque, one in 44 at 0.1
+PROOF = 0.9  # of a load that a verification has proven: near pull-out a motor loses steps in one motion, not in all
 CLEAN = 3  # verifications without a loss, after one with a loss, until that is forgotten: losses can cancel out
 TURNS = 100_000.0  # [rev] of the motor shaft after which 1/e is left
 AGE = 30.0 * 86_400.0  # [s] after which 1/e is left
