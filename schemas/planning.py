@@ -197,6 +197,25 @@ class PlanInputs(Message, frozen=True, kw_only=True):
     elapsed: float = 0.0  # [s] that the plan took; near the time allowed, the clock may have ended a search
 
 
+class SceneVersion(Message, frozen=True, kw_only=True):
+    """Which scene something was made in: the scene itself is on `scene`."""
+
+    version: int = 0
+    epoch: int = 0
+    jaws: tuple[SceneObject, ...] = ()  # the gripper's, which stand in no scene
+
+
+class AnswerInputs(Message, frozen=True, kw_only=True):
+    """What the planner has made an answer to `ik`, `fk`, `state_validity` or `scene/edit` from, beside the question."""
+
+    stamp: int = 0  # [ns] UNIX time just before the answer; of `scene/edit` that of the changed scene
+    request: str = ""  # its key
+    number: int = 0  # of the answer to this request since the planner started, from 1
+    present: JointState | None = None  # the newest joint state
+    age: float = 0.0  # [s] of that state
+    scene: SceneVersion = SceneVersion()  # of `scene/edit` the one before it, with the jaws as they are after it
+
+
 class PlanCancel(Message, frozen=True, kw_only=True):
     """End a plan that waits or is being made; its own answer is then PREEMPTED."""
 
@@ -331,3 +350,34 @@ class JogStatus(Message, frozen=True, kw_only=True):
     limits: tuple[JogLimit, ...] = ()
     client: str = ""  # the node that it is about, while somebody holds control; empty: everybody
     check: str = ""  # "control": somebody else holds it
+
+
+class JogTaken(Message, frozen=True, kw_only=True, tag="taken"):
+    """A command that the jog has taken."""
+
+    now: float = 0.0  # [s] of the planner's monotonic clock
+    command: JogCommand = JogCommand()
+    client: str = ""  # the node that has said it
+    begins: bool = False  # after a silence in which the jog has stood: nothing before it counts
+
+
+class JogTick(Message, frozen=True, kw_only=True, tag="tick"):
+    """One period of the jog, and a checksum of what it has said in it."""
+
+    now: float = 0.0  # [s] of the planner's monotonic clock
+    stamp: int = 0  # [ns] UNIX time
+    present: JointState | None = None  # the newest joint state
+    age: float = 0.0  # [s] of that state
+    goal_is_active: bool = False
+    not_ready: str = ""  # why the device does not move
+    scene: SceneVersion | None = None  # None: as in the tick before
+    told_to: str = ""  # the node that a status is about
+    said: str = ""  # BLAKE2 of target and status in msgpack; empty: neither
+
+
+class JogInputs(Message, frozen=True, kw_only=True):
+    """What the planner has jogged from for half a second: enough to jog the same way again."""
+
+    stamp: int = 0  # [ns] UNIX time
+    number: int = 0  # since the planner started, from 0
+    inputs: tuple[JogTaken | JogTick, ...] = ()  # in their order

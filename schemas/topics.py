@@ -44,11 +44,13 @@ from schemas.motion import (
     FollowJointTrajectoryResult,
 )
 from schemas.planning import (
+    AnswerInputs,
     FkRequest,
     FkResponse,
     IkRequest,
     IkResponse,
     JogCommand,
+    JogInputs,
     JogStatus,
     PlanCancel,
     PlanCancelResult,
@@ -147,10 +149,16 @@ PLAN_PROGRESS = Topic(  # EVERY: several plans share the key, and the newest of 
 PLAN_INPUTS = Topic(
     "plan/inputs", PlanInputs, EVERY, None, True, "planner", "what the next answer was made from, for `gemelo replay`"
 )
+ANSWER_INPUTS = Topic(
+    "answer/inputs", AnswerInputs, EVERY, None, True, "planner", "what answers to ik, fk, ... and edits were made from"
+)
 SCENE = Topic("scene", PlanningScene, LATCHED, None, True, "planner", "what stands around the arm and what it carries")
 CONTACTS = Topic("contacts", Contacts, LATCHED, None, True, "planner", "what touches where a plan was refused")
 JOG = Topic("jog", JogCommand, LATEST, 50.0, True, ANY, "how to move now, by hand")
 JOG_STATUS = Topic("jog_status", JogStatus, LATEST, None, True, "planner", "what slows the jogging")
+JOG_INPUTS = Topic(
+    "jog/inputs", JogInputs, EVERY, None, True, "planner", "what is jogged from, twice a second, for `gemelo replay`"
+)
 DEVICE_STATUS = Topic(
     "device/status", DeviceStatus, LATCHED, None, True, GATEWAY, "who the device is, and whether it is online"
 )
@@ -184,7 +192,7 @@ PARAMETER_CHANGES = Topic(
 
 TOPICS: tuple[Topic[Message], ...] = (
     DESCRIPTION, JOINT_STATES, JOINT_COMMANDS, STEP_ERRORS, JOINT_TARGETS, FRAMES, STATIC_FRAMES, PLANNED_PATH,
-    PLAN_PROGRESS, PLAN_INPUTS,
+    PLAN_PROGRESS, PLAN_INPUTS, ANSWER_INPUTS, JOG_INPUTS,
     SCENE, CONTACTS, JOG, JOG_STATUS, DEVICE_STATUS, DEVICE_STATE, DEVICE_EVENTS, DEVICE_CONFIGURATION,
     SENSORS, DEVICE_SHAFT, GRIPPER_STATE, STEP_LEDGER, STOPPING_DISTANCE, CONTROL,
     COMMANDS, COMMAND_ACKS, GATEWAY_INPUTS, LOG, STATISTICS, PARAMETER_CHANGES,

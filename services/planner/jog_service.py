@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from msgspec.structs import replace
-
 from schemas.joints import JointState
 from schemas.planning import JogCommand, JogStatus
-from schemas.topics import CONTROL, DEVICE_STATUS, FOLLOW_JOINT_TRAJECTORY, JOG, JOG_STATUS, JOINT_TARGETS
+from schemas.topics import CONTROL, DEVICE_STATUS, FOLLOW_JOINT_TRAJECTORY, JOG, JOG_INPUTS, JOG_STATUS, JOINT_TARGETS
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.planner.collision.world import World
-from services.planner.jog.jog import PERIOD, STATUS_PERIOD, Jog
+from services.planner.jog.jog import NEVER, PERIOD, SILENCE, STATUS_PERIOD, Jog, signed
+from services.planner.jog.jog_log import JogLog, digest_of
+from services.planner.scene.standing import version_of
 from services.runtime.actions.keys import status_topic
 from services.runtime.node import Node
 from services.runtime.topics import Latest
@@ -24,11 +24,21 @@ class JogService:
     The jog is made with the first command, so that an arm that is never jogged pays nothing.
     """
 
-    def __init__(self, node: Node, arm: Arm, states: Latest[JointState], newest: Callable[[], World]) -> None:
+    def __init__(
+        self,
+        node: Node,
+        arm: Arm,
+        states: Latest[JointState],
+        newest: Callable[[], World],
+        is_recorded: Callable[[], bool],
+    ) -> None:
+        """`is_recorded` says if what is jogged from is published."""
         self._node, self._arm, self._states, self._newest = node, arm, states, newest
         self._targets, self._status = node.publisher(JOINT_TARGETS), node.publisher(JOG_STATUS)
         self._goals = node.latest(status_topic(FOLLOW_JOINT_TRAJECTORY))
         self._device, self._control = node.latest(DEVICE_STATUS), node.latest(CONTROL)
+        self._log = JogLog(node.publisher(JOG_INPUTS).put, is_recorded)
+        self._active = NEVER  # [s] monotonic, of the newest command and the newest step
         self._client = ""  # the node that jogs
         self._refused = -1.0e9  # [s] monotonic, when another was told last that it may not
         self._world: World | None = None
@@ -40,31 +50,33 @@ class JogService:
         """The gateway decides whose targets move the arm; here others are kept from disturbing the holder's jog."""
         if reason := self._objection(writer):
             return self._refuse(reason, writer)
-        self._client = writer
-        self._in_newest_world().on_command(command, self._node.monotonic())
+        now = self._node.monotonic()
+        begins = not self._is_ticking and now - self._active > SILENCE
+        self._client, self._active = writer, now
+        self._log.taken(now, command, writer, begins, self._node.now())
+        self._in_newest_world().on_command(command, now)
         if not self._is_ticking:
             self._is_ticking = True
             self._node.every(PERIOD, self._tick)
 
     def _tick(self) -> None:
-        node, states, jog = self._node, self._states, self._in_newest_world()
-        device = self._device.message
-        output = jog.step(
-            node.monotonic(),
-            node.now(),
-            states.message,
-            states.age(),
-            self._goal_is_active,
-            "" if device is None else device.reason,
-        )
-        if output.targets is not None:
-            self._targets.put(replace(output.targets, client=self._client))
-        if output.status is not None:
-            self._status.put(replace(output.status, client=self._told_to))
+        node, jog = self._node, self._in_newest_world()
+        now, stamp, present, age = node.monotonic(), node.now(), self._states.message, self._states.age()
+        goal_is_active, not_ready = self._goal_is_active, self._not_ready
+        output = jog.step(now, stamp, present, age, goal_is_active, not_ready)
+        targets, status = signed(output, self._client, self._told_to)
+        if targets is not None:
+            self._targets.put(targets)
+        if status is not None:
+            self._status.put(status)
         if output.said:
             node.log.warning(f"jog: {output.said}")
+        self._active = now
+        self._log.ticked(now, stamp, present, age, goal_is_active, not_ready, version_of(self._newest().scene),
+                         self._told_to, digest_of(targets, status))  # fmt: skip
         if not jog.is_busy:
             self._is_ticking = False
+            self._log.finish()
             node.forget(self._tick)
 
     def _objection(self, writer: str) -> str:
@@ -86,6 +98,10 @@ class JogService:
             self._refused = now
             stamp = self._node.now()
             self._status.put(JogStatus(stamp=stamp, scale=0.0, limited_by=reason, client=writer, check="control"))
+
+    @property
+    def _not_ready(self) -> str:
+        return "" if self._device.message is None else self._device.message.reason
 
     @property
     def _goal_is_active(self) -> bool:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from contextlib import closing
 
 from schemas.deployment import Deployment
-from schemas.topics import FK, IK, JOINT_STATES, STATE_VALIDITY
+from schemas.topics import JOINT_STATES
 from services.arm.model.description import load_arm
 from services.planner.core import Planner
 from services.planner.jog_service import JogService
-from services.planner.kinematics.kinematic_requests import KinematicRequests
+from services.planner.kinematic_service import KinematicService
+from services.planner.parameters import PlannerParameters
 from services.planner.request.start_state import STALE_AFTER
+from services.planner.scene.answer_log import AnswerLog
 from services.planner.scene.scene_keeper import SceneKeeper
 from services.planner.workers.plan_service import PlanService
 from services.planner.workers.workers import Workers
@@ -27,23 +29,13 @@ NOT_READY = "no fresh joint_states: is the stepper_gateway running?"
 def run(node: Node, deployment: Deployment) -> None:
     """Serve until the node is stopped; ready while it knows where the arm is, and can plan."""
     arm = load_arm(project_root() / deployment.robot)
-    planner, kinematic = Planner(arm), KinematicRequests(arm)
-    states = node.latest(JOINT_STATES)
-    keeper = SceneKeeper(node, arm, states, project_root() / deployment.paths.run, planner.set_world)
-    JogService(node, arm, states, lambda: keeper.world)
-    node.serve(
-        IK,
-        lambda request: kinematic.ik(request, states.message, states.age(), planner.checker.newest),
-        worker=True,
-    )
-    node.serve(FK, lambda request: kinematic.fk(request, states.message, states.age()), worker=True)
-    node.serve(
-        STATE_VALIDITY,
-        lambda request: kinematic.validity(request, states.message, states.age(), planner.checker.newest),
-        worker=True,
-    )
+    planner, parameters = Planner(arm), node.parameters(PlannerParameters)
+    states, log = node.latest(JOINT_STATES), AnswerLog(node, lambda: parameters.value.record_inputs)
+    keeper = SceneKeeper(node, arm, states, project_root() / deployment.paths.run, planner.set_world, log)
+    JogService(node, arm, states, lambda: keeper.world, lambda: parameters.value.record_inputs)
+    KinematicService(node, arm, states, lambda: planner.checker.newest, log)
     workers = Workers(arm.folder, project_root(), lambda: (states.message, states.age()), lambda: keeper.world.scene)
-    plans = PlanService(node, workers, planner, keeper)
+    plans = PlanService(node, workers, planner, keeper, lambda: parameters.value.record_inputs)
 
     def step(now: int) -> None:
         plans.step(now)

@@ -21,6 +21,7 @@ from mcap.records import Channel, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 import gemelo
+from schemas.planning import IkRequest, PoseGoal
 from schemas.topics import Topic
 from services.recordings.mcap_file import DEPLOYMENT, METADATA, PROFILE
 from services.recordings.reader import RecordingReader
@@ -30,6 +31,7 @@ from services.stack.stack import Stack, StackError
 
 FOLDER = "tests/replay/recordings"
 CHUNK = 256 * 1024  # [B] uncompressed: larger ones are smaller together
+BETWEEN = 2.0  # [s] chosen: a jog has come to rest, and the next one begins anew
 LAST_WORDS = 1.5  # [s] for the logger's last batches
 
 
@@ -101,6 +103,33 @@ def perform(arm: gemelo.Arm) -> None:
     with suppress(gemelo.Error):
         motion.wait()
     arm.move(named="ready", speed=0.7)
+    ask(arm)
+    jog(arm)
+
+
+def ask(arm: gemelo.Arm) -> None:
+    """Every question about a configuration, with answers of both kinds, and a scene edit that is refused."""
+    ready, left = arm.states["ready"], arm.states["left"]
+    arm.ik(IkRequest(goal=PoseGoal(position=arm.fk(left).position)), solutions=4)
+    arm.fk({arm.joint_names[0]: 0.2})  # the others as they stand
+    arm.check(ready)
+    for refused in ({arm.joint_names[0]: 30.0}, {arm.joint_names[-1]: -30.0}):
+        with suppress(gemelo.Refused):
+            arm.check(refused)
+    with suppress(gemelo.Refused):
+        arm.scene.remove("nothing")
+
+
+def jog(arm: gemelo.Arm) -> None:
+    """Against a wall by the tool, and, after a silence, one joint."""
+    x, y, z = arm.fk().position
+    arm.scene.add_box("wall", size=(0.3, 0.02, 0.3), at=(x, y + 0.12, z))
+    with suppress(gemelo.Refused):
+        arm.jog(twist=(0.0, 0.08, 0.0), duration=1.5)
+    time.sleep(BETWEEN)
+    arm.scene.remove("wall")
+    arm.jog(joints={arm.joint_names[0]: -0.3}, duration=0.8)
+    time.sleep(BETWEEN)
 
 
 def cut(source: Path, target: Path, topics: Iterable[Topic[Any]]) -> None:

@@ -1,4 +1,4 @@
-"""`planner` again: every recorded question to `plan`, in the scene and from the joint state that it was planned from.
+"""`planner` again: every recorded question, in the scene and from the joint state of its answer, and every jog.
 
 A plan depends on the clock only where its time ends a search. So the clock stands still here, and an answer that took a
 good part of its allowed time is set aside: no other run would give it again.
@@ -12,46 +12,52 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from schemas.planning import PlanCode, PlanInputs, PlanningTimes, PlanRequest, PlanResponse
-from schemas.scene import PlanningScene, SceneObject
-from schemas.topics import PLAN, PLAN_INPUTS, PLANNED_PATH, SCENE
-from services.planner.collision.scene_shapes import SceneError
-from services.planner.collision.world import World
+from schemas.planning import PlanCode, PlanInputs, PlanningTimes, PlanRequest, PlanResponse, SceneVersion
+from schemas.topics import JOG_INPUTS, PLAN, PLAN_INPUTS, PLANNED_PATH, SCENE
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
 from services.planner.core import LONGEST, Planner
 from services.recordings.table import exchanges_of
+from services.replay import planner_answers, planner_jog
 from services.replay.comparison import Comparison
+from services.replay.planner_answers import AnswersAgain
+from services.replay.planner_jog import JogAgain
 from services.replay.recorded import Heard, NotReplayable, Recorded
-from services.runtime.deployment import project_root
+from services.replay.scenes import Scenes
 
 PLANS = exchanges_of(PLAN)
-TOPICS = (PLANS, PLAN_INPUTS, SCENE, PLANNED_PATH)
+TOPICS = tuple(dict.fromkeys((PLANS, PLAN_INPUTS, SCENE, PLANNED_PATH, *planner_answers.TOPICS, *planner_jog.TOPICS)))
 PATIENT = 0.4  # of the time allowed: a search is ended after half of it at the earliest (`path/search.py`)
 CLOCKS = "plans that took more than 40 % of their time: the clock may have ended a search"
 UNPLANNED = "plans that were refused or cancelled before a process planned them"
 UNANSWERED = "questions without an answer"
 ENDED = (PlanCode.TIMED_OUT, PlanCode.PREEMPTED)
 
-SceneKey = tuple[int, int, tuple[SceneObject, ...]]  # version, epoch, jaws
-
 
 def replay(recorded: Recorded, comparison: Comparison) -> None:
-    """Compares each answer but for `planning_time` and `times`, and the `planned_path` that is published with it."""
-    again = PlansAgain(recorded, comparison)
-    for exchange, inputs in again.pairs():
-        if not again.hold(exchange, inputs):
-            break
+    """Compares plans but for `planning_time` and `times`, each `planned_path`, all other answers, scenes and jogs."""
+    arm = recorded.arm()
+    scenes = Scenes(recorded, arm, Kinematics(arm))
+    others = any(recorded.of(topic) for topic in (JOG_INPUTS, *planner_answers.EXCHANGES.values()))
+    if recorded.of(PLANS) or not others:
+        again = PlansAgain(recorded, comparison, arm, scenes)
+        for exchange, inputs in again.pairs():
+            if not again.hold(exchange, inputs):
+                return
+    AnswersAgain(recorded, comparison, arm, scenes).compare()
+    if comparison.difference is None:
+        JogAgain(recorded, comparison, arm, scenes).compare()
 
 
 class PlansAgain:
     """The core of the planner, and the recorded plans that are made with it."""
 
-    def __init__(self, recorded: Recorded, comparison: Comparison) -> None:
+    def __init__(self, recorded: Recorded, comparison: Comparison, arm: Arm, scenes: Scenes) -> None:
         self.comparison = comparison
-        self._recorded = recorded
-        self._planner = Planner(recorded.arm())
-        self._shown: SceneKey | None = None
-        scenes = [each.message for each in recorded.require(SCENE)]
-        self._scenes = {(scene.version, scene.epoch): scene for scene in scenes}
+        self._recorded, self._scenes = recorded, scenes
+        self._planner = Planner(arm)
+        self._shown: SceneVersion | None = None
+        recorded.require(SCENE)
         self._paths = recorded.of(PLANNED_PATH)
         self._put = [path.message.stamp for path in self._paths]
 
@@ -68,7 +74,8 @@ class PlansAgain:
             if inputs is None or lost or (number is not None and inputs.message.number != number + 1):
                 raise NotReplayable(
                     f"{self._recorded.path}: {PLAN_INPUTS.key} of the plan at {exchange.at:.3f} s is missing (number "
-                    f"{1 if number is None else number + 1}): an input was lost; take another recording"
+                    f"{1 if number is None else number + 1}): an input was lost, or record_inputs was off; take "
+                    "another recording"
                 )
             number = inputs.message.number
             yield exchange, inputs.message
@@ -103,28 +110,11 @@ class PlansAgain:
 
     def _show(self, exchange: Heard[Any], inputs: PlanInputs) -> None:
         """Gives the planner the scene that it had, with the jaws as they stood."""
-        key = (inputs.scene_version, inputs.scene_epoch, inputs.jaws)
-        if key == self._shown:
-            return
-        scene = self._scenes.get(key[:2])
-        if scene is None:
-            raise NotReplayable(
-                f"{self._recorded.path}: version {key[0]} of the scene, in which the plan at {exchange.at:.3f} s was "
-                "made, is not in it; record from the planner's start, or `scene` too"
-            )
-        self._planner.set_world(self._world(replace(scene, objects=(*scene.objects, *inputs.jaws))))
-        self._planner.prepare()
-        self._shown = key
-
-    def _world(self, scene: PlanningScene) -> World:
-        arm = self._planner.arm
-        try:
-            return World(arm, self._planner.kinematics, scene, (project_root(), arm.folder))
-        except (SceneError, ValueError) as error:
-            raise NotReplayable(
-                f"{self._recorded.path}: version {scene.version} of the scene cannot be built here: {error}; put the "
-                "mesh where it was"
-            ) from error
+        version = SceneVersion(version=inputs.scene_version, epoch=inputs.scene_epoch, jaws=inputs.jaws)
+        if version != self._shown:
+            self._planner.set_world(self._scenes.world(version, f"the plan at {exchange.at:.3f} s"))
+            self._planner.prepare()
+            self._shown = version
 
 
 def _aside(request: PlanRequest, was: PlanResponse, inputs: PlanInputs) -> str:

@@ -5,59 +5,20 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-import pytest
-
 from schemas.frames import Transform
 from schemas.gripper import GripperState
 from schemas.joints import JointState
 from schemas.planning import JointGoal, NamedGoal, PlanCode, PlanRequest
 from schemas.scene import SceneAdd, SceneClear, SceneObject, SceneRequest, SphereShape
-from schemas.topics import DESCRIPTION, GRIPPER_STATE, PLAN, SCENE_EDIT
-from services.arm.model.description import load_arm
-from services.recordings.channels import Entry
-from services.recordings.mcap_file import McapFile
-from services.recordings.table import recorded_topics
+from schemas.topics import GRIPPER_STATE, PLAN, SCENE_EDIT
 from services.replay.main import replay, text_of
-from services.replay.planner import PLANS, TOPICS, UNPLANNED
-from services.runtime.deployment import project_root
+from services.replay.planner import PLANS, UNPLANNED
 from services.runtime.node import Node
-from services.state_publisher.main import describe
-from tests.planner.planning_node import beside_a_planner
+from tests.replay.recorded_bus import PATIENCE, Recorder
 
-PATIENCE = 60.0  # [s]
 NAMES = ("brazo_joint", "antebrazo_joint", "efector_joint")
 HOME = JointState(name=NAMES, position=(0.0, 0.0, 0.0))
 READY = PlanRequest(goal=NamedGoal(name="ready"), start=HOME, allowed_time=30.0)
-
-
-@pytest.fixture
-def planner(tmp_path: Path):
-    with beside_a_planner(tmp_path, "person", ends_within=PATIENCE) as node:
-        yield node
-
-
-class Recorder:
-    """Everything that a replay of the planner needs, as it comes."""
-
-    def __init__(self, node: Node, path: Path) -> None:
-        self.entries: list[Entry] = []
-        self._node, self._path = node, path
-        wanted = {topic.key for topic in TOPICS}
-        for topic in (each for each in recorded_topics() if each.key in wanted):
-            node.subscribe(topic, lambda said, topic=topic: self._keep(topic, said), own=True, batch=0.0)
-
-    def _keep(self, topic, said) -> None:
-        self.entries.append(Entry(topic, said, time.time_ns()))
-
-    def answers(self) -> int:
-        return sum(entry.topic.key == PLANS.key for entry in self.entries)
-
-    def write(self) -> Path:
-        file = McapFile(self._path, {"deployment": {"json": '{"robot": "urdf/rm1"}'}})
-        arm = load_arm(project_root() / "urdf/rm1")
-        file.write([Entry(DESCRIPTION, describe(arm), self.entries[0].arrival), *self.entries])
-        file.close()
-        return self._path
 
 
 def test_plans_in_scenes_that_change_are_made_again_to_the_byte(planner: Node, tmp_path: Path):
@@ -84,5 +45,6 @@ def test_plans_in_scenes_that_change_are_made_again_to_the_byte(planner: Node, t
 
     replayed = replay(recorder.write(), "planner")
     assert replayed.difference is None, text_of(replayed)
-    assert replayed.alike == {PLANS.key: 4, "planned_path": 2}
+    edits = {"@request/scene/edit": 2, "scene": 2}
+    assert replayed.alike == {PLANS.key: 4, "planned_path": 2, **edits}
     assert replayed.aside == {UNPLANNED: 1}

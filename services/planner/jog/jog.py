@@ -10,6 +10,7 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from schemas.joints import JointState, JointTargets
@@ -55,6 +56,7 @@ class Jog:
         self._arm = arm
         self._interpreter = JogInterpreter(kinematics)
         self._braking = Braking(arm, PERIOD)
+        self._world = world
         self._limiter = VelocityLimiter(arm, world, self._braking)
         self._command = JogCommand()
         self._heard = self._told = self._rested = self._on_way = NEVER
@@ -80,6 +82,7 @@ class Jog:
 
     def set_world(self, world: World) -> None:
         """What counts from the next step on."""
+        self._world = world
         self._limiter = VelocityLimiter(self._arm, world, self._braking)
 
     def on_command(self, command: JogCommand, now: float) -> None:
@@ -123,6 +126,7 @@ class Jog:
             )
         self._positions = np.array(standing_position(self._arm, present, age))
         self._velocity = np.zeros(len(self._arm.joints))
+        self._limiter = VelocityLimiter(self._arm, self._world, self._braking)  # nothing of an earlier jog counts
         self._trail.clear()
         self._trail.append((now, self._positions))  # it stands there until its first target has come through
         self._rested = self._on_way = now
@@ -252,3 +256,12 @@ class Jog:
             return JogOutput()
         self._told = now
         return JogOutput(status=JogStatus(stamp=stamp, scale=0.0, limited_by=reason), said=reason if was_led else "")
+
+
+def signed(output: JogOutput, client: str, told_to: str) -> tuple[JointTargets | None, JogStatus | None]:
+    """Target and status as they are published: with the node that jogs, and the one that the status is about."""
+    targets, status = output.targets, output.status
+    return (
+        None if targets is None else replace(targets, client=client),
+        None if status is None else replace(status, client=told_to),
+    )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
 
-from schemas.frames import Transform
 from schemas.gripper import GripperState
 from schemas.joints import JointState
 from schemas.message import Vector
@@ -18,12 +17,12 @@ from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.arm.model.gripper import jaw_objects, jaws_apart
 from services.planner.collision.clearance import ROUNDING
-from services.planner.collision.scene_shapes import SceneError
 from services.planner.collision.world import World
-from services.planner.request.start_state import STALE_AFTER
+from services.planner.scene.answer_log import AnswerLog
 from services.planner.scene.scene_check import usable_part
 from services.planner.scene.scene_file import FILE, DamagedScene, load_scene, put_aside, save_scene
-from services.planner.scene.scene_store import SceneStore, drawn_epoch
+from services.planner.scene.scene_store import SceneStore, changed, drawn_epoch
+from services.planner.scene.standing import link_poses, standing, version_of
 from services.runtime.deployment import project_root
 from services.runtime.node import Node
 from services.runtime.topics import Latest
@@ -38,10 +37,12 @@ class SceneKeeper:
     `world` is for the node's thread of logic alone.
     """
 
-    def __init__(self, node: Node, arm: Arm, states: Latest[JointState], folder: Path, on_world: OnWorld) -> None:
+    def __init__(
+        self, node: Node, arm: Arm, states: Latest[JointState], folder: Path, on_world: OnWorld, log: AnswerLog
+    ) -> None:
         self._node, self._arm, self._states, self._on_world = node, arm, states, on_world
         self._kinematics = Kinematics(arm)  # its own: the planner's is in use in another thread
-        self._file = folder / FILE
+        self._file, self._log = folder / FILE, log
         self._folders = (project_root(), arm.folder)
         self._scene, self._contacts = node.publisher(SCENE), node.publisher(CONTACTS)
         self._store = SceneStore(arm, self._folders, self._restored())
@@ -85,16 +86,16 @@ class SceneKeeper:
             self._scene.put(self._store.scene)
 
     def _edit(self, request: SceneRequest) -> SceneResponse:
-        before, apart = self._store.scene, self._apart
+        before, apart, stamp = self._store.scene, self._apart, self._node.now()
+        present, age = self._states.message, self._states.age()
         self._take_opening(request)
-        response = self._store.edit(request, self._links, self._node.now())
-        if self._store.scene is before and self._apart == apart:
-            return response
-        try:
+        links = lambda: link_poses(self._kinematics, standing(self._arm, present, age))  # noqa: E731
+        response, world = changed(self._store, request, links, stamp, self._built)
+        if world is None and self._apart != apart:
             world = self._built(self._store.scene)
-        except (SceneError, ValueError) as error:
-            self._store.scene = before
-            return SceneResponse(reason=str(error), version=before.version)
+        self._log.tell(SCENE_EDIT, stamp, present, age, version_of(self._with_jaws(before)))
+        if world is None:
+            return response
         self.world = world
         self._show()
         self._tell_what_touches_here()
@@ -120,29 +121,20 @@ class SceneKeeper:
         self._is_touching = bool(touching)
 
     def _built(self, scene: PlanningScene) -> World:
+        return World(self._arm, self._kinematics, self._with_jaws(scene), self._folders)
+
+    def _with_jaws(self, scene: PlanningScene) -> PlanningScene:
         jaws = () if self._apart is None else jaw_objects(self._arm, self._apart)
-        with_jaws = msgspec.structs.replace(scene, objects=(*scene.objects, *jaws))
-        return World(self._arm, self._kinematics, with_jaws, self._folders)
+        return msgspec.structs.replace(scene, objects=(*scene.objects, *jaws))
 
     def _show(self) -> None:
         """Tells the planner and the bus; a world is no thing for two threads, so the planner has one of its own."""
         self._on_world(self._built(self._store.scene))
         self._scene.put(self._store.scene)
 
-    def _links(self) -> Mapping[str, Transform] | None:
-        """Where the links are, or None where that is not known."""
-        configuration = self._configuration()
-        return None if configuration is None else self._kinematics.link_poses(configuration)
-
     def _configuration(self) -> Vector | None:
         """Where the arm stands, or None without a fresh joint state of all joints."""
-        state = self._states.message
-        if state is None or self._states.age() > STALE_AFTER:
-            return None
-        values = dict(zip(state.name, state.position, strict=False))
-        if any(name not in values for name in self._arm.joint_names):
-            return None
-        return tuple(values[name] for name in self._arm.joint_names)
+        return standing(self._arm, self._states.message, self._states.age())
 
     def _save(self, scene: PlanningScene) -> str:
         """What went wrong; the scene is changed nevertheless."""

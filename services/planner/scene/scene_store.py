@@ -6,6 +6,8 @@ Epoch 0 is the empty scene of before the first change, which draws an epoch: so 
 from __future__ import annotations
 
 import secrets
+from collections.abc import Callable
+from typing import TypeVar
 
 import msgspec
 
@@ -15,6 +17,8 @@ from services.planner.collision.scene_shapes import Folders, SceneError
 from services.planner.scene.grasp import find_grasp
 from services.planner.scene.scene_check import require_scene
 from services.planner.scene.scene_edit import LinkPoses, edited
+
+W = TypeVar("W")
 
 
 class SceneStore:
@@ -49,6 +53,24 @@ class SceneStore:
         except SceneError as error:
             return SceneResponse(reason=str(error), version=self.scene.version)
         return SceneResponse(accepted=True, version=self.scene.version, name=name, width=width)
+
+
+def changed(
+    store: SceneStore, request: SceneRequest, links: LinkPoses, stamp: int, built: Callable[[PlanningScene], W]
+) -> tuple[SceneResponse, W | None]:
+    """As `SceneStore.edit`, with what `built` makes of the changed scene; None where it is as it was.
+
+    A scene of which `built` raises `SceneError` or `ValueError` is refused, and the store left as it was.
+    """
+    before = store.scene
+    response = store.edit(request, links, stamp)
+    if store.scene is before:
+        return response, None
+    try:
+        return response, built(store.scene)
+    except (SceneError, ValueError) as error:
+        store.scene = before
+        return SceneResponse(reason=str(error), version=before.version), None
 
 
 def drawn_epoch() -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from msgspec.structs import replace
 
 from schemas.planning import PlanCancel, PlanCancelResult, PlanCode, PlanInputs, PlanRequest, PlanResponse
@@ -16,7 +18,11 @@ from services.runtime.requests.server import Pending
 class PlanService:
     """Hands requests to the workers and their answers back, all in the node's thread of logic."""
 
-    def __init__(self, node: Node, workers: Workers, planner: Planner, keeper: SceneKeeper) -> None:
+    def __init__(
+        self, node: Node, workers: Workers, planner: Planner, keeper: SceneKeeper, is_recorded: Callable[[], bool]
+    ) -> None:
+        """`is_recorded` says if what answers were made from is published."""
+        self._is_recorded = is_recorded
         self._node, self._workers, self._planner, self._keeper = node, workers, planner, keeper
         self._path, self._progress = node.publisher(PLANNED_PATH), node.publisher(PLAN_PROGRESS)
         self._inputs, self._answers = node.publisher(PLAN_INPUTS), 0
@@ -47,5 +53,6 @@ class PlanService:
             self._node.log.info(f"refused: {response.refusal.message}")
         self._keeper.show_refusal(response)
         self._answers += 1
-        self._inputs.put(replace(inputs, stamp=self._node.now(), number=self._answers))
+        if self._is_recorded():
+            self._inputs.put(replace(inputs, stamp=self._node.now(), number=self._answers))
         pending.reply(replace(response, planning_time=self._node.monotonic() - began))

@@ -1,0 +1,69 @@
+"""What a jog is given, published twice a second and at its end: enough for `gemelo replay` to jog that way again."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+
+from schemas.joints import JointState, JointTargets
+from schemas.message import encode
+from schemas.planning import JogCommand, JogInputs, JogStatus, JogTaken, JogTick, SceneVersion
+
+MOST = 25  # inputs of one message: half a second of periods
+DIGEST = 8  # [B]
+
+
+class JogLog:
+    """Keeps inputs until `publish` is given them; `is_on` says if any are kept. Pure.
+
+    After it was off there is a gap in the numbers of the messages.
+    """
+
+    def __init__(self, publish: Callable[[JogInputs], object], is_on: Callable[[], bool]) -> None:
+        self._publish, self._is_on = publish, is_on
+        self._inputs: list[JogTaken | JogTick] = []
+        self._number, self._stamp, self._has_gap = 0, 0, False
+        self._told: SceneVersion | None = None  # the scene of the tick before
+
+    def taken(self, now: float, command: JogCommand, client: str, begins: bool, stamp: int) -> None:
+        """A command that the jog is given at `now` [s] monotonic, `stamp` [ns] UNIX."""
+        if begins:
+            self._told = None
+        self._add(JogTaken(now=now, command=command, client=client, begins=begins), stamp)
+
+    def ticked(
+        self, now: float, stamp: int, present: JointState | None, age: float, goal_is_active: bool, not_ready: str,
+        scene: SceneVersion, told_to: str, said: str,
+    ) -> None:  # fmt: skip
+        """A step of the jog with its arguments, and the `digest_of` what was said."""
+        is_same, self._told = scene == self._told, scene
+        tick = JogTick(
+            now=now, stamp=stamp, present=present, age=age if present is not None else 0.0,  # infinite before the first
+            goal_is_active=goal_is_active, not_ready=not_ready, scene=None if is_same else scene, told_to=told_to,
+            said=said,
+        )  # fmt: skip
+        self._add(tick, stamp)
+
+    def finish(self) -> None:
+        """Publishes what is left: the jog stands."""
+        if self._inputs:
+            self._publish(JogInputs(stamp=self._stamp, number=self._number, inputs=tuple(self._inputs)))
+            self._number, self._inputs = self._number + 1, []
+
+    def _add(self, given: JogTaken | JogTick, stamp: int) -> None:
+        if not self._is_on():
+            self._inputs, self._told, self._has_gap = [], None, True
+            return
+        self._number, self._has_gap = self._number + self._has_gap, False
+        self._stamp = self._stamp if self._inputs else stamp
+        self._inputs.append(given)
+        if len(self._inputs) >= MOST:
+            self.finish()
+
+
+def digest_of(targets: JointTargets | None, status: JogStatus | None) -> str:
+    """A checksum of what was said in one period; empty where that was nothing."""
+    if targets is None and status is None:
+        return ""
+    said = b"".join(b"-" if each is None else encode(each) for each in (targets, status))
+    return hashlib.blake2b(said, digest_size=DIGEST).hexdigest()

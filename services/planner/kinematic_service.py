@@ -1,0 +1,43 @@
+"""`ik`, `fk` and `state_validity` on the bus: answered in the node's worker thread, each with what it was made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from schemas.joints import JointState
+from schemas.message import Message
+from schemas.topics import FK, IK, STATE_VALIDITY, Request
+from services.arm.model.description import Arm
+from services.planner.collision.world import World
+from services.planner.kinematics.kinematic_requests import KinematicRequests
+from services.planner.scene.answer_log import AnswerLog
+from services.planner.scene.standing import version_of
+from services.runtime.node import Node
+from services.runtime.topics import Latest
+
+Q = TypeVar("Q", bound=Message)
+R = TypeVar("R", bound=Message)
+Answer = Callable[[Q, JointState | None, float, World], R]  # of a question; [s] the age of the joint state
+
+
+class KinematicService:
+    """Serves the three requests; `newest` gives the world of the scene as it is."""
+
+    def __init__(
+        self, node: Node, arm: Arm, states: Latest[JointState], newest: Callable[[], World], log: AnswerLog
+    ) -> None:
+        self._node, self._states, self._newest, self._log = node, states, newest, log
+        requests = KinematicRequests(arm)
+        self._serve(IK, requests.ik)
+        self._serve(FK, lambda question, present, age, _world: requests.fk(question, present, age))
+        self._serve(STATE_VALIDITY, requests.validity)
+
+    def _serve(self, request: Request[Q, R], answer: Answer[Q, R]) -> None:
+        def answered(question: Q) -> R:
+            present, age, world = self._states.message, self._states.age(), self._newest()
+            response = answer(question, present, age, world)
+            self._log.tell(request, self._node.now(), present, age, version_of(world.scene))
+            return response
+
+        self._node.serve(request, answered, worker=True)

@@ -1,0 +1,36 @@
+"""Where the arm stands by a joint state, and which scene a world is of. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from schemas.frames import Transform
+from schemas.joints import JointState
+from schemas.message import Vector
+from schemas.planning import SceneVersion
+from schemas.scene import PlanningScene
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
+from services.arm.model.gripper import JAWS
+from services.planner.request.start_state import STALE_AFTER
+
+
+def standing(arm: Arm, state: JointState | None, age: float) -> Vector | None:
+    """[rad] or [m] of every joint, or None without a fresh joint state of all joints; `age` [s] is of `state`."""
+    if state is None or age > STALE_AFTER:
+        return None
+    values = dict(zip(state.name, state.position, strict=False))
+    if any(name not in values for name in arm.joint_names):
+        return None
+    return tuple(values[name] for name in arm.joint_names)
+
+
+def link_poses(kinematics: Kinematics, configuration: Vector | None) -> Mapping[str, Transform] | None:
+    """Where the links are in the base, or None where that is not known."""
+    return None if configuration is None else kinematics.link_poses(configuration)
+
+
+def version_of(scene: PlanningScene) -> SceneVersion:
+    """Which scene this is, jaws included."""
+    jaws = tuple(each for each in scene.objects if each.name in JAWS)
+    return SceneVersion(version=scene.version, epoch=scene.epoch, jaws=jaws)

@@ -1,0 +1,55 @@
+"""The planning scenes of a recording, and worlds made of them."""
+
+from __future__ import annotations
+
+from msgspec.structs import replace
+
+from schemas.planning import SceneVersion
+from schemas.scene import PlanningScene
+from schemas.topics import SCENE
+from services.arm.kinematics.kinematics import Kinematics
+from services.arm.model.description import Arm
+from services.planner.collision.scene_shapes import SceneError
+from services.planner.collision.world import World
+from services.replay.recorded import Heard, NotReplayable, Recorded
+from services.runtime.deployment import project_root
+
+
+class Scenes:
+    """Every recorded scene by its version; `world` keeps the last one that it has made."""
+
+    def __init__(self, recorded: Recorded, arm: Arm, kinematics: Kinematics) -> None:
+        self.folders = (project_root(), arm.folder)
+        self._recorded, self._arm, self._kinematics = recorded, arm, kinematics
+        self.heard: dict[tuple[int, int], Heard[PlanningScene]] = {}
+        for heard in recorded.of(SCENE):
+            self.heard[heard.message.version, heard.message.epoch] = heard
+        self._last: tuple[SceneVersion, World] | None = None
+
+    def scene(self, version: SceneVersion, what: str) -> PlanningScene:
+        """Without the jaws; raises `NotReplayable` that says for `what` it is missed."""
+        heard = self.heard.get((version.version, version.epoch))
+        if heard is None:
+            raise NotReplayable(
+                f"{self._recorded.path}: version {version.version} of the scene, in which {what} was made, is not in "
+                "it; record from the planner's start, or `scene` too"
+            )
+        return heard.message
+
+    def world(self, version: SceneVersion, what: str) -> World:
+        """With the jaws; raises `NotReplayable`."""
+        if self._last is None or self._last[0] != version:
+            scene = self.scene(version, what)
+            try:
+                self._last = version, self.built(scene, version)
+            except (SceneError, ValueError) as error:
+                raise NotReplayable(
+                    f"{self._recorded.path}: version {version.version} of the scene cannot be built here: {error}; "
+                    "put the mesh where it was"
+                ) from error
+        return self._last[1]
+
+    def built(self, scene: PlanningScene, version: SceneVersion) -> World:
+        """The world of `scene` with the jaws of `version`; raises `SceneError`, `ValueError`."""
+        with_jaws = replace(scene, objects=(*scene.objects, *version.jaws))
+        return World(self._arm, self._kinematics, with_jaws, self.folders)
