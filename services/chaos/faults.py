@@ -126,6 +126,11 @@ def garbled(site: Site, random: Random) -> str:
     return f"garble {site.link.garbling:.0%} of what passes the link to the broker"
 
 
+def lossy(site: Site, random: Random) -> str:
+    site.link.losing = random.uniform(0.02, 0.3)
+    return f"lose {site.link.losing:.0%} of the frames of QoS 0"
+
+
 def healed(site: Site) -> None:
     site.link.heal()
 
@@ -198,10 +203,11 @@ FAULTS: tuple[Fault, ...] = (
     *(Fault(f"restart {name}", "SIGTERM", restarted(name)) for name in (*BYSTANDERS, "stepper_gateway", "broker")),
     Fault("restart router", "SIGTERM", restarted("router"), mutes=True),
     Fault("restart logger", "SIGTERM", restarted("logger"), mutes=True),
+    Fault("restart virtual_esp32", "SIGTERM to the device", restarted("virtual_esp32"), boots=True),
     *(
         Fault(f"freeze {name} {length}", "SIGSTOP, then SIGCONT", frozen(name), lasts, thawed(name),
               mutes=name in ("router", "logger"))
-        for name in ("stepper_gateway", "broker", "router", "virtual_esp32", "planner", "logger", "state_publisher")
+        for name in ("stepper_gateway", "broker", "router", "virtual_esp32", "logger", *BYSTANDERS)
         for length, lasts in (("shortly", SHORT), ("long", LONG))
     ),
     Fault("cut link", "the link to the broker is cut", cut, SHORT, healed),
@@ -209,6 +215,7 @@ FAULTS: tuple[Fault, ...] = (
     Fault("stall link", "connections stay open, nothing passes", stalled, SHORT, healed),
     Fault("stall link long", "connections stay open, nothing passes", stalled, LONG, healed),
     Fault("slow link", "every piece is late", slowed, LONG, healed),
+    Fault("lossy link", "frames of QoS 0 never arrive", lossy, LONG, healed),
     Fault("garble link", "bits change on the way", garbled, LONG, healed),
     Fault("doubled frames", "frames of the wire are said again", doubled_frames),
     Fault("changed frames", "frames of the wire are said with bytes changed", changed_frames),

@@ -1,4 +1,4 @@
-"""A TCP proxy before the MQTT broker, through which gateway and virtual device talk: cut, stalled, slow or garbled."""
+"""A TCP proxy before the MQTT broker, between gateway and virtual device: cut, stalled, slow, lossy or garbled."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import asyncio
 import threading
 from contextlib import suppress
 from random import Random
+
+from services.chaos.lost_packets import PacketLoss
 
 PIECE = 16 * 1024  # [B] that are read at once
 LOOK_EVERY = 0.01  # [s] while the link stalls
@@ -15,13 +17,15 @@ class SlowLink:
     """Listens on `port` of 127.0.0.1 and forwards to `target`, in a thread of its own, until `close`.
 
     `cut`: connections are dropped and none is taken. `stalled`: they stay open, and nothing passes. `delay` [s]: of
-    every piece, in both directions. `garbling`: the share of pieces of which one byte is changed.
+    every piece, in both directions. `losing`: the share of MQTT packets of QoS 0 that never arrive. `garbling`: the
+    share of pieces of which one byte is changed.
     """
 
     def __init__(self, port: int, target: int, seed: int = 0) -> None:
         self.is_cut = False
         self.is_stalled = False
         self.delay = 0.0
+        self.losing = 0.0
         self.garbling = 0.0
         self._port, self._target, self._random = port, target, Random(seed)
         self._writers: set[asyncio.StreamWriter] = set()
@@ -39,7 +43,7 @@ class SlowLink:
 
     def heal(self) -> None:
         """Everything passes as it should again."""
-        self.is_cut, self.is_stalled, self.delay, self.garbling = False, False, 0.0, 0.0
+        self.is_cut, self.is_stalled, self.delay, self.losing, self.garbling = False, False, 0.0, 0.0, 0.0
 
     def close(self) -> None:
         """Drops every connection and ends the thread."""
@@ -76,19 +80,20 @@ class SlowLink:
 
     async def _pump(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._writers.add(writer)
+        packets = PacketLoss()
         with suppress(OSError):
             while data := await reader.read(PIECE):
                 if self.delay > 0.0:
                     await asyncio.sleep(self.delay)
                 while self.is_stalled:
                     await asyncio.sleep(LOOK_EVERY)
-                writer.write(self._garbled(data))
+                writer.write(self._garbled(packets.without(data, lambda: self._random.random() < self.losing)))
                 await writer.drain()
         self._writers.discard(writer)
         writer.close()
 
     def _garbled(self, data: bytes) -> bytes:
-        if self._random.random() >= self.garbling:
+        if not data or self._random.random() >= self.garbling:
             return data
         changed = bytearray(data)
         changed[self._random.randrange(len(changed))] ^= 1 << self._random.randrange(8)

@@ -11,6 +11,7 @@ from services.chaos.campaign import Episode, order, unexpected_hands
 from services.chaos.faults import FAULTS, Fault
 from services.chaos.main import chosen_faults, unfit
 from services.chaos.report import Report, page_of, rows_of, summary, text_of
+from services.stack.stack import PROCESSES
 
 
 def fault(name: str) -> Fault:
@@ -73,7 +74,7 @@ def test_the_reports_name_each_violation_and_the_command_that_repeats_it() -> No
         ("hold", 1, 0),
         ("stop", 2, 1),
     ]
-    assert "3 faults in 60 s, seed 7: 1 faults and 0 checks violated" in summary(found)
+    assert "3 faults in 60 s (3.0 a minute), seed 7: 1 faults and 0 checks violated" in summary(found)
     assert "gemelo chaos --seed 7 --episode 1" in text_of(found)
     page = page_of(found)
     assert "&lt;b&gt;jumped" in page
@@ -89,3 +90,10 @@ def test_what_cannot_be_run_is_said(monkeypatch) -> None:
     assert unfit(1.0, FAULTS, []) == ""
     monkeypatch.setenv("GEMELO_DEVICE", "board")
     assert "virtual devices only" in unfit(1.0, FAULTS, [])
+
+
+def test_every_process_is_killed_restarted_and_frozen():
+    """All that a stack runs, the panel apart, which is a client like any other."""
+    names = {each.name for each in FAULTS}
+    for process in set(PROCESSES) - {"viewer", "panel", "camera", "detector"}:
+        assert {f"kill {process}", f"restart {process}", f"freeze {process} shortly", f"freeze {process} long"} <= names
