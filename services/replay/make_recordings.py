@@ -21,7 +21,6 @@ from mcap.records import Channel, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 import gemelo
-from schemas.planning import IkRequest, PoseGoal
 from schemas.topics import Topic
 from services.recordings.mcap_file import DEPLOYMENT, METADATA, PROFILE
 from services.recordings.reader import RecordingReader
@@ -110,7 +109,7 @@ def perform(arm: gemelo.Arm) -> None:
 def ask(arm: gemelo.Arm) -> None:
     """Every question about a configuration, with answers of both kinds, and a scene edit that is refused."""
     ready, left = arm.states["ready"], arm.states["left"]
-    arm.ik(IkRequest(goal=PoseGoal(position=arm.fk(left).position)), solutions=4)
+    arm.ik(position=arm.fk(left).position, solutions=4)
     arm.fk({arm.joint_names[0]: 0.2})  # the others as they stand
     arm.check(ready)
     for refused in ({arm.joint_names[0]: 30.0}, {arm.joint_names[-1]: -30.0}):

@@ -38,5 +38,4 @@ def test_what_the_core_keeps_does_not_grow_with_the_moves_that_it_has_made() -> 
         rig.run(0.3)
         counts.append(objects_of(rig.core))
     early, late = counts[WARM_UP : WARM_UP + MOVES // 2], counts[WARM_UP + MOVES // 2 :]
-    print(early, late)
-    assert max(late) <= 1.05 * max(early), (early, late)
+    assert max(late) - max(early) < 5 * MOVES, (early, late)  # a message that is kept is more than ten objects

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -122,7 +122,7 @@ def _time_line(length: float, direction: Array, limits: JointLimits) -> tuple[Tr
     demand.max_acceleration = [MARGIN * float(np.min(limits.acceleration[moving] / share[moving]))]
     demand.max_jerk = [MARGIN * float(np.min(limits.jerk[moving] / share[moving]))]
     profile = solved(demand, f"a path of {length:.3g} s at full speed")
-    return profile, np.cumsum(profile.profiles[0][0].t).tolist()
+    return profile, list(accumulate(profile.profiles[0][0].t))
 
 
 def solved(demand: InputParameter, what: str) -> Trajectory:
