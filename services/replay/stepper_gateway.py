@@ -78,7 +78,7 @@ class GatewayAgain:
             follows = before is not None and message.session == before.session
             expected = before.number + 1 if before is not None and follows else 0
             if message.number != expected:
-                came = f"after {expected - 1} of the same process comes {message.number}" if follows else (
+                came = f"after {expected - 1} comes {message.number}" if follows else (
                     f"those of a new process begin with {message.number}")  # fmt: skip
                 raise NotReplayable(
                     f"{self._recorded.path}: {GATEWAY_INPUTS.key} number {expected} is missing at {heard.at:.3f} s "
