@@ -49,6 +49,7 @@ from schemas.topics import (
     JOINT_TARGETS,
     PLAN,
 )
+from services.runtime.bus.pace import Pace, Rate
 from services.runtime.bus.zenoh_bus import ZenohBus
 
 THERE, BACK = "gemelo-bench/there", "gemelo-bench/back"
@@ -57,6 +58,8 @@ _COUNT = struct.Struct("<I")
 RATE = 5000.0  # [1/s]
 BURST = 0.005  # [s] between two bursts: a sleep is hardly more exact
 WARM_UP = 1.0  # [s] until the flood has its full rate
+NO_PACE = Rate(1e9, 1_000_000)  # of a client that is not ours; `OURS` is flooded by one that is
+OURS = "loop"
 GOAL = GoalRequest(goal_id="flood", client="flood", goal=msgspec.Raw(encode(FollowJointTrajectoryGoal())))
 REQUESTS: dict[str, tuple[tuple[str, Message], ...]] = {
     "requests": (
@@ -66,6 +69,7 @@ REQUESTS: dict[str, tuple[tuple[str, Message], ...]] = {
         (f"{FOLLOW_JOINT_TRAJECTORY.key}/goal", GOAL),
         (PLAN.key, PlanRequest()),
     ),
+    OURS: ((DEVICE_COMMAND.key, DeviceCommandRequest(command=SpeedCommand())),),
     "commands": ((DEVICE_COMMAND.key, DeviceCommandRequest(command=SpeedCommand())),),
     "holds": ((DEVICE_STOP.key, DeviceStopRequest(kind=StopKind.HOLD)),),
 }
@@ -181,7 +185,7 @@ def _flood(options: argparse.Namespace) -> None:
 
 
 def _bus(what: str, options: argparse.Namespace) -> Callable[[], None]:
-    bus = ZenohBus(RouterSection(port=options.port), options.robot)
+    bus = ZenohBus(RouterSection(port=options.port), options.robot, None if what == OURS else Pace(NO_PACE))
     if what == "targets":
         publication = bus.publish(JOINT_TARGETS.key, JointTargets.__name__, JOINT_TARGETS.delivery)
         payload = encode(JointTargets())

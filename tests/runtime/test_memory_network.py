@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from schemas.topics import EVERY, LATCHED, LATEST
-from services.runtime.bus.interface import Arrival
+from services.runtime.bus.interface import UNREAD, Arrival
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 
 
@@ -25,7 +25,7 @@ def test_a_network_that_is_away_loses_the_latest_and_keeps_the_rest() -> None:
     assert not reader.wait_served("plan", 0.01)
     answers: list[object] = []
     reader.ask("plan", "Text", b"", 1.0, answers.append)
-    assert answers == [None]
+    assert answers == [UNREAD]
     network.is_connected = True
     assert sorted((arrival.key, arrival.payload) for arrival in heard if arrival.key == "every") == [
         ("every", b"1"), ("every", b"2"),

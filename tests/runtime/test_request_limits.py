@@ -7,14 +7,16 @@ import time
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
 from schemas.message import Message, encode
+from schemas.motion import FollowJointTrajectoryGoal
 from schemas.planning import PlanRequest, PlanResponse
-from schemas.topics import DEVICE_STOP, PLAN
-from services.runtime.bus.interface import Bus, BusReply, Query
+from schemas.topics import DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, PLAN
+from services.runtime.actions.client import PAUSE
+from services.runtime.actions.server import accept
+from services.runtime.bus.interface import UNREAD, Bus, BusReply, Query
+from services.runtime.bus.pace import Pace, Rate
 from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.bus.zenoh_declarations import QUERIES
 from services.runtime.errors import NoAnswer
@@ -24,27 +26,12 @@ from services.runtime.requests.limits import (
     MAX_WAITING_OF_A_CLIENT,
     OF_A_CLIENT,
     OF_REFUSALS,
-    Rate,
     RequestRates,
-    TokenBucket,
 )
 from services.runtime.requests.server import REPEAT
 from tests.runtime.support import Buses, RouterProcess, hear, spinning, until
 
 Answers = list[BusReply | None]
-
-
-@given(st.floats(0.1, OF_A_CLIENT.per_second), st.integers(1, 3000))
-def test_a_client_below_the_rate_is_never_dropped(rate: float, count: int) -> None:
-    bucket = TokenBucket(OF_A_CLIENT, 0.0)
-    assert all(bucket.take(number / rate) for number in range(count))
-
-
-@given(st.floats(1.5, 20.0), st.floats(1.0, 5.0))
-def test_of_a_flood_only_the_rate_is_taken(factor: float, seconds: float) -> None:
-    bucket, rate = TokenBucket(OF_A_CLIENT, 0.0), OF_A_CLIENT.per_second * factor
-    taken = sum(bucket.take(number / rate) for number in range(round(seconds * rate)))
-    assert taken <= OF_A_CLIENT.burst + OF_A_CLIENT.per_second * seconds + 1
 
 
 def test_clients_that_change_their_names_share_one_rate() -> None:
@@ -98,17 +85,25 @@ def test_what_a_client_asks_above_its_rate_is_dropped_counted_and_said_once(
     ask(client, PLAN.key, PlanRequest(), answers)
     with spinning(server):
         assert until(lambda: len(flood) == 30 and len(answers) == 1)
-    assert flood[:20] == [None] * 20
+    assert flood[:20] == [UNREAD] * 20
     assert all(answer is not None and answer.ok for answer in flood[20:] + answers)
     assert dropped(server, PLAN.key) == 20
-    assert capsys.readouterr().err.count("of one client: no answer (further ones are only counted)") == 1
+    assert capsys.readouterr().err.count("of one client: nothing of it is read until") == 1
 
 
-def test_a_caller_above_the_rate_hears_that_there_is_no_answer(buses: Buses) -> None:
+def test_a_caller_above_the_rate_hears_at_once_of_how_much_is_taken(buses: Buses) -> None:
     server, client = limited(buses, "planner", Rate(0.0, 0)), buses.node("script")
     server.serve(PLAN, lambda request: PlanResponse())
-    with pytest.raises(NoAnswer, match="planner did not answer plan within 5 s: is it busy, or gone"):
-        client.call(PLAN, PlanRequest(), timeout=5.0)
+    with pytest.raises(NoAnswer, match="planner dropped plan unread: it takes 500 requests a second of one client"):
+        client.call(PLAN, PlanRequest(), timeout=60.0)
+
+
+def test_a_goal_that_is_dropped_is_sent_again_a_few_times_only(buses: Buses) -> None:
+    server, client = limited(buses, "gateway", Rate(0.0, 0)), buses.node("script")
+    server.serve_action(FOLLOW_JOINT_TRAJECTORY, lambda goal_id, goal: accept(), lambda goal_id: "")
+    with pytest.raises(NoAnswer, match="dropped follow_joint_trajectory/goal unread"):
+        client.action(FOLLOW_JOINT_TRAJECTORY).send(FollowJointTrajectoryGoal(), timeout=0.5)
+    assert 1 < dropped(server, f"{FOLLOW_JOINT_TRAJECTORY.key}/goal") <= 0.5 / PAUSE + 1
 
 
 def test_no_more_is_said_of_what_is_refused_than_the_rate(buses: Buses) -> None:
@@ -119,7 +114,7 @@ def test_no_more_is_said_of_what_is_refused_than_the_rate(buses: Buses) -> None:
     for _ in range(MAX_WAITING_OF_A_CLIENT + 30):
         ask(client, PLAN.key, PlanRequest(), answers)
     assert until(lambda: len(answers) == 30)
-    assert answers.count(None) == 25
+    assert answers.count(UNREAD) == 25
     assert dropped(server, PLAN.key) == 30
 
 
@@ -135,7 +130,7 @@ def test_a_stop_above_the_rate_is_carried_out(buses: Buses) -> None:
     assert until(lambda: len(answers) == 18)
     assert hear(server, lambda: len(answers) == 21 and len(handled) == 2)
     assert handled == [StopKind.HOLD, StopKind.STOP]
-    assert answers.count(None) == 18
+    assert answers.count(UNREAD) == 18
 
 
 def test_a_flood_of_equal_stops_leaves_the_loop_free_between_two_of_them(buses: Buses) -> None:
@@ -173,7 +168,7 @@ def test_the_last_stop_of_a_flood_is_carried_out(buses: Buses) -> None:
 def test_a_key_whose_requests_nobody_takes_delays_no_other(
     router: RouterProcess, request: pytest.FixtureRequest
 ) -> None:
-    server, client = (ZenohBus(router.deployment.router, "rm1") for _ in range(2))
+    server, client = (ZenohBus(router.deployment.router, "rm1", Pace(Rate(1e9, 1))) for _ in range(2))
     request.addfinalizer(client.close)
     request.addfinalizer(server.close)
     is_over = threading.Event()
@@ -193,7 +188,7 @@ def test_a_key_whose_requests_nobody_takes_delays_no_other(
 def test_every_urgent_request_arrives_however_slowly_they_are_taken(
     router: RouterProcess, request: pytest.FixtureRequest
 ) -> None:
-    server, client = (ZenohBus(router.deployment.router, "rm1") for _ in range(2))
+    server, client = (ZenohBus(router.deployment.router, "rm1", Pace(Rate(1e9, 1))) for _ in range(2))
     request.addfinalizer(client.close)
     request.addfinalizer(server.close)
     may_go_on = threading.Event()

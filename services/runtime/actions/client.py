@@ -23,6 +23,7 @@ G = TypeVar("G", bound=Message)
 F = TypeVar("F", bound=Message)
 R = TypeVar("R", bound=Message)
 
+PAUSE = 0.05  # [s] between two tries
 ATTEMPT = 1.0  # [s] of one try to send a goal; further tries carry the same id, so it is accepted once
 
 
@@ -99,8 +100,9 @@ class ActionClient(Generic[G, F, R]):
             try:
                 return requests.call(self._bus, keys.goal_request(self.action), request, max(0.05, min(ATTEMPT, left)))
             except NoAnswer:
-                if time.monotonic() >= end - 0.05:
+                if time.monotonic() >= end - PAUSE:
                     raise
+                time.sleep(PAUSE)  # the answer that none will come is there at once
 
     def _on_feedback(self, message: GoalFeedback) -> None:
         handle = self._handles.get(message.goal_id)

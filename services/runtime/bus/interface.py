@@ -34,6 +34,9 @@ class BusReply:
     payload: bytes
 
 
+UNREAD = BusReply(False, "", b"")  # of a request that was dropped, or whose server ended, before its time-out
+
+
 class Query(Protocol):
     """A request that waits for exactly one of `reply`, `fail` and `drop`, from any thread."""
 
@@ -121,9 +124,10 @@ class Bus(Protocol):
         on_answer: Callable[[BusReply | None], None],
         urgent: bool = False,
     ) -> None:
-        """Sends one request, before all that waits to be sent if it is `urgent`.
+        """Sends one request, before all that waits to be sent if it is `urgent`; else it waits for its turn.
 
-        `on_answer` comes exactly once, with None where no answer came in `timeout` [s].
+        `on_answer` comes exactly once: with None where no answer came in `timeout` [s], with `UNREAD` at once where
+        none will come.
         """
         ...
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from schemas.topics import Delivery
-from services.runtime.bus.interface import Arrival, BusReply, Declaration, Query
+from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Declaration, Query
 from services.runtime.bus.memory_network import (
     MemoryNetwork,
     MemoryPublication,
@@ -83,11 +83,11 @@ class MemoryBus:
         on_answer: Callable[[BusReply | None], None],
         urgent: bool = False,
     ) -> None:
-        """Sends one request; `on_answer` is called with None after `timeout` [s]."""
+        """Sends one request."""
         with self.network.lock:
             service = self.network.services.get(key) if self.is_connected else None
         if service is None:
-            on_answer(None)
+            on_answer(UNREAD)
         else:
             service.on_query(MemoryQuery(Arrival(key, schema, payload), f"{id(self):x}", timeout, on_answer))
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from schemas.topics import Delivery
-from services.runtime.bus.interface import Arrival, BusReply, Query
+from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Query
 
 KEPT = 1024  # messages that wait for the network to come back, as in Zenoh's publishers' cache
 
@@ -136,7 +136,7 @@ class MemoryQuery:
         self._finish(BusReply(False, schema, payload))
 
     def drop(self) -> None:
-        self._finish(None)
+        self._finish(UNREAD)
 
     def _finish(self, answer: BusReply | None) -> None:
         with self._lock:

@@ -20,7 +20,8 @@ from schemas.deployment import RouterSection
 from schemas.system import Exchange
 from schemas.topics import Delivery
 from services.runtime.bus.dead_links import end_dead_links
-from services.runtime.bus.interface import Arrival, BusReply, Query
+from services.runtime.bus.interface import UNREAD, Arrival, BusReply, Query
+from services.runtime.bus.pace import Pace
 from services.runtime.bus.zenoh_config import client_config
 from services.runtime.bus.zenoh_declarations import (
     ServerMonitor,
@@ -40,6 +41,7 @@ CACHE = 1024  # messages of an EVERY key that survive while the router is away
 CACHE_OF = {Exchange.__name__: 64}  # messages; a plan's answer is some 50 kB
 HEARTBEAT = 0.5  # [s] after which a reader notices that it misses the last message
 CLOSE_TIMEOUT = 1.0  # [s]
+MOST_OF_A_TIMEOUT = 0.9  # what ends without an answer after that has timed out
 TO_ANSWER = 1.0  # [s] for a writer to say what it wrote last; one that is frozen is gone after the lease of 1 s
 RECONNECTION_TIMEOUT = 10.0  # [s] that a session may take to come back to a router that listens
 
@@ -51,8 +53,9 @@ class BusNotOpen(BusError):
 class ZenohBus:
     """One node's session, and a second one where it serves urgent keys."""
 
-    def __init__(self, router: RouterSection, robot: str) -> None:
-        """Raises `BusNotOpen` where the router does not take the session."""
+    def __init__(self, router: RouterSection, robot: str, pace: Pace | None = None) -> None:
+        """Raises `BusNotOpen` where the router does not take the session; `pace` is that of its requests."""
+        self._pace = pace or Pace()
         self._router, self._robot = router, robot
         self._watches: list[object] = []
         self._session = self._open()
@@ -186,7 +189,7 @@ class ZenohBus:
         on_answer: Callable[[BusReply | None], None],
         urgent: bool = False,
     ) -> None:
-        """Sends one request; `on_answer` is called with None after `timeout` [s]."""
+        """Sends one request, which waits for its turn unless it is urgent."""
         answers: list[BusReply] = []
 
         def on_reply(reply: zenoh.Reply) -> None:
@@ -197,8 +200,13 @@ class ZenohBus:
                 answers.append(BusReply(False, schema_in(error.encoding), bytes(error.payload)))
 
         def on_end() -> None:
-            on_answer(answers[0] if answers else None)
+            # Zenoh ends a request that has timed out as one that was dropped: with or without an error of its own.
+            nothing = UNREAD if time.monotonic() - asked < MOST_OF_A_TIMEOUT * timeout else None
+            on_answer(answers[0] if answers else nothing)
 
+        if not urgent:
+            self._pace.wait_for_turn()
+        asked = time.monotonic()
         self._session.get(
             key,
             # Direct: else Zenoh starts a thread for each request, which costs ten times as much as the request itself.

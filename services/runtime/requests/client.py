@@ -8,10 +8,11 @@ from typing import Generic, TypeVar
 from schemas.message import BadMessage, Message
 from schemas.system import Failure
 from schemas.topics import Request
-from services.runtime.bus.interface import Arrival, Bus, BusReply
+from services.runtime.bus.interface import UNREAD, Arrival, Bus, BusReply
 from services.runtime.bus.wire import from_arrival, schema_of, to_payload
 from services.runtime.errors import NoAnswer, Refused
 from services.runtime.loop.task_queue import Task
+from services.runtime.requests.limits import DEBT, OF_A_CLIENT
 
 Q = TypeVar("Q", bound=Message)
 R = TypeVar("R", bound=Message)
@@ -48,6 +49,8 @@ class PendingCall(Generic[Q, R]):
             answer = None
         if answer is None:
             raise NoAnswer(_silent(self._bus, self._request, self._timeout))
+        if answer == UNREAD:
+            raise NoAnswer(_unread(self._bus, self._request))
         return response_in(self._request, answer)
 
     def _on_answer(self, answer: BusReply | None) -> None:
@@ -77,6 +80,17 @@ def _silent(bus: Bus, request: Request[Q, R], timeout: float) -> str:
     if not bus.is_connected:
         return _away(request)
     return f"{request.server} did not answer {request.key} within {timeout:g} s: is it busy, or gone?"
+
+
+def _unread(bus: Bus, request: Request[Q, R]) -> str:
+    """The text for a request that was dropped; its server may also have ended before it answered."""
+    if not bus.is_connected:
+        return _away(request)
+    most, pause = f"{OF_A_CLIENT.per_second:g} requests a second", f"{DEBT / OF_A_CLIENT.per_second:g} s"
+    return (
+        f"{request.server} dropped {request.key} unread: it takes {most} of one client, and nothing of one that asks "
+        f"for more; wait for each answer, and ask again after {pause} (or it has just ended: `gemelo node list`)"
+    )
 
 
 def _away(request: Request[Q, R]) -> str:

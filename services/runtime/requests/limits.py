@@ -5,51 +5,19 @@ from __future__ import annotations
 import threading
 import time
 from collections import Counter
-from typing import NamedTuple
 
+from services.runtime.bus.pace import Rate, TokenBucket
 
-class Rate(NamedTuple):
-    """So many at once, and so many a second from then on."""
-
-    per_second: float  # [1/s]
-    burst: int
-
-
-# Chosen. A script waits for its answers, so its rate is one by the round trip, some hundred a second; a panel and its
-# programs ask some ten times a second. A request that is dropped costs its server some 20 us, one that is answered 300.
-OF_A_CLIENT = Rate(500.0, 1000)  # requests to one node; those above it are dropped without an answer
+# Chosen. A panel and its programs ask some ten times a second; a script that only asks goes by its pace (bus/pace.py),
+# which stays below. A request that is dropped costs its server some 20 us, one that is answered 300.
+OF_A_CLIENT = Rate(500.0, 1000)  # requests to one node; those above it are dropped unread
+DEBT = 500  # requests above it that count as well: a flood is not carried out in part, which would cost far more
 OF_REFUSALS = Rate(100.0, 1000)  # answers "busy" of one node; the other refusals are dropped without an answer
 MAX_CLIENTS = 256  # whose rates are kept; those that come on top of them share one
 
 # Chosen: a script waits for its answers, so few clients ever have more than one request here.
 MAX_WAITING_OF_A_CLIENT = 64  # requests of one client that wait in one server; more are refused
 MAX_WAITING = 1024  # requests of all clients that wait in one server; more are refused
-
-
-class TokenBucket:
-    """Permits what a rate permits, from a full bucket on."""
-
-    def __init__(self, rate: Rate, now: float) -> None:
-        """`now` in [s] monotonic."""
-        self._rate = rate
-        self._tokens, self._at = float(rate.burst), now
-
-    def take(self, now: float) -> bool:
-        """True if one more is permitted at `now` [s] monotonic."""
-        self._refill(now)
-        if self._tokens < 1.0:
-            return False
-        self._tokens -= 1.0
-        return True
-
-    def is_full(self, now: float) -> bool:
-        """True if until `now` [s] nothing was taken for long enough that the bucket is as good as new."""
-        self._refill(now)
-        return self._tokens >= self._rate.burst
-
-    def _refill(self, now: float) -> None:
-        self._tokens = min(float(self._rate.burst), self._tokens + (now - self._at) * self._rate.per_second)
-        self._at = now
 
 
 class RequestRates:
@@ -80,7 +48,7 @@ class RequestRates:
             self._of = {name: bucket for name, bucket in self._of.items() if not bucket.is_full(now)}
         if len(self._of) >= MAX_CLIENTS:
             return self._others
-        return self._of.setdefault(client, TokenBucket(self._of_a_client, now))
+        return self._of.setdefault(client, TokenBucket(self._of_a_client, now, DEBT))
 
 
 class WaitingRequests:

@@ -27,7 +27,7 @@ R = TypeVar("R", bound=Message)
 R_contra = TypeVar("R_contra", bound=Message, contravariant=True)
 
 MAX_UNANSWERED = 1024  # callers of one urgent server that are answered together; the rest hears so at once
-REPEAT = 0.005  # [s] chosen: in a flood of stops the gateway is free for other work between two of them
+REPEAT = 0.01  # [s] chosen: in a flood of stops the gateway is free for other work between two of them
 MAX_TAKEN = 64  # questions whose last time is kept
 MAX_TOLD = 64  # callers that are named with an answer
 
@@ -192,7 +192,8 @@ class RequestServer(Generic[Q, R]):
         self._dropped += 1
         if self._dropped == 1:
             most = f"more than {OF_A_CLIENT.per_second:g} requests a second to this node"
-            self._warn(f"{self.request.key}: {most} of one client: no answer (further ones are only counted)")
+            said = "nothing of it is read until it asks for less (further ones are only counted)"
+            self._warn(f"{self.request.key}: {most} of one client: {said}")
 
     def _refuse(self, query: Query, reason: str) -> None:
         self._refused += 1
