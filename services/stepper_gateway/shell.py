@@ -193,11 +193,10 @@ class Shell:
         self._give(Command(self._ticket(pending), request, pending.client))
 
     def _on_stop(self, request: DeviceStopRequest, pending: Pending[DeviceCommandResponse]) -> None:
-        """What waits behind a stop was asked for before it, and must not move the arm after it."""
+        """What was asked for before a stop must not move the arm after it."""
         reason = f"{request.kind} was asked for after it: ask again"
-        self._server.refuse_waiting(reason)
-        self._gripper.refuse_waiting(reason)
-        self._commands.refuse_waiting(reason)
+        for server in (self._server, self._gripper, self._commands):
+            server.refuse_waiting(reason, pending.asked)
         self._give(Stop(self._ticket(pending), request))
 
     def _on_configure(self, _request: ConfigureRequest, pending: Pending[ConfigureResponse]) -> None:

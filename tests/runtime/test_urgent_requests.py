@@ -127,7 +127,7 @@ def test_what_a_stop_has_overtaken_is_refused(buses: Buses) -> None:
     action = server.serve_action(FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: "")
 
     def stop(request: DeviceStopRequest) -> DeviceCommandResponse:
-        action.refuse_waiting("stop was asked for after it: ask again")
+        action.refuse_waiting("stop was asked for after it: ask again", {})
         return DeviceCommandResponse(accepted=True)
 
     server.serve(DEVICE_STOP, stop)

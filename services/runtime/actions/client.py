@@ -94,11 +94,11 @@ class ActionClient(Generic[G, F, R]):
                 del self._handles[handle.goal_id]
 
     def _ask(self, request: GoalRequest, timeout: float) -> Any:
-        end = time.monotonic() + timeout
+        end, number = time.monotonic() + timeout, self._bus.take_number()  # one for all: no try overtakes a stop
         while True:
-            left = end - time.monotonic()
+            left = max(0.05, min(ATTEMPT, end - time.monotonic()))
             try:
-                return requests.call(self._bus, keys.goal_request(self.action), request, max(0.05, min(ATTEMPT, left)))
+                return requests.call(self._bus, keys.goal_request(self.action), request, left, number)
             except NoAnswer:
                 if time.monotonic() >= end - PAUSE:
                     raise

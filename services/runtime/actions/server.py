@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -106,9 +106,12 @@ class ActionServer(Generic[G, F, R]):
         end = GoalEnd(stamp=time.time_ns(), goal_id=goal_id, client=goal.client, status=status, result=raw)
         self._ended.put(end)
 
-    def refuse_waiting(self, reason: str) -> None:
-        """Refuses the goals that have arrived by now and were not looked at yet."""
-        self._goal_requests.refuse_waiting(reason)
+    def refuse_waiting(self, reason: str, asked: Mapping[str, int]) -> None:
+        """Refuses the goals that were sent before a stop that is handled now and were not looked at yet.
+
+        `asked` are the clients that want it, as in `Pending.asked`.
+        """
+        self._goal_requests.refuse_waiting(reason, asked)
 
     def session_of(self, goal_id: str) -> str:
         """The session that has sent a goal that is decided upon, or was accepted; empty where it did not say."""
@@ -161,7 +164,7 @@ class ActionServer(Generic[G, F, R]):
             pending.reply(CancelResponse(reason=self._cancel_absent(request.goal_id)))
             return
         if not request.goal_id:
-            self.refuse_waiting("all goals were cancelled after it was sent: send it again")
+            self.refuse_waiting("all goals were cancelled after it was sent: send it again", pending.asked)
         wanted = (request.goal_id,) if request.goal_id else self.active
         canceling, reasons = [], [] if wanted else ["no goal is active"]
         for goal_id in wanted:

@@ -50,6 +50,11 @@ class Query(Protocol):
         """The session that asks, as it says itself; empty where it does not say."""
         ...
 
+    @property
+    def number(self) -> int:
+        """How many requests its client had asked for with this one; 0 where it does not say."""
+        ...
+
     def reply(self, schema: str, payload: bytes) -> None: ...
 
     def fail(self, schema: str, payload: bytes) -> None: ...
@@ -115,6 +120,10 @@ class Bus(Protocol):
         """True if a node serves `key`; waits up to `timeout` [s] for it."""
         ...
 
+    def take_number(self) -> int:
+        """The number of a request that is asked for now: higher than those of all before it."""
+        ...
+
     def ask(
         self,
         key: str,
@@ -123,11 +132,12 @@ class Bus(Protocol):
         timeout: float,
         on_answer: Callable[[BusReply | None], None],
         urgent: bool = False,
+        number: int = 0,
     ) -> None:
         """Sends one request, before all that waits to be sent if it is `urgent`; else it waits for its turn.
 
         `on_answer` comes exactly once: with None where no answer came in `timeout` [s], with `UNREAD` at once where
-        none will come.
+        none will come. `number` is one that `take_number` has given, where it is asked for again.
         """
         ...
 

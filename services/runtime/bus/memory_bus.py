@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 from schemas.topics import Delivery
@@ -25,6 +26,7 @@ class MemoryBus:
     def __init__(self, network: MemoryNetwork) -> None:
         self.network = network
         self._declared: list[Declaration] = []
+        self._numbers = itertools.count(1)
 
     @property
     def is_connected(self) -> bool:
@@ -74,6 +76,10 @@ class MemoryBus:
         with self.network.served:
             return self.network.served.wait_for(lambda: key in self.network.services and self.is_connected, timeout)
 
+    def take_number(self) -> int:
+        """The number of a request that is asked for now."""
+        return next(self._numbers)
+
     def ask(
         self,
         key: str,
@@ -82,14 +88,17 @@ class MemoryBus:
         timeout: float,
         on_answer: Callable[[BusReply | None], None],
         urgent: bool = False,
+        number: int = 0,
     ) -> None:
         """Sends one request."""
+        number = number or self.take_number()
         with self.network.lock:
             service = self.network.services.get(key) if self.is_connected else None
         if service is None:
             on_answer(UNREAD)
         else:
-            service.on_query(MemoryQuery(Arrival(key, schema, payload), f"{id(self):x}", timeout, on_answer))
+            asked = MemoryQuery(Arrival(key, schema, payload), f"{id(self):x}", number, timeout, on_answer)
+            service.on_query(asked)
 
     def declare_alive(self, key: str) -> MemoryToken:
         with self.network.lock:

@@ -118,10 +118,10 @@ class MemoryQuery:
     """A request on its way; the first answer counts, and after the time-out none does."""
 
     def __init__(
-        self, arrival: Arrival, client: str, timeout: float, on_answer: Callable[[BusReply | None], None]
+        self, arrival: Arrival, client: str, number: int, timeout: float, on_answer: Callable[[BusReply | None], None]
     ) -> None:
         """`timeout` in [s]; `on_answer` is called once, with None after it."""
-        self.arrival, self.client = arrival, client
+        self.arrival, self.client, self.number = arrival, client, number
         self._on_answer = on_answer
         self._lock = threading.Lock()
         self._is_open = True

@@ -7,6 +7,7 @@ writer, and recovery by the reader, so that a router that restarts costs nothing
 
 from __future__ import annotations
 
+import itertools
 import socket
 import threading
 import time
@@ -28,6 +29,7 @@ from services.runtime.bus.zenoh_declarations import (
     ZenohDeclaration,
     ZenohPublication,
     ZenohQueryable,
+    asked_by,
     close_at_exit,
     encoding_of,
     forget,
@@ -60,7 +62,8 @@ class ZenohBus:
         self._watches: list[object] = []
         self._session = self._open()
         self._urgent_session: zenoh.Session | None = None
-        self._name = str(self._session.zid()).encode()
+        self._name = str(self._session.zid())
+        self._numbers = itertools.count(1)
         self._disconnected_since: float | None = None  # [s] monotonic
         self._tokens: list[ZenohDeclaration] = []
         self._queryables: list[ZenohQueryable] = []
@@ -180,6 +183,10 @@ class ZenohBus:
                 monitor = self._monitors[key] = ServerMonitor(self._session, key)
         return monitor.wait(timeout)
 
+    def take_number(self) -> int:
+        """The number of a request that is asked for now."""
+        return next(self._numbers)
+
     def ask(
         self,
         key: str,
@@ -188,8 +195,10 @@ class ZenohBus:
         timeout: float,
         on_answer: Callable[[BusReply | None], None],
         urgent: bool = False,
+        number: int = 0,
     ) -> None:
         """Sends one request, which waits for its turn unless it is urgent."""
+        number = number or self.take_number()
         answers: list[BusReply] = []
 
         def on_reply(reply: zenoh.Reply) -> None:
@@ -218,7 +227,7 @@ class ZenohBus:
             consolidation=zenoh.ConsolidationMode.NONE,
             priority=zenoh.Priority.REAL_TIME if urgent else zenoh.Priority.DATA,
             express=urgent,
-            attachment=self._name,
+            attachment=asked_by(self._name, number),
         )
 
     def declare_alive(self, key: str) -> ZenohDeclaration:

@@ -15,6 +15,7 @@ from zenoh.handlers import FifoChannel, Handler, RingChannel
 from services.runtime.bus.interface import ENCODING, Arrival
 
 MAX_CLIENT_NAME = 32  # [bytes] of what a client says of itself
+MAX_DIGITS = 18  # of the number of a request
 QUERIES = 1024  # of one key that wait for Python; chosen: a client's burst (requests/limits.py) fits
 
 
@@ -48,7 +49,7 @@ class ZenohQuery:
 
     def __init__(self, query: zenoh.Query, key: str) -> None:
         self._query, self._key = query, key
-        self.client = bytes(query.attachment or b"")[:MAX_CLIENT_NAME].hex()
+        self.client, self.number = asker(bytes(query.attachment or b""))
 
     @cached_property
     def arrival(self) -> Arrival:
@@ -123,6 +124,17 @@ class ServerMonitor:
     def wait(self, timeout: float) -> bool:
         """True if a node serves the key; waits up to `timeout` [s] for it."""
         return self._served.wait(timeout)
+
+
+def asked_by(client: str, number: int) -> bytes:
+    """What goes with a request: the session that asks, and the number of the request."""
+    return f"{client}:{number}".encode()
+
+
+def asker(attached: bytes) -> tuple[str, int]:
+    """The client that asks, by a name that any bytes give, and the number of its request, 0 where there is none."""
+    name, _, number = attached[: MAX_CLIENT_NAME + 1 + MAX_DIGITS].partition(b":")
+    return name[:MAX_CLIENT_NAME].hex(), int(number) if number.isdigit() else 0
 
 
 def encoding_of(schema: str) -> zenoh.Encoding:

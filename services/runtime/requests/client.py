@@ -23,7 +23,9 @@ SERVER_APPEARANCE_TIMEOUT = 1.0  # [s] that a client waits for a server to appea
 class PendingCall(Generic[Q, R]):
     """A request that was sent, and its reply."""
 
-    def __init__(self, bus: Bus, request: Request[Q, R], question: Q, timeout: float, wake: Task) -> None:
+    def __init__(
+        self, bus: Bus, request: Request[Q, R], question: Q, timeout: float, wake: Task, number: int = 0
+    ) -> None:
         """Sends the request, with `timeout` [s] for its reply; `wake` is then called from another thread.
 
         Raises `NoAnswer` where no node serves the request.
@@ -31,10 +33,10 @@ class PendingCall(Generic[Q, R]):
         self._bus, self._request, self._wake = bus, request, wake
         self._timeout = timeout
         self._answers: SimpleQueue[BusReply | None] = SimpleQueue()
-        payload = to_payload(question)
+        payload, number = to_payload(question), number or bus.take_number()
         if not bus.wait_served(request.key, min(timeout, SERVER_APPEARANCE_TIMEOUT)):
             raise NoAnswer(_nobody(bus, request))
-        bus.ask(request.key, schema_of(request.request), payload, timeout, self._on_answer, request.urgent)
+        bus.ask(request.key, schema_of(request.request), payload, timeout, self._on_answer, request.urgent, number)
 
     @property
     def is_over(self) -> bool:
@@ -58,9 +60,9 @@ class PendingCall(Generic[Q, R]):
         self._wake()
 
 
-def call(bus: Bus, request: Request[Q, R], question: Q, timeout: float) -> R:
-    """The answer; blocks up to `timeout` [s]. Raises `Refused` or `NoAnswer`."""
-    return PendingCall(bus, request, question, timeout, wake=lambda: None).response()
+def call(bus: Bus, request: Request[Q, R], question: Q, timeout: float, number: int = 0) -> R:
+    """The answer; blocks up to `timeout` [s]. Raises `Refused` or `NoAnswer`; `number` as that of `Bus.ask`."""
+    return PendingCall(bus, request, question, timeout, lambda: None, number).response()
 
 
 def response_in(request: Request[Q, R], answer: BusReply) -> R:

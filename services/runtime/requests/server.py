@@ -6,7 +6,7 @@ import math
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Generic, Protocol, TypeVar
 
 import msgspec
@@ -20,6 +20,7 @@ from services.runtime.bus.wire import from_arrival, schema_of, to_payload
 from services.runtime.errors import Refused
 from services.runtime.loop.task_queue import Task
 from services.runtime.requests.limits import OF_A_CLIENT, RequestRates, WaitingRequests
+from services.runtime.requests.overtaken import OvertakenRequests
 from services.runtime.topics import Warn
 
 Q = TypeVar("Q", bound=Message)
@@ -30,6 +31,7 @@ MAX_UNANSWERED = 1024  # callers of one urgent server that are answered together
 REPEAT = 0.01  # [s] chosen: in a flood of stops the gateway is free for other work between two of them
 MAX_TAKEN = 64  # questions whose last time is kept
 MAX_TOLD = 64  # callers that are named with an answer
+MAX_ASKERS = 256  # callers of one urgent request whose numbers are kept
 
 Tell = Callable[[Exchange], None]
 
@@ -68,6 +70,11 @@ class Pending(Protocol[R_contra]):
         """The session that asks, as it says itself; of several the first."""
         ...
 
+    @property
+    def asked(self) -> dict[str, int]:
+        """Of each session that asks the number of its newest request."""
+        ...
+
     def reply(self, response: R_contra) -> None:
         """Only the first answer counts; from any thread."""
 
@@ -81,6 +88,7 @@ class PendingQuery(Generic[R]):
     def __init__(self, query: Query, report: AnswerReport | None = None) -> None:
         self._query, self._report = query, report
         self.client = query.client
+        self.asked = {query.client: query.number}
         self._is_answered = False
 
     def reply(self, response: R) -> None:
@@ -109,12 +117,17 @@ class PendingGroup(Generic[R]):
         self.is_queued = False  # for the event loop
         self.is_new = True  # no timer will queue it
         self._queries: list[PendingQuery[R]] = []
-        self._askers: list[str] = []
+        self.asked: dict[str, int] = {}  # also of those that get no answer
         self._on_answered = on_answered
 
+    def note(self, query: Query) -> None:
+        """It asks for the same, whether it will be answered or not."""
+        if len(self.asked) < MAX_ASKERS or query.client in self.asked:
+            self.asked[query.client] = max(query.number, self.asked.get(query.client, 0))
+
     def join(self, query: Query) -> None:
+        """It is answered with the others."""
         self._queries.append(PendingQuery(query))
-        self._askers.append(query.client)
 
     def reply(self, response: R) -> None:
         for query in self._take():
@@ -140,7 +153,7 @@ class PendingGroup(Generic[R]):
 
     def _clients(self) -> tuple[str, ...]:
         """Who asked, each once; also whose question was carried out without an answer."""
-        return tuple(dict.fromkeys((self.client, *self._askers)))
+        return tuple(self.asked)
 
 
 class RequestServer(Generic[Q, R]):
@@ -162,7 +175,7 @@ class RequestServer(Generic[Q, R]):
         self._handler, self._warn, self._rates = handler, warn, rates
         self._received, self._refused, self._dropped, self._bad = 0, 0, 0, 0
         self._waiting = WaitingRequests(request.key)
-        self._void_before, self._void_reason = -math.inf, ""  # [s] monotonic
+        self._overtaken = OvertakenRequests(request.key)
         self._declaration = bus.serve(request.key, self._on_query, request.urgent)
 
     @property
@@ -173,9 +186,12 @@ class RequestServer(Generic[Q, R]):
     def close(self) -> None:
         self._declaration.close()
 
-    def refuse_waiting(self, reason: str) -> None:
-        """Refuses the requests that have arrived but are not handled yet, because an urgent request made them void."""
-        self._void_before, self._void_reason = time.monotonic(), reason
+    def refuse_waiting(self, reason: str, asked: Mapping[str, int]) -> None:
+        """Refuses the requests that were asked for before an urgent one that is handled now and made them void.
+
+        Those are what has arrived, and what the clients in `asked` (see `Pending.asked`) have asked for before.
+        """
+        self._overtaken.stop(reason, asked, time.monotonic())
 
     def _on_query(self, query: Query) -> None:
         """Nothing of a request is read before its client may ask at all."""
@@ -208,8 +224,8 @@ class RequestServer(Generic[Q, R]):
         if question is None:
             return
         pending = PendingQuery[R](query, self._report(query.arrival.payload, arrived))
-        if arrived <= self._void_before:
-            pending.refuse("void", f"{self.request.key}: {self._void_reason}")
+        if void := self._overtaken.refusal(query.client, query.number, arrived):
+            pending.refuse("void", void)
         else:
             self._received += 1
             self._handle(question, pending)
@@ -284,6 +300,7 @@ class UrgentServer(RequestServer[Q, R]):
                     return refusal
                 report = self._report(encode(question), time.monotonic())
                 group = self._groups[question] = PendingGroup(query.client, self._answered, report)
+            group.note(query)
             self._queue(question, group, is_answered)
             self._received += 1
             if not is_answered:

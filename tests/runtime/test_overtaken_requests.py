@@ -1,0 +1,153 @@
+"""A goal that was asked for before a stop is not carried out after it, however late it arrives."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from schemas.actions import GoalRequest, GoalResponse
+from schemas.device import DeviceCommandResponse, DeviceStopRequest
+from schemas.message import decode, encode
+from schemas.motion import FollowJointTrajectoryGoal
+from schemas.system import Failure, TopicStatistics
+from schemas.topics import DEVICE_STOP
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
+from services.runtime.actions import keys
+from services.runtime.actions.client import _raw
+from services.runtime.actions.server import accept
+from services.runtime.bus.interface import Bus, BusReply
+from services.runtime.bus.pace import Rate
+from services.runtime.bus.zenoh_declarations import MAX_CLIENT_NAME, asked_by, asker
+from services.runtime.errors import NoAnswer, Refused
+from services.runtime.node import Node
+from services.runtime.requests.limits import OF_A_CLIENT, RequestRates
+from services.runtime.requests.overtaken import MOST_CLIENTS, OvertakenRequests
+from services.runtime.requests.server import Pending
+from tests.runtime.support import Buses, spinning, until
+
+GOAL = keys.goal_request(FOLLOW).key
+numbers = st.integers(1, 10**12)
+
+
+@given(st.lists(numbers, min_size=1), numbers)
+def test_what_a_client_asked_before_its_newest_stop_is_void_and_nothing_else(stops: list[int], number: int) -> None:
+    requests = OvertakenRequests("goal")
+    for at, stop in enumerate(stops):
+        requests.stop("stop was asked for after it", {"a": stop}, float(at))
+    arrived = float(len(stops))
+    refusal = requests.refusal("a", number, arrived)
+    assert bool(refusal) == (number < max(stops))
+    if refusal:
+        assert f"request {number} of its client, the stop request {max(stops)}" in refusal
+    assert not requests.refusal("another", number, arrived)
+    assert not requests.refusal("a", 0, arrived)
+    assert requests.refusal("another", number, arrived - 1.0)
+
+
+def test_the_newest_stop_of_the_last_clients_is_kept() -> None:
+    requests = OvertakenRequests("goal")
+    for name in range(10 * MOST_CLIENTS):
+        requests.stop("stop", {"operator": 10, f"client {name}": 10}, 0.0)
+    assert requests.refusal("operator", 9, 1.0)
+    assert requests.refusal(f"client {10 * MOST_CLIENTS - 1}", 9, 1.0)
+    assert not requests.refusal("client 0", 9, 1.0)
+    assert len(requests._stops) == MOST_CLIENTS
+
+
+@given(st.text("0123456789abcdef", max_size=MAX_CLIENT_NAME), st.integers(0, 10**18 - 1))
+def test_who_asks_says_its_name_and_number(name: str, number: int) -> None:
+    assert asker(asked_by(name, number)) == (name.encode().hex(), number)
+
+
+@given(st.binary(max_size=200))
+def test_what_others_attach_is_a_short_name_and_some_number(attached: bytes) -> None:
+    name, number = asker(attached)
+    assert len(name) <= 2 * MAX_CLIENT_NAME
+    assert number >= 0
+
+
+def gateway(buses: Buses, started: list[str]) -> Node:
+    """A node that refuses what a stop has overtaken, as stepper_gateway does."""
+    node = buses.node("gateway")
+    action = node.serve_action(FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: "")
+
+    def on_stop(_request: DeviceStopRequest, pending: Pending[DeviceCommandResponse]) -> None:
+        action.refuse_waiting("stop was asked for after it: ask again", pending.asked)
+        pending.reply(DeviceCommandResponse(accepted=True))
+
+    node.serve_later(DEVICE_STOP, on_stop)
+    return node
+
+
+def counted(node: Node, key: str) -> TopicStatistics:
+    return next(each for each in node._endpoints.statistics() if each.key == key)
+
+
+def send(client: Bus, goal_id: str, answers: list[BusReply | None], number: int = 0) -> None:
+    goal = encode(GoalRequest(goal_id=goal_id, client="test", goal=_raw(FollowJointTrajectoryGoal())))
+    client.ask(GOAL, "GoalRequest", goal, 20.0, answers.append, number=number)
+
+
+def test_a_goal_that_arrives_after_a_later_stop_is_refused_with_both_numbers(buses: Buses) -> None:
+    started: list[str] = []
+    server, client, other = gateway(buses, started), buses.open(), buses.open()
+    for each in (client, other):
+        assert each.wait_served(GOAL, 5.0)
+        assert each.wait_served(DEVICE_STOP.key, 5.0)
+    late, others = client.take_number(), other.take_number()
+    stops: list[BusReply | None] = []
+    goals: list[BusReply | None] = []
+    with spinning(server):
+        client.ask(DEVICE_STOP.key, "DeviceStopRequest", encode(DeviceStopRequest()), 20.0, stops.append, True)
+        assert until(lambda: len(stops) == 1)
+        send(client, "stuck", goals, late)
+        assert until(lambda: len(goals) == 1)
+        send(client, "newer", goals)
+        assert until(lambda: len(goals) == 2)
+        send(other, "another's", goals, others)
+        assert until(lambda: len(goals) == 3)
+    refused, newer, anothers = goals
+    assert refused is not None
+    assert not refused.ok
+    said = decode(Failure, refused.payload)
+    assert said.kind == "void"
+    assert f"this was request {late} of its client, the stop request {late + 1}" in said.message
+    for answer in (newer, anothers):
+        assert answer is not None
+        assert decode(GoalResponse, answer.payload).accepted
+    assert started == ["newer", "another's"]
+
+
+def test_a_goal_that_is_tried_again_does_not_pass_a_stop_in_between(buses: Buses) -> None:
+    started: list[str] = []
+    server, client = gateway(buses, started), buses.node("script")
+    rates: RequestRates = server._rates
+    rates._of_a_client = Rate(0.0, 0)  # every try is dropped
+    heard: list[BaseException] = []
+
+    def send_goal() -> None:
+        try:
+            client.action(FOLLOW).send(FollowJointTrajectoryGoal(), timeout=20.0)
+        except (Refused, NoAnswer) as error:
+            heard.append(error)
+
+    sending = threading.Thread(target=send_goal)
+    with spinning(server):
+        sending.start()
+        assert until(lambda: counted(server, GOAL).dropped)
+        with pytest.raises(NoAnswer):  # it is carried out, but above the rate nothing is answered
+            client.call(DEVICE_STOP, DeviceStopRequest())
+        assert until(
+            lambda: any(each.received for each in server._endpoints.statistics() if each.key == DEVICE_STOP.key)
+        )
+        rates._of_a_client = OF_A_CLIENT
+        rates._of.clear()
+        sending.join(timeout=20.0)
+    assert not sending.is_alive()
+    (error,) = heard
+    assert isinstance(error, Refused)
+    assert "the stop request" in str(error)
+    assert not started
