@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from schemas.device import DeviceCommandResponse, DeviceStopRequest, StopKind
-from schemas.message import Message, encode
+from schemas.message import Message, decode, encode
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.planning import PlanRequest, PlanResponse
 from schemas.topics import DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, PLAN
@@ -131,6 +131,33 @@ def test_a_stop_above_the_rate_is_carried_out(buses: Buses) -> None:
     assert hear(server, lambda: len(answers) == 21 and len(handled) == 2)
     assert handled == [StopKind.HOLD, StopKind.STOP]
     assert answers.count(UNREAD) == 18
+
+
+def test_a_client_that_floods_hears_that_its_stop_was_carried_out(buses: Buses) -> None:
+    server, client = limited(buses, "gateway", Rate(0.0, 3)), buses.open()
+    server.serve(PLAN, lambda request: PlanResponse())
+    server.serve(DEVICE_STOP, lambda request: DeviceCommandResponse(accepted=True))
+    assert client.wait_served(PLAN.key, 1.0)
+    assert client.wait_served(DEVICE_STOP.key, 1.0)
+    flood, answers = Answers(), Answers()
+    for _ in range(20):
+        ask(client, PLAN.key, PlanRequest(), flood)
+    assert until(lambda: len(flood) == 17)
+    ask(client, DEVICE_STOP.key, DeviceStopRequest(), answers)
+    with spinning(server):
+        assert until(lambda: len(answers) == 1)
+    assert answers[0] is not None
+    assert decode(DeviceCommandResponse, answers[0].payload).accepted
+
+
+def test_a_caller_whose_stops_are_too_many_hears_that_they_are_carried_out(buses: Buses) -> None:
+    server, client = limited(buses, "gateway", Rate(0.0, 0)), buses.node("script")
+    handled: list[StopKind] = []
+    server.serve(DEVICE_STOP, lambda request: handled.append(request.kind) or DeviceCommandResponse(accepted=True))
+    with spinning(server):
+        with pytest.raises(NoAnswer, match="carries out the others all the same"):
+            client.call(DEVICE_STOP, DeviceStopRequest(), timeout=60.0)
+        assert until(lambda: handled == [StopKind.STOP])
 
 
 def test_a_flood_of_equal_stops_leaves_the_loop_free_between_two_of_them(buses: Buses) -> None:

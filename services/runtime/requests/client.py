@@ -89,6 +89,11 @@ def _unread(bus: Bus, request: Request[Q, R]) -> str:
     if not bus.is_connected:
         return _away(request)
     most, pause = f"{OF_A_CLIENT.per_second:g} requests a second", f"{DEBT / OF_A_CLIENT.per_second:g} s"
+    if request.urgent:
+        return (
+            f"{request.server} has not answered {request.key}: it answers {most} of that kind of one client, and "
+            f"carries out the others all the same; ask again after {pause} (or it has just ended: `gemelo node list`)"
+        )
     return (
         f"{request.server} dropped {request.key} unread: it takes {most} of one client, and nothing of one that asks "
         f"for more; wait for each answer, and ask again after {pause} (or it has just ended: `gemelo node list`)"

@@ -10,7 +10,7 @@ from services.runtime.bus.pace import Rate, TokenBucket
 
 # Chosen. A panel and its programs ask some ten times a second; a script that only asks goes by its pace (bus/pace.py),
 # which stays below. A request that is dropped costs its server some 20 us, one that is answered 300.
-OF_A_CLIENT = Rate(500.0, 1000)  # requests to one node; those above it are dropped unread
+OF_A_CLIENT = Rate(500.0, 1000)  # requests to one node, and as many urgent ones; those above it are dropped unread
 DEBT = 500  # requests above it that count as well: a flood is not carried out in part, which would cost far more
 OF_REFUSALS = Rate(100.0, 1000)  # answers "busy" of one node; the other refusals are dropped without an answer
 MAX_CLIENTS = 256  # whose rates are kept; those that come on top of them share one
@@ -28,14 +28,14 @@ class RequestRates:
         self._of_a_client = of_a_client
         self._refusals = TokenBucket(of_refusals, now)
         self._others = TokenBucket(of_a_client, now)  # of the clients that have no bucket of their own
-        self._of: dict[str, TokenBucket] = {}
+        self._of: dict[tuple[str, bool], TokenBucket] = {}  # by client, and whether of its urgent requests
         self._lock = threading.Lock()
 
-    def permit_request(self, client: str) -> bool:
-        """True if `client` may ask once more now."""
-        now = time.monotonic()
+    def permit_request(self, client: str, urgent: bool = False) -> bool:
+        """True if `client` may ask once more now; its urgent requests are counted for themselves."""
+        now, kind = time.monotonic(), (client, urgent)
         with self._lock:
-            bucket = self._of.get(client) or self._new(client, now)
+            bucket = self._of.get(kind) or self._new(kind, now)
             return bucket.take(now)
 
     def permit_refusal(self) -> bool:
@@ -43,12 +43,12 @@ class RequestRates:
         with self._lock:
             return self._refusals.take(time.monotonic())
 
-    def _new(self, client: str, now: float) -> TokenBucket:
+    def _new(self, kind: tuple[str, bool], now: float) -> TokenBucket:
         if len(self._of) >= MAX_CLIENTS:
-            self._of = {name: bucket for name, bucket in self._of.items() if not bucket.is_full(now)}
+            self._of = {each: bucket for each, bucket in self._of.items() if not bucket.is_full(now)}
         if len(self._of) >= MAX_CLIENTS:
             return self._others
-        return self._of.setdefault(client, TokenBucket(self._of_a_client, now, DEBT))
+        return self._of.setdefault(kind, TokenBucket(self._of_a_client, now, DEBT))
 
 
 class WaitingRequests:

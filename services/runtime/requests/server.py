@@ -285,7 +285,7 @@ class UrgentServer(RequestServer[Q, R]):
         if question is None:
             return
         self._last = (arrival, question)
-        is_answered = self._rates.permit_request(query.client)
+        is_answered = self._rates.permit_request(query.client, urgent=True)
         if refusal := self._join(question, query, is_answered):
             self._refuse(query, refusal)
         elif not is_answered:
