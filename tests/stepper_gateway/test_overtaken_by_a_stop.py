@@ -1,0 +1,84 @@
+"""The gateway without a device: what a client asked for before its stop is refused, in whatever order it arrives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, closing
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from schemas.actions import GoalRequest
+from schemas.deployment import Deployment, PathsSection
+from schemas.device import DeviceCommandRequest, DeviceStopRequest, SpeedCommand, StopKind
+from schemas.gripper import GripperCommandGoal
+from schemas.message import Message, decode, encode
+from schemas.motion import FollowJointTrajectoryGoal
+from schemas.system import Empty, Failure
+from schemas.topics import DEVICE_COMMAND, DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, GATEWAY, GRIPPER_COMMAND
+from services.arm.model.description import load_arm
+from services.runtime.actions.keys import goal_request
+from services.runtime.bus.interface import BusReply
+from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
+from services.runtime.endpoints import info_request
+from services.runtime.node import Node
+from services.runtime.process.shutdown import ShutdownRequest
+from services.stepper_gateway.core import GatewayCore
+from services.stepper_gateway.inputs import Began
+from services.stepper_gateway.ledger.ledger_file import LedgerFile
+from services.stepper_gateway.parameters import GatewayParameters
+from services.stepper_gateway.shell import Shell
+from tests.runtime.support import ROOT, spinning, until
+
+
+def goal(wanted: Message) -> GoalRequest:
+    return GoalRequest(goal_id=type(wanted).__name__, client="test", goal=msgspec.Raw(encode(wanted)))
+
+
+MOVING = (
+    (goal_request(FOLLOW_JOINT_TRAJECTORY).key, goal(FollowJointTrajectoryGoal())),
+    (goal_request(GRIPPER_COMMAND).key, goal(GripperCommandGoal())),
+    (DEVICE_COMMAND.key, DeviceCommandRequest(command=SpeedCommand())),
+)
+
+
+@pytest.fixture
+def client(tmp_path: Path) -> Iterator[MemoryBus]:
+    """Of a bus on which a gateway without a device serves."""
+    network = MemoryNetwork()
+    deployment = Deployment(robot="urdf/rm1", paths=PathsSection(out=str(tmp_path / "out"), run=str(tmp_path / "run")))
+    with ExitStack() as stack:
+        node = Node(GATEWAY, deployment, robot="rm1", bus=MemoryBus(network), stop=ShutdownRequest())
+        stack.callback(node.close)
+        parameters = node.parameters(GatewayParameters)
+        file = stack.enter_context(closing(LedgerFile(tmp_path / "run", "rm1", node.log.warning)))
+        core = GatewayCore(load_arm(ROOT / "urdf/rm1"), 1, parameters.value)
+        shell = Shell(node, core, Began(1, parameters.value), parameters, file)
+        stack.enter_context(spinning(node, shell.step))
+        yield stack.enter_context(closing(MemoryBus(network)))
+
+
+def ask(client: MemoryBus, key: str, question: Message, number: int = 0) -> BusReply:
+    answers: list[BusReply | None] = []
+    client.ask(key, type(question).__name__, encode(question), 20.0, answers.append, number=number)
+    assert until(lambda: answers, 20.0)
+    assert answers[0] is not None
+    return answers[0]
+
+
+@pytest.mark.parametrize(("key", "question"), MOVING, ids=[key for key, _ in MOVING])
+@pytest.mark.parametrize("kind", StopKind)
+def test_what_was_asked_before_a_stop_is_void_and_what_is_asked_after_it_is_not(
+    client: MemoryBus, key: str, question: Message, kind: StopKind
+) -> None:
+    before = client.take_number()
+    stop = DeviceStopRequest(kind=kind)  # it is answered only when the device has been silent for long
+    client.ask(DEVICE_STOP.key, type(stop).__name__, encode(stop), 20.0, lambda answer: None, True)
+    ask(client, info_request(GATEWAY).key, Empty())  # this answer says that the stop has been handled
+    refused = ask(client, key, question, before)
+    assert not refused.ok
+    said = decode(Failure, refused.payload)
+    assert said.kind == "void"
+    assert f"{kind} was asked for after it: ask again (this was request {before} of its client" in said.message
+    assert ask(client, key, question).ok
