@@ -90,7 +90,7 @@ class MemoryBus:
         urgent: bool = False,
         number: int = 0,
     ) -> None:
-        """Sends one request."""
+        """Sends one request with `timeout` [s] for its answer."""
         number = number or self.take_number()
         with self.network.lock:
             service = self.network.services.get(key) if self.is_connected else None

@@ -197,7 +197,7 @@ class ZenohBus:
         urgent: bool = False,
         number: int = 0,
     ) -> None:
-        """Sends one request, which waits for its turn unless it is urgent."""
+        """Sends one request with `timeout` [s] for its answer; it waits for its turn unless it is urgent."""
         number = number or self.take_number()
         answers: list[BusReply] = []
 
