@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 from services.arm.model.urdf import Triple
 from services.collision_fitting.fitted_shape import Fitted
 from services.collision_fitting.mesh_surface import MeshSurface
 from services.planner.collision_geometry.link_shapes import solid_of
-from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -23,6 +24,7 @@ SHARE = 0.95  # of the outer surface, that is to be within the bound
 STEP, MOST_STEPS = 0.004, 16  # [m] between places on a shape, and how many along an edge at most
 AROUND = 32  # places on a circle
 ON_A_BALL = 500
+MOST_ON_A_HULL = 1500
 GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # [rad]: Fibonacci's spiral on a ball
 BURIED = -1e-5  # [m] deep in another shape, from where on a place is no outer surface
 
@@ -42,13 +44,17 @@ class ShapeSurface:
     """Places on a fitted shape, the areas that they stand for [m^2], and how far each is from the mesh [m]."""
 
     def __init__(self, fitted: Fitted, mesh: MeshSurface) -> None:
-        self.shapes = fitted.shapes
+        self.fitted, self.shapes = fitted, fitted.shapes
         found = [_surface(shape) for shape in self.shapes]
         outer = [_outer(points, self.shapes, index) for index, (points, _) in enumerate(found)]
         self.points = np.vstack([points[mask] for (points, _), mask in zip(found, outer, strict=True)])
         self.areas = np.concatenate([areas[mask] for (_, areas), mask in zip(found, outer, strict=True)])
         self.beyond = mesh.distances(self.points)
         self._free: WeakKeyDictionary[ShapeSurface, Mask] = WeakKeyDictionary()
+
+    def share_within(self, within: float) -> float:
+        """Of its own surface, that is within so many [m] of the mesh."""
+        return float(self.areas[self.beyond <= within].sum() / self.areas.sum())
 
     def free_of(self, other: ShapeSurface) -> Mask:
         """(n,) True for the places that are in no shape of the other."""
@@ -104,6 +110,9 @@ def _surface(shape: CollisionShape) -> tuple[Array, Array]:
             local, areas = _on_box(np.array(shape.size))
         case ShapeKind.CYLINDER:
             local, areas = _on_cylinder(*shape.size)
+        case ShapeKind.HULL:
+            assert shape.mesh is not None
+            local, areas = _on_hull(shape.mesh)
         case _:
             local, areas = _on_ball(shape.size[0])
     return local @ shape.rotation.T + shape.pose[0], areas
@@ -144,6 +153,17 @@ def _on_cylinder(radius: float, length: float) -> tuple[Array, Array]:
     ends = [np.column_stack((disc, np.full(len(disc), 0.5 * sign * length))) for sign in (-1.0, 1.0)]
     areas = (np.repeat(along, AROUND) * 2.0 * np.pi * radius / AROUND, disc_areas, disc_areas)
     return np.vstack((side, *ends)), np.concatenate(areas)
+
+
+def _on_hull(mesh: TriangleMesh) -> tuple[Array, Array]:
+    corners = mesh.vertices[mesh.faces]
+    sides = corners[:, 1:] - corners[:, :1]
+    areas = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    count = int(np.clip(areas.sum() / STEP**2, ON_A_BALL, MOST_ON_A_HULL))
+    whole = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    drawn, _ = trimesh.sample.sample_surface(whole, count, seed=0)
+    each = np.concatenate((np.full(len(drawn), areas.sum() / len(drawn)), np.zeros(len(mesh.vertices))))
+    return np.vstack((drawn, mesh.vertices)), each
 
 
 def _on_ball(radius: float) -> tuple[Array, Array]:

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import trimesh
 
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.kinematics import Kinematics
@@ -10,27 +15,43 @@ from services.arm.model.description import Arm, load_arm
 from services.arm.model.urdf import Triple
 from services.arm.model.urdf_edit import with_collisions
 from services.collision_fitting.excess import depth_in
-from services.collision_fitting.fitted_shape import Fitted
 from services.collision_fitting.mesh_fit import LinkFit
 from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 # Tuning constants: chosen, where a line does not say measured or standard.
+HULLS = "meshes/collision"  # from the URDF on
 OUTSIDE = 1e-6  # [m] that a corner may be outside the shapes as they are loaded again: a rounding
 
 
-def elements_of(fitted: Fitted) -> list[str]:
+def elements_of(fit: LinkFit) -> list[str]:
     """As <collision> elements; URDF knows no capsule, so that it and a plate are three."""
-    return [_element(shape, fitted.origin.rpy) for shape in fitted.shapes]
+    numbered = enumerate(fit.shapes, 1)
+    return [
+        _element(shape, each.origin.rpy, hull_file(fit.link, number))
+        for number, each in numbered
+        for shape in each.shapes
+    ]
 
 
-def _element(shape: CollisionShape, rpy: Triple) -> str:
+def hull_file(link: str, number: int) -> str:
+    """Where a link's shape of this number is if it is a hull, from the URDF on."""
+    return f"{HULLS}/{_file_name(link)}.{number}.stl"
+
+
+def _file_name(link: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_-]", lambda found: f"-{ord(found[0]):x}-", link)
+
+
+def _element(shape: CollisionShape, rpy: Triple, file: str) -> str:
     origin = f'<origin xyz="{_words(shape.pose[0])}" rpy="{_words(rpy)}"/>'
-    return f"<collision>\n  {origin}\n  <geometry>{_geometry(shape)}</geometry>\n</collision>"
+    return f"<collision>\n  {origin}\n  <geometry>{_geometry(shape, file)}</geometry>\n</collision>"
 
 
-def _geometry(shape: CollisionShape) -> str:
+def _geometry(shape: CollisionShape, file: str) -> str:
     match shape.kind:
+        case ShapeKind.HULL:
+            return f'<mesh filename="{file}"/>'
         case ShapeKind.BOX:
             return f'<box size="{_words(shape.size)}"/>'
         case ShapeKind.CYLINDER:
@@ -43,25 +64,56 @@ def _words(values: Sequence[float]) -> str:
 
 
 def write_fits(arm: Arm, fits: Sequence[LinkFit]) -> Arm:
-    """Puts the shapes into the URDF in place of those that the links have, and returns the arm, loaded again.
+    """Puts the shapes into the URDF in place of those that the links have, hulls into files beside it, and returns the
+    arm, loaded again.
 
-    Raises `DescriptionError` where not every shape is there then or a corner of a mesh is outside them, and the file is
-    as it was. Raises OSError where it cannot be read or written.
+    Raises `DescriptionError` where not every shape is there then or a corner of a mesh is outside them, and the files
+    are as they were. Raises OSError where one cannot be read or written.
     """
-    wanted = {fit.link: [element for shape in fit.shapes for element in elements_of(shape)] for fit in fits}
+    wanted = {fit.link: elements_of(fit) for fit in fits}
     before = arm.urdf_path.read_bytes()
     try:
         after = with_collisions(before.decode("utf-8"), wanted).encode("utf-8")
     except ValueError as error:
         raise DescriptionError(f"{arm.urdf_path} cannot be edited: {error}") from error
-    arm.urdf_path.write_bytes(after)
-    try:
-        changed = load_arm(arm.folder)
-        _require_there(changed, fits, wanted)
-    except ValueError:
-        arm.urdf_path.write_bytes(before)
-        raise
+    with _restored(arm.urdf_path.parent / HULLS):
+        _write_hulls(arm.urdf_path.parent, fits)
+        arm.urdf_path.write_bytes(after)
+        try:
+            changed = load_arm(arm.folder)
+            _require_there(changed, fits, wanted)
+        except ValueError:
+            arm.urdf_path.write_bytes(before)
+            raise
     return changed
+
+
+def _write_hulls(folder: Path, fits: Sequence[LinkFit]) -> None:
+    """The files of these links' hulls, and no others of these links."""
+    (folder / HULLS).mkdir(parents=True, exist_ok=True)
+    for fit in fits:
+        for old in (folder / HULLS).glob(f"{_file_name(fit.link)}.[0-9]*.stl"):
+            old.unlink()
+        for number, each in enumerate(fit.shapes, 1):
+            for mesh in (shape.mesh for shape in each.shapes if shape.mesh is not None):
+                whole = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+                whole.export(folder / hull_file(fit.link, number))
+    if not any((folder / HULLS).iterdir()):
+        (folder / HULLS).rmdir()
+
+
+@contextmanager
+def _restored(folder: Path) -> Iterator[None]:
+    """The files in `folder` are as they were if the block raises."""
+    before = {path: path.read_bytes() for path in folder.glob("*.stl")}
+    try:
+        yield
+    except BaseException:
+        for path in folder.glob("*.stl"):
+            path.unlink()
+        for path, content in before.items():
+            path.write_bytes(content)
+        raise
 
 
 def touching_states(arm: Arm) -> list[str]:

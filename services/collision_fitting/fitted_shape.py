@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
+
+import numpy as np
 
 from services.arm.frames.transforms import compose, from_rpy
 from services.arm.model.urdf import Origin, Triple
+from services.planner.collision_geometry.link_shapes import hull_mesh
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 
@@ -19,6 +23,7 @@ class Kind(StrEnum):
     CYLINDER = "cylinder"  # radius, length
     CAPSULE = "capsule"  # radius, length of the straight part
     PLATE = "plate with round ends"  # radius of the ends, distance of their middles along x, thickness
+    HULL = "convex hull"  # its volume in m^3
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,7 @@ class Fitted:
     kind: Kind
     size: tuple[float, ...]
     origin: Origin  # in the link
+    corners: tuple[Triple, ...] = ()  # [m] of a hull, from its origin
 
     @property
     def volume(self) -> float:
@@ -41,11 +47,17 @@ class Fitted:
                 return math.pi * radius**2 * (length + 4.0 / 3.0 * radius)
             case Kind.PLATE, (radius, length, thickness):
                 return (math.pi * radius + 2.0 * length) * radius * thickness
+            case Kind.HULL, (volume,):
+                return volume
         return 4.0 / 3.0 * math.pi * self.size[0] ** 3
 
     @property
     def shapes(self) -> tuple[CollisionShape, ...]:
         """It in the link's frame, as what a URDF knows: a capsule and a plate are three."""
+        return self._shapes
+
+    @cached_property
+    def _shapes(self) -> tuple[CollisionShape, ...]:
         match self.kind, self.size:
             case Kind.CAPSULE, (radius, length):
                 balls = (self._shape(ShapeKind.SPHERE, (radius,), (0.0, 0.0, side * length)) for side in (-0.5, 0.5))
@@ -56,6 +68,9 @@ class Fitted:
                     for side in (-0.5, 0.5)
                 )
                 return self._shape(ShapeKind.BOX, (length, 2.0 * radius, thickness)), *ends
+            case Kind.HULL, _:
+                pose = (self.origin.xyz, from_rpy(*self.origin.rpy))
+                return (CollisionShape("hull", ShapeKind.HULL, (), pose, hull_mesh(np.array(self.corners))),)
         return (self._shape(ShapeKind(self.kind), self.size),)
 
     def _shape(self, kind: ShapeKind, size: tuple[float, ...], at: Triple = (0.0, 0.0, 0.0)) -> CollisionShape:

@@ -61,7 +61,7 @@ def fit_meshes(folder: Path, within: float, most: int, only: Sequence[str], writ
             ]
         )
     for fit in fits:
-        lines += [f"{fit.link}:", *(element for shape in fit.shapes for element in elements_of(shape))]
+        lines += [f"{fit.link}:", *elements_of(fit)]
     return "\n".join([*lines, "nothing is written: give --write for that"])
 
 

@@ -48,6 +48,11 @@ class MeshSurface:
         )
         self._inside = lru_cache(maxsize=4096)(self._find_inside)
 
+    def near_distances(self, points: Array) -> Array:
+        """(n,) [m] from points (n, 3) to the nearest place: some `SPACING` more than to the surface at most."""
+        distances: Array = self._tree.query(points)[0]
+        return distances
+
     def distances(self, points: Array) -> Array:
         """(n,) [m] from points (n, 3) to the surface: exact where one of the nearest places is on the nearest triangle,
         else a little more."""

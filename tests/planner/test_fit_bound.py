@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from services.collision_fitting.clipping import clipped, common_corners
+from services.collision_fitting.enclosing_hull import MOST_SIDES, enclosing_hull
 from services.collision_fitting.excess import SHARE, Excess, depth_in, excess_of
 from services.collision_fitting.fitted_shape import Fitted
 from services.collision_fitting.mesh_fit import LinkFit, beyond_bound
@@ -23,6 +24,7 @@ from services.collision_fitting.mesh_surface import MeshSurface
 from services.collision_fitting.parts import shapes_around
 from services.planner.collision_geometry.coal_shapes import is_inside, tree_of
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
+from services.planner.collision_geometry.solids import polytope_around
 
 WITHIN = 0.005  # [m]
 SEEDS = st.integers(0, 2**32 - 1)
@@ -52,7 +54,45 @@ def spiked() -> trimesh.Trimesh:
     return trimesh.boolean.union([trimesh.creation.box((0.1, 0.1, 0.1)), spike])
 
 
+def bent_tube() -> trimesh.Trimesh:
+    """Two straight tubes and a quarter of a ring between them, of one body."""
+    straight = [(0.0, 0.0, z) for z in np.linspace(0.0, 0.12, 5)]
+    bend = [(0.08 - 0.08 * np.cos(turn), 0.0, 0.12 + 0.08 * np.sin(turn)) for turn in np.linspace(0.1, 1.5, 10)]
+    path = np.array([*straight, *bend, *((x, 0.0, 0.2) for x in np.linspace(0.1, 0.2, 4))])
+    turns = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+    circle = trimesh.path.polygons.Polygon(0.04 * np.column_stack((np.cos(turns), np.sin(turns))))
+    return trimesh.creation.sweep_polygon(circle, path)
+
+
+def crossed_tubes() -> trimesh.Trimesh:
+    """A joint's housing: a tube into another of equal width, cut off obliquely and covered by a lid of its own, with
+    open triangles: as a vendor draws it."""
+    across = trimesh.transformations.rotation_matrix(np.pi / 2.0, (1.0, 0.0, 0.0))
+    housing = trimesh.creation.cylinder(0.06, 0.13, sections=64, transform=across)
+    neck = trimesh.creation.cylinder(0.05, 0.3, sections=64)
+    neck.apply_translation((0.0, 0.0, 0.15))
+    both = trimesh.boolean.union([housing, neck])
+    cut = both.slice_plane((0.0, -0.04, 0.0), (0.0, 1.0, 0.5))
+    lid = trimesh.creation.cylinder(0.061, 0.004, sections=64)
+    lid.apply_transform(trimesh.geometry.align_vectors((0.0, 0.0, 1.0), (0.0, 1.0, 0.5)))
+    lid.apply_translation((0.0, -0.04, 0.0))
+    return trimesh.util.concatenate([cut, lid])
+
+
+def flanged_tube() -> trimesh.Trimesh:
+    ends = [
+        trimesh.creation.cylinder(
+            0.05, 0.02, sections=48, transform=trimesh.transformations.translation_matrix((0.0, 0.0, z))
+        )
+        for z in (-0.15, 0.15)
+    ]
+    return trimesh.boolean.union([trimesh.creation.cylinder(0.03, 0.3, sections=48), *ends])
+
+
 MESHES = {
+    "a bent tube": bent_tube,
+    "crossed tubes": crossed_tubes,
+    "a tube with flanges": flanged_tube,
     "an angle": lambda: trimesh.creation.extrude_polygon(trimesh.path.polygons.Polygon(LEG), 0.04),
     "a hollow link": lambda: trimesh.creation.annulus(0.035, 0.04, 0.18),
     "six parts": six_parts,
@@ -82,6 +122,7 @@ def drawn_on(shape: CollisionShape, random: np.random.Generator, count: int) -> 
         ShapeKind.BOX: lambda: trimesh.creation.box(shape.size),
         ShapeKind.CYLINDER: lambda: trimesh.creation.cylinder(*shape.size, sections=128),
         ShapeKind.SPHERE: lambda: trimesh.creation.icosphere(5, shape.size[0]),
+        ShapeKind.HULL: lambda: trimesh.Trimesh(shape.mesh.vertices, shape.mesh.faces, process=False),
     }[shape.kind]()
     places, _ = trimesh.sample.sample_surface(made, count, seed=random)
     return places @ shape.rotation.T + shape.pose[0], float(made.area)
@@ -140,6 +181,53 @@ def test_parts_in_one_link_get_a_shape_each_where_one_box_stood_far_beyond():
     assert len(fitted) <= 8
 
 
+@pytest.mark.parametrize("name", ["a bent tube", "crossed tubes", "a tube with flanges"])
+def test_a_tube_needs_a_shape_for_each_of_its_bends_and_steps(name: str):
+    _, fitted, excess = fitted_to(name)
+    assert len(fitted) <= 6
+    assert excess.worst < 0.012
+
+
+def test_an_open_tube_is_cut_along_its_bore_until_its_wall_is_left():
+    """No one cut makes a difference: halves are as full as the whole."""
+    _, fitted, excess = fitted_to("a hollow link")
+    assert len(fitted) <= 8
+    assert excess.worst < 0.006
+
+
+@given(SEEDS, st.integers(4, 200))
+@settings(max_examples=40, deadline=None)
+def test_a_hull_of_few_sides_holds_all_points_and_stands_out_little(seed: int, count: int):
+    random = np.random.default_rng(seed)
+    points = random.uniform(-0.1, 0.1, (count, 3)) * random.uniform(0.05, 1.0, 3)
+    hull = enclosing_hull(points, np.zeros((0, 3)))
+    assert hull is not None
+    (shape,) = hull.shapes
+    assert depth_in([shape], points).min() >= 1e-6
+    own = polytope_around(points)
+    assert own.depth(np.array(hull.corners) + hull.origin.xyz).min() >= -0.004
+    assert len(hull.corners) <= 2 * MOST_SIDES
+
+
+def test_points_on_a_plane_have_no_hull():
+    flat = np.column_stack((np.random.default_rng(0).uniform(size=(30, 2)), np.zeros(30)))
+    assert enclosing_hull(flat, np.zeros((0, 3))) is None
+
+
+@given(SEEDS)
+@settings(max_examples=30, deadline=None)
+def test_projection_onto_a_polytope_brings_no_point_farther_from_any_of_its_points(seed: int):
+    random = np.random.default_rng(seed)
+    solid = polytope_around(random.normal(size=(30, 3)))
+    outside, inner = random.normal(size=(50, 3)) * 4.0, random.normal(size=(200, 3))
+    inner = inner[solid.depth(inner) >= 0.0]
+    moved = solid.nearest(outside)
+    before = np.linalg.norm(outside[:, None] - inner[None], axis=2)
+    after = np.linalg.norm(moved[:, None] - inner[None], axis=2)
+    assert (after <= before + 1e-12).all()
+    assert solid.depth(moved).min() > -0.1
+
+
 @given(SEEDS)
 @settings(max_examples=30, deadline=None)
 def test_both_sides_of_a_cut_have_all_of_the_triangles_and_no_more(seed: int):
@@ -178,5 +266,6 @@ def test_what_cannot_be_met_is_said_with_the_figure_the_place_and_what_would_do(
     fit = LinkFit("forearm", mesh, shapes, WITHIN, excess)
     assert not fit.is_within
     said = beyond_bound(fit, 1)
-    assert said.startswith('link "forearm": 91 % of the surface of its 1 shapes is within 5 mm of its mesh, not 95 %')
-    assert re.search(r"\(-?0, -?0, -?90\) mm stands 3[45]\.\d mm beyond it: give --most 2 or --within \d+mm$", said)
+    said_of = r'link "forearm": (89|9[01]) % of the surface of its 1 shapes is within 5 mm of its mesh, not 95 %: '
+    assert re.match(said_of, said)
+    assert re.search(r"\(-?\d, -?\d, -?90\) mm stands 3[1-5]\.\d mm beyond it: give --most 2 or --within \d+mm$", said)

@@ -19,8 +19,8 @@ from services.arm.model.description import Arm, load_arm
 from services.arm.model.srdf_edit import with_pairs
 from services.arm.model.urdf_edit import with_collisions
 from services.cli.robot_folder import plan_of
-from services.collision_fitting.excess import SHARE, depths
-from services.collision_fitting.fit_writing import touching_states, write_fits
+from services.collision_fitting.excess import SHARE, depth_in, depths
+from services.collision_fitting.fit_writing import HULLS, touching_states, write_fits
 from services.collision_fitting.fitted_shape import Fitted, Kind
 from services.collision_fitting.fitting import fitted
 from services.collision_fitting.hull import smallest_ball
@@ -30,7 +30,8 @@ from services.collision_fitting.mesh_surface import MeshSurface
 from services.collision_fitting.parts import shapes_around
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision_geometry.coal_shapes import is_inside
-from services.planner.collision_geometry.shapes import TriangleMesh
+from services.planner.collision_geometry.link_shapes import link_shapes
+from services.planner.collision_geometry.shapes import ShapeKind, TriangleMesh
 
 URDF = Path(__file__).parents[2] / "urdf"
 SEEDS = st.integers(0, 2**32 - 1)
@@ -70,7 +71,7 @@ def test_the_smallest_ball_holds_all_and_no_other_place_needs_less(seed: int, di
         assert np.linalg.norm(points - moved, axis=1).max() >= radius - 1e-9
 
 
-@given(SEEDS, st.sampled_from(list(Kind)))
+@given(SEEDS, st.sampled_from([kind for kind in Kind if kind is not Kind.HULL]))
 @settings(max_examples=40, deadline=None)
 def test_what_has_one_of_the_shapes_is_found_to_have_it(seed: int, kind: Kind):
     random = np.random.default_rng(seed)
@@ -143,7 +144,7 @@ def test_an_angle_of_one_piece_is_cut_into_its_legs():
     made = trimesh.creation.extrude_polygon(trimesh.path.polygons.Polygon(outline), 0.04)
     surface = MeshSurface(as_mesh(made))
     one, two = shapes_around(surface, 0.005, 1), shapes_around(surface, 0.005, 24)
-    assert one[0].volume == pytest.approx(0.2 * 0.2 * 0.04, rel=0.01)
+    assert one[0].volume == pytest.approx(made.convex_hull.volume, rel=0.01)
     assert len(two) == 2
     assert sum(each.volume for each in two) < 1.05 * made.volume
     assert {each.kind for each in two} == {Kind.BOX}
@@ -331,3 +332,40 @@ def test_edges_of_the_text_stay_as_they_are():
     for link in ("b", "nowhere"):
         with pytest.raises(ValueError, match=f'link "{link}" has no <visual>'):
             with_collisions(text, {link: []})
+
+
+def _tubes(copied: Path) -> Arm:
+    """The arm with a mesh that takes convex hulls."""
+    bend = trimesh.creation.cylinder(0.03, 0.2, sections=32)
+    cut = bend.slice_plane((0.0, 0.0, 0.0), (0.0, 0.6, 0.8), cap=True)
+    _replace_mesh(copied, cut)
+    return load_arm(copied)
+
+
+def test_a_convex_hull_is_written_as_a_file_beside_the_urdf_and_read_as_a_solid(copied: Path):
+    arm = _tubes(copied)
+    link = _first_with_mesh(arm)
+    (fit,) = fit_links(arm, only=[link])
+    assert Kind.HULL in [each.kind for each in fit.shapes]
+    changed = write_fits(arm, [fit])
+    shapes = link_shapes(changed)[link]
+    assert ShapeKind.HULL in [shape.kind for shape in shapes]
+    assert depth_in(shapes, fit.mesh.vertices).min() >= 0.0
+    files = sorted((copied / HULLS).iterdir())
+    (written,) = [each for each in changed.model.links if each.name == link]
+    assert sorted(copied / each.mesh for each in written.collisions if each.mesh) == files
+
+
+def test_a_hull_that_is_no_longer_needed_leaves_no_file_and_one_that_failed_is_back(copied: Path):
+    arm = _tubes(copied)
+    (fit,) = fit_links(arm, only=[_first_with_mesh(arm)])
+    write_fits(arm, [fit])
+    before = {path: path.read_bytes() for path in (copied / HULLS).iterdir()}
+    wrong = replace(fit, mesh=TriangleMesh(fit.mesh.vertices + 1.0, fit.mesh.faces), shapes=fit.shapes[:1])
+    with pytest.raises(DescriptionError, match=r"sticks .* mm out of its shapes"):
+        write_fits(load_arm(copied), [wrong])
+    assert {path: path.read_bytes() for path in (copied / HULLS).iterdir()} == before
+    _replace_mesh(copied, trimesh.creation.box((0.1, 0.1, 0.1)))
+    arm = load_arm(copied)
+    write_fits(arm, fit_links(arm, only=[fit.link]))
+    assert not (copied / HULLS).exists()

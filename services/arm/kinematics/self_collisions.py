@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from services.arm.errors import DescriptionError
+from services.arm.kinematics.convex_meshes import convex_or_same
 from services.arm.kinematics.joint_mapping import JointMapping
 from services.arm.model.description import Arm
 
@@ -103,6 +104,8 @@ def _read_collision_geometry(arm: Arm, model: pin.Model) -> pin.GeometryModel:
             f"{arm.urdf_path}: {geometry.ngeoms} of {expected} collision shapes could be loaded; use box, cylinder, "
             "sphere or mesh (<capsule> is not URDF)"
         )
+    for shape in geometry.geometryObjects:
+        shape.geometry = convex_or_same(shape.geometry)
     return geometry
 
 

@@ -9,6 +9,7 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
+from services.arm.kinematics.convex_meshes import convex_hull
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 Array = NDArray[np.float64]
@@ -33,6 +34,19 @@ def geometry_of(shape: CollisionShape) -> coal.CollisionGeometry:
         case ShapeKind.MESH:
             assert shape.mesh is not None
             return tree_of(shape.mesh)
+        case ShapeKind.HULL:
+            assert shape.mesh is not None
+            return hull_around(shape.mesh)
+
+
+def hull_around(mesh: TriangleMesh) -> coal.Convex:
+    """The convex hull of a mesh's vertices, as coal has it."""
+    tree = coal.BVHModelOBBRSS()
+    tree.beginModel(len(mesh.faces), len(mesh.vertices))
+    tree.addVertices(mesh.vertices)
+    tree.addTriangles(mesh.faces.astype(np.int64))
+    tree.endModel()
+    return convex_hull(tree)
 
 
 @lru_cache(maxsize=64)

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import coal
+import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from services.arm.errors import DescriptionError
+from services.arm.kinematics.convex_meshes import corners_of
 from services.arm.kinematics.self_collisions import load_collision_geometry
 from services.arm.model.description import Arm
 from services.planner.collision_geometry.coal_shapes import mesh_of
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
-from services.planner.collision_geometry.solids import Box, Capsule, Cylinder, Solid
+from services.planner.collision_geometry.solids import Box, Capsule, Cylinder, Polytope, Solid, polytope_around
 
+Array = NDArray[np.float64]
 Form = tuple[ShapeKind, tuple[float, ...], TriangleMesh | None]
 
 
@@ -43,9 +50,34 @@ def _form_of(geometry: coal.CollisionGeometry, link: str) -> Form:
             return ShapeKind.SPHERE, (float(geometry.radius),), None
         case coal.BVHModelBase():
             return ShapeKind.MESH, (), mesh_of(geometry)
+        case coal.ConvexBase():
+            return ShapeKind.HULL, (), hull_mesh(corners_of(geometry))
     raise DescriptionError(
         f'link "{link}": there are no spheres for a {type(geometry).__name__}; use box, cylinder, sphere or mesh'
     )
+
+
+def hull_mesh(points: Array) -> TriangleMesh:
+    """The convex hull of points (n, 3) [m] that have a volume, its triangles turned outwards; of equal points the same
+    mesh, so that what is built of it is built once."""
+    return _hull_mesh(np.ascontiguousarray(points, dtype=float).tobytes())
+
+
+@lru_cache(maxsize=1024)
+def _hull_mesh(content: bytes) -> TriangleMesh:
+    points = np.frombuffer(content).reshape(-1, 3)
+    hull = ConvexHull(points)
+    corners = points[hull.simplices]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inwards = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) < 0.0
+    faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
+    used, numbers = np.unique(faces, return_inverse=True)
+    return TriangleMesh(points[used], numbers.reshape(-1, 3).astype(np.int32))
+
+
+@lru_cache(maxsize=1024)
+def _polytope_of(mesh: TriangleMesh) -> Polytope:
+    return polytope_around(mesh.vertices)
 
 
 def solid_of(shape: CollisionShape) -> Solid:
@@ -60,4 +92,7 @@ def solid_of(shape: CollisionShape) -> Solid:
             return Cylinder(size[0], 0.5 * size[1])
         case ShapeKind.CAPSULE:
             return Capsule(size[0], 0.5 * size[1])
+        case ShapeKind.HULL:
+            assert shape.mesh is not None
+            return _polytope_of(shape.mesh)
     raise ValueError(f'"{shape.name}": a {shape.kind} has no end and cannot be covered')

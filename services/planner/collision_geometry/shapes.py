@@ -24,10 +24,11 @@ class ShapeKind(StrEnum):
     CAPSULE = "capsule"  # radius, length of the straight part; along z
     HALF_SPACE = "half_space"  # nothing: solid where z <= 0
     MESH = "mesh"  # nothing
+    HULL = "hull"  # nothing; solid is what the convex hull of its mesh holds
 
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "half_space": 0, "mesh": 0}
+SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "half_space": 0, "mesh": 0, "hull": 0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +64,8 @@ class CollisionShape:
         wanted = SIZES[self.kind]
         if len(self.size) != wanted or not all(0.0 < value < math.inf for value in self.size):
             raise ValueError(f'"{self.name}": a {self.kind} has {wanted} sizes above 0 m, not {self.size}')
-        if (self.kind is ShapeKind.MESH) != (self.mesh is not None):
-            raise ValueError(f'"{self.name}": a mesh, and only a mesh, comes with its triangles')
+        if (self.kind in (ShapeKind.MESH, ShapeKind.HULL)) != (self.mesh is not None):
+            raise ValueError(f'"{self.name}": a mesh or hull, and nothing else, comes with its triangles')
         if not 0.0 <= self.padding < math.inf:
             raise ValueError(f'"{self.name}": padding must be 0 m or more, not {self.padding}')
         if not all(math.isfinite(value) for part in self.pose for value in part):

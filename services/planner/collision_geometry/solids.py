@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 Array = NDArray[np.float64]
+
+# Tuning constants: chosen, where a line does not say measured or standard.
+PROJECTIONS = 40  # onto one side of a polytope after the other; some ten are enough
+PLANE_DIGITS = 9  # to which the sides' planes are rounded: two triangles of one side are one plane
 
 
 class Solid(Hashable, Protocol):
@@ -107,3 +113,54 @@ class Capsule:
         axis = np.zeros_like(points)
         axis[..., 2] = np.clip(points[..., 2], -self.half_length, self.half_length)
         return axis
+
+
+@dataclass(frozen=True)
+class Polytope:
+    """The convex hull of corners [m]; `planes` are its sides: a unit normal, and what that times a point is at most."""
+
+    planes: tuple[tuple[float, ...], ...]
+    half_sizes: tuple[float, float, float]  # of a box about its own origin, not about its middle
+
+    @property
+    def half(self) -> Array:
+        """(3,) half sizes [m] of the box around it."""
+        return np.array(self.half_sizes)
+
+    def depth(self, points: Array) -> Array:
+        """(...) [m] to the surface from inside; below 0 outside, there at most as far as the surface is. Points are
+        (..., 3) [m]."""
+        depth: Array = (self._offsets - points @ self._normals.T).min(axis=-1)
+        return depth
+
+    def nearest(self, points: Array) -> Array:
+        """(..., 3) [m] the points themselves; for those outside a point of the surface, but for rounding.
+
+        Each is projected onto the plane that it is farthest beyond, again and again (projections onto convex sets): no
+        step brings it farther from any point of the solid.
+        """
+        moved = points.reshape(-1, 3).copy()
+        for _ in range(PROJECTIONS):
+            beyond = moved @ self._normals.T - self._offsets
+            worst = beyond.argmax(axis=1)
+            over = np.maximum(beyond[np.arange(len(moved)), worst], 0.0)
+            if not over.any():
+                break
+            moved -= over[:, None] * self._normals[worst]
+        return moved.reshape(points.shape)
+
+    @cached_property
+    def _normals(self) -> Array:
+        return np.array(self.planes)[:, :3]
+
+    @cached_property
+    def _offsets(self) -> Array:
+        return np.array(self.planes)[:, 3]
+
+
+def polytope_around(corners: Array) -> Polytope:
+    """The convex hull of corners (n, 3) [m] that have a volume."""
+    equations = ConvexHull(corners).equations
+    planes = np.unique(np.round(np.column_stack((equations[:, :3], -equations[:, 3])), PLANE_DIGITS), axis=0)
+    x, y, z = np.abs(corners).max(axis=0).tolist()
+    return Polytope(tuple(tuple(plane) for plane in planes.tolist()), (x, y, z))

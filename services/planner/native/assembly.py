@@ -155,7 +155,7 @@ class Assembly:
 def _told_cover(arm: Arm, link: str, shapes: Mapping[str, Sequence[CollisionShape]], bulge: float) -> SphereCover:
     """The link's spheres; what takes long, or is large, is said in the log."""
     several, number = shapes[link], list(shapes).index(link) + 1
-    triangles = sum(len(shape.mesh.faces) for shape in several if shape.mesh is not None)
+    triangles = sum(len(each.mesh.faces) for each in several if each.mesh and each.kind is ShapeKind.MESH)
     place = f'{arm.name}, link "{link}" ({number} of {len(shapes)})'
     if triangles:
         log.info("%s: spheres around %d triangles ...", place, triangles)
@@ -234,5 +234,5 @@ def _form(shape: CollisionShape) -> tuple[int, tuple[float, float, float], float
             return 1, (size[0], 0.0, 0.5 * size[1]), 0.0
         case ShapeKind.HALF_SPACE:
             return 2, (0.0, 0.0, 0.0), 0.0
-        case ShapeKind.MESH:
+        case ShapeKind.MESH | ShapeKind.HULL:
             return 3, (0.0, 0.0, 0.0), 0.0

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.planner.collision_geometry.link_shapes import solid_of
-from services.planner.collision_geometry.shapes import CollisionShape
+from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 from services.planner.collision_geometry.solids import Capsule, Solid
 from services.planner.native.binding import motion
 from services.planner.native.model_cache import cached_rows
@@ -59,7 +59,7 @@ def _placed(shape: CollisionShape, bulge: float) -> SphereCover:
 
 def kept_cover(shape: CollisionShape, bulge: float) -> SphereCover:
     """The spheres [m] of a shape about its own origin, from the disk where they have been made before."""
-    if shape.mesh is None:
+    if shape.mesh is None or shape.kind is ShapeKind.HULL:
         return _kept_solid(solid_of(shape), bulge)
     vertices, faces = shape.mesh.arrays
     content = b"".join(

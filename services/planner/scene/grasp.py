@@ -63,7 +63,7 @@ def width_of(shape: CollisionShape, pose: Rigid) -> float:
             return float(np.abs(turn) @ np.array(shape.size))
         case ShapeKind.SPHERE:
             return 2.0 * shape.size[0]
-        case ShapeKind.MESH:
+        case ShapeKind.MESH | ShapeKind.HULL:
             assert shape.mesh is not None
             return float(np.ptp(shape.mesh.vertices @ turn))
         case _:
