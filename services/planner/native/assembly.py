@@ -155,7 +155,7 @@ class Assembly:
 def _told_cover(arm: Arm, link: str, shapes: Mapping[str, Sequence[CollisionShape]], bulge: float) -> SphereCover:
     """The link's spheres; what takes long, or is large, is said in the log."""
     several, number = shapes[link], list(shapes).index(link) + 1
-    triangles = sum(len(each.mesh.faces) for each in several if each.mesh and each.kind is ShapeKind.MESH)
+    triangles = sum(len(shape.mesh.faces) for shape in several if shape.mesh is not None)
     place = f'{arm.name}, link "{link}" ({number} of {len(shapes)})'
     if triangles:
         log.info("%s: spheres around %d triangles ...", place, triangles)
