@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from services.arm.kinematics.joint_mapping import JointMapping
 from services.arm.kinematics.kinematics import frame_of_link
 from services.arm.model.description import Arm
+from services.planner.collision_geometry.coal_shapes import hull_around
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 
 Array = NDArray[np.float64]
@@ -72,3 +73,6 @@ def solid_of(shape: CollisionShape) -> coal.CollisionGeometry:
                 model.addTriangle(*vertices[face])
             model.endModel()
             return model
+        case ShapeKind.HULL:
+            assert shape.mesh is not None
+            return hull_around(shape.mesh)

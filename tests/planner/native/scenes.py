@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from services.arm.frames.transforms import Rigid
+from services.planner.collision_geometry.link_shapes import hull_mesh
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 
 Array = NDArray[np.float64]
@@ -26,6 +27,8 @@ def random_shape(rng: np.random.Generator, kind: ShapeKind, name: str) -> Collis
         return CollisionShape(name, kind, (), ((0.0, 0.0, -0.05 - 0.2 * rng.random()), _leaning(rng)))
     if kind is ShapeKind.MESH:
         return CollisionShape(name, kind, (), random_pose(rng), rng.choice([box_mesh, star_mesh])(rng))
+    if kind is ShapeKind.HULL:
+        return CollisionShape(name, kind, (), random_pose(rng), hull_mesh(rng.uniform(-0.1, 0.1, (12, 3))))
     sizes = {ShapeKind.BOX: 3, ShapeKind.SPHERE: 1, ShapeKind.CYLINDER: 2, ShapeKind.CAPSULE: 2}[kind]
     return CollisionShape(name, kind, tuple(rng.uniform(0.02, 0.2, sizes).tolist()), random_pose(rng))
 
