@@ -78,7 +78,7 @@ class CollisionChecker:
         if found.touching is not None:
             return found.touching
         for stretch in found.unresolved:
-            touching = self.world.touching(stretch, margin)
+            touching = self.world.touching(stretch.rows, margin, stretch.pairs)
             if touching is not None:
                 return touching
         return None

@@ -29,18 +29,25 @@ class ContinuousCheck:
     def __init__(self, reach: Array, look: Look) -> None:
         self.reach, self._look = reach, look
 
-    def touching(self, positions: Array, margin: float, deadline: Deadline = NEVER) -> Array | None:
+    def touching(
+        self,
+        positions: Array,
+        margin: float,
+        deadline: Deadline = NEVER,
+        asked: NDArray[np.int_] | None = None,
+    ) -> Array | None:
         """Any configuration along the rows of `positions` (m, n) at which a pair is nearer than `margin` [m], or None;
-        raises `PlanRefused` once the deadline has passed."""
-        moved = self._movement(positions)
+        of the `asked` (k,) pairs alone where these are given. Raises `PlanRefused` once the deadline has passed."""
+        among = np.arange(len(self.reach)) if asked is None else asked
+        moved = self._movement(positions, among)
         finest = max(FINEST * margin, float(moved[-1].max(initial=0.0)) / MOST_LOOKS)
-        waiting = [(0.0, float(len(positions) - 1), np.arange(len(self.reach)), moved[0], moved[-1])]
+        waiting = [(0.0, float(len(positions) - 1), np.arange(len(among)), moved[0], moved[-1])]
         while waiting:
             deadline.check()
             low, high, pairs, left, right = waiting.pop()
             middle = 0.5 * (low + high)
             configuration = _at(middle, positions)
-            spare = self._look(configuration, pairs.tolist()) - margin
+            spare = self._look(configuration, among[pairs].tolist()) - margin
             if spare.size and float(spare.min()) <= 0.0:
                 return configuration
             reached, known = _at(middle, moved)[pairs], np.maximum(spare, finest)
@@ -51,10 +58,10 @@ class ContinuousCheck:
                 waiting.append((middle, high, pairs[after], reached[after], right[after]))
         return None
 
-    def _movement(self, positions: Array) -> Array:
-        """(m, k) [m] that each pair has moved at most since the first row."""
-        steps = np.abs(np.diff(positions, axis=0)) @ self.reach.T
-        return np.concatenate((np.zeros((1, len(self.reach))), np.cumsum(steps, axis=0)))
+    def _movement(self, positions: Array, among: NDArray[np.int_]) -> Array:
+        """(m, k) [m] that each of these (k,) pairs has moved at most since the first row."""
+        steps = np.abs(np.diff(positions, axis=0)) @ self.reach[among].T
+        return np.concatenate((np.zeros((1, len(among))), np.cumsum(steps, axis=0)))
 
 
 def _at(place: float, rows: Array) -> Array:

@@ -9,11 +9,12 @@ import math
 import threading
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from services.arm.kinematics.self_collisions import LinkPair
 from services.arm.model.description import Arm
 from services.planner.collision.native_scene import native_scene
 from services.planner.collision.world import Positions, World
@@ -33,12 +34,19 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+class Stretch(NamedTuple):
+    """The rows (m, n) of a polyline, and the names of the pairs that may touch on it; None for all pairs."""
+
+    rows: Array
+    pairs: frozenset[LinkPair] | None = None
+
+
 @dataclass(frozen=True)
 class Resolution:
-    """Answer about a polyline: a configuration (n,) that surely touches, or the stretches (m, n) left unresolved."""
+    """Answer about a polyline: a configuration (n,) that surely touches, or the stretches that are left unresolved."""
 
     touching: Array | None = None
-    unresolved: tuple[Array, ...] = ()
+    unresolved: tuple[Stretch, ...] = ()
 
 
 class SphereCheck(Protocol):
@@ -99,8 +107,10 @@ class NativeCheck:
         touching = planner.touching(rows)
         if touching is not None:
             return Resolution(touching)
-        intervals = planner.unresolved_intervals(rows).tolist()
-        return Resolution(unresolved=tuple(rows_between(rows, begin, end) for begin, end in intervals))
+        intervals = planner.unresolved_intervals(rows)
+        return Resolution(
+            unresolved=tuple(Stretch(rows_between(rows, each.begin, each.end), each.pairs) for each in intervals)
+        )
 
     @cached_property
     def _planner(self) -> NativePlanner:
@@ -129,7 +139,7 @@ class ExactShapesOnly:
 
     def resolve(self, world: World, rows: Array, margin: float) -> Resolution:
         """The whole polyline through `rows` (m, n) [rad] or [m], unresolved."""
-        return Resolution(unresolved=(rows,))
+        return Resolution(unresolved=(Stretch(rows),))
 
 
 def sphere_check(arm: Arm) -> SphereCheck:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -136,10 +138,22 @@ class World:
         """(pairs, n) how far at most [m] two shapes move against one another per unit of each joint."""
         return self._sweep.reach
 
-    def touching(self, positions: Array, margin: float) -> Array | None:
+    def touching(self, positions: Array, margin: float, pairs: frozenset[LinkPair] | None = None) -> Array | None:
         """Any configuration along the rows of `positions` (m, n) at which something is nearer than `margin` [m], or
-        None."""
-        return self._sweep.touching(positions, margin, self.deadline)
+        None; of the `pairs` of these names alone, in either order, where they are given."""
+        return self._sweep.touching(positions, margin, self.deadline, None if pairs is None else self._numbers(pairs))
+
+    def _numbers(self, pairs: frozenset[LinkPair]) -> NDArray[np.int_]:
+        """(k,) the places in `pair_names` of all shapes of the pairs of these names."""
+        numbers = (self._by_name.get(pair, []) + self._by_name.get((pair[1], pair[0]), []) for pair in pairs)
+        return np.array(sorted(chain.from_iterable(numbers)), dtype=int)
+
+    @cached_property
+    def _by_name(self) -> dict[LinkPair, list[int]]:
+        places: dict[LinkPair, list[int]] = {}
+        for place, pair in enumerate(self._geometry.names):
+            places.setdefault(pair, []).append(place)
+        return places
 
     def pairs_within(self, positions: Positions, margin: float = 0.0) -> list[LinkPair]:
         """The pairs of names nearer than `margin` [m], each once."""

@@ -74,7 +74,9 @@ def look(
     seconds: float,
     cancel: CancelFlag | None,
 ) -> tuple[int, Array]: ...
-def unresolved_intervals(world: World, kernel: Kernel, rows: Array, margin: float, finest: float) -> Array: ...
+def doubts(
+    world: World, kernel: Kernel, rows: Array, margin: float, finest: float
+) -> list[tuple[float, float, Integers]]: ...
 def plan(
     world: World,
     kernel: Kernel,

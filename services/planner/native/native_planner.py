@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
 MARGIN = 0.001  # [m]
 FINEST = 0.0002  # [m] how much nearer than the margin a way may seem before it is refused
+COARSE = 0.001  # [m] the same where the true shapes have the last word
 FREE, TOUCHING = 0, 1  # motion_validator.h
 FOUND = 0  # plan.h
 
@@ -32,6 +33,14 @@ class ContactPair(NamedTuple):
 
     first: str
     second: str
+
+
+class UnresolvedInterval(NamedTuple):
+    """From one fractional row number of a polyline to another, and which pairs may come too near there."""
+
+    begin: float
+    end: float
+    pairs: frozenset[ContactPair]
 
 
 class NativePlanner:
@@ -109,10 +118,17 @@ class NativePlanner:
         """True if the uniform cubic B-spline of the control points (k, n) [rad] or [m] keeps the margin everywhere."""
         return self._look(self._rows(control), 3)
 
-    def unresolved_intervals(self, rows: ArrayLike) -> Array:
-        """Intervals (k, 2) of fractional row numbers in which the polyline through `rows` (m, n) [rad] or [m] is not
-        known to keep the margin."""
-        return motion.unresolved_intervals(self._scene.world, self._kernel, self._rows(rows), self.margin, FINEST)
+    def unresolved_intervals(self, rows: ArrayLike) -> list[UnresolvedInterval]:
+        """Where the polyline through `rows` (m, n) [rad] or [m] is not known to keep the margin, in order."""
+        compiled_scene = self._scene
+        found = motion.doubts(compiled_scene.world, self._kernel, self._rows(rows), self.margin, COARSE)
+        name_of = compiled_scene.name_of
+        return [
+            UnresolvedInterval(
+                begin, end, frozenset(ContactPair(name_of(first), name_of(second)) for first, second in pairs.tolist())
+            )
+            for begin, end, pairs in found
+        ]
 
     def touching(self, rows: ArrayLike) -> Array | None:
         """A configuration (n,) [rad] or [m] on the polyline through `rows` (m, n) that does not keep the margin,

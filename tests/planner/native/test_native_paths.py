@@ -7,6 +7,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from schemas.frames import Transform
+from schemas.scene import BoxShape, CylinderShape, PlanningScene, SceneObject
+from services.arm.kinematics.kinematics import Kinematics
+from services.planner.collision.sphere_check import show_scene
+from services.planner.collision.world import World
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 from services.planner.native.native_planner import NativePlanner
 from services.planner.native.paths import Effort, FreePath
@@ -73,8 +78,9 @@ def test_what_is_not_in_doubt_is_free_by_coal_too(arm, core, configurations):
     truth, wholly = Truth(arm, scene), 0
     for corners in configurations(90, 50).reshape(30, 3, -1):
         rows = corners[0] + 0.3 * (corners - corners[0])
-        doubts = core.unresolved_intervals(rows)
-        assert (len(doubts) == 0) == core.path_free(rows)
+        intervals = core.unresolved_intervals(rows)
+        doubts = np.array([(each.begin, each.end) for each in intervals]).reshape(-1, 2)
+        assert not len(doubts) or not core.path_free(rows)
         assert (doubts[:, 0] < doubts[:, 1]).all()
         assert (doubts[:-1, 1] < doubts[1:, 0]).all()
         wholly += len(doubts) == 0
@@ -84,6 +90,40 @@ def test_what_is_not_in_doubt_is_free_by_coal_too(arm, core, configurations):
                 configuration = rows[first] + (place - first) * (rows[first + 1] - rows[first])
                 assert truth.distance(configuration) > core.margin - UNSURE
     assert 0 < wholly < 30
+
+
+def test_what_comes_within_the_margin_is_among_the_pairs_in_doubt(arm, core, configurations):
+    rng = np.random.default_rng(15)
+    boxes = [random_object(rng, f"box {number}") for number in range(12)]
+    world = World(arm, Kinematics(arm), PlanningScene(objects=tuple(boxes)))
+    show_scene(core, world)
+    core.margin, within, several = 0.004, 0, 0
+    for corners in configurations(90, 51).reshape(30, 3, -1):
+        rows = corners[0] + 0.3 * (corners - corners[0])
+        intervals = core.unresolved_intervals(rows)
+        several += sum(len(each.pairs) > 1 for each in intervals)
+        for place in np.linspace(0.0, 2.0, 80).tolist():
+            first = min(int(place), 1)
+            near = world.pairs_within(rows[first] + (place - first) * (rows[first + 1] - rows[first]), core.margin)
+            told = {frozenset(pair) for each in intervals if each.begin <= place <= each.end for pair in each.pairs}
+            assert {frozenset(pair) for pair in near} <= told
+            within += len(near)
+    assert within > 20
+    assert several > 5
+
+
+def random_object(rng: np.random.Generator, name: str) -> SceneObject:
+    """A box or a cylinder within the arm's reach."""
+    size = tuple(rng.uniform(0.02, 0.1, 3).tolist())
+    shape = BoxShape(size=size) if rng.random() < 0.5 else CylinderShape(radius=size[0], length=size[1])
+    place = tuple((rng.uniform(0.1, 0.4) * directed(rng)).tolist())
+    return SceneObject(name=name, shape=shape, pose=Transform(translation=place, rotation=UPRIGHT))
+
+
+def directed(rng: np.random.Generator) -> np.ndarray:
+    """(3,) of length 1."""
+    some = rng.normal(size=3)
+    return np.asarray(some / np.linalg.norm(some))
 
 
 @pytest.mark.parametrize("thickness", [0.02, 0.002, 0.0002, 0.00002])

@@ -33,6 +33,7 @@ class CollisionCheck {
 
   private:
     bool is_over() const {
+        if (query_.marks != nullptr) return false;
         const uint32_t hits = result_.hits & query_.lanes;
         return hits == query_.lanes || (query_.first_hit_is_all && hits != 0);
     }
@@ -40,7 +41,7 @@ class CollisionCheck {
     // The lanes that could still learn something from a squared distance of which `limit` is the least that is free.
     uint32_t within(const Lanes& gap, float limit) const {
         const Lanes wide = open_ + limit;
-        return not_beyond(gap, wide * wide) & query_.lanes & ~result_.hits;
+        return not_beyond(gap, wide * wide) & query_.lanes & (query_.marks != nullptr ? kAllLanes : ~result_.hits);
     }
 
     void note(const Lanes& gap, float limit, uint32_t near, int32_t first, int32_t second) {
@@ -52,11 +53,12 @@ class CollisionCheck {
             result_.second = second;
         }
         result_.near |= near;
+        if (query_.marks != nullptr) query_.marks[first * (kMaxParts + world_.obstacle_count) + second] = 1;
         close();
     }
 
     // Lanes that are already known to be near only want to know of hits.
-    void close() { open_ = select(spread(result_.near), 0.0f, motion_); }
+    void close() { open_ = query_.marks != nullptr ? motion_ : select(spread(result_.near), 0.0f, motion_); }
 
     void begin(float motion) {
         motion_ = half_ * motion;

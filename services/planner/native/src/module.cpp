@@ -222,10 +222,10 @@ nb::ndarray<nb::numpy, bool> are_free(const World& world, const Kernel& kernel, 
                 for (size_t i = 0; i < dof; ++i) joints[i * kLanes + lane] = static_cast<float>(row[i]);
             }
             CheckResult checked;
-            kernel.check(
-                world.view(),
-                {joints, half, still.data(), still.data(), static_cast<float>(margin), (1u << lanes) - 1, false},
-                checked);
+            kernel.check(world.view(),
+                         {joints, half, still.data(), still.data(), static_cast<float>(margin), (1u << lanes) - 1,
+                          false, nullptr},
+                         checked);
             for (size_t lane = 0; lane < lanes; ++lane) verdicts[first + lane] = !(checked.hits >> lane & 1u);
         }
     }
@@ -243,7 +243,7 @@ nb::tuple clearance(const World& world, const Kernel& kernel, const Row& row, do
     while (high - low > 1e-6) {
         for (int lane = 0; lane < kLanes; ++lane)
             half[lane] = static_cast<float>(low + (high - low) * (lane + 1) / kLanes);
-        kernel.check(world.view(), {joints, half, unit.data(), unit.data(), 0.0f, kAllLanes, true}, checked);
+        kernel.check(world.view(), {joints, half, unit.data(), unit.data(), 0.0f, kAllLanes, true, nullptr}, checked);
         if (checked.hits != 0) return nb::make_tuple(0.0, checked.first, checked.second);
         if (checked.near == 0 && low == 0.0 && high == most) return nb::make_tuple(most, -1, -1);
         int free = 0;
@@ -284,24 +284,29 @@ nb::tuple look(const World& world, const Kernel& kernel, const Rows& rows, int d
                           array_of(Joints(validator.touching()), {validator.touching().size()}));
 }
 
-// The ranges (k, 2) of a polyline, in rows, that are not known to be free.
-nb::ndarray<nb::numpy, double> unresolved_intervals(const World& world, const Kernel& kernel, const Rows& rows,
-                                                    double margin, double finest) {
+// Of a polyline that is not known to be free: for each range, in rows, begin and end, and the pairs (k, 2) in doubt.
+nb::list doubts(const World& world, const Kernel& kernel, const Rows& rows, double margin, double finest) {
     require_columns(rows.shape(1), static_cast<size_t>(world.dof()), "joint values");
     require_usable(rows.data(), rows.size());
     require(rows.shape(0) > 1, "a polyline needs two rows");
     Tolerances tolerances;
     tolerances.margin = margin;
     tolerances.finest = finest;
-    MotionValidator validator(world, kernel, tolerances);
-    const Polyline path(rows.data(), rows.shape(0), rows.shape(1));
-    std::vector<double> ranges;
-    for (const auto& range :
-         validator.unresolved_intervals(path, StopCondition(std::numeric_limits<double>::infinity(), nullptr))) {
-        ranges.insert(ranges.end(), range.begin(), range.end());
+    std::vector<MotionValidator::Doubt> found;
+    {
+        nb::gil_scoped_release release;
+        MotionValidator validator(world, kernel, tolerances);
+        const Polyline path(rows.data(), rows.shape(0), rows.shape(1));
+        found = validator.doubts(path, StopCondition(std::numeric_limits<double>::infinity(), nullptr));
     }
-    const size_t count = ranges.size() / 2;
-    return array_of(std::move(ranges), {count, size_t{2}});
+    nb::list result;
+    for (const auto& doubt : found) {
+        std::vector<int32_t> pairs;
+        for (const auto& pair : doubt.pairs) pairs.insert(pairs.end(), pair.begin(), pair.end());
+        const size_t count = doubt.pairs.size();
+        result.append(nb::make_tuple(doubt.begin, doubt.end, array_of(std::move(pairs), {count, size_t{2}})));
+    }
+    return result;
 }
 
 std::vector<Joints> each_row(const Rows& rows, const World& world, const char* what) {
@@ -438,7 +443,7 @@ NB_MODULE(_motion, module) {
     module.def("first_contact", &first_contact, "world"_a, "kernel"_a, "row"_a, "margin"_a);
     module.def("look", &look, "world"_a, "kernel"_a, "rows"_a, "degree"_a, "margin"_a, "finest"_a, "seconds"_a,
                "cancel"_a.none());
-    module.def("unresolved_intervals", &unresolved_intervals, "world"_a, "kernel"_a, "rows"_a, "margin"_a, "finest"_a);
+    module.def("doubts", &doubts, "world"_a, "kernel"_a, "rows"_a, "margin"_a, "finest"_a);
     module.def("plan", &find, "world"_a, "kernel"_a, "bounds"_a, "start"_a, "goals"_a, "seed"_a, "margin"_a,
                "seconds"_a, "cancel"_a.none(), "enough"_a);
     module.def("quintics", &quintics, "stamps"_a, "positions"_a, "velocities"_a, "accelerations"_a, "times"_a,

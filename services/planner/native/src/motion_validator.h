@@ -65,39 +65,70 @@ class MotionValidator {
         return Verdict::kFree;
     }
 
-    // From where to where, in spans, the path is not known to be free; empty where all of it is.
-    std::vector<std::array<double, 2>> unresolved_intervals(const JointPath& path, const StopCondition& stop) {
+    // From where to where, in spans, the path is not known to be free, and of which pairs: parts, or a part and
+    // kMaxParts + an obstacle.
+    struct Doubt {
+        double begin, end;
+        std::vector<std::array<int32_t, 2>> pairs;
+    };
+
+    // In order; empty where all of the path is free.
+    std::vector<Doubt> doubts(const JointPath& path, const StopCondition& stop) {
         begin(path);
-        std::vector<std::array<double, 2>> found;
+        std::vector<Stretch> found;
         for (size_t next = 0, count = 0; next < stretches_.size(); next += count) {
             count = std::min<size_t>(kLanes, stretches_.size() - next);
             const uint32_t hits = check(path, next, count, false);
             for (size_t lane = 0; lane < count; ++lane) {
                 const Stretch stretch = stretches_[next + lane];
                 if (((hits | result_.near) >> lane & 1u) == 0 || (!stop() && cut(stretch))) continue;
-                const double middle = static_cast<double>(stretch.span) + stretch.middle;
-                found.push_back({middle - stretch.half, middle + stretch.half});
+                found.push_back(stretch);
             }
         }
-        return joined(std::move(found));
+        return joined(path, std::move(found));
     }
 
   private:
-    // In order, and those that meet as one.
-    static std::vector<std::array<double, 2>> joined(std::vector<std::array<double, 2>> ranges) {
-        std::sort(ranges.begin(), ranges.end());
-        std::vector<std::array<double, 2>> result;
-        for (const auto& range : ranges) {
-            if (result.empty() || range[0] > result.back()[1] + 1e-9) result.push_back(range);
-            result.back()[1] = range[1];
-        }
-        return result;
-    }
-
     struct Stretch {
         size_t span;
         double middle, half;
     };
+
+    static double middle_of(const Stretch& stretch) { return static_cast<double>(stretch.span) + stretch.middle; }
+
+    // In order, and those that meet as one, with the pairs of all of them.
+    std::vector<Doubt> joined(const JointPath& path, std::vector<Stretch> found) {
+        std::sort(found.begin(), found.end(),
+                  [](const Stretch& a, const Stretch& b) { return middle_of(a) < middle_of(b); });
+        stretches_ = std::move(found);
+        std::vector<Doubt> result;
+        for (size_t first = 0, next = 0; first < stretches_.size(); first = next) {
+            Doubt doubt{middle_of(stretches_[first]) - stretches_[first].half, 0.0, {}};
+            for (next = first; next < stretches_.size(); ++next) {
+                const double begins = middle_of(stretches_[next]) - stretches_[next].half;
+                if (next > first && begins > doubt.end + 1e-9) break;
+                doubt.end = middle_of(stretches_[next]) + stretches_[next].half;
+            }
+            doubt.pairs = near_pairs(path, first, next);
+            result.push_back(std::move(doubt));
+        }
+        return result;
+    }
+
+    // All that are near in any of the stretches from one up to another.
+    std::vector<std::array<int32_t, 2>> near_pairs(const JointPath& path, size_t first, size_t last) {
+        const size_t parts = static_cast<size_t>(world_.view().part_count);
+        const size_t columns = kMaxParts + static_cast<size_t>(world_.view().obstacle_count);
+        std::vector<uint8_t> marks(parts * columns, 0);
+        for (size_t next = first; next < last; next += kLanes) {
+            check(path, next, std::min<size_t>(kLanes, last - next), false, marks.data());
+        }
+        std::vector<std::array<int32_t, 2>> pairs;
+        for (size_t i = 0; i < marks.size(); ++i) {
+            if (marks[i] != 0) pairs.push_back({static_cast<int32_t>(i / columns), static_cast<int32_t>(i % columns)});
+        }
+        return pairs;
+    }
 
     static size_t first_lane(uint32_t lanes) {
         size_t lane = 0;
@@ -143,7 +174,8 @@ class MotionValidator {
     }
 
     // The lanes that touch; the others are not looked at where one does and `is_one_enough`.
-    uint32_t check(const JointPath& path, size_t next, size_t count, bool is_one_enough = true) {
+    uint32_t check(const JointPath& path, size_t next, size_t count, bool is_one_enough = true,
+                   uint8_t* marks = nullptr) {
         float joints[kMaxDof * kLanes], half[kLanes];
         double row[kMaxDof];
         for (size_t lane = 0; lane < kLanes; ++lane) {
@@ -155,7 +187,8 @@ class MotionValidator {
         const uint32_t lanes = (1u << count) - 1;
         const float margin = static_cast<float>(tolerances_.margin);
         kernel_.check(world_.view(),
-                      {joints, half, part_motion_.data(), pair_motion_.data(), margin, lanes, is_one_enough}, result_);
+                      {joints, half, part_motion_.data(), pair_motion_.data(), margin, lanes, is_one_enough, marks},
+                      result_);
         checks_ += count;
         return result_.hits;
     }

@@ -88,7 +88,7 @@ struct WorldView {
     const ObstacleView* obstacles;
     const NodeView* tree;  // spheres around the bounded obstacles; its leaves' items are obstacles
     const int32_t* unbounded;
-    int32_t frame_count, part_count, pair_count, tree_count, unbounded_count;
+    int32_t frame_count, part_count, pair_count, tree_count, unbounded_count, obstacle_count;
 };
 
 struct CheckQuery {
@@ -99,6 +99,7 @@ struct CheckQuery {
     float margin;           // [m] that must stay free
     uint32_t lanes;         // which lanes matter
     bool first_hit_is_all;  // whether one lane's hit ends the question
+    uint8_t* marks;  // null, or [parts][kMaxParts + obstacles]: all pairs near in a lane that matters are set to 1
 };
 
 struct CheckResult {

@@ -23,7 +23,7 @@ class World {
         add_obstacles();
         view_ = {chain_->frames.data(), part_views_.data(), pairs_.data(),         obstacles_.data(),
                  tree_.data(),          unbounded_.data(),  count(chain_->frames), count(part_views_),
-                 count(pairs_),         count(tree_),       count(unbounded_)};
+                 count(pairs_),         count(tree_),       count(unbounded_),     count(obstacles_)};
     }
     World(const World&) = delete;
     World& operator=(const World&) = delete;
