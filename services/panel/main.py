@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import logging
 import sys
 import threading
@@ -27,7 +28,7 @@ from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.shutdown import ShutdownRequest, end_soon, stop_on_signals
 
 NAME = "panel"
-PICTURES = 25.0  # [Hz] at most
+APART = 0.02  # [s] at least from the beginning of one picture to the next, however much is dragged
 TEXTS = 5.0  # [Hz]
 LOOK_FOR_TWIN = 2.0  # [s] of one look
 
@@ -40,6 +41,7 @@ class Panel:
         self._pages: dict[int, Page] = {}
         self._arms = arm_pages(deployment)
         self._lock = threading.Lock()
+        self._texts_at = -1.0 / TEXTS  # [s] monotonic
         self.operator = Operator(arm)
         with contextlib.redirect_stdout(None), own_pages_only(deployment.panel.host):  # without its own greeting
             self._server = viser.ViserServer(deployment.panel.host, deployment.panel.port, verbose=False)
@@ -49,28 +51,41 @@ class Panel:
         log.info(f"page: http://{deployment.panel.host}:{deployment.panel.port}")
 
     def run(self, stop: ShutdownRequest) -> None:
-        """Draws until it is asked to stop; ready while the arm's state is live."""
-        texts_at = 0.0
-        while not stop.is_set:
-            began = time.monotonic()
-            readings = self.operator.bus.read()
-            self._arm.node.set_ready(readings.is_live, "" if readings.is_live else "no fresh joint_states")
+        """Draws until it is asked to stop, when something has changed; ready while the arm's state is live."""
+        gc.freeze()  # what is loaded by now stays: to look through it again would hold up everything for 0.1 s
+        try:
+            followed = 0.0  # [s] monotonic, of the last picture that somebody asked for
+            while not stop.is_set:
+                self.draw(time.monotonic())
+                if self.operator.wait(min(1.0 / TEXTS, self._world.period)):
+                    time.sleep(max(0.0, followed + APART - time.monotonic()))
+                    followed = time.monotonic()
+        finally:
+            gc.unfreeze()
+
+    def draw(self, now: float) -> None:
+        """One picture at `now` [s] monotonic, and the texts when their time has come."""
+        readings = self.operator.bus.read()
+        self._arm.node.set_ready(readings.is_live, "" if readings.is_live else "no fresh joint_states")
+        with self._server.atomic():  # one message for all of it
             self._world.update(readings)
-            if began - texts_at > 1.0 / TEXTS:
-                texts_at = began
-                for page in self._present():
-                    self._refresh(page, readings)
-            self.operator.wait(max(0.0, 1.0 / PICTURES - (time.monotonic() - began)))
+        self._server.flush()  # else viser waits for a sixtieth of a second
+        self.operator.bus.pace.drawn(tuple(readings.joints.values()), now)
+        if now - self._texts_at >= 1.0 / TEXTS:
+            self._texts_at = now
+            for page in self._present():
+                self._refresh(page, readings, now)
 
     def close(self) -> None:
         """Ends the server; the arm brakes where the page has led it."""
         self.operator.close()
         self._server.stop()
 
-    def _refresh(self, page: Page, readings: Readings) -> None:
+    def _refresh(self, page: Page, readings: Readings, now: float) -> None:
         """A browser may go at any moment, with everything that was built for it."""
         try:
-            page.refresh(readings)
+            with page.client.atomic():
+                page.refresh(readings, now)
         except Exception:
             if page in self._present():
                 raise

@@ -170,6 +170,10 @@ class Node:
         """
         return requests.PendingCall(self._bus, request, question, timeout, on_answer)
 
+    def is_served(self, request: Request[Q, R]) -> bool:
+        """True if a node serves `request` now. It is watched from the first look on, so that a later call finds it."""
+        return self._bus.wait_served(request.key, 0.0)
+
     def serve_action(self, action: Action[G, F, R], on_goal: OnGoal[G], on_cancel: OnCancel) -> ActionServer[G, F, R]:
         """Serves an action: `on_goal(goal_id, goal)` accepts or refuses, `on_cancel(goal_id)` says "" or why not."""
         clients = ClientWatch(self._watch_alive, lambda: self._bus.is_connected)

@@ -59,7 +59,7 @@ class LiveSliders:
                 if not self._is_open:
                     return
                 target = self._target
-            speeds = self.speeds(self._bus.read().joints, target)
+            speeds = self.speeds(self._bus.joints, target)
             if any(speeds.values()):
                 self._jogging.hold(JogWish(joints=speeds))
             else:

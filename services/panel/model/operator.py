@@ -17,6 +17,7 @@ from services.panel.model.motions import MotionChoice, Motions
 from services.panel.model.picks import Picks
 from services.panel.model.problems import Problem, problem_of
 from services.panel.model.readings import Bus
+from services.panel.model.stop_lane import StopLane
 from services.panel.model.teaching import Teaching
 
 PAGE = "the page"  # the holder's name, where the page has taken control
@@ -36,22 +37,24 @@ class Operator:
     """One for all browsers. Any thread may call it; errors are told in `newest_problem`, never raised."""
 
     def __init__(self, arm: gemelo.Arm) -> None:
-        self.arm, self.bus = arm, Bus(arm)
+        self._changed = threading.Event()
+        self.arm, self.bus = arm, Bus(arm, self.wake)
         cell = deployed_cell(arm.deployment)
         self.cameras = CameraPictures(arm, cell.camera_names)
         self.picks = Picks(arm, cell, self.tell, self.wake)
         self.choice = MotionChoice()
         self.homing: dict[str, str] = {}  # by joint what it does, while the arm homes
         self._told: ToldProblem | None = None
-        self._changed = threading.Event()
         self.goal = GoalSolver(arm, self.wake)
         self.motions = Motions(arm, self.tell)
         self.jogging = Jogging(arm, self._jog_refused)
         self.teaching = Teaching(arm, self.wake)
         self.live = LiveSliders(arm, self.jogging, self.bus)
+        self._stops = StopLane(arm, self.tell, self._end_all)
 
     def close(self) -> None:
         """Ends its threads; the arm brakes where the page has led it by hand."""
+        self._stops.close()
         self.teaching.stop()
         self.live.close()
         self.jogging.close()
@@ -61,10 +64,11 @@ class Operator:
         """Something that is shown has changed."""
         self._changed.set()
 
-    def wait(self, timeout: float) -> None:
-        """Returns after a change, or after `timeout` [s]."""
-        self._changed.wait(timeout)
+    def wait(self, timeout: float) -> bool:
+        """True after a change, False after `timeout` [s] without one."""
+        has_changed = self._changed.wait(timeout)
         self._changed.clear()
+        return has_changed
 
     def tell(self, problem: Problem) -> None:
         """Shows it at every browser."""
@@ -146,12 +150,15 @@ class Operator:
         self.wake()
 
     def stop(self) -> None:
-        """Before everything else; also what is planned just now does not begin."""
+        """Before everything else; also what is planned just now does not begin. Returns without waiting."""
         self.motions.on_stop()
         self.picks.on_stop()
+        self._stops.press()
+
+    def _end_all(self) -> None:
+        """What would move the arm again by itself."""
         self.jogging.release()
         self.live.switch(False)
-        self.guarded(self.arm.stop)
         self.guarded(self.teaching.stop)
 
     def set_speed(self, share: float) -> None:

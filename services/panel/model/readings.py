@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import gemelo
@@ -11,11 +12,14 @@ from gemelo.device import fault_of
 from schemas.control import ControlState
 from schemas.device import DeviceState, DeviceStatus
 from schemas.gripper import GripperState
+from schemas.joints import JointState
 from schemas.ledger import StepLedger, StoppingDistance
 from schemas.planning import JogStatus, PlannedPath
 from schemas.scene import Contacts, PlanningScene, SceneObject
 from schemas.system import LogRecord
 from services.arm.model.gripper import jaw_objects, jaws_apart
+from services.panel.model.pace import Pace
+from services.runtime.topics import Latest
 
 LOG_LINES = 12  # chosen: what a person reads at one look
 LATE = 0.5  # [s] a joint state older than that is not where the arm is
@@ -50,10 +54,12 @@ class Readings:
 class Bus:
     """Subscriptions of one connection. Any thread may read."""
 
-    def __init__(self, arm: gemelo.Arm) -> None:
+    def __init__(self, arm: gemelo.Arm, on_moved: Callable[[], object]) -> None:
+        """`on_moved` is called with a joint state of which a picture is due."""
         node, topics = arm.node, gemelo.topics
-        self._arm = arm
-        self._joints, self._commands = node.latest(topics.JOINT_STATES), node.latest(topics.JOINT_COMMANDS)
+        self._arm, self._on_moved, self.pace = arm, on_moved, Pace()
+        self._joints, self._commands = Latest(topics.JOINT_STATES), node.latest(topics.JOINT_COMMANDS)
+        node.subscribe(topics.JOINT_STATES, self._on_joints)
         self._errors, self._sensors = node.latest(topics.STEP_ERRORS), node.latest(topics.SENSORS)
         self._state, self._status = node.latest(topics.DEVICE_STATE), node.latest(topics.DEVICE_STATUS)
         self._scene, self._contacts = node.latest(topics.SCENE), node.latest(topics.CONTACTS)
@@ -66,11 +72,11 @@ class Bus:
 
     def read(self) -> Readings:
         """Everything that has a value for every joint, now."""
-        joints, errors = self._joints.message, self._errors.message
+        errors = self._errors.message
         commands, sensors = self._commands.message, self._sensors.message
         state = self._state.message
         return Readings(
-            joints=dict(zip(joints.name, joints.position, strict=False)) if joints is not None else {},
+            joints=self.joints,
             age=self._joints.age(),
             step_errors=dict(zip(errors.name, errors.error, strict=False)) if errors is not None else {},
             commanded=dict(zip(commands.name, commands.position, strict=False)) if commands is not None else {},
@@ -85,6 +91,17 @@ class Bus:
             stopping=self._stopping.message if not self._stopping.is_stale else None,
             control=self._control.message,
         )
+
+    def _on_joints(self, state: JointState) -> None:
+        self._joints.on_message(state)
+        if self.pace.is_due(state.position, time.monotonic()):
+            self._on_moved()
+
+    @property
+    def joints(self) -> Mapping[str, float]:
+        """[rad] or [m] measured, by joint."""
+        state = self._joints.message
+        return dict(zip(state.name, state.position, strict=False)) if state is not None else {}
 
     @property
     def scene(self) -> PlanningScene:

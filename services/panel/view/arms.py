@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -12,21 +13,51 @@ import yourdfpy
 from numpy.typing import NDArray
 from viser.extras import ViserUrdf
 
+from services.arm.frames.transforms import Rigid
+from services.arm.kinematics.chain import complete, joint_transform, link_transforms, origin_of
+from services.arm.model.description import Arm
+from services.arm.model.urdf import JointKind, UrdfJoint
+
 Array = NDArray[np.float64]
 Color = tuple[float, float, float, float]  # red, green, blue and opacity, each 0 to 1
 
 UNSEEN = 1e-5  # [rad] or [m] less of a joint is not drawn anew
 
 
+class JointFrames(ViserUrdf):
+    """The drawing of a URDF, whose nodes are known by the link that hangs on them."""
+
+    def by_link(self) -> dict[str, viser.SceneNodeHandle]:
+        """The node of each link but the root: its pose is the one in its parent link."""
+        pairs = zip(self._joint_map_values, self._joint_frames, strict=True)
+        return {joint.child: frame for joint, frame in pairs}
+
+
+@dataclass
+class DrawnJoint:
+    """One joint that moves, and its node."""
+
+    joint: UrdfJoint
+    origin: Rigid
+    node: viser.SceneNodeHandle
+    shown: float | None = None  # [rad] or [m]
+
+
 class DrawnArm:
     """One arm under the scene's node `name`; `color` paints all of it, else it has the URDF's colours."""
 
-    def __init__(self, server: viser.ViserServer, path: Path, name: str, color: Color | None = None) -> None:
-        self._model = load_model(path)
+    def __init__(self, server: viser.ViserServer, arm: Arm, name: str, color: Color | None = None) -> None:
+        self._model, self._name = arm.model, name
         self._root = server.scene.add_frame(name, show_axes=False)
-        self._drawn = ViserUrdf(server, self._model, root_node_name=name, mesh_color_override=color)
-        self._names = self._model.actuated_joint_names
-        self._shown: Array = np.zeros(0)
+        drawn = JointFrames(server, load_model(arm.urdf_path), root_node_name=name, mesh_color_override=color)
+        drawn.update_cfg(np.zeros(len(drawn.get_actuated_joint_names())))  # what is fixed is placed here only
+        self._nodes = drawn.by_link()
+        self._joints = [
+            DrawnJoint(joint, origin_of(joint), self._nodes[joint.child])
+            for joint in arm.model.joints
+            if joint.kind is not JointKind.FIXED
+        ]
+        self._positions: Mapping[str, float] = {}
 
     @property
     def is_visible(self) -> bool:
@@ -38,17 +69,34 @@ class DrawnArm:
             self._root.visible = visible
 
     def show(self, joints: Mapping[str, float]) -> bool:
-        """Joint values [rad] or [m] by name; False where it stands so already."""
-        values = np.array([joints.get(name, 0.0) for name in self._names])
-        if self._shown.shape == values.shape and float(np.abs(values - self._shown).max(initial=0.0)) < UNSEEN:
-            return False
-        self._shown = values
-        self._drawn.update_cfg(values)
-        return True
+        """Joint values [rad] or [m] by name; False where it stands so already.
 
-    def pose(self, link: str) -> Array:
-        """(4, 4) where `link` is in the base's frame, as the arm is drawn."""
-        return np.asarray(self._model.get_transform(link), dtype=float)
+        Only the nodes of joints that have moved are sent, and of each only what a joint of its kind changes.
+        """
+        positions = complete(self._model, joints)
+        moved = False
+        for drawn in self._joints:
+            at = positions.get(drawn.joint.name, 0.0)
+            if drawn.shown is not None and abs(at - drawn.shown) < UNSEEN:
+                continue
+            drawn.shown, moved = at, True
+            point, (x, y, z, w) = joint_transform(drawn.joint, at, drawn.origin)
+            if drawn.joint.kind is JointKind.PRISMATIC:
+                drawn.node.position = point
+            else:
+                drawn.node.wxyz = (w, x, y, z)
+        if moved:
+            self._positions = positions
+        return moved
+
+    def pose(self, link: str) -> Rigid:
+        """Where `link` is in the root link's frame, as the arm is drawn."""
+        return link_transforms(self._model, self._positions)[link]
+
+    def node_of(self, link: str) -> str:
+        """The scene's node that moves with `link`: what hangs on it needs not be sent while the arm moves."""
+        node = self._nodes.get(link)
+        return f"{self._name}/visual" if node is None else str(node.name)
 
 
 def load_model(path: Path) -> yourdfpy.URDF:

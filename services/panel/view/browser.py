@@ -1,10 +1,11 @@
 """The few lines of JavaScript that viser's page lacks, and what they tell of the browser.
 
 Space is Stop wherever the focus is but in a text field: a focused button would else be pressed by it, and a number
-field would swallow it. The arrow keys hold the jog buttons that name them. Once a second the browser's language, its
-wish for dark colours, its frame rate and the newest header that it has drawn come back through a hidden text field; a
-click into the image of a camera does at once. A press and its release are taken for the click, since the image may have
-been replaced by the next one between the two.
+field would swallow it. The arrow keys hold the jog buttons that name them. The browser's language, its wish for dark
+colours, its frame rate and the newest header that it has drawn come back through a hidden text field: with each header
+that bears a new mark, and when the rate has changed; a page on which nothing changes says nothing. A click into the
+image of a camera comes at once: a press and its release are taken for it, since the image may have been replaced by the
+next one between the two.
 The tabs stand closer, so that all of them have room in one row. A file that is too large is not sent at all.
 """
 
@@ -19,6 +20,7 @@ CHANNEL = "gemelo-browser"  # how the hidden field's text begins
 CAMERA_MARK = "data-gemelo-camera"  # the attribute of a camera's image that names the camera
 LARGEST_UPLOAD = 20_000_000  # [bytes] chosen: the planner takes 500,000 triangles, which are 25 MB
 DRAGGED = 6  # [pixels] of the page from the press to the release, from which on it was no click
+RATE_CHANGED = 0.3  # share of the frame rate by which it must change before the browser tells it by itself
 STOP_SIGN = "■"  # how the Stop button's text begins, in every language
 
 SCRIPT = """
@@ -79,7 +81,7 @@ SCRIPT = """
     tooLarge = size;
   }, true);
   const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;
-  let frames = 0, began = performance.now(), rate = 0, told = '', toldClicks = 0;
+  let frames = 0, began = performance.now(), rate = 0, told = '', toldClicks = 0, toldRate = 0;
   const tell = () => {
     frames += 1;
     const now = performance.now();
@@ -88,9 +90,11 @@ SCRIPT = """
     const sent = (document.querySelector('[data-gemelo-sent]') || {dataset: {}}).dataset.gemeloSent || '';
     if (field) {
       field.parentElement.parentElement.parentElement.parentElement.style.display = 'none';
-      if (sent !== told || clicks !== toldClicks) {
+      const hasNewRate = Math.abs(rate - toldRate) > RATE_CHANGED * toldRate;
+      if (sent !== told || clicks !== toldClicks || tooLarge || hasNewRate) {
         told = sent;
         toldClicks = clicks;
+        toldRate = rate;
         set.call(field, 'CHANNEL ' + JSON.stringify({sent: Number(sent), language: navigator.language, rate: rate,
           dark: matchMedia('(prefers-color-scheme: dark)').matches, width: innerWidth, height: innerHeight,
           too_large: tooLarge, clicked: clicked}));
@@ -138,6 +142,7 @@ def script_html() -> str:
         "CAMERA_MARK": CAMERA_MARK,
         "LARGEST_UPLOAD": str(LARGEST_UPLOAD),
         "DRAGGED": str(DRAGGED),
+        "RATE_CHANGED": str(RATE_CHANGED),
     }
     for name, value in values.items():
         script = script.replace(name, value)

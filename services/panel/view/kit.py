@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from typing import Literal
 
 import viser
@@ -33,6 +33,12 @@ class Kit:
         handle.on_click(without_event(act))
         if needs:
             self._gated.append((handle, needs))
+        return handle
+
+    def urgent(self, label: str, action: Callable[[], object], *, color: Color) -> viser.GuiButtonHandle:
+        """`action` runs where the browser's words are read, before all that other buttons do; it must not wait."""
+        handle = self.gui.add_button(label, color=color)
+        handle.on_click(at_once(action))
         return handle
 
     def held(self, label: str, action: Callable[[], object], *, rate: float, needs: str = "") -> viser.GuiButtonHandle:
@@ -69,6 +75,15 @@ def without_event(action: Callable[[], object]) -> Callable[[object], None]:
     """A callback of viser's that needs to know nothing of the event."""
 
     def run(event: object) -> None:
+        action()
+
+    return run
+
+
+def at_once(action: Callable[[], object]) -> Callable[[object], Coroutine[object, object, None]]:
+    """As `without_event`, but not in one of viser's threads, which may all be busy; `action` must not wait."""
+
+    async def run(event: object) -> None:
         action()
 
     return run

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 PLANE = (2.0, 2.0, 0.002)  # [m] as much of a plane as is drawn
 STANDING, CARRIED, TOUCHING = (150, 160, 175), (90, 170, 110), (215, 60, 50)
 DOT = 0.008  # [m] radius of a contact
-LinkPose = Callable[[str], Array]  # (4, 4) of a link in the base frame
+NodeOf = Callable[[str], str]  # the scene's node that moves with a link
 
 
 class Obstacles:
@@ -29,22 +29,23 @@ class Obstacles:
         self._server, self._folders = server, tuple(folders)
         self._drawn: dict[str, tuple[SceneObject, viser.MeshHandle]] = {}
         self._meshes: dict[str, trimesh.Trimesh] = {}
+        self._items: tuple[SceneObject, ...] = ()
         self._red: frozenset[str] = frozenset()
         self._contacts: tuple[Contact, ...] = ()
         self._dots: list[viser.SceneNodeHandle] = []
 
-    def show(self, items: Sequence[SceneObject], contacts: Sequence[Contact], link_pose: LinkPose) -> None:
-        """The scene's objects and the jaws, those in `contacts` red; carried ones where their link is."""
+    def show(self, items: Sequence[SceneObject], contacts: Sequence[Contact], node_of: NodeOf) -> None:
+        """The scene's objects and the jaws, those in `contacts` red; carried ones hang on their link."""
+        if tuple(items) == self._items and tuple(contacts) == self._contacts:
+            return
         red = frozenset(name for contact in contacts for name in (contact.first, contact.second))
         present = {item.name: item for item in items}
         for name in [name for name, (item, _) in self._drawn.items() if self._is_stale(item, present.get(name), red)]:
             self._drawn.pop(name)[1].remove()
         for name, item in present.items():
             if name not in self._drawn:
-                self._draw(item, name in red)
-            if item.attached:
-                self._place(self._drawn[name][1], link_pose(item.frame) @ matrix_of(item.pose))
-        self._red = red
+                self._draw(item, name in red, f"{node_of(item.frame)}/carried" if item.attached else "/scene")
+        self._items, self._red = tuple(items), red
         self._show_contacts(tuple(contacts))
 
     def under_the_cursor(self, origin: Array, direction: Array) -> Array | None:
@@ -61,21 +62,17 @@ class Obstacles:
     def _is_stale(self, drawn: SceneObject, item: SceneObject | None, red: frozenset[str]) -> bool:
         return drawn != item or (drawn.name in red) != (drawn.name in self._red)
 
-    def _draw(self, item: SceneObject, is_red: bool) -> None:
+    def _draw(self, item: SceneObject, is_red: bool, below: str) -> None:
         mesh = self._mesh(item)
         color = TOUCHING if is_red else CARRIED if item.attached else STANDING
         handle = self._server.scene.add_mesh_simple(
-            f"/scene/{abs(hash(item.name))}", mesh.vertices, mesh.faces, color=color, flat_shading=True,
+            f"{below}/{abs(hash(item.name))}", mesh.vertices, mesh.faces, color=color, flat_shading=True,
             opacity=0.95 if not item.attached else 0.8,
         )  # fmt: skip
         self._meshes[item.name] = mesh
-        self._place(handle, matrix_of(item.pose))
+        pose = matrix_of(item.pose)
+        handle.wxyz, handle.position = viser.transforms.SO3.from_matrix(pose[:3, :3]).wxyz, pose[:3, 3]
         self._drawn[item.name] = (item, handle)
-
-    def _place(self, handle: viser.MeshHandle, pose: Array) -> None:
-        wxyz, position = viser.transforms.SO3.from_matrix(pose[:3, :3]).wxyz, pose[:3, 3]
-        if not (np.allclose(handle.wxyz, wxyz, atol=1e-6) and np.allclose(handle.position, position, atol=1e-6)):
-            handle.wxyz, handle.position = wxyz, position
 
     def _show_contacts(self, contacts: tuple[Contact, ...]) -> None:
         if contacts == self._contacts:

@@ -18,7 +18,7 @@ from services.panel.view.arm_pages import ArmPage, arms_line
 from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, read_browser, script_html
 from services.panel.view.camera_box import CameraBox
 from services.panel.view.control_box import ControlBox
-from services.panel.view.kit import Kit, Mirror, box, esc, set_if_new, without_event
+from services.panel.view.kit import Kit, Mirror, at_once, box, esc, picture, set_if_new, without_event
 from services.panel.view.tabs.device import DeviceTab
 from services.panel.view.tabs.jog import JogTab
 from services.panel.view.tabs.move import MoveTab
@@ -61,19 +61,18 @@ class Page:
         self._built: Look | None = None
         self._is_plain = False  # drawn without shadows
         self._told = 0
+        self._said: tuple[str, bool] = ("", False)  # by the header, and whether the lag was known
 
-    def refresh(self, readings: Readings) -> None:
-        """Shows what has changed. All is built in here, by one thread: callbacks only say what is wanted."""
+    def refresh(self, readings: Readings, now: float) -> None:
+        """Shows what has changed, at `now` [s] monotonic. All is built in here, by one thread: callbacks only say what
+        is wanted."""
         if self._built != self._wanted:
             self._rebuild(self._wanted)
-        now = time.monotonic()
-        if now - self._marked > MARK:
-            self._marked = now
         self._kit.refresh(reasons(self._operator.arm, readings))
         is_held = readings.state is not None and readings.state.mode is DeviceMode.HOLD
         set_if_new(self._hold, "visible", not is_held)
         set_if_new(self._resume, "visible", is_held)
-        set_if_new(self._header, "content", self._header_text(readings))
+        self._show_header(readings, now)
         self._control.refresh(readings)
         self._show_problem()
         self._move.refresh(readings)
@@ -106,7 +105,7 @@ class Page:
         if self._arms:
             kit.line(arms_line(self._arms, self._operator.arm.name, words))
         self._header = kit.line()
-        kit.button(f"{STOP_SIGN} {words('stop')}", self._operator.stop, color="red")
+        kit.urgent(f"{STOP_SIGN} {words('stop')}", self._operator.stop, color="red")
         self._hold = kit.button(words("hold"), self._operator.arm.hold, color="gray", needs="hold")
         self._resume = kit.button(words("resume"), self._operator.arm.resume, color="gray", needs="resume")
         self._speed = gui.add_slider(words("speed"), 0, 100, 1, 100)
@@ -160,12 +159,12 @@ class Page:
     def _add_commands(self) -> None:
         """The same by keys, and in the palette that Ctrl-K opens."""
         words, gui, operator = self._words, self.client.gui, self._operator
-        keys: tuple[tuple[str, Literal["space", "H", "R", "P"], Callable[[], object]], ...] = (
-            ("stop", "space", operator.stop),
+        keys: tuple[tuple[str, Literal["H", "R", "P"], Callable[[], object]], ...] = (
             ("hold", "H", lambda: operator.guarded(operator.arm.hold)),
             ("resume", "R", lambda: operator.guarded(operator.arm.resume)),
             ("plan", "P", operator.plan),
         )
+        gui.add_command(words("stop"), hotkey="space").on_trigger(at_once(operator.stop))
         for name, key, action in keys:
             gui.add_command(words(name), hotkey=key).on_trigger(without_event(action))
 
@@ -176,7 +175,7 @@ class Page:
     def _rebuild(self, look: Look) -> None:
         self.close()
         self.client.gui.reset()
-        self._told = 0
+        self._told, self._said = 0, ("", False)
         self._build(look)
         self._built = look
 
@@ -198,22 +197,34 @@ class Page:
             self._was_chosen = True
             self._wanted = Look(language_of(browser.language), browser.dark)
 
-    def _header_text(self, readings: Readings) -> str:
-        words, state = self._words, readings.state
+    def _show_header(self, readings: Readings, now: float) -> None:
+        """Sent where it says something new; the newest lag and a new mark go with it, but are no reason to send it."""
+        text, color = self._header_text(readings)
+        said = text, isfinite(self.lag)
+        if said == self._said:
+            return
+        self._said = said
+        if now - self._marked > MARK:
+            self._marked = now
         mark = f'<span data-gemelo-sent="{1000 * (self._marked - self._began):.0f}"></span>'
+        lag = f" · {1000 * self.lag:.0f} ms" if isfinite(self.lag) and readings.is_live else ""
+        set_if_new(self._header, "content", mark + box(f"{text}{lag}", color))
+
+    def _header_text(self, readings: Readings) -> tuple[str, str]:
+        """What it says, and its colour."""
+        words, state = self._words, readings.state
         if state is None or not readings.is_live:
             age = f"{readings.age:.1f} s" if isfinite(readings.age) else "-"
             reason = readings.status.reason if readings.status is not None and not readings.status.online else ""
-            return mark + box(f"<b>{esc(words('not_live', age=age))}</b> {esc(reason)}", BAD)
+            return f"<b>{esc(words('not_live', age=age))}</b> {esc(reason)}", BAD
         worst = max((abs(error) for error in readings.step_errors.values()), default=0.0)
         error = words("step_error", steps=f"{worst:.2f}")
         if readings.status is not None and readings.status.open_loop:
             error = words("sent_not_verified")
-        lag = f", {1000 * self.lag:.0f} ms" if isfinite(self.lag) else ""
-        text = f"<b>{esc(words(f'mode_{state.mode.name.lower()}'))}</b> · {esc(error)} · {esc(words('live_data'))}{lag}"
+        text = f"<b>{esc(words(f'mode_{state.mode.name.lower()}'))}</b> · {esc(error)} · {esc(words('live_data'))}"
         if readings.fault:
-            return mark + box(f"{text}<br>{esc(readings.fault)}", BAD)
-        return mark + box(text, GOOD if state.armed and all(state.referenced) else NEUTRAL)
+            return f"{text}<br>{esc(readings.fault)}", BAD
+        return text, GOOD if state.armed and all(state.referenced) else NEUTRAL
 
     def _show_problem(self) -> None:
         told = self._operator.newest_problem

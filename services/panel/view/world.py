@@ -36,15 +36,16 @@ class World:
         arm = operator.arm.description
         self._operator, self._scene = operator, server.scene
         self._base, self._tool = arm.base_frame, arm.tool_frame
-        self.measured = DrawnArm(server, arm.urdf_path, "/measured")
-        self._goal = DrawnArm(server, arm.urdf_path, "/goal", GOAL)
-        self._bad_goal = DrawnArm(server, arm.urdf_path, "/bad_goal", BAD_GOAL)
-        self._ghost = DrawnArm(server, arm.urdf_path, "/ghost", GHOST)
+        self.measured = DrawnArm(server, arm, "/measured")
+        self._goal = DrawnArm(server, arm, "/goal", GOAL)
+        self._bad_goal = DrawnArm(server, arm, "/bad_goal", BAD_GOAL)
+        self._ghost = DrawnArm(server, arm, "/ghost", GHOST)
         self.obstacles = Obstacles(server, (project_root(), arm.folder))
         reach = max(0.3, float(np.linalg.norm(operator.goal.goal.pose.position)))
         self._set_stage(server, reach)
         self._gizmos = self._make_gizmos(0.35 * reach, operator.goal.rings)
-        self._frame = self._scene.add_frame("/tool", axes_length=0.12 * reach, axes_radius=0.004 * reach)
+        on_tool = f"{self.measured.node_of(self._tool)}/axes"
+        self._scene.add_frame(on_tool, axes_length=0.12 * reach, axes_radius=0.004 * reach)
         self._dragged: viser.TransformControlsHandle | None = None
         self._tool_pose = operator.goal.goal.pose
         for gizmo in self._gizmos:
@@ -65,7 +66,12 @@ class World:
         self._show_plan()
         contacts = goal.problem.contacts if goal.problem is not None else ()
         bus = self._operator.bus
-        self.obstacles.show((*bus.scene.objects, *bus.jaws), contacts, self.measured.pose)
+        self.obstacles.show((*bus.scene.objects, *bus.jaws), contacts, self.measured.node_of)
+
+    @property
+    def period(self) -> float:
+        """[s] after which it wants to be drawn again, though nobody has said anything new."""
+        return 1.0 / GHOST_RATE if self._ghost.is_visible and self.is_playing else float("inf")
 
     @property
     def tool_pose(self) -> gemelo.Pose:
@@ -101,21 +107,16 @@ class World:
         return [arrows, turning]
 
     def _follow(self, gizmo: viser.TransformControlsHandle) -> None:
-        @gizmo.on_drag_start
-        def _(event: viser.TransformControlsEvent) -> None:
-            self._dragged = gizmo
-
         @gizmo.on_update
-        def _(event: viser.TransformControlsEvent) -> None:
+        async def _(event: viser.TransformControlsEvent) -> None:  # in viser's loop: in the order of the drag
+            self._dragged = None if event.phase == "end" else gizmo
+            if event.phase == "end":
+                self._operator.goal.settle()
+                return
             w, a, b, c = (float(value) for value in event.target.wxyz)
             x, y, z = (float(value) for value in event.target.position)
             pose = gemelo.Pose((x, y, z), (a, b, c, w))
             self._operator.goal.set_pose(pose, event.client_id if event.client_id is not None else -1)
-
-        @gizmo.on_drag_end
-        def _(event: viser.TransformControlsEvent) -> None:
-            self._dragged = None
-            self._operator.goal.settle()
 
     def _show_goal(self, goal: Goal, readings: Readings) -> None:
         measured = readings.joints
@@ -150,15 +151,12 @@ class World:
         self._ghost.show(configuration_at(plan, at))
 
     def _tool_moved(self) -> None:
-        pose = self.measured.pose(self._tool)
-        self._frame.position = pose[:3, 3]
-        self._frame.wxyz = viser.transforms.SO3.from_matrix(pose[:3, :3]).wxyz
-        x, y, z = (float(value) for value in pose[:3, 3])
-        w, a, b, c = (float(value) for value in self._frame.wxyz)
-        self._tool_pose = gemelo.Pose((x, y, z), (a, b, c, w))
-        if self._trail and float(np.linalg.norm(self._trail[-1] - pose[:3, 3])) < STEP:
+        point, orientation = self.measured.pose(self._tool)
+        self._tool_pose = gemelo.Pose(point, orientation)
+        tip = np.array(point)
+        if self._trail and float(np.linalg.norm(self._trail[-1] - tip)) < STEP:
             return
-        self._trail.append(pose[:3, 3].copy())
+        self._trail.append(tip)
         if len(self._trail) > 1 and time.monotonic() - self._trail_drawn > REDRAWN:
             self._trail_drawn = time.monotonic()
             self._draw_line("/executed", np.array(self._trail), EXECUTED)

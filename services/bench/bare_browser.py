@@ -1,0 +1,96 @@
+"""A browser of the operator's page that draws nothing: it speaks viser's protocol, reads all that is sent and drops it.
+
+What it measures is the page's own: a real browser without a graphics card takes most of a machine.
+"""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+import msgspec
+import viser
+import zstandard
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
+from websockets.typing import Subprotocol
+
+from services.panel.view.browser import CHANNEL
+
+CAMERA = {
+    "type": "ViewerCameraMessage", "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (1.0, 1.0, 1.0), "fov": 1.0, "near": 0.1,
+    "far": 100.0, "image_height": 720, "image_width": 840, "look_at": (0.0, 0.0, 0.0), "up_direction": (0.0, 0.0, 1.0),
+}  # fmt: skip
+LENGTHS = 16  # [bytes] before the compressed part of a frame: its length decompressed, and compressed
+MARK = re.compile(r'data-gemelo-sent="(\d+)"')
+Said = dict[str, Any]  # one message of viser's, as its fields by name; "type" is its class
+PATIENCE = 30.0  # [s]
+
+
+class BareBrowser:
+    """Hears in a thread of its own; `on_said` is called there with each message and when it came, [s] monotonic."""
+
+    def __init__(self, socket: Connection, on_said: Callable[[Said, float], object]) -> None:
+        self._socket, self._on_said = socket, on_said
+        self._news = threading.Condition()
+        self._labels: dict[str, str] = {}  # of buttons, by their number
+        self._channel, self._answered = "", ""  # the number of the hidden field, and the newest mark that was answered
+        self.frames = 0
+        socket.send(msgspec.msgpack.encode(CAMERA))  # with its first camera a browser is there
+        threading.Thread(target=self._hear, daemon=True, name="bare browser").start()
+
+    def press(self, label: str) -> None:
+        """Presses the newest button whose label begins so, once the page has it; raises TimeoutError if it has none."""
+        self._set(self._button(label), True)
+
+    def _set(self, number: str, value: object) -> None:
+        said = {"type": "GuiUpdateMessage", "uuid": number, "updates": {"value": value}}
+        self._socket.send(msgspec.msgpack.encode(said))
+
+    def _button(self, label: str) -> str:
+        with self._news:
+            if not self._news.wait_for(lambda: self._found(label), PATIENCE):
+                raise TimeoutError(f'the page has no button "{label}" after {PATIENCE:g} s')
+            return self._found(label)
+
+    def _found(self, label: str) -> str:
+        return next((number for number, text in reversed(self._labels.items()) if text.startswith(label)), "")
+
+    def _hear(self) -> None:
+        unpacker = zstandard.ZstdDecompressor()
+        with suppress(ConnectionClosed):
+            for frame in self._socket:
+                now = time.monotonic()
+                assert isinstance(frame, bytes)
+                length, packed = (int.from_bytes(frame[at : at + 8], "little") for at in (0, 8))
+                text = unpacker.decompress(frame[LENGTHS : LENGTHS + packed], max_output_size=length)
+                self.frames += 1
+                for said in msgspec.msgpack.decode(text)["messages"]:
+                    self._note(said)
+                    self._on_said(said, now)
+
+    def _note(self, said: Said) -> None:
+        """Remembers the buttons, and answers marks as the page's script does."""
+        if said["type"] == "GuiButtonMessage":
+            with self._news:
+                self._labels[said["uuid"]] = str(said["props"]["label"])
+                self._news.notify_all()
+        elif said["type"] == "GuiTextMessage" and said["value"].startswith(CHANNEL):
+            self._channel = said["uuid"]
+        found = MARK.search(str((said.get("props") or said.get("updates") or {}).get("content", "")))
+        if found and self._channel and found[1] != self._answered:
+            self._answered = found[1]
+            self._set(self._channel, f'{CHANNEL} {{"sent": {found[1]}, "language": "en", "rate": 60.0}}')
+
+
+@contextmanager
+def bare_browser(address: str, on_said: Callable[[Said, float], object]) -> Iterator[BareBrowser]:
+    """One that looks at the page at `address`, host and port."""
+    protocol = Subprotocol(f"viser-v{viser.__version__}")
+    with connect(f"ws://{address}", subprotocols=[protocol], max_size=None) as socket:
+        yield BareBrowser(socket, on_said)

@@ -1,0 +1,150 @@
+"""What the page sends, counted message by message: nothing while nothing changes, and little while the arm moves."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gemelo.device import Device
+from schemas.device import StopKind
+from schemas.frames import Transform
+from schemas.scene import BoxShape, PlanningScene, SceneObject
+from services.arm.model.description import load_arm
+from services.panel.main import TEXTS
+from services.panel.model.pace import EARLY, PERIOD, Pace
+from services.panel.view.arms import DrawnArm, load_model
+from services.panel.view.browser import STOP_SIGN
+from services.panel.words.en import ENGLISH
+from tests.panel.memory_page import ROOT, MemoryPage, memory_page
+from tests.runtime.support import until
+
+BUSY = 40  # presses, of which each keeps a thread: more than viser has
+
+
+@pytest.fixture(params=["rm1", "parol6"])
+def page(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[MemoryPage]:
+    with memory_page(request.param, tmp_path) as page:
+        settle(page)
+        yield page
+
+
+def settle(page: MemoryPage) -> None:
+    """Until the browser has all, and its answers have been shown."""
+    for _ in range(20):
+        page.draw(5)
+        if not page.sent():
+            page.draw(5)
+            if not page.sent():
+                return
+    raise AssertionError("the page goes on sending")
+
+
+def test_nothing_is_sent_to_a_browser_while_nothing_changes(page: MemoryPage):
+    page.draw(round(60.0 * TEXTS))
+    assert page.sent() == {}
+
+
+def test_a_picture_of_one_joint_that_moves_is_one_message_whatever_the_arm_carries(page: MemoryPage):
+    arm = page.panel.operator.arm.description
+    box = SceneObject(name="box", shape=BoxShape(size=(0.02, 0.02, 0.02)), frame=arm.tool_frame, attached=True,
+                      pose=Transform(translation=(0.0, 0.0, 0.02), rotation=(0.0, 0.0, 0.0, 1.0)))  # fmt: skip
+    page.gateway.show_scene(PlanningScene(objects=(box,)))
+    assert until(lambda: len(page.panel.operator.bus.scene.objects) == 1)
+    settle(page)
+    page.gateway.joints |= {arm.joints[0].name: 0.101}
+    page.now += PERIOD - 1.0 / TEXTS
+    page.draw()
+    said = page.sent()
+    assert {name: number for name, number in said.items() if name.startswith("Set")} == {"SetOrientationMessage": 1}
+    assert set(said) <= {"SetOrientationMessage", "GuiUpdateMessage"}
+
+
+def test_stop_goes_out_though_every_thread_is_busy_with_other_buttons(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    busy, over = [], threading.Event()
+
+    def keep(device: Device) -> None:
+        busy.append(device)
+        assert over.wait(60.0)
+
+    monkeypatch.setattr(Device, "reset", keep)
+    with memory_page("rm1", tmp_path) as page:
+        settle(page)
+        try:
+            for _ in range(BUSY):
+                page.browser.press(ENGLISH["reset"])
+            assert until(lambda: len(busy) >= 32)
+            page.browser.press(STOP_SIGN)
+            assert until(lambda: bool(page.gateway.stops))
+            assert page.gateway.stops[0].kind is StopKind.STOP
+            assert len(busy) < BUSY  # the others still wait for a thread
+        finally:
+            over.set()
+
+
+@pytest.mark.parametrize("robot", ["rm1", "parol6"])
+@settings(max_examples=20, deadline=None)
+@given(data=st.data())
+def test_the_drawn_arm_stands_as_the_urdf_says(robot: str, drawn_arms: dict[str, DrawnArm], data: st.DataObject):
+    arm, drawn = load_arm(ROOT / "urdf" / robot), drawn_arms[robot]
+    model = load_model(arm.urdf_path)
+    joints = {
+        joint.name: data.draw(st.floats(max(joint.lower, -3.0), min(joint.upper, 3.0))) for joint in arm.joints
+    }  # fmt: skip
+    drawn.show(joints)
+    model.update_cfg(np.array([joints.get(name, 0.0) for name in model.actuated_joint_names]))
+    for joint in arm.model.joints:
+        node = drawn._nodes[joint.child]
+        wanted = model.get_transform(joint.child, joint.parent)
+        w, x, y, z = node.wxyz
+        assert rotation(w, x, y, z) == pytest.approx(wanted[:3, :3], abs=1e-4)
+        assert node.position == pytest.approx(wanted[:3, 3], abs=1e-4)
+    tool = model.get_transform(arm.tool_frame)
+    assert drawn.pose(arm.tool_frame)[0] == pytest.approx(tool[:3, 3], abs=1e-4)
+
+
+@pytest.fixture(scope="module")
+def drawn_arms(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, DrawnArm]]:
+    with memory_page("rm1", tmp_path_factory.mktemp("page")) as page:
+        arms = {name: load_arm(ROOT / "urdf" / name) for name in ("rm1", "parol6")}
+        yield {name: DrawnArm(page.panel._server, arm, f"/test_{name}") for name, arm in arms.items()}
+
+
+def rotation(w: float, x: float, y: float, z: float) -> np.ndarray:
+    """(3, 3) of a unit quaternion."""
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def test_of_an_arm_that_moves_every_second_state_is_drawn_as_it_comes_and_the_last_one_too():
+    pace, drawn = Pace(), []
+    for step in range(500):
+        now, position = 0.02 * step + 0.004 * (step % 3), (float(min(step, 250)),)
+        if pace.is_due(position, now):
+            drawn.append(position)
+            pace.drawn(position, now)
+    assert 120 <= len(drawn) <= 130
+    assert drawn[0] == (0.0,)
+    assert drawn[-1] == (250.0,)
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 0.1), st.integers(0, 3)), max_size=100))
+def test_pictures_are_never_closer_than_they_may_be_and_never_of_what_is_drawn_already(heard: list[tuple[float, int]]):
+    pace, now, before, shown = Pace(), 0.0, float("-inf"), None
+    for wait, position in heard:
+        now += wait
+        if pace.is_due((float(position),), now):
+            assert now - before >= PERIOD - EARLY
+            assert position != shown
+            pace.drawn((float(position),), now)
+            before, shown = now, position
