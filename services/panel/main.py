@@ -65,14 +65,15 @@ class Panel:
 
     def draw(self, now: float) -> None:
         """One picture at `now` [s] monotonic, and the texts when their time has come."""
-        readings = self.operator.bus.read()
-        self._arm.node.set_ready(readings.is_live, "" if readings.is_live else "no fresh joint_states")
+        bus = self.operator.bus
+        self._arm.node.set_ready(bus.is_live, "" if bus.is_live else "no fresh joint_states")
+        joints = bus.joints
         with self._server.atomic():  # one message for all of it
-            self._world.update(readings)
+            self._world.update(joints)
         self._server.flush()  # else viser waits for a sixtieth of a second
-        self.operator.bus.pace.drawn(tuple(readings.joints.values()), now)
+        bus.pace.drawn(tuple(joints.values()), now)
         if now - self._texts_at >= 1.0 / TEXTS:
-            self._texts_at = now
+            self._texts_at, readings = now, bus.read()
             for page in self._present():
                 self._refresh(page, readings, now)
 

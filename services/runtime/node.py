@@ -41,7 +41,7 @@ from services.runtime.requests import client as requests
 from services.runtime.requests.exchanges import exchange_topic
 from services.runtime.requests.limits import RequestRates
 from services.runtime.requests.server import Pending, RequestServer, UrgentServer
-from services.runtime.topics import Latest, Publisher, Subscription
+from services.runtime.topics import Latest, LatestOnDemand, Publisher, Subscription
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Message)
@@ -131,8 +131,15 @@ class Node:
         self._endpoints.subscriptions.append(subscription)
         return subscription
 
-    def latest(self, topic: Topic[M]) -> Latest[M]:
-        """The newest message of a topic, with its age."""
+    def latest(self, topic: Topic[M], *, on_demand: bool = False) -> Latest[M]:
+        """The newest message of a topic, with its age.
+
+        `on_demand`: decoded only when somebody looks at it, in whatever thread that is; cheaper for what comes often.
+        """
+        if on_demand:
+            unread = LatestOnDemand(self._bus, self._loop, topic, self.log.warning)
+            self._endpoints.subscriptions.append(unread.subscription)
+            return unread
         latest = Latest(topic)
         self.subscribe(topic, latest.on_message)
         return latest

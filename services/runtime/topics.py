@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
@@ -12,7 +13,7 @@ from schemas.topics import ANY, Delivery, Topic
 from services.runtime.bus.interface import Arrival, Bus
 from services.runtime.bus.wire import from_arrival, schema_of, to_payload
 from services.runtime.loop.loop import Loop
-from services.runtime.loop.task_queue import ArrivalQueue, EveryQueue, LatestQueue
+from services.runtime.loop.task_queue import ArrivalQueue, EveryQueue, LatestQueue, UnreadQueue
 
 M = TypeVar("M", bound=Message)
 
@@ -54,16 +55,18 @@ class Subscription(Generic[M]):
         own: bool,
         batch: float | None,
         on_signed: Callable[[M, str], object] | None = None,
+        queue: UnreadQueue | None = None,
     ) -> None:
         """With `batch` [s] the messages are handled together, once in this time; with 0 each as it comes, but all.
 
         `on_signed` takes the place of `handler`, and is told the node that wrote the message too.
+        What lands in `queue` waits there for `take_in`.
         """
         self.topic = topic
         self._handler, self._on_signed, self._warn = handler, on_signed, warn
         self._received, self._bad, self._lost_said = 0, 0, False
         self._loop = loop
-        self._queue = self._queue_for(batch)
+        self._queue: ArrivalQueue = self._queue_for(batch) if queue is None else queue
         self._declaration = bus.subscribe(topic.key, topic.delivery, self._queue.on_arrival, self._queue.on_miss, own)
 
     def _queue_for(self, batch: float | None) -> ArrivalQueue:
@@ -76,7 +79,9 @@ class Subscription(Generic[M]):
 
     @property
     def statistics(self) -> TopicStatistics:
-        return TopicStatistics(key=self.topic.key, received=self._received, dropped=self._queue.dropped, bad=self._bad)
+        unread = self._queue.passed_over if isinstance(self._queue, UnreadQueue) else 0
+        received = self._received + unread
+        return TopicStatistics(key=self.topic.key, received=received, dropped=self._queue.dropped, bad=self._bad)
 
     def close(self) -> None:
         self._declaration.close()
@@ -88,6 +93,12 @@ class Subscription(Generic[M]):
         if self._queue.dropped and self.topic.delivery is not Delivery.LATEST and not self._lost_said:
             self._lost_said = True
             self._warn(f"{self.topic.key}: {self._queue.dropped} messages lost (counted from now on in statistics)")
+
+    def take_in(self, arrival: Arrival) -> bool:
+        """Hands over what has waited in a queue of its own; False where it is bad."""
+        before = self._received
+        self._handle(arrival)
+        return self._received > before
 
     def _handle(self, arrival: Arrival) -> None:
         try:
@@ -120,24 +131,53 @@ class Latest(Generic[M]):
 
     def __init__(self, topic: Topic[M]) -> None:
         self.topic = topic
-        self.message: M | None = None
+        self._message: M | None = None
         self._arrived = 0.0  # [s] monotonic
         self._arrived_unix = 0  # [ns]
 
+    @property
+    def message(self) -> M | None:
+        """None before the first."""
+        self._look()
+        return self._message
+
     def on_message(self, message: M) -> None:
-        self.message = message
+        self._message = message
         self._arrived, self._arrived_unix = time.monotonic(), time.time_ns()
 
     def age(self, now: int | None = None) -> float:
         """[s] since the message came, up to `now` [ns UNIX] where given; infinite before the first."""
-        if self.message is None:
+        self._look()
+        if self._message is None:
             return float("inf")
         return time.monotonic() - self._arrived if now is None else (now - self._arrived_unix) * 1e-9
 
     @property
     def is_stale(self) -> bool:
         """Older than five periods of the topic's rate, or never heard; a latched message stays valid."""
-        if self.message is not None and self.topic.delivery is Delivery.LATCHED:
+        age = self.age()
+        if self._message is not None and self.topic.delivery is Delivery.LATCHED:
             return False
         stale_after = DEFAULT_STALE_AFTER if self.topic.rate is None else PERIODS_TO_STALE / self.topic.rate
-        return self.age() > stale_after
+        return age > stale_after
+
+    def _look(self) -> None:
+        """Takes in what has come since; here that is done as it comes."""
+
+
+class LatestOnDemand(Latest[M]):
+    """As `Latest`, but a message is decoded when somebody asks for it, in the thread that asks.
+
+    For what comes often and is looked at now and then; the age counts from when it came.
+    """
+
+    def __init__(self, bus: Bus, loop: Loop, topic: Topic[M], warn: Warn) -> None:
+        super().__init__(topic)
+        self._queue, self._looking = UnreadQueue(), threading.Lock()
+        self.subscription = Subscription(bus, loop, topic, self.on_message, warn, False, None, queue=self._queue)
+
+    def _look(self) -> None:
+        with self._looking:
+            arrived = self._queue.take()
+            if arrived is not None and self.subscription.take_in(arrived.arrival):
+                self._arrived, self._arrived_unix = arrived.at, arrived.at_unix

@@ -15,8 +15,9 @@ from schemas.frames import RobotDescription
 from schemas.joints import JointState, JointTargets
 from schemas.message import BadMessage, encode
 from schemas.planning import PlanCode, PlanRequest, PlanResponse
-from schemas.system import Empty, LogRecord, NodeStatistics, Parameter, Parameters, SetParameter
+from schemas.system import Empty, LogRecord, NodeStatistics, Parameter, Parameters, SetParameter, TopicStatistics
 from schemas.topics import COMMAND_ACKS, DESCRIPTION, JOINT_STATES, LOG, PLAN, STATISTICS, Request
+from services.runtime import topics
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.errors import NoAnswer, NodeNameTaken, Refused
@@ -139,6 +140,42 @@ def test_latest_knows_its_age(buses: Buses) -> None:
     time.sleep(0.1)
     assert latest.is_stale
     assert 0.1 <= latest.age(reader.now()) < 0.5
+
+
+def test_on_demand_only_what_is_looked_at_is_decoded_and_its_age_counts_from_when_it_came(
+    buses: Buses, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    decoded: list[bytes] = []
+    decode = topics.from_arrival
+    monkeypatch.setattr(topics, "from_arrival", lambda kind, at: decoded.append(at.payload) or decode(kind, at))
+    reader, writer = buses.node("reader"), buses.node("writer")
+    latest = reader.latest(JOINT_STATES, on_demand=True)
+    assert latest.message is None
+    buses.settle()
+    for stamp in range(1, 101):
+        writer.publisher(JOINT_STATES).put(JointState(stamp=stamp))
+    assert until(lambda: figures(reader).received >= 99)  # the hundredth waits for somebody
+    time.sleep(0.1)
+    assert latest.is_stale  # nobody has spun: it was decoded in this thread
+    assert latest.age() >= 0.1
+    assert latest.message == JointState(stamp=100)
+    assert len(decoded) == 1
+    assert figures(reader).received == 100
+
+
+def figures(node: Node) -> TopicStatistics:
+    return next(each for each in node.statistics() if each.key == JOINT_STATES.key)
+
+
+def test_on_demand_a_bad_message_leaves_the_one_before_and_is_counted(buses: Buses) -> None:
+    reader, writer, stranger = buses.node("reader"), buses.node("writer"), buses.open()
+    latest = reader.latest(JOINT_STATES, on_demand=True)
+    buses.settle()
+    writer.publisher(JOINT_STATES).put(JointState(stamp=3))
+    assert until(lambda: latest.message)
+    stranger.publish(JOINT_STATES.key, "JointState", JOINT_STATES.delivery).put(b"\xc1 not msgpack")
+    assert until(lambda: latest.message and figures(reader).bad == 1)
+    assert latest.message == JointState(stamp=3)
 
 
 def test_bad_messages_are_dropped_counted_and_named_once(buses: Buses) -> None:

@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 import gemelo
 from gemelo.device import fault_of
@@ -14,12 +15,16 @@ from schemas.device import DeviceState, DeviceStatus
 from schemas.gripper import GripperState
 from schemas.joints import JointState
 from schemas.ledger import StepLedger, StoppingDistance
+from schemas.message import Message
 from schemas.planning import JogStatus, PlannedPath
 from schemas.scene import Contacts, PlanningScene, SceneObject
 from schemas.system import LogRecord
+from schemas.topics import Topic
 from services.arm.model.gripper import jaw_objects, jaws_apart
 from services.panel.model.pace import Pace
 from services.runtime.topics import Latest
+
+M = TypeVar("M", bound=Message)
 
 LOG_LINES = 12  # chosen: what a person reads at one look
 LATE = 0.5  # [s] a joint state older than that is not where the arm is
@@ -58,14 +63,14 @@ class Bus:
         """`on_moved` is called with a joint state of which a picture is due."""
         node, topics = arm.node, gemelo.topics
         self._arm, self._on_moved, self.pace = arm, on_moved, Pace()
-        self._joints, self._commands = Latest(topics.JOINT_STATES), node.latest(topics.JOINT_COMMANDS)
+        self._joints, self._commands = Latest(topics.JOINT_STATES), self._shown(topics.JOINT_COMMANDS)
         node.subscribe(topics.JOINT_STATES, self._on_joints)
-        self._errors, self._sensors = node.latest(topics.STEP_ERRORS), node.latest(topics.SENSORS)
-        self._state, self._status = node.latest(topics.DEVICE_STATE), node.latest(topics.DEVICE_STATUS)
+        self._errors, self._sensors = self._shown(topics.STEP_ERRORS), self._shown(topics.SENSORS)
+        self._state, self._status = self._shown(topics.DEVICE_STATE), node.latest(topics.DEVICE_STATUS)
         self._scene, self._contacts = node.latest(topics.SCENE), node.latest(topics.CONTACTS)
-        self._path, self._jog = node.latest(topics.PLANNED_PATH), node.latest(topics.JOG_STATUS)
-        self._gripper = node.latest(topics.GRIPPER_STATE)
-        self._ledger, self._stopping = node.latest(topics.STEP_LEDGER), node.latest(topics.STOPPING_DISTANCE)
+        self._path, self._jog = node.latest(topics.PLANNED_PATH), self._shown(topics.JOG_STATUS)
+        self._gripper = self._shown(topics.GRIPPER_STATE)
+        self._ledger, self._stopping = self._shown(topics.STEP_LEDGER), self._shown(topics.STOPPING_DISTANCE)
         self._control = node.latest(topics.CONTROL)
         self._log: deque[LogRecord] = deque(maxlen=LOG_LINES)
         node.subscribe(topics.LOG, self._log.append)
@@ -92,10 +97,19 @@ class Bus:
             control=self._control.message,
         )
 
+    def _shown(self, topic: Topic[M]) -> Latest[M]:
+        """What comes fifty times a second, and is shown five times."""
+        return self._arm.node.latest(topic, on_demand=True)
+
     def _on_joints(self, state: JointState) -> None:
         self._joints.on_message(state)
         if self.pace.is_due(state.position, time.monotonic()):
             self._on_moved()
+
+    @property
+    def is_live(self) -> bool:
+        """True while joint states come."""
+        return self._joints.age() < LATE
 
     @property
     def joints(self) -> Mapping[str, float]:

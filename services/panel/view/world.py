@@ -13,7 +13,6 @@ import viser
 import gemelo
 from services.panel.model.goal import Goal
 from services.panel.model.operator import Operator
-from services.panel.model.readings import Readings
 from services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, Rings
 from services.panel.view.arms import Array, DrawnArm
 from services.panel.view.obstacles import Obstacles
@@ -57,12 +56,12 @@ class World:
         self._played_at = 0.0
         self.is_playing, self.scrubbed = True, 0.0  # [s] of the plan that the ghost shows while it does not play
 
-    def update(self, readings: Readings) -> None:
-        """One picture."""
+    def update(self, measured: Mapping[str, float]) -> None:
+        """One picture of the arm at these joint values [rad] or [m], and of all else."""
         goal = self._operator.goal.goal
-        if self.measured.show(readings.joints):
+        if self.measured.show(measured):
             self._tool_moved()
-        self._show_goal(goal, readings)
+        self._show_goal(goal, measured)
         self._show_plan()
         contacts = goal.problem.contacts if goal.problem is not None else ()
         bus = self._operator.bus
@@ -118,8 +117,7 @@ class World:
             pose = gemelo.Pose((x, y, z), (a, b, c, w))
             self._operator.goal.set_pose(pose, event.client_id if event.client_id is not None else -1)
 
-    def _show_goal(self, goal: Goal, readings: Readings) -> None:
-        measured = readings.joints
+    def _show_goal(self, goal: Goal, measured: Mapping[str, float]) -> None:
         apart = any(abs(at - measured.get(name, at)) > APART for name, at in goal.joints.items())
         is_bad = goal.problem is not None and goal.wanted is None
         self._goal.is_visible = apart and not is_bad

@@ -7,8 +7,10 @@ message that does not fit is counted.
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Protocol
 
@@ -18,6 +20,15 @@ EVERY_CAPACITY = 4096  # messages
 EVERY_BYTES = 64 * 1024 * 1024
 
 Task = Callable[[], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Arrived:
+    """An arrival, and when it came."""
+
+    arrival: Arrival
+    at: float  # [s] monotonic
+    at_unix: int  # [ns]
 
 
 class TaskQueue:
@@ -127,6 +138,33 @@ class EveryQueue:
             arrival = self._waiting.popleft()
             self._bytes -= len(arrival.payload)
         self._handle(arrival)
+
+
+class UnreadQueue:
+    """The newest arrival, until somebody takes it: nobody is woken for it, and older ones are never decoded."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._waiting: Arrived | None = None
+        self.dropped = 0
+        self.passed_over = 0  # arrivals that nobody has looked at
+
+    def on_arrival(self, arrival: Arrival) -> None:
+        arrived = Arrived(arrival, time.monotonic(), time.time_ns())
+        with self._lock:
+            self.passed_over += self._waiting is not None
+            self._waiting = arrived
+
+    def on_miss(self, count: int) -> None:
+        self.dropped += count
+
+    def take(self) -> Arrived | None:
+        """The newest, once."""
+        if self._waiting is None:
+            return None
+        with self._lock:
+            arrived, self._waiting = self._waiting, None
+        return arrived
 
 
 def _nothing() -> None:
