@@ -1,32 +1,31 @@
 """The figures of the operator's page: what it costs, its lag, how soon its space bar stops, how fast a goal follows.
 
-A browser without a graphics card draws on the same cores, so all but `goal_drag_hz` measure the machine as well.
+A browser without a graphics card draws on the same cores, so what is measured beside one measures the machine as well;
+what a browser that does not draw sees is the page's own.
 """
 
 from __future__ import annotations
 
 import shutil
-import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from math import cos, pi, sin
 
 import psutil
-import viser
 from playwright.sync_api import Page, sync_playwright
-from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
-from websockets.typing import Subprotocol
 
 import gemelo
 from schemas.joints import JointState
 from services.arm.model.description import load_arm
+from services.bench.bare_browser import Said, bare_browser
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples, quantile
 from services.bench.stack import Stacks, has_mosquitto
 from services.bench.stops import Wire
 from services.panel.model.goal import GoalSolver
+from services.panel.model.pace import UNSEEN
+from services.panel.view.browser import STOP_SIGN
 from services.runtime.deployment import load_deployment, project_root
 from services.stack.stack import Stack
 
@@ -35,17 +34,17 @@ SIZE = {"width": 1280, "height": 720}
 SETTLE, WINDOW, WINDOWS = 3.0, 2.0, 5  # [s], [s], of CPU
 MOVES, STOPS = 20, 20
 DRAG = 4.0  # [s]
-MOVED = b"/measured/"  # in a message that draws the measured arm
+MEASURED = "/measured"  # the scene's node under which the measured arm is drawn
+AFTER_MOVE = 0.2  # [s]
 AMPLITUDE = 0.02  # [m] radius of the circle that is dragged
 PATIENCE = 60.0  # [s]
 
 
 @dataclass
 class Opened:
-    """A twin with a page, one browser that shows it, and an arm that can move."""
+    """A twin with a page, and an arm that can move."""
 
     stack: Stack
-    page: Page
     arm: gemelo.Arm
     address: str  # of the page, host and port
 
@@ -56,58 +55,58 @@ class Opened:
 
 
 def panel_cpu_percent(stacks: Stacks) -> Figure:
-    """CPU [% of a core] of the panel while the arm moves, with one browser; the reference is at rest."""
+    """CPU [% of a core] of the panel while the arm moves, with one browser; the references are at rest, and without
+    what a browser's drawing does to the machine."""
     with opened(stacks) as twin:
-        time.sleep(SETTLE)
-        rest = _shares(twin)
-        motion = twin.arm.start(named="left", speed=0.05)
-        moving = _shares(twin)
-        motion.cancel()
-        motion.wait()
-    idle = quantile(rest, 0.5)
-    note = f"{WINDOWS} windows of {WINDOW:g} s; at rest {idle:.1f} (goal 5), while it moves the goal is 15"
-    return of_samples(moving, Goal(median=15.0), {"at rest": idle}, note)
+        with bare_browser(twin.address, lambda said, at: None):
+            bare_rest, bare_moving = _shares_at_rest_and_moving(twin)
+        with _chromium(twin):
+            rest, moving = _shares_at_rest_and_moving(twin)
+    reference = {
+        "at rest": quantile(rest, 0.5),
+        "bare browser": quantile(bare_moving, 0.5),
+        "bare browser, at rest": quantile(bare_rest, 0.5),
+    }
+    note = f"{WINDOWS} windows of {WINDOW:g} s; at rest the goal is 5, while it moves 15; a bare browser does not draw"
+    return of_samples(moving, Goal(median=15.0), reference, note)
 
 
 def panel_lag_ms(stacks: Stacks) -> Figure:
     """From a joint state on the bus, the first that moves, to the message with it on the way to a browser [ms]."""
-    with opened(stacks) as twin, _drawn(twin.address) as drawn:
-        lags = []
-        for number in range(MOVES):
-            moved: list[float] = []
-            before = twin.arm.joints
+    with opened(stacks) as twin:
+        drawn: list[float] = []
 
-            def watch(state: JointState, before: dict[str, float] = before, moved: list[float] = moved) -> None:
-                here = zip(state.name, state.position, strict=True)
-                if not moved and any(abs(at - before[name]) > 1e-4 for name, at in here):
-                    moved.append(time.monotonic())
+        def note_drawn(said: Said, at: float) -> None:
+            if str(said.get("name", "")).startswith(MEASURED):
+                drawn.append(at)
 
-            heard = twin.arm.node.subscribe(gemelo.topics.JOINT_STATES, watch)
-            name = twin.arm.joint_names[0]
-            twin.arm.move(joints={name: 0.05 * (1 + number % 2)}, speed=0.5)
-            twin.page.wait_for_timeout(200.0)
-            heard.close()
-            after = [at for at in drawn if moved and at >= moved[0]]
-            if after:
-                lags.append(1000.0 * (after[0] - moved[0]))
-    return of_samples(lags, Goal(p99=60.0), note=f"{MOVES} moves from rest, one browser without a graphics card")
+        with bare_browser(twin.address, note_drawn):
+            bare = _lags(twin, drawn)
+            with _chromium(twin):
+                lags = _lags(twin, drawn)
+    note = f"{MOVES} moves from rest beside a browser without a graphics card; a bare browser does not draw"
+    return of_samples(lags, Goal(p99=60.0), _of_bare(bare), note)
 
 
 def stop_key_ms(stacks: Stacks) -> Figure:
-    """From the space bar to the STOP frame on the wire [ms], while the arm moves."""
+    """From the space bar to the STOP frame on the wire [ms], while the arm moves; the reference is from the word of a
+    browser that does not draw."""
     with opened(stacks) as twin:
         wire = Wire(int(twin.stack.deployment["GEMELO_MQTT_PORT"]), twin.arm.description.device.name)
         try:
-            taken = [_stopped(twin, wire, number) for number in range(STOPS)]
+            with bare_browser(twin.address, lambda said, at: None) as browser:
+                bare = [_stopped(twin, wire, number, lambda: browser.press(STOP_SIGN)) for number in range(STOPS)]
+            with _chromium(twin) as page:
+                taken = [_stopped(twin, wire, number, lambda: page.keyboard.press("Space")) for number in range(STOPS)]
         finally:
             wire.close()
-    note = f"{STOPS} moves; the device slows in its next slot, see hold_reaction_ms"
-    return of_samples(taken, Goal(p99=100.0), note=note)
+    note = f"{STOPS} moves; the device slows in its next slot, see hold_reaction_ms; a bare browser does not draw"
+    return of_samples(taken, Goal(p99=100.0), _of_bare(bare), note)
 
 
 def goal_drag_hz(stacks: Stacks) -> Figure:
     """Poses of a dragged goal that are solved and checked in a second, newest first, as from a browser at 60 Hz."""
-    with opened(stacks) as twin:
+    with opened(stacks) as twin, _chromium(twin):
         pose = twin.arm.fk(twin.arm.states["ready"])
         solver = GoalSolver(twin.arm, lambda: None)
         try:
@@ -125,39 +124,28 @@ def goal_drag_hz(stacks: Stacks) -> Figure:
 
 @contextmanager
 def opened(stacks: Stacks) -> Iterator[Opened]:
-    """Starts it all, and ends it; raises NotMeasured without Chromium."""
-    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if program is None:
-        raise NotMeasured("there is no Chromium: apt-get install chromium")
+    """Starts all but a browser, and ends it."""
     stacks.stop()
     broker = "mosquitto" if has_mosquitto() else "amqtt"
-    with Stack(broker=broker, panel=True) as stack, sync_playwright() as playwright:
+    with Stack(broker=broker, panel=True) as stack, _arm(stack) as arm:
         deployment = load_deployment(None, stack.environment)
-        with playwright.chromium.launch(executable_path=program, args=FLAGS) as browser, _arm(stack) as arm:
-            page = browser.new_page(viewport=SIZE)
-            address = f"{deployment.panel.host}:{deployment.panel.port}"
-            page.goto(f"http://{address}")
-            page.get_by_role("tab").first.wait_for(timeout=1000.0 * PATIENCE)
-            yield Opened(stack, page, arm, address)
+        yield Opened(stack, arm, f"{deployment.panel.host}:{deployment.panel.port}")
 
 
 @contextmanager
-def _drawn(address: str) -> Iterator[list[float]]:
-    """[s] monotonic, of each message that moves the measured arm, as it reaches a client beside the browser.
-
-    The browser's own news of its messages waits until somebody asks the browser for something.
-    """
-    drawn: list[float] = []
-    with connect(f"ws://{address}", subprotocols=[Subprotocol(f"viser-v{viser.__version__}")], max_size=None) as socket:
-
-        def listen() -> None:
-            with suppress(ConnectionClosed):
-                for message in socket:
-                    if isinstance(message, bytes) and MOVED in message:
-                        drawn.append(time.monotonic())  # noqa: PERF401 it is read meanwhile
-
-        threading.Thread(target=listen, daemon=True).start()
-        yield drawn
+def _chromium(twin: Opened) -> Iterator[Page]:
+    """A browser that draws the page; raises NotMeasured without Chromium."""
+    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if program is None:
+        raise NotMeasured("there is no Chromium: apt-get install chromium")
+    with (
+        sync_playwright() as playwright,
+        playwright.chromium.launch(executable_path=program, args=FLAGS) as browser,
+    ):
+        page = browser.new_page(viewport=SIZE)
+        page.goto(f"http://{twin.address}")
+        page.get_by_role("tab").first.wait_for(timeout=1000.0 * PATIENCE)
+        yield page
 
 
 @contextmanager
@@ -172,24 +160,63 @@ def _arm(stack: Stack) -> Iterator[gemelo.Arm]:
         yield arm
 
 
+def _of_bare(samples: Sequence[float]) -> dict[str, float]:
+    return {"bare browser": quantile(samples, 0.5), "bare browser, p99": quantile(samples, 0.99)}
+
+
+def _shares_at_rest_and_moving(twin: Opened) -> tuple[list[float], list[float]]:
+    """[% of a core] in each window."""
+    time.sleep(SETTLE)
+    rest = _shares(twin)
+    motion = twin.arm.start(named="left", speed=0.05)
+    moving = _shares(twin)
+    twin.arm.stop()
+    with suppress(gemelo.Aborted):
+        motion.wait()
+    twin.arm.move(named="home")
+    return rest, moving
+
+
 def _shares(twin: Opened) -> list[float]:
     """[% of a core] in each window."""
     shares = []
     for _ in range(WINDOWS):
         before, began = twin.panel_cpu(), time.monotonic()
-        twin.page.wait_for_timeout(1000.0 * WINDOW)
+        time.sleep(WINDOW)
         shares.append(100.0 * (twin.panel_cpu() - before) / (time.monotonic() - began))
     return shares
 
 
-def _stopped(twin: Opened, wire: Wire, number: int) -> float:
+def _lags(twin: Opened, drawn: list[float]) -> list[float]:
+    """[ms] of each move; `drawn` is [s] monotonic of each message that moves the measured arm."""
+    lags = []
+    name = twin.arm.joint_names[0]
+    for number in range(MOVES):
+        moved: list[float] = []
+        before = twin.arm.joints[name]
+
+        def watch(state: JointState, before: float = before, moved: list[float] = moved) -> None:
+            if not moved and abs(state.position[state.name.index(name)] - before) > UNSEEN:
+                moved.append(time.monotonic())
+
+        drawn.clear()
+        heard = twin.arm.node.subscribe(gemelo.topics.JOINT_STATES, watch)
+        twin.arm.move(joints={name: 0.05 * (1 + number % 2)}, speed=0.5)
+        time.sleep(AFTER_MOVE)
+        heard.close()
+        if moved and drawn:
+            lags.append(1000.0 * max(0.0, drawn[0] - moved[0]))
+    return lags
+
+
+def _stopped(twin: Opened, wire: Wire, number: int, press: Callable[[], object]) -> float:
     """[ms] of one stop."""
     motion = twin.arm.start(named="left" if number % 2 else "home", speed=0.2)
     end = time.monotonic() + PATIENCE
     while max(map(abs, twin.arm.velocities.values())) < 1e-3 and time.monotonic() < end:
         time.sleep(0.005)
     pressed = time.monotonic()
-    twin.page.keyboard.press("Space")
+    press()
     taken = 1000.0 * (wire.next(pressed) - pressed)
     with suppress(gemelo.Aborted):
         motion.wait()

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
+from unittest import mock
 
 import gemelo
 from gemelo.session import Session
@@ -28,6 +30,7 @@ from services.arm.model.description import Arm as Description
 from services.arm.model.description import load_arm
 from services.bench.bare_browser import BareBrowser, Said, bare_browser
 from services.panel.main import TEXTS, Panel
+from services.runtime import topics
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.deployment import load_deployment
 from services.runtime.node import Node
@@ -140,7 +143,10 @@ def memory_page(robot: str, folder: Path) -> Iterator[MemoryPage]:
         Node("planner", deployment, bus=MemoryBus(network), robot=arm.name) as planner,
     ):
         gateway = Gateway(node, planner, arm)
+        began = time.monotonic()
+        stopped = SimpleNamespace(monotonic=lambda: began, time_ns=time.time_ns)
         with (
+            mock.patch.object(topics, "time", stopped),  # what is said does not grow old on a machine under load
             spinning(node, lambda now: gateway.say()),
             gemelo.Arm(Session(deployment, arm, Node("panel", deployment, arm.name, MemoryBus(network)))) as connected,
         ):

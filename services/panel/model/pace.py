@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 PERIOD = 0.04  # [s] chosen: 25 pictures a second of an arm that moves
+UNSEEN = 1e-5  # [rad] or [m] less of a joint is not drawn anew
 EARLY = 0.01  # [s] half the time between two joint states, so that each picture is of one that has just come
 
 
@@ -18,9 +19,14 @@ class Pace:
 
     def is_due(self, positions: tuple[float, ...], now: float) -> bool:
         """True if these joint values [rad] or [m] are to be drawn at `now` [s] monotonic."""
-        return positions != self._drawn and now - self._drawn_at >= PERIOD - EARLY
+        return now - self._drawn_at >= PERIOD - EARLY and self._is_new(positions)
 
     def drawn(self, positions: tuple[float, ...], now: float) -> None:
         """These joint values [rad] or [m] have been drawn, beginning at `now` [s] monotonic."""
-        if positions != self._drawn:
+        if self._is_new(positions):
             self._drawn, self._drawn_at = positions, now
+
+    def _is_new(self, positions: tuple[float, ...]) -> bool:
+        if len(positions) != len(self._drawn):
+            return True
+        return any(abs(at - before) >= UNSEEN for at, before in zip(positions, self._drawn, strict=True))

@@ -17,11 +17,10 @@ from services.arm.frames.transforms import Rigid
 from services.arm.kinematics.chain import complete, joint_transform, link_transforms, origin_of
 from services.arm.model.description import Arm
 from services.arm.model.urdf import JointKind, UrdfJoint
+from services.panel.model.pace import UNSEEN
 
 Array = NDArray[np.float64]
 Color = tuple[float, float, float, float]  # red, green, blue and opacity, each 0 to 1
-
-UNSEEN = 1e-5  # [rad] or [m] less of a joint is not drawn anew
 
 
 class JointFrames(ViserUrdf):
