@@ -102,6 +102,21 @@ class Mirror:
             set_if_new(self._handle, "value", value)
 
 
+class Steady:
+    """A measured value of which only a real change is shown: else the page would be sent again for its noise."""
+
+    def __init__(self, share: float, least: float) -> None:
+        """A change counts from `share` of the value that is shown, and from `least` in its own unit."""
+        self._share, self._least = share, least
+        self._shown: float | None = None
+
+    def of(self, value: float) -> float:
+        """What to show now that it is `value`."""
+        if self._shown is None or abs(value - self._shown) > max(self._least, self._share * abs(self._shown)):
+            self._shown = value
+        return self._shown
+
+
 def set_if_new(handle: object, name: str, value: object) -> None:
     """Sends nothing where it is so already."""
     if getattr(handle, name) != value:

@@ -9,7 +9,7 @@ import viser
 from services.panel.model.readings import Readings
 from services.panel.model.units import text_of
 from services.panel.view.gripper_box import GripperBox
-from services.panel.view.kit import Kit, Mirror, box, esc, set_if_new, table
+from services.panel.view.kit import Kit, Mirror, Steady, box, esc, set_if_new, table
 
 
 class DeviceTab:
@@ -19,6 +19,7 @@ class DeviceTab:
         self._kit, self._operator = kit, kit.operator
         words, arm = kit.words, kit.operator.arm
         self._facts = kit.line()
+        self._round_trip = Steady(share=0.5, least=0.002)  # [s]
         kit.button(words("arm"), arm.device.arm, color="green", needs="arm")
         kit.button(words("disarm"), arm.device.disarm, color="orange", needs="disarm")
         kit.button(words("home"), self._operator.home, color="blue", needs="home")
@@ -49,7 +50,7 @@ class DeviceTab:
         if state is not None:
             rows.append((esc(words("mode")), esc(state.mode.name)))
             rows.append((esc(words("inputs")), esc(", ".join(state.inputs) or "-")))
-            rows.append((esc(words("link")), f"{1000 * state.round_trip:.1f} ms"))
+            rows.append((esc(words("link")), f"{1000 * self._round_trip.of(state.round_trip):.0f} ms"))
             for name, handle in self._outputs.items():
                 handle.show(name in state.outputs)
         set_if_new(self._facts, "content", table(rows) if rows else "")
