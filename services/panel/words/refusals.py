@@ -18,8 +18,11 @@ def sentence_of(problem: Problem, joints: Joints, templates: Mapping[str, str]) 
 
     Some checks have several templates, as `_variant` says.
     """
-    place, variant = problem.check.replace("-", " ").replace(" ", "_"), _variant(problem)
+    place, variant = key_of(problem.check), _variant(problem)
     template = templates.get(f"{place}_{variant}" if variant else place)
+    if template is None and problem.value is None:
+        template = templates.get(place)  # one that needs no value
+        template = template if template and "{value}" not in template else None
     if template is None:
         return None
     show = SHOWN.get(problem.check)
@@ -31,12 +34,20 @@ def sentence_of(problem: Problem, joints: Joints, templates: Mapping[str, str]) 
     return template.format(subject=problem.subject, first=first, second=second, **values)
 
 
+def key_of(check: str) -> str:
+    """The check as the tables' keys have it."""
+    return check.replace("-", " ").replace(" ", "_")
+
+
 def _variant(problem: Problem) -> str:
-    """Of the check's template: "axis" where the subject is one of the tool's, "touch" where two things do."""
+    """Of the check's template: "axis" where the subject is one of the tool's, "touch" where two things do,
+    "own" where the subject is what was asked for, "unknown" without a value."""
     if problem.subject in ("x", "y", "z"):
         return "axis"
     if problem.value is None:
         return "unknown"
+    if problem.subject == problem.check:
+        return "" if problem.check not in PAIRS else "own"
     return "touch" if problem.check in PAIRS and problem.value <= 0.0 else ""
 
 
@@ -61,7 +72,15 @@ def _seconds(problem: Problem, joints: Joints, value: float) -> str:
     return f"{value:.1f} s"
 
 
-PAIRS = ("collision", "self-collision")
+def _per_cent(problem: Problem, joints: Joints, value: float) -> str:
+    return f"{100.0 * value:.0f} %"
+
+
+def _plain(problem: Problem, joints: Joints, value: float) -> str:
+    return f"{value:g}"
+
+
+PAIRS = ("collision", "self-collision", "clearance")
 # By the planner's check: how its value and its limit are shown.
 SHOWN: dict[str, Show] = {
     "joint limit": _of_joint,
@@ -73,4 +92,13 @@ SHOWN: dict[str, Show] = {
     "clearance": _millimetres,
     "orientation": _degrees,
     "joint state": _seconds,
+    "allowed time": _seconds,
+    "jump": _of_joint,
+    "configuration": _of_joint,
+    "pull-out torque": _per_cent,
+    "step rate": _per_cent,
+    "pulse width": _per_cent,
+    "device queue": _per_cent,
+    "confidence": _per_cent,
+    "tool limit": _plain,
 }

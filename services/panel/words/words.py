@@ -5,8 +5,9 @@ from __future__ import annotations
 from services.panel.model.availability import Reason
 from services.panel.model.problems import Problem
 from services.panel.words.en import ENGLISH
-from services.panel.words.es import REFUSALS, SPANISH
-from services.panel.words.refusals import Joints, sentence_of
+from services.panel.words.es import SPANISH
+from services.panel.words.es_refusals import REFUSALS
+from services.panel.words.refusals import Joints, key_of, sentence_of
 
 TABLES = {"en": ENGLISH, "es": SPANISH}
 SENTENCES: dict[str, dict[str, str]] = {"en": {}, "es": REFUSALS}  # in English the planner's own are shown
@@ -29,10 +30,13 @@ class Words:
         """Why something cannot be done now; empty where it can."""
         return "" if reason is None else self(f"reason_{reason[0]}", value=reason[1])
 
+    def check(self, check: str) -> str:
+        """What a check that refuses or limits is called; empty where the table has no name for it."""
+        return self._table.get(f"check_{key_of(check)}", "")
+
     def problem(self, problem: Problem) -> tuple[str, str]:
         """A heading for the check, and a sentence; where this language has none, that of the part that refused."""
-        key = f"check_{problem.check.replace(' ', '_').replace('-', '_')}"
-        heading = self._table.get(key, self._table["check_other"] if problem.is_refusal else self._table["check_ended"])
+        heading = self.check(problem.check) or self("check_other" if problem.is_refusal else "check_ended")
         known = self._table.get(f"text_{problem.text.replace(' ', '_')}")
         return heading, known or sentence_of(problem, self._joints, SENTENCES[self.language]) or problem.text
 

@@ -56,7 +56,8 @@ class JogTab:
         status = self._operator.bus.jog_status
         content = ""
         if status is not None and status.active:
-            told = ", ".join(f"{limit.check} {limit.subject}" for limit in status.limits)
+            names = ((self._kit.words.check(limit.check) or limit.check, limit.subject) for limit in status.limits)
+            told = ", ".join(f"{name} ({subject})" for name, subject in names)
             content = box(esc(self._kit.words("jogging", share=round(100 * status.scale), limits=told)), "#1c7ed6")
         set_if_new(self._status, "content", content)
 

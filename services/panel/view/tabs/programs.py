@@ -124,7 +124,8 @@ class ProgramsTab:
         """One step: indented in its repeat, lit while it is carried out, with its time and tightest margin."""
         about = ""
         if leg is not None and leg.refusal is not None:
-            about = f'<span style="color:#e03131">✗ {esc(leg.refusal.check)}</span>'
+            name = self._kit.words.check(leg.refusal.check) or leg.refusal.check
+            about = f'<span style="color:#e03131">✗ {esc(name)}</span>'
         elif leg is not None and leg.duration:
             joint, margin = leg.tightest
             about = f"{leg.duration:.2f} s"
