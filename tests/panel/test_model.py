@@ -7,6 +7,7 @@ import math
 import re
 import string
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,9 +21,10 @@ from schemas.device import DeviceMode, DeviceState
 from services.arm.model.description import Arm as Description
 from services.arm.model.description import load_arm
 from services.panel.model.availability import CHECKS
+from services.panel.model.goal import GoalSolver
 from services.panel.model.problems import Problem, problem_of
 from services.panel.model.teaching import deleted, inserted, shifted
-from services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, tool_rings
+from services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, ToolTurns, tool_turns
 from services.panel.view.browser import CHANNEL, Browser, read_browser, script_html
 from services.panel.view.obstacles import nearest_hit
 from services.panel.words.en import ENGLISH
@@ -31,6 +33,7 @@ from services.panel.words.es_refusals import REFUSALS
 from services.panel.words.refusals import key_of
 from services.panel.words.words import Words, language_of
 from tests.arm.bare_arm import ROBOT
+from tests.runtime.support import until
 
 PANEL = Path(__file__).parents[2] / "services/panel"
 READY = DeviceState(mode=DeviceMode.IDLE, armed=True, referenced=(True, True), name=("a", "b"))
@@ -181,13 +184,17 @@ def wrist(folder: Path, axis: str) -> Description:
     """A SCARA whose tool a fourth joint turns about `axis`."""
     joints = (("a", "base", "one", "revolute", "0 0 0"), ("b", "one", "two", "revolute", "0.2 0 0"),
               ("c", "two", "three", "prismatic", "0.2 0 0"), ("d", "three", "hand", "revolute", "0 0 0"))  # fmt: skip
+    return bare(folder, joints, {name: axis if name == "d" else "0 0 1" for name, *_ in joints})
+
+
+def bare(folder: Path, joints: tuple[tuple[str, ...], ...], axes: dict[str, str]) -> Description:
+    """An arm of joints (name, parent, child, kind, origin) that turn or slide along their axes."""
     texts = [
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin xyz="{at}"/>'
-        f'<axis xyz="{axis if name == "d" else "0 0 1"}"/>'
-        '<limit lower="-2" upper="2" effort="9" velocity="1"/></joint>'
+        f'<axis xyz="{axes[name]}"/><limit lower="-2" upper="2" effort="9" velocity="1"/></joint>'
         for name, parent, child, kind, at in joints
     ]
-    links = "".join(f'<link name="{name}"/>' for name in ("base", "one", "two", "three", "hand"))
+    links = "".join(f'<link name="{name}"/>' for name in ("base", *(joint[2] for joint in joints)))
     (folder / "robot.urdf").write_text(f'<robot name="bare">{links}{"".join(texts)}</robot>')
     (folder / "robot.toml").write_text(ROBOT)
     values = "".join(f'<joint name="{joint[0]}" value="0"/>' for joint in joints)
@@ -200,10 +207,45 @@ def wrist(folder: Path, axis: str) -> Description:
 
 def test_the_gizmo_turns_only_what_the_arm_can(tmp_path: Path):
     ours = {name: load_arm(Path(__file__).parents[2] / "urdf" / name) for name in ("rm1", "parol6")}
-    assert tool_rings(ours["rm1"]) == NO_RINGS
-    assert tool_rings(ours["parol6"]) == ALL_RINGS
-    assert tool_rings(wrist(tmp_path, "0 0 -1")) == (False, False, True)
-    assert tool_rings(wrist(tmp_path, "1 0 0")) == NO_RINGS  # two directions, of which one is left to choose
+    assert tool_turns(ours["rm1"]) == ToolTurns(NO_RINGS, keeps_orientation=False)
+    assert tool_turns(ours["parol6"]) == ToolTurns(ALL_RINGS, keeps_orientation=True)
+    assert tool_turns(wrist(tmp_path, "0 0 -1")) == ToolTurns((False, False, True), keeps_orientation=True)
+    assert tool_turns(wrist(tmp_path, "1 0 0")) == ToolTurns((True, False, False), keeps_orientation=False)
+
+
+@pytest.mark.parametrize(("axis", "rings"), [("0 0 1", (False, False, True)), ("1 0 0", (True, False, False))])
+def test_five_joints_turn_the_tool_about_the_axis_of_the_last_one(tmp_path: Path, axis: str, rings: tuple[bool, ...]):
+    arm = five_joints(tmp_path, axis)
+    assert tool_turns(arm) == ToolTurns(rings, keeps_orientation=False)
+
+
+def test_the_arrows_of_five_joints_lead_the_place_and_their_ring_the_orientation(tmp_path: Path):
+    asked: list[set[str]] = []
+    arm = five_joints(tmp_path, "0 0 1")
+    still, pose = dict.fromkeys(arm.joint_names, 0.0), gemelo.Pose((0.1, 0.0, 0.5))
+
+    def ik(near: dict[str, float], **target: object) -> list[dict[str, float]]:
+        asked.append(set(target))
+        return [near]
+
+    stub = SimpleNamespace(description=arm, joints=still, fk=lambda joints: pose, ik=ik, check=lambda joints: None)
+    solver = GoalSolver(stub, lambda: None)
+    try:
+        for number, is_turned in enumerate((False, True), start=1):
+            solver.set_pose(pose, is_turned=is_turned)
+            assert until(lambda number=number: solver.solved == number)
+    finally:
+        solver.close()
+    assert asked == [{"position"}, {"pose"}]
+
+
+def five_joints(folder: Path, axis: str) -> Description:
+    """A vertical arm: it turns on its base, has three parallel joints, and rolls its tool about `axis`."""
+    joints = (("a", "base", "one", "revolute", "0 0 0.1"), ("b", "one", "two", "revolute", "0 0 0.1"),
+              ("c", "two", "three", "revolute", "0 0 0.2"), ("d", "three", "four", "revolute", "0 0 0.2"),
+              ("e", "four", "hand", "revolute", "0.05 0 0.1"))  # fmt: skip
+    axes = {"a": "0 0 1", "e": axis}
+    return bare(folder, joints, {name: axes.get(name, "0 1 0") for name, *_ in joints})
 
 
 def test_what_a_browser_tells_is_read_and_rubbish_is_not():

@@ -9,7 +9,7 @@ from math import pi
 
 import gemelo
 from services.panel.model.problems import Problem, problem_of
-from services.panel.model.tool_turns import tool_rings
+from services.panel.model.tool_turns import tool_turns
 
 IDLE = 1.0  # [s] after which a solver without work looks whether it is to end
 JUMP = {"rad": pi / 4, "m": 0.05}  # chosen: more of a joint between two points of a drag is another configuration
@@ -38,6 +38,7 @@ class JointsWish:
 class PoseWish:
     pose: gemelo.Pose
     source: int
+    is_turned: bool  # the orientation is meant too
 
 
 class GoalSolver:
@@ -51,17 +52,12 @@ class GoalSolver:
         self._news = threading.Condition()
         self._wish: JointsWish | PoseWish | None = None
         self._is_open = True
-        self.rings = tool_rings(arm.description)  # that the gizmo has
+        self.turns = tool_turns(arm.description)  # what the gizmo offers
         self.solved = 0  # wishes that were answered
         joints = arm.joints
         self.goal = Goal(joints, arm.fk(joints))
         self._thread = threading.Thread(target=self._run, name="goal", daemon=True)
         self._thread.start()
-
-    @property
-    def can_turn(self) -> bool:
-        """True if the gizmo may turn the tool."""
-        return any(self.rings)
 
     def set_joints(self, joints: Mapping[str, float], source: int = -1) -> None:
         """All joints [rad] or [m], or some; the goal shows them at once, and is checked right after."""
@@ -70,10 +66,13 @@ class GoalSolver:
             self.goal = replace(self.goal, joints=joints, version=self.goal.version + 1, source=source)
             self._want(JointsWish(joints, source))
 
-    def set_pose(self, pose: gemelo.Pose, source: int = -1) -> None:
-        """Where the tool is to be; the nearest configuration is taken."""
+    def set_pose(self, pose: gemelo.Pose, source: int = -1, *, is_turned: bool = False) -> None:
+        """Where the tool is to be; the nearest configuration is taken.
+
+        Its orientation counts where it was turned, or where the arm can keep it; else it follows from the place.
+        """
         with self._news:
-            self._want(PoseWish(pose, source))
+            self._want(PoseWish(pose, source, is_turned or (any(self.turns.rings) and self.turns.keeps_orientation)))
 
     def settle(self) -> None:
         """The drag has ended: the gizmo goes back to where the goal arm's tool is."""
@@ -125,10 +124,10 @@ class GoalSolver:
 
     def _followed(self, before: Goal, wish: PoseWish) -> Goal:
         """The nearest configuration for the gizmo's pose; where there is none, the goal stays and says why."""
-        target = self._target(wish.pose)
+        target = self._target(wish)
         try:
             [joints] = self._arm.ik(near=before.joints, **target)
-            return self._arrived(before, joints, wish.pose, None)
+            return self._arrived(before, joints, wish, None)
         except gemelo.Refused as refused:
             problem = problem_of(refused)
         except Exception as error:
@@ -139,15 +138,15 @@ class GoalSolver:
             [joints] = self._arm.ik(near=before.joints, touching=True, **target)
         except Exception:
             return replace(before, problem=problem, wanted=wish.pose, jumped=())
-        return self._arrived(before, joints, wish.pose, self._problem_at(joints) or problem)
+        return self._arrived(before, joints, wish, self._problem_at(joints) or problem)
 
-    def _arrived(self, before: Goal, joints: Mapping[str, float], pose: gemelo.Pose, problem: Problem | None) -> Goal:
+    def _arrived(self, before: Goal, joints: Mapping[str, float], wish: PoseWish, problem: Problem | None) -> Goal:
         units = {joint.name: joint.unit for joint in self._arm.description.joints}
         jumped = tuple(name for name, at in joints.items() if abs(at - before.joints[name]) > JUMP[units[name]])
-        return Goal(joints, pose if self.can_turn else self._arm.fk(joints), problem, None, jumped)
+        return Goal(joints, wish.pose if wish.is_turned else self._arm.fk(joints), problem, None, jumped)
 
-    def _target(self, pose: gemelo.Pose) -> gemelo.ToolGoal:
-        return gemelo.ToolGoal(pose=pose) if self.can_turn else gemelo.ToolGoal(position=pose.position)
+    def _target(self, wish: PoseWish) -> gemelo.ToolGoal:
+        return gemelo.ToolGoal(pose=wish.pose) if wish.is_turned else gemelo.ToolGoal(position=wish.pose.position)
 
     def _problem_at(self, joints: Mapping[str, float]) -> Problem | None:
         try:

@@ -115,7 +115,7 @@ class Operator:
             turned = nearest.get("orientation")
             orientation = tuple(turned) if turned else self.goal.goal.pose.orientation
             a, b, c, d = orientation
-            self.goal.set_pose(gemelo.Pose((x, y, z), (a, b, c, d)))
+            self.goal.set_pose(gemelo.Pose((x, y, z), (a, b, c, d)), is_turned=bool(turned))
         self.forget_problem()
 
     def follow_measured(self) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,26 +19,41 @@ ALL_RINGS: Rings = (True, True, True)
 # Tuning constants: chosen, where a line does not say measured or standard.
 SAMPLES = 8  # configurations; those at a stretch do not hide what others can
 STEP = 1e-5  # [rad] or [m] of the finite differences
-RANK = 1e-4  # singular value [m] or [rad] per joint below which a direction is none: above the differences' error
-ALONG = 0.999  # cosine from which the axis is one of the tool's own
+RANK = 1e-4  # share of the largest singular value below which a direction is none: above the differences' error
+MISSED = 0.01  # of a twist of length one: what is missed of a direction that cannot be is several times that
 
 
-def tool_rings(arm: Arm) -> Rings:
-    """All where every orientation can be chosen beside a position; one where the tool turns about one direction only
-    and the angle can be chosen (a SCARA with a wrist); else none: the orientation follows from the position."""
+@dataclass(frozen=True)
+class ToolTurns:
+    """What the gizmo may offer of an arm's tool."""
+
+    rings: Rings
+    keeps_orientation: (
+        bool  # along every axis the tool can be moved without being turned; else arrows lead its place only
+    )
+
+
+def tool_turns(arm: Arm) -> ToolTurns:
+    """A ring about each of the tool's axes about which it can be turned wherever it is, while its place stays: all
+    three with six joints, the last joint's own with five, the vertical one of a SCARA with a wrist."""
     lower = [max(joint.lower, -np.pi) for joint in arm.joints]
     upper = [min(joint.upper, np.pi) for joint in arm.joints]
-    configurations = np.random.default_rng(1).uniform(lower, upper, (SAMPLES, len(arm.joints)))
-    jacobians = [_jacobian(arm, configuration) for configuration in configurations]
-    chosen = max(_rank(jacobian) - _rank(jacobian[:3]) for jacobian in jacobians)
-    if chosen == 3:
-        return ALL_RINGS
-    _, values, rows = np.linalg.svd(np.hstack([jacobian[3:] for jacobian in jacobians]).T)
-    if chosen != 1 or int(np.sum(values > RANK)) != 1:
-        return NO_RINGS
-    in_tool = np.abs(_tool(arm, configurations[0])[:, :3].T @ rows[0])
-    x, y, z = (in_tool > ALONG).tolist()
-    return x, y, z
+    samples = np.random.default_rng(1).uniform(lower, upper, (SAMPLES, len(arm.joints)))
+    jacobians = [_jacobian(arm, configuration) for configuration in samples]
+    axes = [_tool(arm, configuration)[:, :3] for configuration in samples]
+    pairs = list(zip(jacobians, axes, strict=True))
+    x, y, z = (
+        all(_can(jacobian, np.concatenate([np.zeros(3), tool[:, axis]])) for jacobian, tool in pairs)
+        for axis in range(3)
+    )
+    keeps = all(_can(jacobian, direction) for jacobian in jacobians for direction in np.eye(6)[:3])
+    return ToolTurns((x, y, z), keeps)
+
+
+def _can(jacobian: Array, twist: Array) -> bool:
+    """True if some joint velocities give the tool this twist (6,), [m/s] above [rad/s], and nothing besides."""
+    velocities = np.linalg.lstsq(jacobian, twist, rcond=RANK)[0]
+    return float(np.linalg.norm(jacobian @ velocities - twist)) < MISSED
 
 
 def _jacobian(arm: Arm, configuration: Array) -> Array:
@@ -57,7 +74,3 @@ def _tool(arm: Arm, configuration: Array) -> Array:
     point, turn = link_transforms(arm.model, positions)[arm.tool_frame]
     axes = [rotate(turn, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
     return np.array([*axes, point]).T
-
-
-def _rank(jacobian: Array) -> int:
-    return int(np.linalg.matrix_rank(jacobian, tol=RANK))

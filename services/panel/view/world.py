@@ -42,7 +42,7 @@ class World:
         self.obstacles = Obstacles(server, (project_root(), arm.folder))
         reach = max(0.3, float(np.linalg.norm(operator.goal.goal.pose.position)))
         self._set_stage(server, reach)
-        self._gizmos = self._make_gizmos(0.35 * reach, operator.goal.rings)
+        self._gizmos = self._make_gizmos(0.35 * reach, operator.goal.turns.rings)
         on_tool = f"{self.measured.node_of(self._tool)}/axes"
         self._scene.add_frame(on_tool, axes_length=0.12 * reach, axes_radius=0.004 * reach)
         self._dragged: viser.TransformControlsHandle | None = None
@@ -115,7 +115,8 @@ class World:
             w, a, b, c = (float(value) for value in event.target.wxyz)
             x, y, z = (float(value) for value in event.target.position)
             pose = gemelo.Pose((x, y, z), (a, b, c, w))
-            self._operator.goal.set_pose(pose, event.client_id if event.client_id is not None else -1)
+            source = event.client_id if event.client_id is not None else -1
+            self._operator.goal.set_pose(pose, source, is_turned=gizmo is not self._gizmos[0])
 
     def _show_goal(self, goal: Goal, measured: Mapping[str, float]) -> None:
         apart = any(abs(at - measured.get(name, at)) > APART for name, at in goal.joints.items())

@@ -42,7 +42,7 @@ class JogTab:
             for axis in ("x", "y", "z"):
                 for sign in (1, -1):
                     self._tool_button(axis, sign, "")
-            for axis, can_turn in zip(("x", "y", "z"), self._operator.goal.rings, strict=True):
+            for axis, can_turn in zip(("x", "y", "z"), self._operator.goal.turns.rings, strict=True):
                 for sign in (1, -1) if can_turn else ():
                     self._tool_button(axis, sign, "r")
         with gui.add_folder(words("joints")):
