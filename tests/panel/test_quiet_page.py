@@ -19,7 +19,7 @@ from services.arm.model.description import load_arm
 from services.panel.main import TEXTS
 from services.panel.model.pace import EARLY, PERIOD, Pace
 from services.panel.view.arms import DrawnArm, load_model
-from services.panel.view.browser import STOP_SIGN
+from services.panel.view.browser import CHANNEL, STOP_SIGN
 from services.panel.words.en import ENGLISH
 from tests.panel.memory_page import ROOT, MemoryPage, memory_page
 from tests.runtime.support import until
@@ -63,6 +63,14 @@ def test_a_picture_of_one_joint_that_moves_is_one_message_whatever_the_arm_carri
     said = page.sent()
     assert {name: number for name, number in said.items() if name.startswith("Set")} == {"SetOrientationMessage": 1}
     assert set(said) <= {"SetOrientationMessage", "GuiUpdateMessage"}
+
+
+def test_a_browser_that_tells_its_frame_rate_later_has_the_lag_that_it_had(page: MemoryPage):
+    [shown] = page.panel._present()
+    assert shown.browser is not None
+    lag, sent = shown.lag, shown.browser.sent
+    shown._hear(f'{CHANNEL} {{"sent": {sent}, "language": "en", "rate": 5.0}}')
+    assert (shown.lag, shown.browser.rate) == (lag, 5.0)
 
 
 def test_stop_goes_out_though_every_thread_is_busy_with_other_buttons(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
