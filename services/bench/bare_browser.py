@@ -90,7 +90,7 @@ class BareBrowser:
 
 @contextmanager
 def bare_browser(address: str, on_said: Callable[[Said, float], object]) -> Iterator[BareBrowser]:
-    """One that looks at the page at `address`, host and port."""
+    """One at the page at `address`, host and port; `on_said` gets each message and its arrival [s] monotonic."""
     protocol = Subprotocol(f"viser-v{viser.__version__}")
     with connect(f"ws://{address}", subprotocols=[protocol], max_size=None) as socket:
         yield BareBrowser(socket, on_said)

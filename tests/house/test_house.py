@@ -9,6 +9,7 @@ import pytest
 from tests.house.counts import Module, circles, fragments, imports, modules, without_unit
 
 KEPT = {
+    "services.planner.parameters": "as the parameters of every service",
     "services.panel.view.pick_box": "a part of the page, as all its boxes",
     "services.stepper_gateway.ledger.reasons": "the sentences, apart from the arithmetic",
 }

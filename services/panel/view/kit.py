@@ -111,7 +111,7 @@ class Steady:
         self._shown: float | None = None
 
     def of(self, value: float) -> float:
-        """What to show now that it is `value`."""
+        """What to show, in the unit of `value`, now that this is measured."""
         if self._shown is None or abs(value - self._shown) > max(self._least, self._share * abs(self._shown)):
             self._shown = value
         return self._shown

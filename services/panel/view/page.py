@@ -18,7 +18,7 @@ from services.panel.view.arm_pages import ArmPage, arms_line
 from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, read_browser, script_html
 from services.panel.view.camera_box import CameraBox
 from services.panel.view.control_box import ControlBox
-from services.panel.view.kit import Kit, Mirror, at_once, box, esc, picture, set_if_new, without_event
+from services.panel.view.kit import Kit, Mirror, at_once, box, esc, set_if_new, without_event
 from services.panel.view.tabs.device import DeviceTab
 from services.panel.view.tabs.jog import JogTab
 from services.panel.view.tabs.move import MoveTab

@@ -35,7 +35,8 @@ class JogLog:
         self, now: float, stamp: int, present: JointState | None, age: float, goal_is_active: bool, not_ready: str,
         scene: SceneVersion, told_to: str, said: str,
     ) -> None:  # fmt: skip
-        """A step of the jog with its arguments, and the `digest_of` what was said."""
+        """A step of the jog at `now` [s] monotonic, `stamp` [ns] UNIX, with `present` of `age` [s]; and the `digest_of`
+        what was said."""
         is_same, self._told = scene == self._told, scene
         tick = JogTick(
             now=now, stamp=stamp, present=present, age=age if present is not None else 0.0,  # infinite before the first
