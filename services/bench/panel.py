@@ -211,7 +211,7 @@ def _lags(twin: Opened, drawn: list[float]) -> list[float]:
 
 def _stopped(twin: Opened, wire: Wire, number: int, press: Callable[[], object]) -> float:
     """[ms] of one stop."""
-    motion = twin.arm.start(named="left" if number % 2 else "home", speed=0.2)
+    motion = twin.arm.start(named="home" if number % 2 else "left", speed=0.2)
     end = time.monotonic() + PATIENCE
     while max(map(abs, twin.arm.velocities.values())) < 1e-3 and time.monotonic() < end:
         time.sleep(0.005)
