@@ -246,7 +246,8 @@ class Motion:
         errors = ", ".join(
             f"{name} {error:+.2f}" for name, error in zip(result.joint_names, result.final_error, strict=False)
         )
-        return f"{about} in {result.duration:.2f} s, final error [steps] {errors}>"
+        why = f": {result.error_string}" if result.error_string else ""
+        return f"{about} in {result.duration:.2f} s{why}, final error [steps] {errors}>"
 
 
 def check_of(refused: runtime.GoalRefused, usual: str) -> str:

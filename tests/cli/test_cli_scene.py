@@ -28,6 +28,7 @@ from services.cli.errors import ExitCode
 from services.cli.main import run
 from services.cli.scene import attach_choices, pair_choices
 from services.cli.session import load_robot, reported
+from services.planner.scene.answer_log import AnswerLog
 from services.planner.scene.scene_keeper import SceneKeeper
 from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
@@ -47,7 +48,8 @@ def keeper(arm, network, deployment, session, connected, monkeypatch, tmp_path) 
 
     monkeypatch.setattr(scene_module, "connect_arm", connect_arm)
     with Node("planner", deployment, robot="rm1", bus=MemoryBus(network)) as node:
-        SceneKeeper(node, arm, node.latest(JOINT_STATES), tmp_path, lambda world: None)
+        log = AnswerLog(node, lambda: False)
+        SceneKeeper(node, arm, node.latest(JOINT_STATES), tmp_path, lambda world: None, log)
         states = session.node.publisher(JOINT_STATES)
 
         def stand(now: int) -> None:

@@ -159,7 +159,7 @@ def test_a_plan_waits_for_an_arm_that_is_just_coming_to_rest_but_not_for_one_tha
     assert arm.move(named="home").status.name == "SUCCEEDED"
     motion = arm.start(named="left", speed=0.1)
     while motion.progress < 0.05:
-        assert not motion.is_over
+        assert not motion.is_over, motion
     with pytest.raises(gemelo.Refused, match="moving start"):
         arm.plan(named="home")
     arm.stop()

@@ -113,14 +113,24 @@ class Person:
 
 
 def place_in_image(page: Page, camera: str, x: float, y: float) -> tuple[float, float]:
-    """[pixels] of the page, of a place in a camera's image from 0 to 1; the image is replaced all the time, so its
-    element is asked once."""
+    """[pixels] of the page, of a place in a camera's image from 0 to 1, once the image stands still; the image is
+    replaced all the time, so its element is looked for each time."""
     found = page.evaluate(
-        """(camera) => {
-          const image = document.querySelector(`img[data-gemelo-camera="${camera}"]`);
-          image.scrollIntoView({block: 'center'});
-          const box = image.getBoundingClientRect();
-          return [box.left, box.top, box.width, box.height];
+        """async (camera) => {
+          const place = () => {
+            const image = document.querySelector(`img[data-gemelo-camera="${camera}"]`);
+            image.scrollIntoView({block: 'center', behavior: 'instant'});
+            const box = image.getBoundingClientRect();
+            return [box.left, box.top, box.width, box.height];
+          };
+          let last = place(), still = 0;
+          while (still < 10) {
+            await new Promise(requestAnimationFrame);
+            const next = place();
+            still = String(next) === String(last) ? still + 1 : 0;
+            last = next;
+          }
+          return last;
         }""",
         camera,
     )

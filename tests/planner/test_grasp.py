@@ -43,7 +43,8 @@ from services.planner.collision.world import World
 from services.planner.scene.grasp import width_of
 from services.planner.scene.scene_store import SceneStore
 from services.runtime.node import Node
-from tests.planner.test_scene_node import edit, planning
+from tests.planner.planning_node import beside_a_planner
+from tests.planner.test_scene_node import edit
 
 ROOT = Path(__file__).parents[2]
 ARMS = {name: load_arm(ROOT / "urdf" / name) for name in ("rm1", "parol6")}
@@ -208,7 +209,7 @@ def test_the_planner_checks_the_jaws_at_their_opening_and_does_not_show_them_as_
     )
     thing = SceneObject(name="thing", shape=SphereShape(radius=0.002), pose=to_message(pose))
     here = ValidityRequest(name=arm.joint_names, position=ready)
-    with planning(tmp_path) as asker:
+    with beside_a_planner(tmp_path) as asker:
         scene = asker.latest(SCENE)
         assert edit(asker, SceneAdd(object=thing)).accepted
         stand(asker, arm, 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 from queue import SimpleQueue
 
 import gemelo
@@ -22,7 +23,7 @@ class StopLane:
     """Sends the stop where it is pressed, and follows it up in a thread that does nothing else."""
 
     def __init__(self, arm: gemelo.Arm, tell: Callable[[Problem], object], end_all: Callable[[], object]) -> None:
-        """`end_all` is called in the lane's thread after each stop has been sent; it may wait."""
+        """`end_all` is called in the lane's thread after each stop has been sent, or is on its way; it may wait."""
         self._arm, self._tell, self._end_all = arm, tell, end_all
         self._calls: SimpleQueue[tuple[Call | None] | None] = SimpleQueue()
         arm.node.is_served(DEVICE_STOP)  # from now on the first press need not find out who serves it
@@ -46,19 +47,23 @@ class StopLane:
 
     def _run(self) -> None:
         while (each := self._calls.get()) is not None:
+            (call,) = each
+            if call is None:  # looking for who serves it may take a while, and so may what `end_all` waits for
+                threading.Thread(target=lambda: self._told(self._arm.stop), name="late stop", daemon=True).start()
             self._end_all()
-            try:
-                self._follow(each[0])
-            except NoAnswer as error:
-                self._tell(problem_of(gemelo.Lost(str(error))))
-            except Exception as error:
-                self._tell(problem_of(error))
+            if call is not None:
+                self._told(partial(self._follow, call))
 
-    def _follow(self, call: Call | None) -> None:
-        """Raises where the stop was refused, or nobody answers; one that could not be sent at once is sent here."""
-        if call is None:
-            self._arm.stop()
-            return
+    def _told(self, work: Callable[[], object]) -> None:
+        try:
+            work()
+        except NoAnswer as error:
+            self._tell(problem_of(gemelo.Lost(str(error))))
+        except Exception as error:
+            self._tell(problem_of(error))
+
+    def _follow(self, call: Call) -> None:
+        """Raises where the stop was refused, or nobody answers."""
         answer = call.response()
         if not answer.accepted:
             raise gemelo.Refused(f"stop refused: {answer.reason}", check="device", reason=answer.reason)
