@@ -2,6 +2,7 @@
 .DEFAULT_GOAL := help
 .PHONY: help setup up down test check coverage format docs demo bench recordings lock clean
 MAKEFLAGS += --no-print-directory
+unexport PYTHONDONTWRITEBYTECODE # where it is set, every process compiles its libraries anew: 3 s of CPU for the page alone
 bin := .venv/bin
 # On every core at once; then the tests that start processes, a file on each core; then browsers, and what watches processes in time.
 side_by_side := $(addprefix tests/,arm bench chaos demo firmware logger planner robot_import schemas stepper_gateway urdf visualizer)
