@@ -8,7 +8,6 @@ import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from services.arm.errors import DescriptionError
 from services.arm.kinematics.convex_meshes import corners_of
@@ -65,6 +64,8 @@ def hull_mesh(points: Array) -> TriangleMesh:
 
 @lru_cache(maxsize=1024)
 def _hull_mesh(content: bytes) -> TriangleMesh:
+    from scipy.spatial import ConvexHull  # takes as long to load as the rest of the planner: only of arms with hulls
+
     points = np.frombuffer(content).reshape(-1, 3)
     hull = ConvexHull(points)
     corners = points[hull.simplices]

@@ -9,7 +9,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 Array = NDArray[np.float64]
 
@@ -160,6 +159,8 @@ class Polytope:
 
 def polytope_around(corners: Array) -> Polytope:
     """The convex hull of corners (n, 3) [m] that have a volume."""
+    from scipy.spatial import ConvexHull  # takes as long to load as the rest of the planner: only of arms with hulls
+
     equations = ConvexHull(corners).equations
     planes = np.unique(np.round(np.column_stack((equations[:, :3], -equations[:, 3])), PLANE_DIGITS), axis=0)
     x, y, z = np.abs(corners).max(axis=0).tolist()
