@@ -4,14 +4,18 @@
 MAKEFLAGS += --no-print-directory
 unexport PYTHONDONTWRITEBYTECODE # where it is set, every process compiles its libraries anew: 3 s of CPU for the page alone
 bin := .venv/bin
-# On every core at once; then the tests that start processes, a file on each core; then browsers, and what watches processes in time.
+# On every core at once; then the tests that start processes, a file on each core; then whole stacks with a browser or with
+# processes that are killed, two files at once; then what measures links, stops and keys in time, alone.
 side_by_side := $(addprefix tests/,arm bench chaos demo firmware logger planner robot_import schemas stepper_gateway urdf visualizer)
 folders := $(filter-out $(side_by_side) tests/panel tests/stack,$(patsubst %/,%,$(wildcard tests/*/)))
-# Of the page and of whole stacks those that open no browser and measure no time: they hold steps, words and files.
-patient := $(patsubst %,tests/panel/test_%.py,camera_box cameras model own_pages picks pointing) $(patsubst %,tests/stack/test_%.py,black_box \
+# Of the page and of whole stacks those that measure no time: they hold steps, words and files.
+patient := $(patsubst %,tests/panel/test_%.py,arm_pages camera_box camera_clicks cameras model own_pages picks pointing quiet_page) $(patsubst %,tests/stack/test_%.py,black_box \
 	camera camera_mount clocks_apart configuration control device imported_arm locked_broker my_own_arm old_dialects picks \
 	plan_files planning provisioning serial_wire several_arms six_joints)
-one_by_one := $(filter-out $(patient),$(wildcard tests/panel/test_*.py tests/stack/test_*.py))
+one_by_one := $(patsubst %,tests/stack/test_%.py,chaos hostile_viewer jogging links stops)
+# They wait for a state, for as long as it takes; the longest first, so that the browsers are mostly on one side.
+in_pairs := $(patsubst %,tests/%.py,panel/test_page stack/test_whole stack/test_deaths stack/test_hosts)
+in_pairs += $(filter-out $(patient) $(one_by_one) $(in_pairs),$(wildcard tests/panel/test_*.py tests/stack/test_*.py))
 # The longest files begin first: one that begins last leaves the other cores idle.
 longest := $(patsubst %,tests/%.py,gemelo/test_programs_on_the_stack examples/test_on_both_arms stack/test_picks gemelo/test_docstrings \
 	stack/test_device stack/test_camera_mount stack/test_clocks_apart stack/test_control examples/test_pick_and_place \
@@ -34,6 +38,7 @@ test: setup ## all tests: Python, firmware, whole stack
 	@deploy/test_firmware
 	@deploy/run_tests worksteal $(side_by_side)
 	@deploy/run_tests loadfile $(file_by_file)
+	@deploy/run_tests pairs $(in_pairs)
 	@deploy/run_tests no $(one_by_one)
 	@deploy/optional
 

@@ -74,7 +74,7 @@ def test_every_file_of_tests_is_run_by_make_test_once(pytestconfig):
     root = pytestconfig.rootpath
     recipe = subprocess.run(["make", "-n", "test"], cwd=root, capture_output=True, text=True, timeout=20.0, check=True)
     given = [line.split()[2:] for line in recipe.stdout.splitlines() if line.startswith("deploy/run_tests ")]
-    assert len(given) == 3
+    assert len(given) == 4
     paths = [root / path for stage in given for path in stage]
     files = [file for path in paths for file in (path.rglob("test_*.py") if path.is_dir() else [path])]
     assert sorted(files) == sorted((root / "tests").rglob("test_*.py"))
