@@ -6,6 +6,9 @@ module=github.com/f1bonacc1/process-compose
 own_binary=$state/bin/process-compose
 # gin's own tag: without it the generated code of an encoding that process-compose has no use for is a quarter of the build.
 tags=nomsgpack
+# The compilation takes two thirds of the time without what is stripped from the program anyway, and with only Go's own
+# library optimized: process-compose starts, asks and stops processes, and passes their lines on.
+compile_flags=('-gcflags=all=-dwarf=false -N -l' -gcflags=std=-dwarf=false)
 chosen=$state/process-compose # a link to it, or to the one on PATH
 
 # In order: the one on PATH, ours if built before, built by Go, built by Go's own wheel, the upstream release.
@@ -47,7 +50,8 @@ build_by() {
     local config=$module/src/config
     mkdir -p "$state/bin"
     say "building process-compose $pinned_version from deploy/tools/go.mod: about a minute the first time"
-    CGO_ENABLED=0 GOWORK=off run "$1" -C "$tools" build -v -tags "$tags" -trimpath -mod=readonly -o "$own_binary" \
+    CGO_ENABLED=0 GOWORK=off run "$1" -C "$tools" build -v -tags "$tags" -trimpath -mod=readonly \
+        "${compile_flags[@]}" -o "$own_binary" \
         -ldflags "-s -w -X $config.Version=$pinned_version" "$module" 2>&1 | counted
 }
 
