@@ -10,11 +10,11 @@ import pytest
 
 from schemas.planning import PlanCode, Refusal
 from services.arm.kinematics.kinematics import Kinematics
-from services.bench import any_planning
 from services.bench.any_arm.drawn_problems import ProblemDrawer, problems
 from services.bench.any_arm.families import FAMILIES, FEWEST, MOST, settings
 from services.bench.any_arm.generated_arms import generated_arm, seven_joints, six_joints
-from services.bench.any_planning import AnyTrial, has_contact, planned, trial
+from services.bench.planner import any_planning
+from services.bench.planner.any_planning import AnyTrial, has_contact, planned, trial
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.world import World
 from services.planner.core import Planner

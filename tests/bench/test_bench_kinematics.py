@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.bench.kinematics import is_solved, random_problems, solve
+from services.bench.planner.kinematics import is_solved, random_problems, solve
 from services.bench.scenes import parol6, rm1
 from services.planner.kinematics.ik import InverseKinematics
 from services.planner.request.deadline import NEVER

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from services.bench.planner.tool_motion import STEP, PlainLines, line_requests
 from services.bench.scenes import parol6, rm1
-from services.bench.tool_motion import STEP, PlainLines, line_requests
 from services.planner.core import Planner
 
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from schemas.planning import PlanCode, Refusal
-from services.bench import path_quality, planning
 from services.bench.figures import NotMeasured
-from services.bench.path_quality import joints_time, least_time
-from services.bench.planning import runs_without_core
+from services.bench.planner import path_quality, planning
+from services.bench.planner.path_quality import joints_time, least_time
+from services.bench.planner.planning import runs_without_core
+from services.bench.planner.trials import PHASES, Trial, trials
 from services.bench.scenes import parol6
-from services.bench.trials import PHASES, Trial, trials
 from services.planner.core import Planner
 from services.planner.timing.profile import joint_limits
 

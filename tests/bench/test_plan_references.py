@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from services.arm.kinematics.kinematics import Kinematics
-from services.bench import references
 from services.bench.figures import NotMeasured
+from services.bench.planner import references
+from services.bench.planner.references import CoalChecker, PlainOmpl, Roboplan
 from services.bench.problems.problem_sets import problem_set
-from services.bench.references import CoalChecker, PlainOmpl, Roboplan
 from services.bench.scenes import SCENES, parol6, random_configurations, rm1
 from services.planner.collision.world import World
 

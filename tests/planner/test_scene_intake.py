@@ -15,7 +15,7 @@ from services.arm.kinematics import self_collisions
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.kinematics.self_collisions import driver_of, shape_reach
 from services.arm.model.description import Arm, load_arm
-from services.bench.scene_intake import drawn_scene
+from services.bench.planner.scene_intake import drawn_scene
 from services.planner.collision import arm_geometry
 from services.planner.collision.world import World
 from tests.planner.test_world import configurations, stl_box

@@ -10,7 +10,7 @@ import pytest
 
 import gemelo as api
 from schemas.topics import camera_truth
-from services.bench.picks import FLOOR, PROCESSES
+from services.bench.vision.picks import FLOOR, PROCESSES
 from services.recordings.mcap_file import CLOCKS
 from services.recordings.reader import RecordingReader
 from services.stack.stack import Stack

@@ -13,7 +13,7 @@ import pytest
 import gemelo
 from gemelo.programs import Go, Pick, Program, ProgramRun, RunStatus, check_program
 from schemas.topics import camera_truth
-from services.bench.picks import FLOOR, PROCESSES, picks
+from services.bench.vision.picks import FLOOR, PROCESSES, picks
 from services.cli.errors import ExitCode
 from services.stack.stack import Stack
 from tests.stack import gemelo as command

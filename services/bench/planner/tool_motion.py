@@ -13,7 +13,7 @@ from schemas.scene import PlanningScene
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.bench.figures import Figure, Goal, of_samples, quantile
-from services.bench.path_quality import least_time
+from services.bench.planner.path_quality import least_time
 from services.bench.scenes import CHECK_SCENE, parol6, rm1
 from services.planner.collision.world import World
 from services.planner.core import Planner

@@ -17,10 +17,10 @@ from msgspec.structs import replace
 
 from schemas.system import Parameter, SetParameter
 from schemas.topics import Request, camera_detections
-from services.bench.camera import CAMERA, virtual_camera
 from services.bench.figures import Figure, NotMeasured, of_samples, quantile
 from services.bench.scenes import rm1
 from services.bench.stack import cpu_seconds, families
+from services.bench.vision.camera import CAMERA, virtual_camera
 from services.runtime.deployment import load_deployment
 from services.runtime.node import Node
 from services.stack.stack import Stack

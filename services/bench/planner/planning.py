@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 import msgspec
 
 from services.bench.figures import Figure, Goal, NotMeasured, of_samples, rounded
+from services.bench.planner.references import PlainOmpl, Reference, Roboplan
+from services.bench.planner.trials import PHASES, Trial, every_trial, spread, trials
 from services.bench.problems.problem_sets import ALLOWED, COUNT, problem_set, problem_sets
-from services.bench.references import PlainOmpl, Reference, Roboplan
 from services.bench.scenes import SCENES, parol6, rm1
-from services.bench.trials import PHASES, Trial, every_trial, spread, trials
 from services.planner.core import Planner
 
 GOAL = Goal(median=2.0, p99=20.0)  # [ms]
@@ -115,7 +115,7 @@ PYTHON_TIMEOUT = 400.0  # [s]
 PROGRAM = """
 import sys
 sys.modules["services.planner.native.binding"] = None
-from services.bench.planning import print_runs
+from services.bench.planner.planning import print_runs
 print_runs(int(sys.argv[1]), float(sys.argv[2]))
 """
 

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from ruckig import InputParameter, Ruckig, Trajectory
 
 from services.bench.figures import Figure, NotMeasured, of_samples, rounded
+from services.bench.planner.trials import Trial, every_trial, spread
 from services.bench.problems.problem_sets import path_length
 from services.bench.scenes import parol6, rm1
-from services.bench.trials import Trial, every_trial, spread
 from services.planner.timing.profile import JointLimits, joint_limits
 from services.planner.timing.toppra_speeds import load_toppra
 

@@ -13,7 +13,7 @@ from schemas.planning import FreeMotion, JointGoal, PlanCode, PlanRequest
 from schemas.scene import BoxShape, PlanningScene, SceneObject
 from services.arm.model.description import Arm
 from services.bench.figures import Figure, Goal, of_samples, quantile
-from services.bench.mesh_planning import dented_ball
+from services.bench.planner.mesh_planning import dented_ball
 from services.bench.scenes import rm1
 from services.planner.collision.world import World
 from services.planner.core import Planner

@@ -1,10 +1,18 @@
-"""The figure of plans around an obstacle whose mesh has a hundred thousand triangles."""
+"""Figures of raw meshes of a hundred thousand triangles: plans around such an obstacle, and the first plan of an arm
+whose links are such meshes, with nothing on the disk and at the next start."""
 
 from __future__ import annotations
 
+import os
 import random
+import shutil
+import statistics
 import struct
+import subprocess
+import sys
+import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +23,13 @@ from schemas.planning import JointGoal, PlanRequest, PlanResponse
 from schemas.scene import MeshShape, PlanningScene, SceneObject
 from services.arm.model.description import Arm
 from services.bench.figures import Figure, of_samples
+from services.bench.planner.trials import spread
 from services.bench.problems.problem_sets import ALLOWED
 from services.bench.scenes import TABLE, parol6
-from services.bench.trials import spread
 from services.planner.collision.clearance import CLEARANCE
 from services.planner.collision.world import World
 from services.planner.core import Planner
+from services.runtime.deployment import project_root
 
 Array = NDArray[np.float64]
 
@@ -28,6 +37,34 @@ RINGS, SECTORS = 225, 225  # 100,800 triangles
 RADIUS, DENTS = 0.08, 0.02  # [m]
 PLACE = (0.28, 0.12, 0.16)  # [m] in front of the arm
 PROBLEMS, WARMING, SEED = 40, 2, 4
+STARTS = 3  # warm ones
+LINKS = ("base_link", "brazo_link", "efector_link")
+HEIGHTS = (-2.0, 2.0, 0.9)  # [m] of the rocks in their links, where they touch nothing
+LINK = """
+  <link name="{parent}_rock">
+    <collision>
+      <origin xyz="0 0 {z}"/>
+      <geometry><mesh filename="rock.stl" scale="{scale} {scale} {scale}"/></geometry>
+    </collision>
+  </link>
+  <joint name="{parent}_rock_joint" type="fixed"><parent link="{parent}"/><child link="{parent}_rock"/></joint>
+"""
+PROGRAM = """
+import sys, time
+from pathlib import Path
+from schemas.joints import JointState
+from schemas.planning import NamedGoal, PlanCode, PlanRequest
+from services.arm.model.description import load_arm
+from services.planner.core import Planner
+began = time.process_time()
+arm = load_arm(Path(sys.argv[1]))
+planner = Planner(arm)
+planner.prepare()
+start = JointState(name=arm.joint_names, position=arm.named_states["home"])
+response = planner.plan(PlanRequest(goal=NamedGoal(name="ready"), start=start, allowed_time=100.0), None)
+assert response.code is PlanCode.SUCCESS, response.refusal
+print(time.process_time() - began)
+"""
 
 
 def plan_mesh_ms() -> Figure:
@@ -49,6 +86,22 @@ def plan_mesh_ms() -> Figure:
         f"parol6, a table and a rock of {triangles()} triangles, {PROBLEMS} random problems, {len(searched)} searched"
     )
     return of_samples([took for took, _ in answers], None, reference, note)
+
+
+def first_plan_s() -> Figure:
+    """Time of the CPU [s] from a robot's folder to its first plan, in a new process, with its models on the disk."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder, kept = rocky(Path(temporary) / "rm1"), Path(temporary) / "cache"
+        cold = first_plan(folder, kept)
+        warm = [first_plan(folder, kept) for _ in range(STARTS)]
+        plain = first_plan(project_root() / "urdf/rm1", kept)
+    reference = {
+        "cold": cold,
+        "warm as a share of cold": statistics.median(warm) / cold,
+        "rm1 as it is, of solids": plain,
+    }
+    note = f"rm1 with a rock of 100,800 triangles on {len(LINKS)} links, of three sizes; {STARTS} warm starts"
+    return of_samples(warm, None, reference, note)
 
 
 def timed_plan(planner: Planner, request: PlanRequest) -> tuple[float, PlanResponse]:
@@ -97,3 +150,23 @@ def dented_ball() -> SceneObject:
     facets["corners"] = corners
     content = bytes(80) + struct.pack("<I", len(facets)) + facets.tobytes()
     return SceneObject(name="rock", shape=MeshShape(data=content), pose=Transform(translation=PLACE))
+
+
+def rocky(folder: Path) -> Path:
+    """A copy of rm1 with rocks that touch nothing."""
+    shutil.copytree(project_root() / "urdf/rm1", folder)
+    shape = dented_ball().shape
+    assert isinstance(shape, MeshShape)
+    (folder / "rock.stl").write_bytes(shape.data)
+    urdf = folder / "robot.urdf"
+    added = [LINK.format(parent=link, z=HEIGHTS[index], scale=1.0 - 0.1 * index) for index, link in enumerate(LINKS)]
+    urdf.write_text(urdf.read_text().replace("</robot>", "".join(added) + "</robot>"))
+    return folder
+
+
+def first_plan(folder: Path, kept: Path) -> float:
+    """[s] of the CPU, by a process that finds its models in `kept`, or makes them."""
+    environment = {**os.environ, "GEMELO_CACHE": str(kept), "OPENBLAS_NUM_THREADS": "1"}
+    command = [sys.executable, "-c", PROGRAM, str(folder)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return float(done.stdout)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.bench.figures import Figure, NotMeasured, of_samples, quantile
-from services.bench.references import CoalChecker
+from services.bench.planner.references import CoalChecker
 from services.bench.scenes import CHECK_SCENE, parol6, random_configurations, rm1
 from services.planner.collision.native_scene import native_scene
 

@@ -19,9 +19,9 @@ from services.bench.any_arm.drawn_problems import DrawnProblem, problems
 from services.bench.any_arm.families import FAMILIES
 from services.bench.any_arm.generated_arms import ARMS, generated_arm
 from services.bench.figures import Figure, NotMeasured, of_samples, quantile, rounded
+from services.bench.planner.references import Answer, CoalChecker, PlainOmpl, Reference, Roboplan
+from services.bench.planner.trials import PHASES, WARMING, spread
 from services.bench.problems.problem_sets import ALLOWED, path_length
-from services.bench.references import Answer, CoalChecker, PlainOmpl, Reference, Roboplan
-from services.bench.trials import PHASES, WARMING, spread
 from services.planner.collision.world import World
 from services.planner.core import Planner
 from services.planner.native.paths import FreePath

@@ -1,0 +1,1 @@
+"""Figures of the planner: checks, kinematics, plans, their deadlines and their quality, beside other libraries."""
