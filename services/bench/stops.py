@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import os
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -44,6 +45,7 @@ RAMP = 0.8  # [s] of acceleration: the arm is stopped during it
 SPEED = 0.01  # [rad/s] below which the arm stands
 PATIENCE = 3.0  # [s]
 FLOOD_SECONDS = 60.0  # at the most
+SLEEP = 0.002  # [s] of the thread that measures how late the bench itself wakes
 
 
 class Wire:
@@ -151,6 +153,29 @@ class Caller:
         self.bus.close()
 
 
+class WakeUps:
+    """Measures in a thread how late the bench's own process gets the processor: that is in every figure of a stop."""
+
+    def __init__(self) -> None:
+        self.late: list[float] = []  # [ms]
+        self._is_over = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="wake-ups", daemon=True)
+
+    def __enter__(self) -> WakeUps:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._is_over.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while not self._is_over.is_set():
+            due = time.monotonic() + SLEEP
+            time.sleep(SLEEP)
+            self.late.append((time.monotonic() - due) * 1e3)
+
+
 def stop_ms(stacks: Stacks) -> Figure:
     """Time [ms] from the call of a stop to its frame on the wire, in the worst of all conditions."""
     running = stacks.with_broker("mosquitto")
@@ -166,10 +191,13 @@ def stop_ms(stacks: Stacks) -> Figure:
     }
     wire: dict[str, list[float]] = {}
     rest: dict[str, list[float]] = {}
+    late: dict[str, list[float]] = {}
     try:
         for name, condition in under.items():
             with condition:
-                wire[name] = caller.stops(CALLS)
+                with WakeUps() as wake_ups:
+                    wire[name] = caller.stops(CALLS)
+                late[name] = wake_ups.late
                 if name not in ("planner frozen", "flood of holds"):
                     rest[name] = caller.stops_of_moves()
         wire["device frozen, configure and 20 presses unanswered"] = _to_a_frozen_device(running, caller)
@@ -180,10 +208,12 @@ def stop_ms(stacks: Stacks) -> Figure:
     reference = {f"{name} p99": quantile(samples, 0.99) for name, samples in wire.items()}
     reference["broker frozen, to the answer that it was not carried out, median"] = quantile(to_answer, 0.5)
     reference["broker frozen, from its thaw to the stop on the wire, median"] = quantile(after_thaw, 0.5)
+    reference |= {f"{name}, the bench itself woke late p99": quantile(samples, 0.99) for name, samples in late.items()}
     reference |= {f"to rest, {name}, median": quantile(samples, 0.5) for name, samples in rest.items()}
     note = (
-        f"the worst condition is given: {worst}; {CALLS} calls each, broker mosquitto, floods of 5,000 a second from a "
-        "process on the same cores that keeps to no pace, a loop from one that does; p99 is "
+        f"the worst condition is given: {worst}; load average {os.getloadavg()[0]:.1f}; "
+        f"{CALLS} calls each, broker mosquitto, floods of 5,000 a second from a process on the same cores that keeps "
+        "to no pace, a loop from one that does; p99 is "
         f"{rounded(quantile(wire[worst], 0.99) / quantile(wire['idle'], 0.99)):g} times that of the idle stack"
     )
     return of_samples(wire[worst], GOAL, reference, note)
