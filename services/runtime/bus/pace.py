@@ -20,7 +20,7 @@ class Rate(NamedTuple):
 
 # Chosen: below what one node takes of a client (`OF_A_CLIENT` in requests/limits.py) by so much that all of it may be
 # held up on its way for a second and then arrive at once.
-OF_ALL_REQUESTS = Rate(450.0, 500)  # requests of one session to all nodes, but for urgent ones
+OF_ALL_REQUESTS = Rate(450.0, 50)  # requests of one session to all nodes, but for urgent ones
 
 
 class TokenBucket:
