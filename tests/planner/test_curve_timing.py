@@ -20,7 +20,7 @@ from services.planner.request.deadline import NEVER
 from services.planner.timing import profile
 from services.planner.timing.profile import joint_limits, trajectory_of
 from services.planner.timing.time_optimal import time_optimal_path
-from services.planner.timing.timing import timed_path
+from services.planner.timing.timing import timed_path, timed_path_in_python
 from services.planner.verification.verify import limit_shares, require_ends, sample
 
 ARM = load_arm(Path(__file__).parents[2] / "urdf" / "parol6")
@@ -98,7 +98,7 @@ def test_what_ruckig_is_asked_about_a_curve_has_no_waypoints(monkeypatch: pytest
             return super().calculate(demand, trajectory)
 
     monkeypatch.setattr(profile, "Ruckig", Listening)
-    timed_path(smooth(corners_of(1, 4), Everywhere(), NEVER), LIMITS)
+    timed_path_in_python(smooth(corners_of(1, 4), Everywhere(), NEVER), LIMITS)
     assert asked
     assert all(demand.intermediate_positions == [] for demand in asked)
 

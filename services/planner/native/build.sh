@@ -34,7 +34,7 @@ exact="-O3 -ffp-contract=off -fno-math-errno -fno-exceptions -fno-rtti -Wno-psab
 # An error only where CI builds: another compiler may warn of more.
 warnings="-Wall -Wextra -Wconversion -Wshadow ${CI:+-Werror}"
 system="-isystem $nanobind/../include -isystem $nanobind/../ext/robin_map/include -isystem $headers"
-objects="$build/nanobind.o $build/module.o $build/vector.o $build/plain.o"
+objects="$build/nanobind.o $build/module.o $build/trajectories.o $build/vector.o $build/plain.o"
 has_avx2=$($compiler -dM -E -x c++ /dev/null | grep -o -m 1 __x86_64__ || true)
 [ -z "$has_avx2" ] || objects="$objects $build/avx2.o"
 
@@ -49,7 +49,9 @@ kernels() {
     [ -z "$has_avx2" ] || kernel avx2 -mavx2
 }
 module() {
-    $compiler $common -O3 -ffp-contract=off $warnings $system -c "$here/src/module.cpp" -o "$build/module.o"
+    for name in module trajectories; do
+        $compiler $common -O3 -ffp-contract=off $warnings $system -c "$here/src/$name.cpp" -o "$build/$name.o"
+    done
     [ "$(cat "$build/nanobind.stamp" 2>/dev/null)" = "$stamp" ] && [ -f "$build/nanobind.o" ] || {
         $compiler $common -Os -w -fno-strict-aliasing $system -c "$nanobind/nb_combined.cpp" -o "$build/nanobind.o"
         printf '%s\n' "$stamp" >"$build/nanobind.stamp"

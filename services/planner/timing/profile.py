@@ -1,12 +1,13 @@
 """Time along a straight line of the joints: jerk-limited, every joint at the same share of its path at every moment.
 
-ruckig times one variable, the path along the line; the joints follow in proportion. That is phase synchronisation
-without its exception: ruckig's own falls back to curved lines where another joint's limit would be exceeded.
+One variable is timed, the path along the line; the joints follow in proportion. That is phase synchronisation without
+its exception: ruckig's own falls back to curved lines where another joint's limit would be exceeded. The compiled core
+(`native/src/timing`) has the movement in closed form, ruckig finds the same where that is not built.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from typing import NamedTuple
@@ -17,6 +18,7 @@ from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from services.arm.model.description import Arm
+from services.planner.native.compiled import IS_BUILT, motion
 
 Array = NDArray[np.float64]
 
@@ -28,6 +30,7 @@ MARGIN = 0.997  # share of the limits that is used, for what SHORTEST leaves out
 LONGEST = 86_400.0  # [s] a plan may take: beyond a day the scaling is a mistake
 STANDSTILL = 1e-9  # [s] at full speed: a path so short is no way
 NEGLIGIBLE = 1e-12  # share of its full speed below which a joint limits nothing
+NO_TIME = 1e-12  # [s] a phase that is shorter is none
 HOLD = 0.1  # [s] that a plan to where the arm already is takes
 
 
@@ -42,6 +45,11 @@ class JointLimits:
     velocity: Array
     acceleration: Array
     jerk: Array
+
+    @property
+    def rows(self) -> tuple[Array, Array, Array]:
+        """(n,) each, as the compiled core takes them."""
+        return self.velocity, self.acceleration, self.jerk
 
 
 def joint_limits(arm: Arm, velocity_scaling: float = 1.0, acceleration_scaling: float = 1.0) -> JointLimits:
@@ -86,6 +94,21 @@ def straight_line(
 def stop_and_go(corners: Array, limits: JointLimits) -> States:
     """From corner to corner of the polyline (m, n) [rad] or [m], each leg as `straight_line`, at rest at all of them;
     raises `NoProfile`."""
+    if not IS_BUILT:
+        return stop_and_go_in_python(corners, limits)
+    return compiled_states(lambda: motion.timed_lines(np.ascontiguousarray(corners), *limits.rows))
+
+
+def compiled_states(timed: Callable[[], tuple[Array, Array, Array, Array]]) -> States:
+    """What the compiled core returns; raises `NoProfile` for its own."""
+    try:
+        return States(*timed())
+    except motion.NoProfile as error:
+        raise NoProfile(str(error)) from error
+
+
+def stop_and_go_in_python(corners: Array, limits: JointLimits) -> States:
+    """`stop_and_go` where the core is not built: ruckig for every leg; raises `NoProfile`."""
     legs, began = [_rest(corners[0], 0.0)], 0.0
     for start, goal in pairwise(corners):
         legs += _leg(start, goal, limits, began)
@@ -122,7 +145,7 @@ def _time_line(length: float, direction: Array, limits: JointLimits) -> tuple[Tr
     demand.max_acceleration = [MARGIN * float(np.min(limits.acceleration[moving] / share[moving]))]
     demand.max_jerk = [MARGIN * float(np.min(limits.jerk[moving] / share[moving]))]
     profile = solved(demand, f"a path of {length:.3g} s at full speed")
-    return profile, list(accumulate(profile.profiles[0][0].t))
+    return profile, list(accumulate(phase.duration for phase in phases_of(profile)))
 
 
 def solved(demand: InputParameter, what: str) -> Trajectory:
@@ -135,6 +158,31 @@ def solved(demand: InputParameter, what: str) -> Trajectory:
     if result not in (Result.Working, Result.Finished):
         raise NoProfile(f"no jerk-limited profile for {what}: {result.name}")
     return profile
+
+
+class Phase(NamedTuple):
+    """Of steady jerk: how long it lasts [s], and the length, its derivatives and the jerk at its begin."""
+
+    duration: float
+    length: float
+    speed: float
+    acceleration: float
+    jerk: float
+
+
+def phases_of(profile: Trajectory) -> list[Phase]:
+    """The profile of one variable, from one change of its jerk to the next."""
+    found = profile.profiles[0][0]
+    phases: list[Phase] = []
+    for row in zip(found.t, found.p, found.v, found.a, found.j, strict=False):
+        phase = Phase(*row)
+        if phase.duration <= NO_TIME:
+            continue
+        if phases and phases[-1].jerk == phase.jerk:
+            phases[-1] = phases[-1]._replace(duration=phases[-1].duration + phase.duration)
+        else:
+            phases.append(phase)
+    return phases
 
 
 def _times(changes: Sequence[float], duration: float) -> list[float]:

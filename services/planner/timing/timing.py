@@ -1,8 +1,8 @@
 """Jerk-limited time along a smooth path: fast where it is straight, slow enough where it bends.
 
-The path is cut into sections. ruckig goes through each of them within its bounds, from the speed at its beginning to
-that at its end, where the speed is steady. At last all is sped up or slowed down evenly until one joint is at one of
-its limits.
+The path is cut into sections. Each of them is gone through as fast as its bounds allow, from the speed at its beginning
+to that at its end, where the speed is steady. At last all is sped up or slowed down evenly until one joint is at one of
+its limits. The compiled core does so (`native/src/timing`), numpy and ruckig where that is not built.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from ruckig import InputParameter, Trajectory
 
-from services.planner.path.curve import Curve, smooth_runs
+from services.planner.native.compiled import IS_BUILT, motion
+from services.planner.path.curve import Curve, TurnsOnTheSpot, smooth_runs
 from services.planner.timing.peaks import peak_shares
 from services.planner.timing.profile import (
     MARGIN,
@@ -21,6 +22,8 @@ from services.planner.timing.profile import (
     SPACING,
     JointLimits,
     States,
+    compiled_states,
+    phases_of,
     require_short,
     solved,
     stop_and_go,
@@ -47,6 +50,16 @@ def timed_path(control: Array, limits: JointLimits) -> States:
 
     At corners it stops. Raises `TurnsOnTheSpot` where the curve does so without a corner.
     """
+    if not IS_BUILT:
+        return timed_path_in_python(control, limits)
+    try:
+        return compiled_states(lambda: motion.timed_curve(np.ascontiguousarray(control), *limits.rows))
+    except motion.TurnsOnTheSpot as error:
+        raise TurnsOnTheSpot(str(error)) from error
+
+
+def timed_path_in_python(control: Array, limits: JointLimits) -> States:
+    """`timed_path` where the core is not built; raises `NoProfile` and `TurnsOnTheSpot`."""
     return along_runs(control, limits, _run_states)
 
 
@@ -69,7 +82,9 @@ def along_runs(
     states = States(*(column[kept] for column in whole))
     states.positions[0], states.positions[-1] = control[0], control[-1]
     states.velocities[[0, -1]] = states.accelerations[[0, -1]] = 0.0
-    return at_limits(states, limits, with_jerk)
+    states = at_limits(states, limits, with_jerk)
+    require_short(float(states.times[-1]))
+    return states
 
 
 def at_limits(states: States, limits: JointLimits, with_jerk: bool) -> States:
@@ -96,12 +111,8 @@ def stretches_through(sections: list[Section]) -> Iterator[Stretch]:
     """Of steady jerk, through all sections; raises `NoProfile`."""
     speeds, travelled = boundary_speeds(sections), 0.0
     for section, before, after in zip(sections, speeds[:-1], speeds[1:], strict=True):
-        profile = _through(section, before, after).profiles[0][0]
-        for duration, length, speed, acceleration, jerk in zip(
-            profile.t, profile.p, profile.v, profile.a, profile.j, strict=False
-        ):
-            if duration > 0.0:
-                yield duration, travelled + length, speed, acceleration, jerk
+        for phase in phases_of(_through(section, before, after)):
+            yield phase._replace(length=travelled + phase.length)
         travelled += section.length
 
 

@@ -17,17 +17,11 @@ from numpy.typing import NDArray
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.planning import PlanCode, Refusal, StepMargin
 from services.arm.model.description import Arm, Joint
+from services.planner.native.compiled import IS_BUILT, motion
 from services.planner.request.deadline import NEVER, Deadline
 from services.planner.request.refusals import PlanRefused
 from services.planner.timing.profile import LONGEST
 from services.planner.verification.verify import at_times
-
-try:
-    from services.planner.native.binding import motion
-except ImportError:  # not built for this interpreter, or hidden: the same in numpy
-    IS_BUILT = False
-else:
-    IS_BUILT = True
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -11,14 +11,8 @@ from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory
 from services.arm.model.description import Arm
+from services.planner.native.compiled import IS_BUILT, motion
 from services.planner.timing.profile import JointLimits
-
-try:
-    from services.planner.native.binding import motion
-except ImportError:  # not built for this interpreter, or hidden: the same in numpy
-    IS_BUILT = False
-else:
-    IS_BUILT = True
 
 Array = NDArray[np.float64]
 

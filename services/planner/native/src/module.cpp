@@ -2,43 +2,21 @@
 //
 // Shapes and finiteness are checked here and in core.py; the headers trust what they are given.
 #include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "arrays.h"
 #include "cover.h"
 #include "descent.h"
 #include "kernels.h"
 #include "plan.h"
-#include "quintic.h"
-
-namespace nb = nanobind;
+#include "trajectories.h"
 
 namespace gemelo {
 namespace {
 
-using Rows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Row = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Integers = nb::ndarray<const int32_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Segments = nb::ndarray<const int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Flag = std::shared_ptr<CancelFlag>;
-
-template <class T>
-nb::ndarray<nb::numpy, T> array_of(std::vector<T> values, std::initializer_list<size_t> shape) {
-    auto* owned = new std::vector<T>(std::move(values));
-    nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-    return nb::ndarray<nb::numpy, T>(owned->data(), shape, owner);
-}
-
-void require(bool is_so, const char* otherwise) {
-    if (!is_so) throw BadModel(otherwise);
-}
-
-void require_columns(size_t is, size_t wanted, const char* what) {
-    if (is == wanted) return;
-    throw BadModel(std::string(what) + " must have " + std::to_string(wanted) + " columns, not " + std::to_string(is));
-}
 
 // Finite, and of a size that a float still knows to the needed digits.
 void require_usable(const double* values, size_t count) {
@@ -336,45 +314,6 @@ nb::ndarray<nb::numpy, double> path_of(const Plan& plan, size_t dof) {
     return array_of(std::move(rows), {plan.path.size(), dof});
 }
 
-// Positions, velocities, accelerations and jerks, (m, n) each, of the quintics through a trajectory's points at `times`
-// (m,), each in the segment `index` (m,).
-nb::tuple quintics(const Row& stamps, const Rows& p, const Rows& v, const Rows& a, const Row& times,
-                   const Segments& index) {
-    const size_t points = stamps.size(), dof = p.shape(1), count = times.size();
-    for (const Rows* rows : {&p, &v, &a}) {
-        require(rows->shape(0) == points && rows->shape(1) == dof, "points must be as many as stamps, and alike");
-    }
-    require(index.size() == count, "each time needs its segment");
-    for (size_t i = 0; i < count; ++i) {
-        require(index(i) >= 0 && static_cast<size_t>(index(i)) + 1 < points, "a segment must exist");
-    }
-    std::array<std::vector<double>, 4> columns;
-    for (auto& column : columns) column.resize(count * dof);
-    {
-        nb::gil_scoped_release release;
-        const TrajectoryView trajectory{stamps.data(), p.data(), v.data(), a.data(), dof};
-        for (size_t i = 0; i < count; ++i) {
-            sample_quintic(trajectory, times(i), static_cast<size_t>(index(i)),
-                           {&columns[0][i * dof], &columns[1][i * dof], &columns[2][i * dof], &columns[3][i * dof]});
-        }
-    }
-    const auto taken = [&](size_t k) { return array_of(std::move(columns[k]), {count, dof}); };
-    return nb::make_tuple(taken(0), taken(1), taken(2), taken(3));
-}
-
-// The largest rate (n,) of a step stream, whose coefficients (k, n) are in 1/256 steps, at `shares` of its knots.
-nb::ndarray<nb::numpy, double> peak_rates_of(const Rows& start, const Rows& square, const Rows& cube, const Row& shares,
-                                             double knot) {
-    const size_t knots = start.shape(0), dof = start.shape(1);
-    for (const Rows* rows : {&square, &cube}) {
-        require(rows->shape(0) == knots && rows->shape(1) == dof, "coefficients must be alike");
-    }
-    std::vector<double> peaks(dof);
-    peak_rates({start.data(), square.data(), cube.data(), knots, dof, shares.size(), knot}, shares.data(),
-               peaks.data());
-    return array_of(std::move(peaks), {dof});
-}
-
 // The leaves' centres (n, leaves, 3), for the tests of the kinematics.
 nb::ndarray<nb::numpy, float> centres(const World& world, const Kernel& kernel, const Rows& rows) {
     require_columns(rows.shape(1), static_cast<size_t>(world.dof()), "joint values");
@@ -393,8 +332,8 @@ nb::ndarray<nb::numpy, float> centres(const World& world, const Kernel& kernel, 
 }  // namespace gemelo
 
 NB_MODULE(_motion, module) {
-    nb::set_leak_warnings(false);  // what Python keeps until the process ends is no leak
     using namespace gemelo;
+    nb::set_leak_warnings(false);  // what Python keeps until the process ends is no leak
     using namespace nb::literals;
     nb::class_<Chain>(module, "Chain");
     nb::class_<ToolDescent>(module, "ToolDescent");
@@ -446,8 +385,6 @@ NB_MODULE(_motion, module) {
     module.def("doubts", &doubts, "world"_a, "kernel"_a, "rows"_a, "margin"_a, "finest"_a);
     module.def("plan", &find, "world"_a, "kernel"_a, "bounds"_a, "start"_a, "goals"_a, "seed"_a, "margin"_a,
                "seconds"_a, "cancel"_a.none(), "enough"_a);
-    module.def("quintics", &quintics, "stamps"_a, "positions"_a, "velocities"_a, "accelerations"_a, "times"_a,
-               "index"_a);
-    module.def("peak_rates", &peak_rates_of, "start"_a, "square"_a, "cube"_a, "shares"_a, "knot"_a);
+    add_trajectories(module);
     module.def("centres", &centres, "world"_a, "kernel"_a, "rows"_a);
 }

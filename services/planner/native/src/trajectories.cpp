@@ -1,0 +1,104 @@
+// Trajectories for Python: timed along a path, and sampled when they are finished; arrays in, arrays out.
+#include "trajectories.h"
+
+#include <array>
+
+#include "arrays.h"
+#include "quintic.h"
+#include "timing/timed_path.h"
+
+namespace gemelo {
+namespace {
+
+// Positions, velocities, accelerations and jerks, (m, n) each, of the quintics through a trajectory's points at `times`
+// (m,), each in the segment `index` (m,).
+nb::tuple quintics(const Row& stamps, const Rows& p, const Rows& v, const Rows& a, const Row& times,
+                   const Segments& index) {
+    const size_t points = stamps.size(), dof = p.shape(1), count = times.size();
+    for (const Rows* rows : {&p, &v, &a}) {
+        require(rows->shape(0) == points && rows->shape(1) == dof, "points must be as many as stamps, and alike");
+    }
+    require(index.size() == count, "each time needs its segment");
+    for (size_t i = 0; i < count; ++i) {
+        require(index(i) >= 0 && static_cast<size_t>(index(i)) + 1 < points, "a segment must exist");
+    }
+    std::array<std::vector<double>, 4> columns;
+    for (auto& column : columns) column.resize(count * dof);
+    {
+        nb::gil_scoped_release release;
+        const TrajectoryView trajectory{stamps.data(), p.data(), v.data(), a.data(), dof};
+        for (size_t i = 0; i < count; ++i) {
+            sample_quintic(trajectory, times(i), static_cast<size_t>(index(i)),
+                           {&columns[0][i * dof], &columns[1][i * dof], &columns[2][i * dof], &columns[3][i * dof]});
+        }
+    }
+    const auto taken = [&](size_t k) { return array_of(std::move(columns[k]), {count, dof}); };
+    return nb::make_tuple(taken(0), taken(1), taken(2), taken(3));
+}
+
+// The largest rate (n,) of a step stream, whose coefficients (k, n) are in 1/256 steps, at `shares` of its knots.
+nb::ndarray<nb::numpy, double> peak_rates_of(const Rows& start, const Rows& square, const Rows& cube, const Row& shares,
+                                             double knot) {
+    const size_t knots = start.shape(0), dof = start.shape(1);
+    for (const Rows* rows : {&square, &cube}) {
+        require(rows->shape(0) == knots && rows->shape(1) == dof, "coefficients must be alike");
+    }
+    std::vector<double> peaks(dof);
+    peak_rates({start.data(), square.data(), cube.data(), knots, dof, shares.size(), knot}, shares.data(),
+               peaks.data());
+    return array_of(std::move(peaks), {dof});
+}
+
+// Times (m,), and positions, velocities and accelerations (m, n).
+nb::tuple taken(States states, size_t dof) {
+    const size_t rows = states.times.size();
+    return nb::make_tuple(array_of(std::move(states.times), {rows}), array_of(std::move(states.positions), {rows, dof}),
+                          array_of(std::move(states.velocities), {rows, dof}),
+                          array_of(std::move(states.accelerations), {rows, dof}));
+}
+
+// The limits of all joints that have columns in `rows`, of which there must be at least `least`.
+LimitsView limits_for(const Rows& rows, size_t least, const Row& velocity, const Row& acceleration, const Row& jerk) {
+    const size_t dof = rows.shape(1);
+    require(dof >= 1 && dof <= static_cast<size_t>(kMaxDof), "an arm has 1 to 16 joint values");
+    require(rows.shape(0) >= least, "a line has 2 corners at least, a curve 4 control points");
+    for (const Row* limit : {&velocity, &acceleration, &jerk}) require_columns(limit->size(), dof, "limits");
+    return {velocity.data(), acceleration.data(), jerk.data(), dof};
+}
+
+// The states along the uniform cubic B-spline of `control` (k, n).
+nb::tuple timed_curve(const Rows& control, const Row& velocity, const Row& acceleration, const Row& jerk) {
+    const LimitsView limits = limits_for(control, 4, velocity, acceleration, jerk);
+    States states;
+    {
+        nb::gil_scoped_release release;
+        states = timed_path(control.data(), control.shape(0), limits);
+    }
+    return taken(std::move(states), limits.dof);
+}
+
+// The states from corner to corner of the polyline (m, n), at rest at all of them.
+nb::tuple timed_lines(const Rows& corners, const Row& velocity, const Row& acceleration, const Row& jerk) {
+    const LimitsView limits = limits_for(corners, 2, velocity, acceleration, jerk);
+    States states;
+    {
+        nb::gil_scoped_release release;
+        states = stop_and_go(corners.data(), corners.shape(0), limits);
+    }
+    return taken(std::move(states), limits.dof);
+}
+
+}  // namespace
+
+void add_trajectories(nb::module_& module) {
+    using namespace nb::literals;
+    nb::exception<NoProfile>(module, "NoProfile", PyExc_ValueError);
+    nb::exception<TurnsOnTheSpot>(module, "TurnsOnTheSpot", PyExc_ValueError);
+    module.def("quintics", &quintics, "stamps"_a, "positions"_a, "velocities"_a, "accelerations"_a, "times"_a,
+               "index"_a);
+    module.def("peak_rates", &peak_rates_of, "start"_a, "square"_a, "cube"_a, "shares"_a, "knot"_a);
+    module.def("timed_curve", &timed_curve, "control"_a, "velocity"_a, "acceleration"_a, "jerk"_a);
+    module.def("timed_lines", &timed_lines, "corners"_a, "velocity"_a, "acceleration"_a, "jerk"_a);
+}
+
+}  // namespace gemelo
