@@ -39,6 +39,12 @@ class Centring:
     def centred(self, target: Target, solution: Array) -> Array | None:
         """Joint values (n,) [rad] or [m] nearer to the middles of their ranges, reached from `solution` (n,) by
         self-motion; `solution` itself where no self-motion brings them nearer, None where there is none."""
+        if self._descent.knows_centring(target):
+            return self._descent.centred(target, solution, self._middle, self._weight)
+        return self.centred_in_python(target, solution)
+
+    def centred_in_python(self, target: Target, solution: Array) -> Array | None:
+        """`centred` where the core is not built, and for targets that it does not know."""
         for step_number in range(STEPS):
             motions = self._free_motions(target, solution)
             if not len(motions):

@@ -75,9 +75,17 @@ class Descent:
             return self._descend(
                 target, start, lambda q: target.error_and_jacobian(self._kinematics, q), target.is_exact
             )
-        rotation = NOTHING if target.rotation is None else target.rotation.reshape(9)
-        tolerances = POSITION_TOLERANCE, ROTATION_TOLERANCE
-        return Attempt(*self._native.descend(start, target.position, rotation, target.metres_per_radian, *tolerances))
+        return Attempt(*self._native.descend(start, *_exact_target(target)))
+
+    def knows_centring(self, target: Target) -> bool:
+        """True if `centred` answers for this target: built, and the target is an exact one."""
+        return self._native is not None and target.pointing is None and not target.is_tolerant
+
+    def centred(self, target: Target, solution: Array, middle: Array, weight: Array) -> Array | None:
+        """As `Centring.centred`, compiled; joint values (n,) [rad] or [m], `weight` (n,) by the distance from
+        `middle` (n,)."""
+        assert self._native is not None
+        return self._native.centred(solution, middle, weight, *_exact_target(target))
 
     def _tolerant(self, target: Target, positions: Array) -> tuple[Array, Array]:
         return target.beyond_tolerances(*target.error_and_jacobian(self._kinematics, positions))
@@ -121,3 +129,9 @@ class Descent:
         if longest > LARGEST_STEP:
             step *= LARGEST_STEP / longest
         return self.clip(positions + step)
+
+
+def _exact_target(target: Target) -> tuple[Array, Array, float, float, float]:
+    """As the compiled descents take it."""
+    rotation = NOTHING if target.rotation is None else target.rotation.reshape(9)
+    return target.position, rotation, target.metres_per_radian, POSITION_TOLERANCE, ROTATION_TOLERANCE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -54,8 +55,13 @@ def _turned(values: Array, turns: Array) -> list[Array]:
     """`values` with up to `turns` full turns added to each."""
     while np.prod(turns + 1.0) > MOST_TURNS:
         turns = np.minimum(turns, turns.max() - 1.0)
-    amounts = product(*(range(int(most) + 1) for most in turns))
-    return [values + math.tau * np.array(amount) for amount in amounts]
+    return list(values + math.tau * _combinations(tuple(turns.astype(int).tolist())))
+
+
+@lru_cache(maxsize=1024)
+def _combinations(turns: tuple[int, ...]) -> NDArray[np.int64]:
+    """(m, n) every choice of 0 to as many full turns of each joint as `turns` (n,) has."""
+    return np.array(list(product(*(range(most + 1) for most in turns))))
 
 
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)

@@ -56,6 +56,17 @@ def descend(
     position_tolerance: float,
     rotation_tolerance: float,
 ) -> Array: ...
+def centre(
+    arm: ToolDescent,
+    joints: Array,
+    middle: Array,
+    weight: Array,
+    position: Array,
+    rotation: Array,
+    metres_per_radian: float,
+    position_tolerance: float,
+    rotation_tolerance: float,
+) -> Array: ...
 def part(frame: int, spheres: Array, solids: list[Obstacle]) -> Part: ...
 def cover(cells: Array, candidates: Array, least: float) -> Array: ...
 def mesh(vertices: Array, faces: Integers) -> TriangleMesh: ...

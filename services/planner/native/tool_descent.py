@@ -44,3 +44,29 @@ class NativeDescent:
             rotation_tolerance,
         )[0]
         return end[:-2].copy(), float(end[-2]), bool(end[-1])
+
+    def centred(
+        self,
+        solution: Array,
+        middle: Array,
+        weight: Array,
+        position: Array,
+        rotation: Array,
+        metres_per_radian: float,
+        position_tolerance: float,
+        rotation_tolerance: float,
+    ) -> Array | None:
+        """`solution` (n,), which meets the target, moved by self-motion towards `middle` (n,), where a joint's distance
+        counts by `weight` (n,); None where it has no self-motion. The target is as of `descend`."""
+        moved = motion.centre(
+            self._arm,
+            np.ascontiguousarray(solution, dtype=np.float64),
+            middle,
+            weight,
+            np.ascontiguousarray(position, dtype=np.float64),
+            np.ascontiguousarray(rotation, dtype=np.float64),
+            metres_per_radian,
+            position_tolerance,
+            rotation_tolerance,
+        )
+        return moved if len(moved) else None

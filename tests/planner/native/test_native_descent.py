@@ -10,6 +10,7 @@ import pytest
 
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm, load_arm
+from services.planner.kinematics.centring import Centring
 from services.planner.kinematics.descent import Descent
 from services.planner.kinematics.targets import Target
 from services.runtime.deployment import project_root
@@ -73,3 +74,30 @@ def test_turns_of_every_size_are_taken_as_pinocchio_does(angle: float):
         one, other = both.compiled.descend(target, start), both.plain.descend(target, start)
         assert one.is_solution == other.is_solution
         assert one.error == pytest.approx(other.error, abs=1e-6, rel=1e-2)
+
+
+@pytest.mark.parametrize("with_turn", [False, True])
+def test_compiled_self_motion_goes_as_far_to_the_middles_as_that_in_python_and_keeps_the_tool(
+    both: Both, with_turn: bool
+):
+    arm = both.kinematics.arm
+    compiled = Centring(arm, both.kinematics, both.compiled)
+    plain = Centring(arm, both.kinematics, both.plain)
+    for wanted, _ in both.pairs():
+        pose = both.kinematics.tool(wanted)
+        target = Target(pose.position, pose.rotation if with_turn else None)
+        one, other = compiled.centred(target, wanted), plain.centred(target, wanted)
+        assert (one is None) == (other is None)
+        if one is None or other is None:
+            continue
+        error, _ = target.error_and_jacobian(both.kinematics, one)
+        assert target.is_exact(error)
+        assert one == pytest.approx(other, abs=1e-4)
+        assert plain.eccentricity(one) <= plain.eccentricity(wanted) + 1e-9
+
+
+def test_self_motion_towards_a_target_with_tolerances_is_left_to_python(both: Both):
+    pose = both.kinematics.tool(both.rows[0])
+    assert both.compiled.knows_centring(Target(pose.position))
+    assert not both.compiled.knows_centring(Target(pose.position, position_tolerance=0.01))
+    assert not both.plain.knows_centring(Target(pose.position))

@@ -64,6 +64,17 @@ class DescentRun {
         return {std::sqrt(now.cost), is_there(now)};
     }
 
+    // The product (dof, dof) of the weighted Jacobian at `joints` with itself.
+    void squared_jacobian(const double* joints, double (*squared)[kMaxDof]) const {
+        const Residual at = residual(joints);
+        for (size_t i = 0; i < dof_; ++i) {
+            for (size_t j = 0; j < dof_; ++j) {
+                squared[i][j] = 0.0;
+                for (size_t row = 0; row < rows(); ++row) squared[i][j] += at.jacobian[row][i] * at.jacobian[row][j];
+            }
+        }
+    }
+
   private:
     static constexpr int kIterations = 40;
     static constexpr double kStall = 1e-5;       // share of the squared error by which a step must improve

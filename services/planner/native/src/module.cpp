@@ -7,6 +7,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "arrays.h"
+#include "centring.h"
 #include "cover.h"
 #include "descent.h"
 #include "kernels.h"
@@ -77,17 +78,38 @@ std::shared_ptr<const ToolDescent> make_tool_descent(const Integers& links, cons
     return arm;
 }
 
+ToolTarget target_of(const Row& position, const Row& rotation, double metres_per_radian, double position_tolerance,
+                     double rotation_tolerance) {
+    require_columns(position.size(), 3, "a position");
+    require(rotation.size() == 9 || rotation.size() == 0, "a rotation has 9 numbers, or none");
+    ToolTarget target{{}, {}, rotation.size() == 9, metres_per_radian, position_tolerance, rotation_tolerance};
+    std::copy(position.data(), position.data() + 3, target.position.begin());
+    std::copy(rotation.data(), rotation.data() + rotation.size(), target.rotation.begin());
+    return target;
+}
+
+// Where self-motion takes the solution `joints` (n,), towards `middle` (n,) by `weight` (n,); empty where there is
+// none.
+nb::ndarray<nb::numpy, double> centre(const ToolDescent& arm, const Row& joints, const Row& middle, const Row& weight,
+                                      const Row& position, const Row& rotation, double metres_per_radian,
+                                      double position_tolerance, double rotation_tolerance) {
+    const size_t dof = arm.lower.size();
+    for (const Row* row : {&joints, &middle, &weight}) require_columns(row->size(), dof, "joint values");
+    const ToolTarget target = target_of(position, rotation, metres_per_radian, position_tolerance, rotation_tolerance);
+    std::vector<double> moved(joints.data(), joints.data() + dof);
+    Centring centring(arm, target, middle.data(), weight.data());
+    if (centring.run(moved.data()) == Centred::kNoFreedom) moved.clear();
+    const size_t count = moved.size();
+    return array_of(std::move(moved), {count});
+}
+
 // Where the descents from `starts` (m, n) end: rows (m, n + 2) of joint values, error [m], and 1 for what is there.
 nb::ndarray<nb::numpy, double> descend(const ToolDescent& arm, const Rows& starts, const Row& position,
                                        const Row& rotation, double metres_per_radian, double position_tolerance,
                                        double rotation_tolerance) {
     const size_t dof = arm.lower.size(), count = starts.shape(0);
     require_columns(starts.shape(1), dof, "joint values");
-    require_columns(position.size(), 3, "a position");
-    require(rotation.size() == 9 || rotation.size() == 0, "a rotation has 9 numbers, or none");
-    ToolTarget target{{}, {}, rotation.size() == 9, metres_per_radian, position_tolerance, rotation_tolerance};
-    std::copy(position.data(), position.data() + 3, target.position.begin());
-    std::copy(rotation.data(), rotation.data() + rotation.size(), target.rotation.begin());
+    const ToolTarget target = target_of(position, rotation, metres_per_radian, position_tolerance, rotation_tolerance);
     std::vector<double> rows(count * (dof + 2));
     {
         nb::gil_scoped_release release;
@@ -371,6 +393,8 @@ NB_MODULE(_motion, module) {
     module.def("tool_descent", &make_tool_descent, "links"_a, "numbers"_a, "frame"_a, "pose"_a, "bounds"_a);
     module.def("descend", &descend, "arm"_a, "starts"_a, "position"_a, "rotation"_a, "metres_per_radian"_a,
                "position_tolerance"_a, "rotation_tolerance"_a);
+    module.def("centre", &centre, "arm"_a, "joints"_a, "middle"_a, "weight"_a, "position"_a, "rotation"_a,
+               "metres_per_radian"_a, "position_tolerance"_a, "rotation_tolerance"_a);
     module.def("part", &make_part, "frame"_a, "spheres"_a, "solids"_a);
     module.def("cover", &cover, "cells"_a, "candidates"_a, "least"_a);
     module.def("mesh", &make_mesh, "vertices"_a, "faces"_a);
