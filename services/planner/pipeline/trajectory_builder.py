@@ -27,6 +27,8 @@ from services.planner.verification.verify import (
     require_jerk,
     require_within_limits,
     sample,
+    sample_between,
+    states_of,
 )
 
 
@@ -113,9 +115,10 @@ class TrajectoryBuilder:
         """The trajectory from `start` to `goal`, (n,) [rad] or [m], slowed where the steppers cannot follow it, then
         verified as it will be executed; raises `TrajectoryTouches` or `PlanRefused`."""
         with self._watch.phase("verification"):
-            samples = sample(trajectory)
+            states = states_of(trajectory)
+            samples = sample_between(*states)
             self._require_free(samples.positions)
-            trajectory, margins, scale = self._feasible(trajectory)
+            trajectory, margins, scale = self._feasible(trajectory, states)
             if scale < 1.0:
                 samples = sample(trajectory)
                 self._require_free(samples.positions)
@@ -134,9 +137,11 @@ class TrajectoryBuilder:
         if touching is not None:
             raise TrajectoryTouches(touching)
 
-    def _feasible(self, trajectory: JointTrajectory) -> tuple[JointTrajectory, tuple[StepMargin, ...], float]:
+    def _feasible(
+        self, trajectory: JointTrajectory, states: States
+    ) -> tuple[JointTrajectory, tuple[StepMargin, ...], float]:
         try:
-            return trajectory, require_feasible(self._arm, trajectory), 1.0
+            return trajectory, require_feasible(self._arm, trajectory, states), 1.0
         except PlanRefused:
             if self._request.step_policy is StepPolicy.REFUSE:
                 raise

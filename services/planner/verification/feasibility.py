@@ -20,8 +20,8 @@ from services.arm.model.description import Arm, Joint
 from services.planner.native.compiled import IS_BUILT, motion
 from services.planner.request.deadline import NEVER, Deadline
 from services.planner.request.refusals import PlanRefused
-from services.planner.timing.profile import LONGEST
-from services.planner.verification.verify import at_times
+from services.planner.timing.profile import LONGEST, States
+from services.planner.verification.verify import states_at, states_of
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -86,10 +86,14 @@ def step_stream(arm: Arm, trajectory: JointTrajectory, part: tuple[int, int] | N
 
     Of all of it, or from one knot to another.
     """
-    duration = trajectory.points[-1].time_from_start
-    last = _knots(trajectory)
+    return _stream(arm, states_of(trajectory), part)
+
+
+def _stream(arm: Arm, states: States, part: tuple[int, int] | None = None) -> StepStream:
+    duration = float(states.times[-1])
+    last = _knots(duration)
     begin, end = part or (0, last)
-    samples = at_times(trajectory, np.minimum(np.arange(begin, end + 1) * KNOT, duration))
+    samples = states_at(states, np.minimum(np.arange(begin, end + 1) * KNOT, duration))
     scale = np.array([joint.steps.per_unit * Q8 for joint in arm.joints])
     position = np.rint(samples.positions * scale)
     slope = np.rint(samples.velocities * scale) * KNOT
@@ -105,23 +109,27 @@ def margins(arm: Arm, stream: StepStream) -> tuple[StepMargin, ...]:
     return tuple(_margin(arm, joint, index, stream) for index, joint in enumerate(arm.joints))
 
 
-def _margins(arm: Arm, trajectory: JointTrajectory) -> tuple[StepMargin, ...]:
+def _margins(arm: Arm, states: States) -> tuple[StepMargin, ...]:
     """Of all of it, by parts that the memory holds."""
-    knots = _knots(trajectory)
+    knots = _knots(float(states.times[-1]))
     parts = [(begin, min(begin + MOST_KNOTS, knots)) for begin in range(0, knots, MOST_KNOTS)]
-    found = [margins(arm, step_stream(arm, trajectory, part)) for part in parts]
+    found = [margins(arm, _stream(arm, states, part)) for part in parts]
     worst = (max(of_joint, key=lambda margin: margin.share) for of_joint in zip(*found, strict=True))
     peaks = np.max([[margin.peak_rate for margin in part] for part in found], axis=0).tolist()
     return tuple(replace(margin, peak_rate=peak) for margin, peak in zip(worst, peaks, strict=True))
 
 
-def _knots(trajectory: JointTrajectory) -> int:
-    return max(1, math.ceil(trajectory.points[-1].time_from_start / KNOT - 1e-9))
+def _knots(duration: float) -> int:
+    return max(1, math.ceil(duration / KNOT - 1e-9))
 
 
 def queue_share(arm: Arm, trajectory: JointTrajectory) -> float:
     """The share of the device's queue that the gateway fills to play `trajectory` at full speed."""
-    peaks = np.max(np.abs([point.velocities for point in trajectory.points]), axis=0)
+    return _queue_share(arm, states_of(trajectory))
+
+
+def _queue_share(arm: Arm, states: States) -> float:
+    peaks = np.abs(states.velocities).max(axis=0)
     braking = max(peak / joint.acceleration for joint, peak in zip(arm.joints, peaks.tolist(), strict=True))
     return float(LEAD + 0.5 * braking) / (arm.device.queue_capacity * KNOT)
 
@@ -133,11 +141,13 @@ def sentence(margin: StepMargin) -> str:
     return f"{margin.name} peaks at {margin.share:.0%} of {margin.rate_limit:g} steps/s ({margin.limited_by})"
 
 
-def require_feasible(arm: Arm, trajectory: JointTrajectory) -> tuple[StepMargin, ...]:
-    """The margins; raises `PlanRefused` with the joint that cannot, and the scaling that would do."""
-    found = _margins(arm, trajectory)
+def require_feasible(arm: Arm, trajectory: JointTrajectory, states: States | None = None) -> tuple[StepMargin, ...]:
+    """The margins; raises `PlanRefused` with the joint that cannot, and the scaling that would do. `states` are the
+    points of `trajectory`, where they are at hand."""
+    states = states or states_of(trajectory)
+    found = _margins(arm, states)
     worst = max(found, key=lambda margin: margin.share)
-    filled = queue_share(arm, trajectory)
+    filled = _queue_share(arm, states)
     if worst.share <= FULL and filled <= 1.0:
         return found
     scale = feasible_scale(arm, trajectory)
@@ -200,8 +210,9 @@ def slowed(trajectory: JointTrajectory, scale: float) -> JointTrajectory:
 
 
 def _can(arm: Arm, trajectory: JointTrajectory) -> bool:
-    found = _margins(arm, trajectory)
-    return max(margin.share for margin in found) <= FULL and queue_share(arm, trajectory) <= 1.0
+    states = states_of(trajectory)
+    found = _margins(arm, states)
+    return max(margin.share for margin in found) <= FULL and _queue_share(arm, states) <= 1.0
 
 
 def _margin(arm: Arm, joint: Joint, index: int, stream: StepStream) -> StepMargin:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from schemas.motion import JointTrajectory
 from services.arm.model.description import Arm
 from services.planner.native.compiled import IS_BUILT, motion
-from services.planner.timing.profile import JointLimits
+from services.planner.timing.profile import JointLimits, States
 
 Array = NDArray[np.float64]
 
@@ -40,31 +40,35 @@ class Samples:
 
 def sample(trajectory: JointTrajectory, density: int = DENSITY) -> Samples:
     """The quintic through the points at `density` instants a segment, all at once, with both ends of every segment."""
-    return sample_between(*_columns(trajectory), density)
+    return sample_between(*states_of(trajectory), density)
 
 
 def sample_between(stamps: Array, p: Array, v: Array, a: Array, density: int = DENSITY) -> Samples:
     """As `sample`, through positions, velocities and accelerations (m, n) at `stamps` (m,) [s]."""
     shares = np.linspace(0.0, 1.0, density + 1)
     times = (stamps[:-1, None] + shares * np.diff(stamps)[:, None]).reshape(-1)
-    return _evaluate((stamps, p, v, a), times, np.repeat(np.arange(len(stamps) - 1), density + 1))
+    return _evaluate(States(stamps, p, v, a), times, np.repeat(np.arange(len(stamps) - 1), density + 1))
 
 
 def at_times(trajectory: JointTrajectory, times: Array) -> Samples:
     """The quintic through the points at `times` (m,) [s], which lie within the trajectory."""
-    stamps = np.array([point.time_from_start for point in trajectory.points])
-    index = np.clip(np.searchsorted(stamps, times, side="right") - 1, 0, len(stamps) - 2)
-    return _evaluate(_columns(trajectory), times, index)
+    return states_at(states_of(trajectory), times)
 
 
-def _columns(trajectory: JointTrajectory) -> tuple[Array, Array, Array, Array]:
-    """Stamps (m,) [s], positions, velocities and accelerations (m, n)."""
+def states_at(states: States, times: Array) -> Samples:
+    """As `at_times`, through `states`."""
+    index = np.clip(np.searchsorted(states.times, times, side="right") - 1, 0, len(states.times) - 2)
+    return _evaluate(states, times, index)
+
+
+def states_of(trajectory: JointTrajectory) -> States:
+    """The points of `trajectory` as arrays."""
     points = trajectory.points
     stamps = np.array([point.time_from_start for point in points])
     p = _rows(len(points), (point.positions for point in points))
     v = _rows(len(points), (point.velocities for point in points))
     a = _rows(len(points), (point.accelerations for point in points))
-    return stamps, p, v, a
+    return States(stamps, p, v, a)
 
 
 def _rows(count: int, rows: Iterable[tuple[float, ...]]) -> Array:
@@ -72,16 +76,16 @@ def _rows(count: int, rows: Iterable[tuple[float, ...]]) -> Array:
     return np.fromiter(chain.from_iterable(rows), dtype=np.float64).reshape(count, -1)
 
 
-def _evaluate(columns: tuple[Array, Array, Array, Array], times: Array, index: NDArray[np.int64]) -> Samples:
+def _evaluate(states: States, times: Array, index: NDArray[np.int64]) -> Samples:
     """At `times` (m,) [s], each in the segment `index` (m,) (Biagiotti and Melchiorri 2008, section 2.1)."""
     if not IS_BUILT:
-        return _evaluate_in_python(columns, times, index)
-    times, (stamps, p, v, a) = np.ascontiguousarray(times), columns
+        return _evaluate_in_python(states, times, index)
+    times, (stamps, p, v, a) = np.ascontiguousarray(times), states
     return Samples(times, *motion.quintics(stamps, p, v, a, times, np.ascontiguousarray(index, dtype=np.int64)))
 
 
-def _evaluate_in_python(columns: tuple[Array, Array, Array, Array], times: Array, index: NDArray[np.int64]) -> Samples:
-    stamps, p, v, a = columns
+def _evaluate_in_python(states: States, times: Array, index: NDArray[np.int64]) -> Samples:
+    stamps, p, v, a = states
     dt = np.diff(stamps)[index][:, None]
     u = (times - stamps[index])[:, None] / dt
     p0, v0, a0 = p[index], v[index] * dt, a[index] * dt * dt
