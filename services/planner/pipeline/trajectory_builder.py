@@ -31,6 +31,9 @@ from services.planner.verification.verify import (
     states_of,
 )
 
+# Tuning constants: chosen, where a line does not say measured or standard.
+ASIDE = 1e-9  # [rad] or [m] beside a line that counts as on it: what rounding leaves
+
 
 class TrajectoryTouches(Exception):
     """The finished trajectory comes too near to something, in `configuration` (n,)."""
@@ -68,11 +71,12 @@ class TrajectoryBuilder:
 
     def line(self, start: Start, goal: Start) -> VerifiedTrajectory:
         """The straight line of the joints from `start` to `goal`, (n,) [rad] or [m]; raises `TrajectoryTouches` or
-        `PlanRefused`. It is looked at before it is timed, and again as it will be executed."""
+        `PlanRefused`. It is looked at before it is timed; what will be executed is held against it, and looked at again
+        wherever it leaves it."""
         ends = np.array((start, goal))
         with self._watch.phase("verification"):
             self._require_free(ends)
-        return self.verified(self._told(self._stopping(ends)), start, goal)
+        return self.verified(self._told(self._stopping(ends)), start, goal, ends)
 
     def path(self, path: Path) -> VerifiedTrajectory:
         """Around its corners or with a stop at each, whichever is faster and free; raises `TrajectoryTouches` or
@@ -111,17 +115,22 @@ class TrajectoryBuilder:
                 return _timed(lambda: time_optimal_path(control, self._limits))
             return _timed(lambda: timed_path(control, self._limits))
 
-    def verified(self, trajectory: JointTrajectory, start: Start, goal: Start) -> VerifiedTrajectory:
+    def verified(
+        self, trajectory: JointTrajectory, start: Start, goal: Start, free_line: Array | None = None
+    ) -> VerifiedTrajectory:
         """The trajectory from `start` to `goal`, (n,) [rad] or [m], slowed where the steppers cannot follow it, then
-        verified as it will be executed; raises `TrajectoryTouches` or `PlanRefused`."""
+        verified as it will be executed; raises `TrajectoryTouches` or `PlanRefused`.
+
+        Between the ends of `free_line` (2, n) all is known to be free.
+        """
         with self._watch.phase("verification"):
             states = states_of(trajectory)
             samples = sample_between(*states)
-            self._require_free(samples.positions)
+            self._require_free(samples.positions, free_line)
             trajectory, margins, scale = self._feasible(trajectory, states)
             if scale < 1.0:
                 samples = sample(trajectory)
-                self._require_free(samples.positions)
+                self._require_free(samples.positions, free_line)
             try:
                 require_ends(trajectory, start, goal)
                 require_within_limits(self._arm, samples, self._limits)
@@ -131,8 +140,11 @@ class TrajectoryBuilder:
                 raise not_verified(str(error)) from error
         return VerifiedTrajectory(trajectory, margins, scale)
 
-    def _require_free(self, rows: Array) -> None:
+    def _require_free(self, rows: Array, free_line: Array | None = None) -> None:
+        """Of the polyline through `rows` (m, n), unless all of it lies on the `free_line` (2, n)."""
         self._deadline.check()
+        if free_line is not None and lies_on(free_line, rows):
+            return
         touching = self._checker.touching(rows, self._margin)
         if touching is not None:
             raise TrajectoryTouches(touching)
@@ -148,6 +160,14 @@ class TrajectoryBuilder:
         scale = feasible_scale(self._arm, trajectory, self._deadline)
         slower = slowed(trajectory, scale) if scale else trajectory
         return slower, require_feasible(self._arm, slower), scale
+
+
+def lies_on(line: Array, rows: Array) -> bool:
+    """True if all `rows` (m, n) [rad] or [m] lie between the two rows of `line` (2, n), and so what is between them."""
+    way = line[1] - line[0]
+    squared = float(way @ way)
+    shares = np.clip((rows - line[0]) @ way / squared, 0.0, 1.0) if squared > 0.0 else np.zeros(len(rows))
+    return bool(np.abs(rows - (line[0] + shares[:, None] * way)).max() <= ASIDE)
 
 
 def _duration(states: States) -> float:
