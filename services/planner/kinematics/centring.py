@@ -44,7 +44,7 @@ class Centring:
         return self.centred_in_python(target, solution)
 
     def centred_in_python(self, target: Target, solution: Array) -> Array | None:
-        """`centred` where the core is not built, and for targets that it does not know."""
+        """`centred` of `solution` (n,) [rad] or [m] where the core is not built or does not know the target."""
         for step_number in range(STEPS):
             motions = self._free_motions(target, solution)
             if not len(motions):

@@ -56,8 +56,8 @@ class NativeDescent:
         position_tolerance: float,
         rotation_tolerance: float,
     ) -> Array | None:
-        """`solution` (n,), which meets the target, moved by self-motion towards `middle` (n,), where a joint's distance
-        counts by `weight` (n,); None where it has no self-motion. The target is as of `descend`."""
+        """`solution` (n,) [rad] or [m], which meets the target, moved by self-motion towards `middle` (n,), where a
+        joint's distance counts by `weight` (n,); None where it has no self-motion. The target is as of `descend`."""
         moved = motion.centre(
             self._arm,
             np.ascontiguousarray(solution, dtype=np.float64),

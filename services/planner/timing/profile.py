@@ -100,7 +100,7 @@ def stop_and_go(corners: Array, limits: JointLimits) -> States:
 
 
 def compiled_states(timed: Callable[[], tuple[Array, Array, Array, Array]]) -> States:
-    """What the compiled core returns; raises `NoProfile` for its own."""
+    """What the compiled core returns: times (m,) [s] and rows (m, n); raises `NoProfile` for its own."""
     try:
         return States(*timed())
     except motion.NoProfile as error:
@@ -108,7 +108,7 @@ def compiled_states(timed: Callable[[], tuple[Array, Array, Array, Array]]) -> S
 
 
 def stop_and_go_in_python(corners: Array, limits: JointLimits) -> States:
-    """`stop_and_go` where the core is not built: ruckig for every leg; raises `NoProfile`."""
+    """`stop_and_go` through `corners` (m, n) [rad] or [m] where the core is not built; raises `NoProfile`."""
     legs, began = [_rest(corners[0], 0.0)], 0.0
     for start, goal in pairwise(corners):
         legs += _leg(start, goal, limits, began)

@@ -59,7 +59,8 @@ def timed_path(control: Array, limits: JointLimits) -> States:
 
 
 def timed_path_in_python(control: Array, limits: JointLimits) -> States:
-    """`timed_path` where the core is not built; raises `NoProfile` and `TurnsOnTheSpot`."""
+    """`timed_path` along `control` (k, n) [rad] or [m] where the core is not built; raises `NoProfile` and
+    `TurnsOnTheSpot`."""
     return along_runs(control, limits, _run_states)
 
 

@@ -56,7 +56,7 @@ def at_times(trajectory: JointTrajectory, times: Array) -> Samples:
 
 
 def states_at(states: States, times: Array) -> Samples:
-    """As `at_times`, through `states`."""
+    """As `at_times`, through `states` at `times` (m,) [s]."""
     index = np.clip(np.searchsorted(states.times, times, side="right") - 1, 0, len(states.times) - 2)
     return _evaluate(states, times, index)
 
