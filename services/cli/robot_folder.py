@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 FIT = "services.collision_fitting.main"  # in a process of its own: the command line loads no planner
 BULGE = 0.005  # [m] that a sphere may reach beyond its link
-WITHIN = 0.005  # [m] of the mesh, where 95 % of the surface of its shapes is to be
-MOST = 24  # shapes of a link
+MOST = 40  # shapes of a link
 FIT_EXAMPLES = """examples:
   gemelo collision fit urdf/parol6
   gemelo collision fit urdf/my_arm --meshes
@@ -89,9 +88,9 @@ def fit_options(parser: Parser) -> None:
     parser.add_argument(
         "--within",
         type=positive_length,
-        default=WITHIN,
+        default=None,
         metavar="DISTANCE",
-        help="of the mesh, where 95 %% of the shapes' surface is to be, with --meshes; as 5mm",
+        help="of the mesh, where 95 %% of the shapes' surface is to be, with --meshes [5mm, 1 %% of a longer link]",
     )
     parser.add_argument(
         "--most", type=positive_integer, default=MOST, metavar="N", help="shapes for a link, with --meshes"
@@ -129,12 +128,12 @@ def spheres(folder: Path, bulge: float) -> ExitCode:
     return _fitted(folder, "--bulge", f"{1000.0 * bulge:g}")
 
 
-def shapes(folder: Path, within: float, most: int, links: Sequence[str], write: bool) -> ExitCode:
-    """Prints the shapes that fit the links' meshes to within so many [m], at most `most` for each; writes them into the
-    URDF if `write`."""
+def shapes(folder: Path, within: float | None, most: int, links: Sequence[str], write: bool) -> ExitCode:
+    """Prints the shapes that fit the links' meshes to within so many [m] or what is usual, at most `most` for each;
+    writes them into the URDF if `write`."""
     only = [f"--link={link}" for link in links]
-    bound = f"--within={1000.0 * within:g}"
-    return _fitted(folder, "--meshes", bound, f"--most={most}", *only, *(["--write"] if write else []))
+    bound = [] if within is None else [f"--within={1000.0 * within:g}"]
+    return _fitted(folder, "--meshes", *bound, f"--most={most}", *only, *(["--write"] if write else []))
 
 
 def _fitted(folder: Path, *options: str) -> ExitCode:

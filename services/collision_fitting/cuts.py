@@ -20,6 +20,8 @@ Numbers = NDArray[np.int64]
 # Tuning constants: chosen, where a line does not say measured or standard.
 PLACES = 600  # of a part and of a section, that the hulls on both sides of a cut are made of where cuts are compared
 LOOKS = 400  # places on such a hull, whose distance from the mesh is looked at
+ROUGH = 5  # times fewer of both, by which all cuts are compared first
+FINALISTS = 8  # cuts that are compared with all of them
 FREE = 0.5  # of the bound, that is not counted there
 PROGRESS = 0.03  # of what stands out, that one cut is to save for two at once not to be tried
 CUTS = 8  # planes across an axis: as far apart from one another as from the ends
@@ -95,14 +97,16 @@ def _between_bodies(part: MeshPart) -> Iterator[_Cut]:
 
 
 def _planes(part: MeshPart) -> Iterator[_Cut]:
-    """Across the link's axes, those along which its places spread, and those of its shape."""
+    """Across the link's axes, those along which its places spread, and those of its shape: the best by a rough look."""
     if len(part.places) < 2:
         return
+    found: list[Array] = []
     for axis, turn in _distinct((np.eye(3), spread(part.places), axes_of(part.fitted))):
         along = part.places @ axis
         even = np.linspace(along.min(), along.max(), CUTS + 2)[1:-1]
-        for offset in (*even.tolist(), *_step(part.places @ turn.T, along)):
-            yield _cut_by(part, np.array([(*axis, offset)]))
+        found += [np.array([(*axis, offset)]) for offset in (*even.tolist(), *_step(part.places @ turn.T, along))]
+    rough = np.array([_cut_by(part, planes, ROUGH).outside.beyond for planes in found])
+    yield from (_cut_by(part, found[number]) for number in np.argsort(rough, kind="stable")[:FINALISTS])
 
 
 def _crossed(part: MeshPart) -> Iterator[_Cut]:
@@ -115,16 +119,17 @@ def _crossed(part: MeshPart) -> Iterator[_Cut]:
         yield from (_cut_by(part, np.delete(planes, axis, axis=0)) for axis in range(3))
 
 
-def _cut_by(part: MeshPart, planes: Array) -> _Cut:
-    """By all of the planes (k, 4), judged by places on it and in the cuts."""
-    sides = [np.vstack((_some(part.places), *(_some(_section(part.corners, plane)) for plane in planes)))]
+def _cut_by(part: MeshPart, planes: Array, rough: int = 1) -> _Cut:
+    """By all of the planes (k, 4), judged by places on it and in the cuts, so many times fewer where it is `rough`."""
+    sections = [_some(_section(part.corners, plane), rough) for plane in planes]
+    sides = [np.vstack((_some(part.places, rough), *sections))]
     for *normal, offset in planes:
         heights = [side @ np.array(normal) - offset for side in sides]
         sides = [
             side[sign * height <= SAME] for side, height in zip(sides, heights, strict=True) for sign in (1.0, -1.0)
         ]
     around = np.vstack((part.planes, planes))
-    return _Cut(_sum(_outside(part, side, around) for side in sides), planes)
+    return _Cut(_sum(_outside(part, side, around, rough) for side in sides), planes)
 
 
 def _sum(several: Iterable[Outside]) -> Outside:
@@ -132,7 +137,7 @@ def _sum(several: Iterable[Outside]) -> Outside:
     return Outside(float(beyond), float(held))
 
 
-def _outside(part: MeshPart, places: Array, planes: Array) -> Outside:
+def _outside(part: MeshPart, places: Array, planes: Array, rough: int = 1) -> Outside:
     """Of the hull of places (n, 3) [m] of the part, without what is on one of the planes (m, 4), where another part
     goes on."""
     try:
@@ -142,16 +147,19 @@ def _outside(part: MeshPart, places: Array, planes: Array) -> Outside:
     corners = places[hull.simplices]
     sides = corners[:, 1:] - corners[:, :1]
     areas = np.cumsum(0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1))
-    faces = np.searchsorted(areas, areas[-1] * (np.arange(LOOKS) + 0.5) / LOOKS)
-    looked_at = np.einsum("pc,pcx->px", WEIGHTS, corners[np.minimum(faces, len(corners) - 1)])
+    count = LOOKS // rough
+    faces = np.searchsorted(areas, areas[-1] * (np.arange(count) + 0.5) / count)
+    looked_at = np.einsum("pc,pcx->px", WEIGHTS[:count], corners[np.minimum(faces, len(corners) - 1)])
     is_outer = (np.abs(looked_at @ planes[:, :3].T - planes[:, 3]) > ON_PLANE).all(axis=1)
     far = np.maximum(part.mesh.near_distances(looked_at[is_outer]) - FREE * part.within, 0.0)
-    return Outside(float(far.sum() * areas[-1] / LOOKS), float(hull.volume))
+    return Outside(float(far.sum() * areas[-1] / count), float(hull.volume))
 
 
 def _section(corners: Array, plane: Array) -> Array:
     """(k, 3) [m] where edges of triangles (f, 3, 3) [m] cross a plane (4,)."""
     heights = corners @ plane[:3] - plane[3]
+    crossed = (heights.min(axis=1) <= 0.0) & (heights.max(axis=1) > 0.0)
+    corners, heights = corners[crossed], heights[crossed]
     ends, high = np.roll(corners, -1, axis=1), np.roll(heights, -1, axis=1)
     crosses = (heights <= 0.0) != (high <= 0.0)
     share = heights[crosses] / (heights[crosses] - high[crosses])
@@ -189,6 +197,6 @@ def _distinct(turns: Sequence[Array]) -> list[tuple[Array, Array]]:
     return found
 
 
-def _some(places: Array) -> Array:
-    """At most twice `PLACES` of them."""
-    return places[:: max(1, len(places) // PLACES)]
+def _some(places: Array, rough: int = 1) -> Array:
+    """At most twice `PLACES` of them, or so many times fewer."""
+    return places[:: max(1, len(places) * rough // PLACES)]

@@ -30,8 +30,9 @@ def report(folder: Path, bulge: float = BULGE) -> str:
     return _table([*rows, ("all", "", str(total), "")])
 
 
-def fit_meshes(folder: Path, within: float, most: int, only: Sequence[str], write: bool) -> str:
-    """What is fitted to each link, to within so many [m], and its elements for the URDF, or that they are written."""
+def fit_meshes(folder: Path, within: float | None, most: int, only: Sequence[str], write: bool) -> str:
+    """What is fitted to each link, to within so many [m] or what is usual, and its elements for the URDF, or that they
+    are written."""
     # Not above: trimesh takes half a second.
     from services.collision_fitting.fit_writing import elements_of, touching_states, write_fits
     from services.collision_fitting.mesh_fit import beyond_bound, fit_links
@@ -90,8 +91,8 @@ def _options(arguments: list[str] | None) -> Namespace:
     parser.add_argument("--bulge", type=float, default=1000.0 * BULGE)
     parser.add_argument("--meshes", action="store_true")
     parser.add_argument("--write", action="store_true")
-    parser.add_argument("--within", type=float, default=5.0)
-    parser.add_argument("--most", type=int, default=24)
+    parser.add_argument("--within", type=float, default=None)
+    parser.add_argument("--most", type=int, default=40)
     parser.add_argument("--link", action="append", default=[])
     return parser.parse_args(arguments)
 
@@ -101,7 +102,8 @@ def main(arguments: list[str] | None = None) -> int:
     options = _options(arguments)
     try:
         if options.meshes:
-            print(fit_meshes(options.folder, options.within / 1000.0, options.most, options.link, options.write))
+            within = None if options.within is None else options.within / 1000.0
+            print(fit_meshes(options.folder, within, options.most, options.link, options.write))
         else:
             print(report(options.folder, options.bulge / 1000.0))
     except (ConfigurationError, ValueError, ImportError, OSError) as error:

@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.description import Arm
 from services.collision_fitting.excess import SHARE, Excess, excess_of
@@ -18,7 +20,8 @@ from services.planner.collision_geometry.shapes import TriangleMesh
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 WITHIN = 0.005  # [m] of the mesh, where `SHARE` of the shapes' outer surface is to be
-MOST = 24  # shapes of a link
+WITHIN_SHARE = 0.01  # of the longest side of a link for which that is more
+MOST = 40  # shapes of a link
 
 
 @dataclass(frozen=True)
@@ -43,13 +46,13 @@ def _tell_nobody(_: str) -> None:
 
 def fit_links(
     arm: Arm,
-    within: float = WITHIN,
+    within: float | None = None,
     most: int = MOST,
     only: Sequence[str] = (),
     tell: Callable[[str], None] = _tell_nobody,
 ) -> list[LinkFit]:
-    """Of every link with a visual mesh, or of those named, to within so many [m]; `tell` hears of each link. Raises
-    `DescriptionError` with what is wrong and where."""
+    """Of every link with a visual mesh, or of those named, to within so many [m], or to what is usual for its size;
+    `tell` hears of each link. Raises `DescriptionError` with what is wrong and where."""
     for name in only:
         if name not in arm.model.link_names:
             raise DescriptionError(
@@ -65,7 +68,7 @@ def fit_links(
     fits = []
     for number, (name, mesh) in enumerate(drawn.items(), 1):
         began = time.monotonic()
-        fits.append(_fit(name, mesh, within, most))
+        fits.append(_fit(name, mesh, usual_bound(mesh) if within is None else within, most))
         place = f'link "{name}" ({number} of {len(drawn)}), {len(mesh.faces)} triangles'
         p95, worst = 1000.0 * fits[-1].excess.p95, 1000.0 * fits[-1].excess.worst
         reach = f"95 % of their surface within {p95:.1f} mm, the worst place {worst:.1f} mm beyond"
@@ -73,6 +76,11 @@ def fit_links(
         shapes = "1 shape" if count == 1 else f"{count} shapes"
         tell(f"{place}: {shapes} after {time.monotonic() - began:.1f} s, {reach}")
     return fits
+
+
+def usual_bound(mesh: TriangleMesh) -> float:
+    """[m] `WITHIN`, more for a link that is longer than half a metre."""
+    return max(WITHIN, WITHIN_SHARE * float(np.ptp(mesh.vertices, axis=0).max()))
 
 
 def _fit(link: str, mesh: TriangleMesh, within: float, most: int) -> LinkFit:

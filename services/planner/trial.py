@@ -57,7 +57,7 @@ def trial(arm: Arm, seconds: float = SECONDS) -> list[Finding]:
 
 
 def _large_models(planner: Planner) -> Iterator[Finding]:
-    """Of links whose shapes become more spheres than are sensible."""
+    """Of links whose spheres reach far beyond their shapes."""
     core, file = planner.checker.native(planner.arm.clearance), planner.arm.urdf_path.name
     for link, (said, remedy) in core.large_links.items() if core else ():
         yield warning(file, f'link "{link}"', said, remedy)

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from services.arm.checks.meshes import MeshFacts
 from services.arm.errors import DescriptionError
 from services.arm.model.description import load_arm
 from services.arm.model.srdf_edit import entries, with_pairs
@@ -23,7 +24,7 @@ from services.robot_import.poses import named_states, srdf_text, zero_state
 
 # [m] chosen: what shapes that are fitted to meshes may stand beyond them. Links that are never farther apart than this
 # beyond the clearance are parts of one hinge, whose true distance such shapes cannot tell.
-EXCESS = 0.005
+EXCESS, EXCESS_SHARE = 0.005, 0.01  # the latter of the longest mesh
 COMMAND_LINE = "services.cli.main"  # its steps in a process of their own: they load the planner
 
 
@@ -55,7 +56,7 @@ def write_robot(folder: Path, description: Description) -> None:
     joints, zero = [joint.name for joint in description.joints], zero_state(description.joints)
     (folder / "robot.srdf").write_text(srdf_text(description.name, joints, {"home": zero}), encoding="utf-8")
     (folder / "robot.toml").write_text(description.robot_toml(zero), encoding="utf-8")
-    _collisions(folder, model)
+    _collisions(folder, description.mended, model)
     with step("home and ready, where nothing touches"):
         home = _write_states(folder)
         (folder / "robot.toml").write_text(description.robot_toml(home), encoding="utf-8")
@@ -98,15 +99,23 @@ def _is_fitted(link: UrdfLink) -> bool:
     return drawn and (not link.collisions or any(shape.mesh is not None for shape in link.collisions))
 
 
-def _collisions(folder: Path, model: UrdfModel) -> None:
+def _collisions(folder: Path, mended: Mended, model: UrdfModel) -> None:
     """Shapes around the meshes, and the pairs of links that need no check."""
     links = [link.name for link in model.links if _is_fitted(link)]
     if links:
         with step(f"collision shapes for {len(links)} links"):
             _run("collision", "fit", str(folder), "--meshes", "--write", "--link", *links)
     with step("pairs of links that need no check"):
-        within = f"{1000.0 * (load_arm(folder).clearance + EXCESS):g}mm"
+        excess = max(EXCESS, EXCESS_SHARE * _longest(mended, model))
+        within = f"{1000.0 * (load_arm(folder).clearance + excess):.3g}mm"
         _run("collision", "matrix", str(folder), "--write", *(["--always-within", within] if links else []))
+
+
+def _longest(mended: Mended, model: UrdfModel) -> float:
+    """[m] along the longest mesh that a link is drawn with."""
+    drawn = ((visual, mended.facts(visual)) for link in model.links for visual in link.visuals)
+    lengths = (facts.longest * max(map(abs, each.scale)) for each, facts in drawn if isinstance(facts, MeshFacts))
+    return max(lengths, default=0.0)
 
 
 def _run(*words: str) -> None:

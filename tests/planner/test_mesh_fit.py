@@ -19,13 +19,15 @@ from services.arm.model.description import Arm, load_arm
 from services.arm.model.srdf_edit import with_pairs
 from services.arm.model.urdf_edit import with_collisions
 from services.cli.robot_folder import plan_of
+from services.collision_fitting import cuts
 from services.collision_fitting.excess import SHARE, depth_in, depths
 from services.collision_fitting.fit_writing import HULLS, touching_states, write_fits
 from services.collision_fitting.fitted_shape import Fitted, Kind
 from services.collision_fitting.fitting import fitted
 from services.collision_fitting.hull import smallest_ball
 from services.collision_fitting.link_meshes import visual_mesh
-from services.collision_fitting.mesh_fit import fit_links
+from services.collision_fitting.mesh_fit import fit_links, usual_bound
+from services.collision_fitting.mesh_part import MeshPart
 from services.collision_fitting.mesh_surface import MeshSurface
 from services.collision_fitting.parts import shapes_around
 from services.planner.collision.clearance import CLEARANCE
@@ -143,11 +145,37 @@ def test_an_angle_of_one_piece_is_cut_into_its_legs():
     outline = np.array([(0, 0), (0.2, 0), (0.2, 0.03), (0.03, 0.03), (0.03, 0.2), (0, 0.2)])
     made = trimesh.creation.extrude_polygon(trimesh.path.polygons.Polygon(outline), 0.04)
     surface = MeshSurface(as_mesh(made))
-    one, two = shapes_around(surface, 0.005, 1), shapes_around(surface, 0.005, 24)
+    one, two = shapes_around(surface, 0.005, 1), shapes_around(surface, 0.005, 40)
     assert one[0].volume == pytest.approx(made.convex_hull.volume, rel=0.01)
     assert len(two) == 2
     assert sum(each.volume for each in two) < 1.05 * made.volume
     assert {each.kind for each in two} == {Kind.BOX}
+
+
+def test_the_bound_of_a_large_link_is_a_share_of_its_length_unless_another_is_asked_for(copied: Path):
+    small, large = (as_mesh(trimesh.creation.box((side, 0.1, 0.1))) for side in (0.4, 1.2))
+    assert usual_bound(small) == pytest.approx(0.005)
+    assert usual_bound(large) == pytest.approx(0.012)
+    _replace_mesh(copied, trimesh.creation.box((1.2, 0.1, 0.1)))
+    arm = load_arm(copied)
+    name = _first_with_mesh(arm)
+    assert fit_links(arm, only=[name])[0].within == pytest.approx(0.012)
+    assert fit_links(arm, 0.003, only=[name])[0].within == 0.003
+
+
+def test_most_cuts_are_told_apart_by_a_rough_look(monkeypatch: pytest.MonkeyPatch):
+    looks: list[int] = []
+    whole = cuts._outside
+
+    def counted(part: MeshPart, places: np.ndarray, planes: np.ndarray, rough: int = 1) -> cuts.Outside:
+        looks.append(rough)
+        return whole(part, places, planes, rough)
+
+    monkeypatch.setattr(cuts, "_outside", counted)
+    made = trimesh.util.concatenate([trimesh.creation.box((0.2, 0.03, 0.03)), trimesh.creation.box((0.03, 0.2, 0.03))])
+    shapes_around(MeshSurface(as_mesh(made)), 0.005, 2)
+    assert looks.count(1) <= 2 * (cuts.FINALISTS + cuts.CUTS) + 1  # both sides of each, and what is cut
+    assert looks.count(cuts.ROUGH) > looks.count(1)
 
 
 def test_a_fitted_arm_loads_and_its_neighbours_do_not_touch_once_its_matrix_is_made(copied: Path):
@@ -155,7 +183,7 @@ def test_a_fitted_arm_loads_and_its_neighbours_do_not_touch_once_its_matrix_is_m
     text, fits = before.urdf_path.read_text(), fit_links(before)
     for fit in fits:
         assert depth(fit.shapes, fit.mesh.vertices).min() >= 0.0
-        assert 1 <= len(fit.shapes) <= 24
+        assert 1 <= len(fit.shapes) <= 40
         assert fit.is_within
         assert fit.excess.share >= SHARE
         assert 0.0 < fit.excess.p95 <= 0.005

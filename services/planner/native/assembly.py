@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -18,7 +19,7 @@ from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import Attachment, CollisionShape, ShapeKind, TriangleMesh
 from services.planner.native.binding import motion
 from services.planner.native.chain import frames_of, transform_row
-from services.planner.native.sphere_cover import BULGE, SphereCover, cover_shapes
+from services.planner.native.sphere_cover import BULGE, SphereCover, cover_shapes, link_cover, longest_side
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ log = logging.getLogger(__name__)
 # Tuning constants: chosen, where a line does not say measured or standard.
 ATTACHED_SHARE = 1.0 / 40.0  # of an attached thing's longest side may be bulge: it is covered while somebody waits
 MOST_KNOWN = 2048  # obstacles that are kept: those of a scene before a change and after it
-MOST_SPHERES = 1500  # of a link: those of rm1 and parol6 together have less
+WIDE = 25.0  # parts of a link's longest side: spheres that reach farther beyond its shapes are said
 OBSTACLES = 64  # the first obstacle's number in a contact: kMaxParts
 HAIR = 1e-4  # [m] a sphere's least radius
 ROUNDING = 2e-5  # [m] for every metre of reach: a float has 24 bits; measured: native/README.md
@@ -153,26 +154,43 @@ class Assembly:
 
 
 def _told_cover(arm: Arm, link: str, shapes: Mapping[str, Sequence[CollisionShape]], bulge: float) -> SphereCover:
-    """The link's spheres; what takes long, or is large, is said in the log."""
+    """The link's spheres; what takes long, and what reaches far beyond the shapes, is said in the log."""
     several, number = shapes[link], list(shapes).index(link) + 1
     triangles = sum(len(shape.mesh.faces) for shape in several if shape.mesh is not None)
     place = f'{arm.name}, link "{link}" ({number} of {len(shapes)})'
     if triangles:
         log.info("%s: spheres around %d triangles ...", place, triangles)
     began = time.monotonic()
-    cover = cover_shapes(several, bulge)
+    cover = link_cover(several, bulge)
     if triangles:
         log.info("%s: %d spheres after %.1f s", place, len(cover.spheres), time.monotonic() - began)
-    if len(cover.spheres) > MOST_SPHERES:
-        log.warning("%s: %s; %s", place, *too_many(arm, len(cover.spheres)))
+    said = wide_spheres(arm, link, several, cover, bulge)
+    if said is not None:
+        log.warning("%s: %s; %s", place, *said)
     return cover
 
 
-def too_many(arm: Arm, spheres: int) -> tuple[str, str]:
-    """What more than `MOST_SPHERES` of a link mean, and the remedy."""
+def wide_spheres(
+    arm: Arm, link: str, shapes: Sequence[CollisionShape], cover: SphereCover, bulge: float
+) -> tuple[str, str] | None:
+    """What it means that a link's spheres reach far beyond its shapes, more than the `bulge` [m] that is usual, and the
+    remedy; None where they do not, and for one simple shape."""
+    is_mesh = any(shape.kind is ShapeKind.MESH for shape in shapes)
+    if cover.bulge <= max(2.0 * bulge, longest_side(shapes) / WIDE) or (len(shapes) == 1 and not is_mesh):
+        return None
+    fit = f"`gemelo collision fit {arm.folder} --meshes --link {link}"
+    wider = math.ceil(1000.0 * cover.bulge)
+    if is_mesh:
+        remedy = f"{fit} --write` makes boxes, cylinders and convex hulls of its mesh"
+    elif any(each.name == link and any(visual.mesh for visual in each.visuals) for each in arm.model.links):
+        remedy = f"{fit} --within {wider}mm --write` makes fewer shapes of its mesh"
+    else:
+        remedy = "give it fewer <collision> shapes, which may overlap"
+    what = "a mesh" if is_mesh else f"{len(shapes)} shapes"
     return (
-        f"its collision shapes become {spheres} spheres, more than {MOST_SPHERES}, so that every check takes longer",
-        f"`gemelo collision fit {arm.folder} --meshes --write` makes boxes, cylinders and capsules of its meshes",
+        f"its collision model is {what}, whose {len(cover.spheres)} spheres reach {1000.0 * cover.bulge:.0f} mm beyond "
+        f"it, not {1000.0 * bulge:g} mm: what comes so near takes longer to check",
+        remedy,
     )
 
 

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from services.arm.model.description import Arm
+from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import Attachment, CollisionShape
-from services.planner.native.assembly import MOST_SPHERES, Assembly, too_many
+from services.planner.native.assembly import Assembly, wide_spheres
 from services.planner.native.binding import CancelFlag as NativeCancelFlag
 from services.planner.native.binding import motion
 from services.planner.native.paths import Effort, FailureReason, FreePath, NoPath
@@ -54,6 +55,7 @@ class NativePlanner:
         self.arm = arm
         self.margin = margin
         self._kernel = motion.kernel(kernel)
+        self._bulge = bulge
         self._assembly = Assembly(arm, bulge)
         self._scene = self._assembly.compiled_scene((), {})
 
@@ -69,9 +71,12 @@ class NativePlanner:
 
     @property
     def large_links(self) -> Mapping[str, tuple[str, str]]:
-        """The links whose shapes become more spheres than are sensible, each with what that means and the remedy."""
-        counts = {link: len(cover.spheres) for link, cover in self.covers.items()}
-        return {link: too_many(self.arm, count) for link, count in counts.items() if count > MOST_SPHERES}
+        """The links whose spheres reach far beyond their shapes, each with what that means and the remedy."""
+        shapes = link_shapes(self.arm)
+        said = {
+            link: wide_spheres(self.arm, link, shapes[link], cover, self._bulge) for link, cover in self.covers.items()
+        }
+        return {link: each for link, each in said.items() if each is not None}
 
     @property
     def sphere_count(self) -> int:

@@ -31,6 +31,9 @@ MOST_MESH_CELLS = 150_000  # of a mesh; a larger one has larger cells, and more 
 MOST_CANDIDATES = 15_000  # centres of spheres; else of those at the surface, then of all, one in eight is tried
 LEVELS = 3  # times that cells are halved from the coarsest to those at the surface
 DEEP = 2.5  # balls deep: such a cell is not halved
+MOST_SPHERES = 1500  # of a link: those of rm1 and parol6 together have less
+LOOK = 20.0  # parts of a link's longest side: the bulge with which its spheres are counted first
+GROWTH = 1.5  # measured: spheres increase by this power of how much less they may bulge
 MEDIAL = 0.9  # the slope of the depth below which a point has several nearest ones on the surface
 
 
@@ -47,6 +50,31 @@ def cover_shapes(shapes: Sequence[CollisionShape], bulge: float) -> SphereCover:
     meshes; raises ValueError for a shape without an end."""
     covers = [_placed(shape, bulge) for shape in shapes]
     return SphereCover(np.vstack([cover.spheres for cover in covers]), max(cover.bulge for cover in covers))
+
+
+def link_cover(shapes: Sequence[CollisionShape], bulge: float) -> SphereCover:
+    """As `cover_shapes`, but with as much more bulge as leaves some `MOST_SPHERES` spheres: those of large links."""
+    look = longest_side(shapes) / LOOK
+    if look <= bulge:
+        return cover_shapes(shapes, bulge)
+    count = len(cover_shapes(shapes, look).spheres)
+    return cover_shapes(shapes, max(bulge, look * (count / MOST_SPHERES) ** (1.0 / GROWTH)))
+
+
+def longest_side(shapes: Sequence[CollisionShape]) -> float:
+    """[m] of the box around all of them, along the axes of their frame."""
+    corners = [_corners(shape) for shape in shapes]
+    low, high = np.min([each[0] for each in corners], axis=0), np.max([each[1] for each in corners], axis=0)
+    return float((high - low).max())
+
+
+def _corners(shape: CollisionShape) -> Array:
+    """(2, 3) [m] of a box around the shape in the frame of its pose; raises ValueError for a shape without an end."""
+    if shape.mesh is not None:
+        points = shape.mesh.vertices @ shape.rotation.T + shape.pose[0]
+        return np.array((points.min(axis=0), points.max(axis=0)))
+    half = np.abs(shape.rotation) @ solid_of(shape).half
+    return np.array((shape.pose[0] - half, shape.pose[0] + half))
 
 
 def _placed(shape: CollisionShape, bulge: float) -> SphereCover:

@@ -19,9 +19,10 @@ from services.planner.collision_geometry.link_shapes import link_shapes, solid_o
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind, TriangleMesh
 from services.planner.core import Planner
 from services.planner.native import model_cache, sphere_cover
+from services.planner.native.assembly import wide_spheres
 from services.planner.native.model_cache import FOLDER, cache_folder, cached_rows
 from services.planner.native.native_planner import NativePlanner
-from services.planner.native.sphere_cover import kept_cover
+from services.planner.native.sphere_cover import SphereCover, kept_cover
 from services.planner.trial import trial
 from tests.arm.plates import add_plate
 from tests.planner.test_world import stl_box
@@ -180,17 +181,42 @@ def test_another_process_finds_what_the_first_has_made(meshed: Arm, made: list[i
 def test_the_log_says_how_far_it_is_and_which_model_is_too_large(
     meshed: Arm, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ):
-    monkeypatch.setattr("services.planner.native.assembly.MOST_SPHERES", 5)
+    monkeypatch.setattr("services.planner.native.sphere_cover.MOST_SPHERES", 1)
     with caplog.at_level(logging.INFO):
         NativePlanner(meshed)
     assert 'link "low_cube" (6 of 6): spheres around 12 triangles ...' in caplog.text
     assert 'link "arm_cube" (5 of 6): spheres around 12 triangles ...' in caplog.text
-    assert f"`gemelo collision fit {meshed.folder} --meshes --write`" in caplog.text
+    assert 'link "brazo_link" (2 of 6): its collision model is 4 shapes, whose' in caplog.text
+    assert f"`gemelo collision fit {meshed.folder} --meshes --link brazo_link --within" in caplog.text
 
 
 def test_the_trial_names_a_model_that_is_too_large_with_the_remedy(meshed: Arm, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("services.planner.native.native_planner.MOST_SPHERES", 5)
-    found = [finding for finding in trial(meshed, 0.0) if finding.subject == 'link "arm_cube"']
+    monkeypatch.setattr("services.planner.native.sphere_cover.MOST_SPHERES", 1)
+    found = [finding for finding in trial(meshed, 0.0) if finding.subject == 'link "brazo_link"']
     assert len(found) == 1
-    assert "spheres, more than" in found[0].message
+    assert "spheres reach" in found[0].message
     assert "gemelo collision fit" in found[0].remedy
+
+
+def sliced(count: int) -> list[CollisionShape]:
+    """So many plates of a link of 2 m, side by side."""
+    places = np.linspace(-1.0, 1.0, count)
+    return [
+        CollisionShape("plate", ShapeKind.BOX, (2.0, 2.0 / count, 2.0), ((0.0, y, 0.0), (0.0, 0.0, 0.0, 1.0)))
+        for y in places
+    ]
+
+
+def test_the_remedy_for_too_many_fitted_shapes_is_fewer_of_them_and_for_one_shape_there_is_none(meshed: Arm):
+    bulge, link = 0.1, "base_link"
+    wide = SphereCover(np.zeros((1500, 4)), bulge)
+    many = wide_spheres(meshed, link, sliced(20), wide, 0.005)
+    assert many is not None
+    assert "20 shapes" in many[0]
+    assert "100 mm beyond" in many[0]
+    assert f"--link {link} --within 100mm --write` makes fewer shapes" in many[1]
+    raw = wide_spheres(meshed, link, [*sliced(1), cube()], wide, 0.005)
+    assert raw is not None
+    assert f"--link {link} --write` makes boxes" in raw[1]
+    assert wide_spheres(meshed, link, sliced(1), wide, 0.005) is None
+    assert wide_spheres(meshed, link, sliced(20), SphereCover(wide.spheres, 0.03), 0.005) is None

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from services.planner.collision_geometry.link_shapes import link_shapes
 from services.planner.collision_geometry.shapes import CollisionShape, ShapeKind
 from services.planner.collision_geometry.solids import Box, Capsule, Cylinder, Solid
-from services.planner.native.sphere_cover import cover_of, cover_shapes, mesh_cover
+from services.planner.native.sphere_cover import MOST_SPHERES, cover_of, cover_shapes, link_cover, mesh_cover
 from tests.planner.native.conftest import load
 from tests.planner.native.scenes import star_mesh
 
@@ -86,6 +86,24 @@ def test_every_link_of_the_arms_is_covered(name, links, most):
             points = inside(solid[shape.kind](shape.size), 4000)
             assert sticks_out(points @ shape.rotation.T + shape.pose[0], cover.spheres) <= HAIR
     assert 0 < total <= most
+
+
+@pytest.mark.parametrize("name", ["rm1", "parol6"])
+def test_links_of_few_spheres_bulge_no_more_than_was_asked_for(name):
+    for several in link_shapes(load(name)).values():
+        assert np.array_equal(link_cover(several, 0.005).spheres, cover_shapes(several, 0.005).spheres)
+
+
+def test_a_large_link_of_many_shapes_bulges_more_and_has_no_more_spheres_than_are_sensible():
+    """As the base of an industrial arm that is fitted with slices: 12,000 spheres that bulge 5 mm."""
+    slices = [
+        CollisionShape("slice", ShapeKind.BOX, (0.6, 0.05, 0.7), ((0.0, y, 0.0), (0.0, 0.0, 0.0, 1.0)))
+        for y in np.linspace(-0.3, 0.3, 13)
+    ]
+    cover = link_cover(slices, 0.005)
+    assert 0.3 * MOST_SPHERES < len(cover.spheres) < 1.5 * MOST_SPHERES
+    for each in slices:
+        assert sticks_out(inside(Box((0.3, 0.025, 0.35)), 400) + each.pose[0], cover.spheres) <= HAIR
 
 
 def test_a_mesh_is_covered_inside_too():
