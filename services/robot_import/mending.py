@@ -99,6 +99,27 @@ def _foreign(mended: Mended) -> None:
         for texture in material.findall("texture"):
             material.remove(texture)
             mended.say(texture, "<texture>", f'"{texture.get("filename")}" is not drawn', "left out")
+    _colours(mended)
+
+
+def _colours(mended: Mended) -> None:
+    """A material that nothing gives a colour: every reader of URDFs complains of it, and nothing is drawn with it."""
+    root = mended.xml.root
+    for material in list(root.iter("material")):
+        for color in material.findall("color"):
+            if len(_numbers(color.get("rgba", "")) or ()) != 4:
+                material.remove(color)
+    known = {material.get("name") for material in root.iter("material") if material.find("color") is not None}
+    said: set[str | None] = set()
+    for parent in [root, *root.iter("visual")]:
+        for material in parent.findall("material"):
+            name = material.get("name")
+            if material.find("color") is not None or (name in known and parent is not root):
+                continue
+            parent.remove(material)
+            if name not in said:
+                mended.say(material, f'material "{name}"', "nothing gives it a colour", "left out")
+            said.add(name)
 
 
 def _names(mended: Mended) -> None:

@@ -97,12 +97,23 @@ def _expanded(path: Path) -> str:
     except ImportError:
         raise DescriptionError(f"{path}: {NO_XACRO}") from None
     installed = substitution_args._eval_find
-    substitution_args._eval_find = lambda package: str(_found_package(package, path))  # else it asks ROS where it is
+    refused: list[DescriptionError] = []  # xacro wraps what is raised in it, and says it twice
+
+    def find(package: str) -> str:
+        try:
+            return str(_found_package(package, path))
+        except DescriptionError as error:
+            refused.append(error)
+            raise
+
+    substitution_args._eval_find = find  # else it asks ROS where it is
     try:
         return str(xacro.process_file(str(path)).toxml())
     except DescriptionError:
         raise
     except Exception as error:  # xacro's own, and those of Python expressions in it
+        if refused:
+            raise refused[0] from error
         raise DescriptionError(f"{path}: xacro cannot expand it: {type(error).__name__}: {error}") from error
     finally:
         substitution_args._eval_find = installed

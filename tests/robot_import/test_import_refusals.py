@@ -13,6 +13,8 @@ from services.arm.checks.findings import Severity
 from services.arm.model.description import load_arm
 from services.cli.errors import ExitCode
 from services.cli.main import run
+from services.robot_import.mending import mend
+from services.robot_import.source import find_source
 from tests.robot_import.exports import by_hand, joint, link, mesh, package, solidworks, workspace, write
 
 
@@ -129,9 +131,9 @@ def test_xacro_is_expanded_with_the_packages_beside_it(tmp_path: Path):
 def test_xacro_that_cannot_be_expanded_says_what_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     robot = xacro_package(tmp_path / "arm", "other_description")
     assert run(["import", str(robot)]) is ExitCode.FAILED
-    assert (
-        f'there is no package "other_description" in {robot.parent}, {robot.parent.parent},' in capsys.readouterr().err
-    )
+    said = capsys.readouterr().err
+    assert f'there is no package "other_description" in {robot.parent}, {robot.parent.parent},' in said
+    assert said.count("there is no package") == 1  # xacro's own wrapping says it twice
     robot.write_text(robot.read_text().replace("other_description", "arm").replace('"one"', '"${nobody}"'))
     assert run(["import", str(robot)]) is ExitCode.FAILED
     said = capsys.readouterr().err
@@ -208,3 +210,19 @@ def test_the_source_itself_is_never_replaced(tmp_path: Path, capsys: pytest.Capt
     )
     assert "which is to be replaced: give --name" in capsys.readouterr().err
     assert (source / "src").is_dir()
+
+
+def test_a_material_that_nothing_colours_is_left_out_and_said_once(tmp_path: Path):
+    """As exporters write them; each reader would complain of each use of it."""
+    visual = "<visual><geometry><box size='0.1 0.1 0.1'/></geometry><material name='{}'/></visual>"
+    path = tmp_path / "plain.urdf"
+    path.write_text(
+        '<robot name="plain"><material name="red"><color rgba="1 0 0 1"/></material><material name="black"><color/>'
+        f"</material><link name='one'>{visual.format('black')}{visual.format('red')}{visual.format('nobodys')}</link>"
+        f"<link name='two'>{visual.format('black')}</link></robot>",
+        encoding="utf-8",
+    )
+    mended = mend(find_source(path))
+    assert [material.get("name") for material in mended.xml.root.iter("material")] == ["red", "red"]
+    said = [note.subject for note in mended.notes if "colour" in note.message]
+    assert said == ['material "black"', 'material "nobodys"']
