@@ -35,6 +35,7 @@ from services.planner.collision.pair_distances import PairDistances
 from services.planner.collision.world import World
 from services.planner.core import Planner
 from services.planner.pipeline.trajectory_builder import TrajectoryBuilder
+from services.planner.workers.workers import for_process
 from tests.arm.plates import add_plate
 from tests.planner.test_world import stl_box
 from tests.planner.walled import WALLED, past_the_wall
@@ -125,6 +126,18 @@ def test_the_answer_leaves_in_time(planner: Planner, monkeypatch: pytest.MonkeyP
             response = planner.plan(REQUESTS[name], None, clock=clock)
             assert clock() - began <= LATEST * ALLOWED, (every, one)
         assert response.code is PlanCode.SUCCESS or response.refusal is not None
+
+
+@pytest.mark.parametrize("allowed", [0.1, 0.3])
+@pytest.mark.parametrize("name", REQUESTS)
+def test_a_short_time_is_kept_too(planner: Planner, monkeypatch: pytest.MonkeyPatch, name: str, allowed: float):
+    """With what a worker process is given of it, and each distance ten times as dear as it is."""
+    request = msgspec.structs.replace(REQUESTS[name], allowed_time=allowed)
+    clock = CountedClock(monkeypatch, 0.003, 0.0006)
+    began = clock()
+    response = planner.plan(for_process(request), None, clock=clock)
+    assert clock() - began <= LATEST * allowed
+    assert response.code is PlanCode.SUCCESS or response.refusal is not None
 
 
 def test_a_plan_in_a_scene_that_has_changed_is_held_against_it_in_time(

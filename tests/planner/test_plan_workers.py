@@ -21,6 +21,7 @@ from schemas.joints import JointState
 from schemas.planning import NamedGoal, PlanCode, PlanRequest, PlanResponse, Timing
 from schemas.scene import BoxShape, MeshShape, PlanningScene, SceneObject
 from services.arm.model.description import load_arm
+from services.planner import core
 from services.planner.core import Planner
 from services.planner.workers import worker
 from services.planner.workers import workers as module
@@ -210,6 +211,15 @@ def test_a_request_without_time_is_refused_by_the_process_that_goes_on(stack: St
     stack.ask(EASY)
     assert stack.answer().code is PlanCode.SUCCESS
     assert planning_processes() == [process]
+
+
+@pytest.mark.parametrize("allowed", [0.1, 0.15, 0.2, 0.3, 1.0, 30.0])
+def test_a_short_time_is_kept_too_and_what_the_process_says_of_being_late_comes_before_it_is_stopped(allowed: float):
+    request = PlanRequest(goal=NamedGoal(name="ready"), start=HOME, allowed_time=allowed)
+    assert module.longest(request) <= 1.09 * allowed
+    own = module.for_process(request).allowed_time
+    assert (1.0 + core.LATEST) * own + 0.5 * module.WAY <= module.longest(request)
+    assert own >= 0.89 * allowed
 
 
 def test_a_defect_costs_the_plan_and_not_the_process():

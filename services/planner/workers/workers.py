@@ -31,7 +31,8 @@ from services.planner.workers.process import Late, Process, WorkerDied, nothing
 
 MOST = 2  # processes: as many as small computers have cores for it
 LATEST = 0.08  # of the allowed time, beyond it: then the plan is answered, whatever its process does
-LEAST_LATE = 0.02  # [s] of that at least: what the way to the process and back may take
+LEAST_LATE = 0.008  # [s] of that at least: shorter plans than 0.1 s may be later
+WAY, MOST_WAY = 0.01, 0.1  # [s] to the process and back, which it has less than is allowed; of short times that share
 GRACE = 1.0  # [s] after that answer in which a process ends its plan by itself
 PATIENCE = 5.0  # [s] for a thread to see that its process is gone
 AGAIN = 3  # plans of one request, where the scene changes or the process dies meanwhile
@@ -177,9 +178,9 @@ class Workers:
                 scene = self._scene()
                 process.show(scene, pending_plan.require_wanted)
                 present, age = self._present()
-                job = Job(request=request, present=present, age=age)
+                job = Job(request=for_process(request), present=present, age=age)
                 began = time.monotonic()
-                response = process.plan(pending_plan, job, _longest(request))
+                response = process.plan(pending_plan, job, longest(request))
                 pending_plan.on_inputs(_inputs(job, scene, time.monotonic() - began))
             except Cancelled:
                 return None
@@ -225,7 +226,12 @@ def _inputs(job: Job, scene: PlanningScene, elapsed: float) -> PlanInputs:
     )
 
 
-def _longest(request: PlanRequest) -> float:
+def for_process(request: PlanRequest) -> PlanRequest:
+    """With the time that its process has of its own: what it says of a plan that is late is to leave in time."""
+    return replace(request, allowed_time=request.allowed_time - min(WAY, MOST_WAY * max(0.0, request.allowed_time)))
+
+
+def longest(request: PlanRequest) -> float:
     """[s] from the beginning of a plan to its answer."""
     allowed = min(max(0.0, request.allowed_time), LONGEST)
     return allowed + max(LATEST * allowed, LEAST_LATE)
