@@ -20,8 +20,8 @@ Numbers = NDArray[np.int64]
 # Tuning constants: chosen, where a line does not say measured or standard.
 PLACES = 600  # of a part and of a section, that the hulls on both sides of a cut are made of where cuts are compared
 LOOKS = 400  # places on such a hull, whose distance from the mesh is looked at
-ROUGH = 5  # times fewer of both, by which all cuts are compared first
-FINALISTS = 8  # cuts that are compared with all of them
+ROUGH = 3  # times fewer of both, by which all cuts are compared first
+FINALISTS = 12  # cuts that are compared with all of them
 FREE = 0.5  # of the bound, that is not counted there
 PROGRESS = 0.03  # of what stands out, that one cut is to save for two at once not to be tried
 CUTS = 8  # planes across an axis: as far apart from one another as from the ends

@@ -10,7 +10,7 @@ from services.robot_import.mending import Mended
 from services.robot_import.questions import Questions, above_zero, number
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-MOST_TRAVEL = {JointKind.REVOLUTE: 4.0 * math.pi, JointKind.PRISMATIC: 5.0}  # [rad], [m]: beyond it is another unit
+MOST_TRAVEL = {JointKind.REVOLUTE: 8.02 * math.pi, JointKind.PRISMATIC: 5.0}  # [rad], [m]: beyond it is another unit
 MOST_VELOCITY = 50.0  # [rad/s] or [m/s]
 TURN, SLIDE = math.pi, 0.2  # [rad] each way, [m]
 VELOCITY, SLIDE_VELOCITY = 1.0, 0.1  # [rad/s], [m/s]

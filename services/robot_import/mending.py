@@ -12,7 +12,15 @@ from functools import lru_cache
 from pathlib import Path
 
 from services.arm.checks.findings import Finding, Severity, error, note, warning
-from services.arm.checks.meshes import Facts, MeshFacts, check_meshes, facts_of, is_in_millimetres, link_volume
+from services.arm.checks.meshes import (
+    SMALLEST,
+    Facts,
+    MeshFacts,
+    check_meshes,
+    facts_of,
+    is_in_millimetres,
+    link_volume,
+)
 from services.arm.checks.urdf import check_urdf, fault_finding, principal_moments
 from services.arm.model.urdf import Geometry, JointKind, UrdfLink, UrdfModel, model_of
 from services.arm.model.xml_reader import XmlReader, parse_xml
@@ -70,7 +78,19 @@ def mend(source: Source) -> Mended:
     model_of(xml)
     xml.faults.clear()
     mended = Mended(source, xml, {})
-    for step in (_foreign, _names, _references, _axes, _mimics, _millimetres, _flat, _frames, _inertias, _unseen):
+    for step in (
+        _foreign,
+        _names,
+        _references,
+        _axes,
+        _mimics,
+        _millimetres,
+        _flat,
+        _tiny,
+        _frames,
+        _inertias,
+        _unseen,
+    ):
         step(mended)
     return mended
 
@@ -209,6 +229,23 @@ def _flat(mended: Mended) -> None:
             message = f'mesh "{geometry.mesh}" in <{item.tag}> bounds no volume'
             link.remove(item)
             mended.say(mesh, _subject(link), message, "left out")
+
+
+def _tiny(mended: Mended) -> None:
+    """A mesh of less than two millimetres is a placeholder; or, where it is scaled, scaled too much."""
+    for link, item, geometry, mesh in _meshes(mended):
+        known = mended.facts(geometry)
+        scale = max(map(abs, geometry.scale))
+        if not isinstance(known, MeshFacts) or not 0.0 < known.longest * scale < SMALLEST:
+            continue
+        message = f'mesh "{geometry.mesh}" is {1000.0 * known.longest * scale:.3g} mm long'
+        if scale == 1.0:
+            link.remove(item)
+            mended.say(mesh, _subject(link), f"{message}: it stands for nothing", "left out")
+        else:
+            line = mended.xml.lines.get(mesh, 0)
+            remedy = f'correct scale="{mesh.get("scale")}"'
+            mended.errors.append(error(mended.source.urdf.name, _subject(link), message, remedy, line))
 
 
 def _frames(mended: Mended) -> None:

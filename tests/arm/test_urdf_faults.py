@@ -58,7 +58,7 @@ def test_a_zero_axis_on_a_fixed_joint_is_harmless(tmp_path: Path):
 @pytest.mark.parametrize(
     ("old", "new", "message", "remedy", "severity"),
     [
-        ('lower="-2" upper="2"', 'lower="-180" upper="180"', "beyond two turns", "degrees", Severity.WARNING),
+        ('lower="-2" upper="2"', 'lower="-180" upper="180"', "beyond four turns", "degrees", Severity.WARNING),
         ('upper="0.4"', 'upper="400"', "is beyond 5 m", "mm", Severity.WARNING),
         ('velocity="3.0"', 'velocity="180"', "180 rad/s is implausible", "degrees per second", Severity.WARNING),
         ('<mimic joint="reach"', '<mimic joint="flange"', 'mimics "flange", which is fixed', "motor", Severity.ERROR),

@@ -7,13 +7,16 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from services.arm.checks.check import check
 from services.arm.checks.findings import Severity
 from services.arm.model.description import load_arm
 from services.cli.errors import ExitCode
 from services.cli.main import run
+from services.robot_import.limits import ask_limits
 from services.robot_import.mending import mend
+from services.robot_import.questions import Questions
 from services.robot_import.source import find_source
 from tests.robot_import.exports import by_hand, joint, link, mesh, package, solidworks, workspace, write
 
@@ -226,3 +229,28 @@ def test_a_material_that_nothing_colours_is_left_out_and_said_once(tmp_path: Pat
     assert [material.get("name") for material in mended.xml.root.iter("material")] == ["red", "red"]
     said = [note.subject for note in mended.notes if "colour" in note.message]
     assert said == ['material "black"', 'material "nobodys"']
+
+
+@pytest.mark.parametrize("scale", ["", ' scale="0.001 0.001 0.001"'])
+def test_a_mesh_that_stands_for_nothing_is_left_out_and_one_that_is_scaled_to_nothing_is_an_error(
+    tmp_path: Path, scale: str
+):
+    size = 0.0002 if not scale else 0.2
+    trimesh.creation.box((size, size, size)).export(tmp_path / "tiny.stl")
+    path = tmp_path / "small.urdf"
+    shape = f"<visual><geometry><mesh filename='tiny.stl'{scale}/></geometry></visual>"
+    path.write_text(f"<robot name='small'><link name='base'>{shape}</link></robot>", encoding="utf-8")
+    mended = mend(find_source(path))
+    errors = [each.message for each in mended.findings() if each.severity is Severity.ERROR]
+    assert bool(scale) == any("0.2 mm long" in message for message in errors)
+    assert (mended.xml.root.find("link/visual") is None) == (not scale)
+
+
+def test_a_wrist_of_two_turns_each_way_keeps_its_limits_however_they_are_rounded(tmp_path: Path):
+    path = tmp_path / "wrist.urdf"
+    moves = joint("wrist", "one", "two", rest='<limit lower="-6.28319" upper="6.28319" effort="1" velocity="1"/>')
+    path.write_text(f'<robot name="wrist"><link name="one"/><link name="two"/>{moves}</robot>', encoding="utf-8")
+    mended = mend(find_source(path))
+    ask_limits(mended, Questions({}, takes_defaults=True))
+    assert mended.model.joints[0].limit.lower == -6.28319  # type: ignore[union-attr]
+    assert not [each for each in mended.findings() if each.subject == 'joint "wrist"']

@@ -13,7 +13,7 @@ from services.arm.model.urdf import Geometry, UrdfLink, UrdfModel
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 IN_MILLIMETRES = 5.0  # longest side in the file's unit from which on a link's mesh is not in metres
-SMALLEST = 0.001  # [m] of its longest side
+SMALLEST = 0.002  # [m] of its longest side
 FLAT = 1e-3  # thickness as a share of the longest side below which a mesh bounds no volume
 LIGHTEST, HEAVIEST = 15.0, 20_000.0  # [kg/m^3] light foam, tungsten: no part of an arm is beyond
 MILLIMETRE_REMEDY = 'write scale="0.001 0.001 0.001"'

@@ -15,7 +15,7 @@ from services.arm.model.xml_reader import XmlFault
 
 COLLISION_REMEDY = "add a box or a cylinder, or let `gemelo collision fit --meshes` fit some"
 SHAPES = ("box", "cylinder", "sphere", "mesh")
-MOST_TRAVEL = {JointKind.REVOLUTE: 2.0 * math.tau, JointKind.PRISMATIC: 5.0}  # [rad] or [m]
+MOST_TRAVEL = {JointKind.REVOLUTE: 4.01 * math.tau, JointKind.PRISMATIC: 5.0}  # [rad] or [m]
 MOST_VELOCITY = {JointKind.REVOLUTE: 50.0, JointKind.CONTINUOUS: 50.0, JointKind.PRISMATIC: 10.0}  # [rad/s] or [m/s]
 FRAME_REMEDY = "leave <inertial> out where the link is a mere frame, else give a mass above 0"
 PLACEHOLDER_EFFORTS = (100.0, 300.0, 1000.0)  # what exporters write when nobody thought about it
@@ -178,7 +178,7 @@ def _travel(kind: JointKind, limit: Limit, subject: str, file: str, line: int) -
         return [error(file, subject, message, "give lower < upper", line)]
     if travel > MOST_TRAVEL[kind]:
         slides = kind is JointKind.PRISMATIC
-        message = f"travel of {travel:.4g} {'m is beyond 5 m' if slides else 'rad is beyond two turns'}"
+        message = f"travel of {travel:.4g} {'m is beyond 5 m' if slides else 'rad is beyond four turns'}"
         return [warning(file, subject, message, "are these mm?" if slides else "are these degrees?", line)]
     return []
 

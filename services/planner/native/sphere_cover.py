@@ -33,7 +33,7 @@ LEVELS = 3  # times that cells are halved from the coarsest to those at the surf
 DEEP = 2.5  # balls deep: such a cell is not halved
 MOST_SPHERES = 1500  # of a link: those of rm1 and parol6 together have less
 LOOK = 20.0  # parts of a link's longest side: the bulge with which its spheres are counted first
-GROWTH = 1.5  # measured: spheres increase by this power of how much less they may bulge
+GROWTH = 2.0  # measured: spheres increase by at most this power of how much less they may bulge
 MEDIAL = 0.9  # the slope of the depth below which a point has several nearest ones on the surface
 
 
