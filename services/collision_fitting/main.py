@@ -13,18 +13,18 @@ from typing import TYPE_CHECKING
 from schemas.errors import ConfigurationError
 from services.arm.model.description import load_arm
 from services.planner.collision_geometry.link_shapes import link_shapes
-from services.planner.native.sphere_cover import BULGE, cover_shapes
+from services.planner.native.sphere_cover import BULGE, link_cover
 
 if TYPE_CHECKING:
     from services.collision_fitting.mesh_fit import LinkFit
 
 
 def report(folder: Path, bulge: float = BULGE) -> str:
-    """A line for every link with collision shapes, and their sum; `bulge` [m] is what is allowed."""
+    """A line for every link with collision shapes, and their sum; `bulge` [m] is allowed, more for large links."""
     rows = [("link", "shapes", "spheres", "bulge [mm]")]
     total = 0
     for link, shapes in link_shapes(load_arm(folder)).items():
-        cover = cover_shapes(shapes, bulge)
+        cover = link_cover(shapes, bulge)
         total += len(cover.spheres)
         rows.append((link, str(len(shapes)), str(len(cover.spheres)), f"{1000.0 * cover.bulge:.2f}"))
     return _table([*rows, ("all", "", str(total), "")])
