@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from gemelo.arm import Arm
@@ -47,6 +47,7 @@ class RunState:
     planned: int = 0  # legs that have been planned so far
     started_at: float = 0.0  # [s] UNIX; 0 before the start
     message: str = ""  # why it has paused, stopped or failed
+    failure: Error | None = field(default=None, compare=False)  # that it has failed by
 
     @property
     def step(self) -> StepPath:
@@ -185,10 +186,12 @@ class ProgramRun:
     def _run(self, execution: Execution) -> None:
         """The run's own thread."""
         status, message = RunStatus.DONE, ""
+        failure: Error | None = None
         try:
             execution.run()
         except Error as error:
             status, message = RunStatus.FAILED, f"step {self._where()}: {error}"
+            failure = error.__cause__ if isinstance(error.__cause__, Error) else error
         except BaseException as error:
             status, message = RunStatus.FAILED, f"step {self._where()}: {type(error).__name__}: {error}"
             raise
@@ -197,7 +200,7 @@ class ProgramRun:
                 status, message = RunStatus.STOPPED, f"stopped in step {self._where()}"
         finally:
             with self._lock:
-                self._put(replace(self._state, status=status, message=message))
+                self._put(replace(self._state, status=status, message=message, failure=failure))
 
     def _on_leg(self, leg: Leg | None, done: int, planned: int, pause: str) -> None:
         """The execution tells what it is at."""

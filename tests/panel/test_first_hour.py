@@ -124,7 +124,7 @@ def teaches(person: Person, arm: gemelo.Arm, folder: Path) -> None:
     for name in ("Uno", "Dos", "Tres"):
         person.chooses("Adónde", name)
         person.press("Añadir tras el paso")
-        person.reads(f"go point='{name}'")
+        person.reads(f"ir a {name}")
     person.press("Revisar todo el programa")
     person.reads("Todo el programa se puede ejecutar")
     person.press("Ejecutar desde el paso")

@@ -154,7 +154,7 @@ def test_points_are_taught_and_a_program_of_them_is_checked_run_changed_and_run_
     for name in ("P0", "P1", "P2"):
         person.chooses("Where to", name)
         person.press("Add after the step")
-        person.reads(f"go point='{name}'")
+        person.reads(f"go to {name}")
     passed: list[dict[str, float]] = []
     arm.node.subscribe(gemelo.topics.JOINT_STATES, lambda state: passed.append(_by_name(state)))
     person.press("Check the whole program")
@@ -163,7 +163,7 @@ def test_points_are_taught_and_a_program_of_them_is_checked_run_changed_and_run_
     until(lambda: any(_same(joints, taught[0]) for joints in passed), bool)
     person.reads("Done.")
     assert _same(arm.joints, taught[2])
-    person.chooses("Step", "3 go point='P2'")
+    person.chooses("Step", "3 go to P2")
     person.press("Delete the step")
     person.types("Name", "tour")
     person.press("Save")

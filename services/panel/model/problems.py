@@ -26,6 +26,8 @@ class Problem:
     value: float | None = None  # of the subject, in the unit of the check
     limit: float | None = None  # that the value is beyond
     is_refusal: bool = True  # False: something moved, and ended before its goal
+    reason: str = ""  # as `text`, in the words of who refused
+    code: int = 0  # of a goal that the gateway has refused or ended, as in `FollowErrorCode`
 
     @property
     def has_nearest(self) -> bool:
@@ -37,10 +39,10 @@ def problem_of(error: Exception) -> Problem:
     if isinstance(error, gemelo.Refused):
         return Problem(
             str(error), error.check, error.remedy, error.nearest, error.contacts,
-            error.subject, error.value, error.limit,
+            error.subject, error.value, error.limit, reason=error.reason, code=error.code,
         )  # fmt: skip
     if isinstance(error, gemelo.Aborted):
-        return Problem(str(error), error.status.name.lower(), is_refusal=False)
+        return Problem(str(error), error.status.name.lower(), is_refusal=False, code=error.code)
     if isinstance(error, gemelo.Error):
         return Problem(str(error), "lost" if isinstance(error, gemelo.Lost) else "argument")
     return Problem(f"{type(error).__name__}: {error}", "defect")

@@ -216,14 +216,14 @@ class Page:
         if state is None or not readings.is_live:
             age = f"{readings.age:.1f} s" if isfinite(readings.age) else "-"
             reason = readings.status.reason if readings.status is not None and not readings.status.online else ""
-            return f"<b>{esc(words('not_live', age=age))}</b> {esc(reason)}", BAD
+            return f"<b>{esc(words('not_live', age=age))}</b> {esc(words.said(reason))}", BAD
         worst = max((abs(error) for error in readings.step_errors.values()), default=0.0)
         error = words("step_error", steps=f"{worst:.2f}")
         if readings.status is not None and readings.status.open_loop:
             error = words("sent_not_verified")
         text = f"<b>{esc(words(f'mode_{state.mode.name.lower()}'))}</b> · {esc(error)} · {esc(words('live_data'))}"
         if readings.fault:
-            return f"{text}<br>{esc(readings.fault)}", BAD
+            return f"{text}<br>{esc(words.said(readings.fault))}", BAD
         return text, GOOD if state.armed and all(state.referenced) else NEUTRAL
 
     def _show_problem(self) -> None:

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from services.panel.model.availability import Reason
 from services.panel.model.problems import Problem
 from services.panel.words.en import ENGLISH
 from services.panel.words.es import SPANISH
+from services.panel.words.es_device import FAULTS, GOAL_CODES, VALUES
+from services.panel.words.es_gateway import GATEWAY
+from services.panel.words.es_goals import GOALS
+from services.panel.words.es_programs import PROGRAMS
 from services.panel.words.es_refusals import REFUSALS
+from services.panel.words.es_work import WORK
 from services.panel.words.refusals import Joints, key_of, sentence_of
+from services.panel.words.sentences import Sentences
 
 TABLES = {"en": ENGLISH, "es": SPANISH}
-SENTENCES: dict[str, dict[str, str]] = {"en": {}, "es": REFUSALS}  # in English the planner's own are shown
+REFUSED: dict[str, Mapping[str, str]] = {"en": {}, "es": REFUSALS}  # in English each part's own sentences are shown
+SENTENCES = {"en": Sentences({}, {}), "es": Sentences(GATEWAY | GOALS | FAULTS | PROGRAMS | WORK, VALUES)}
+CODES: dict[str, Mapping[int, str]] = {"en": {}, "es": GOAL_CODES}
 NAMES = {"en": "English", "es": "Español"}
 
 
@@ -28,7 +38,7 @@ class Words:
 
     def reason(self, reason: Reason) -> str:
         """Why something cannot be done now; empty where it can."""
-        return "" if reason is None else self(f"reason_{reason[0]}", value=reason[1])
+        return "" if reason is None else self(f"reason_{reason[0]}", value=self.value("mode", reason[1]))
 
     def check(self, check: str) -> str:
         """What a check that refuses or limits is called; empty where the table has no name for it."""
@@ -38,7 +48,23 @@ class Words:
         """A heading for the check, and a sentence; where this language has none, that of the part that refused."""
         heading = self.check(problem.check) or self("check_other" if problem.is_refusal else "check_ended")
         known = self._table.get(f"text_{problem.text.replace(' ', '_')}")
-        return heading, known or sentence_of(problem, self._joints, SENTENCES[self.language]) or problem.text
+        return heading, known or sentence_of(problem, self._joints, REFUSED[self.language]) or self._told(problem)
+
+    def said(self, text: str) -> str:
+        """What another part says, line by line; a line that this language does not have is left as it is."""
+        sentences = SENTENCES[self.language]
+        return "\n".join(sentences.of(line) or line for line in text.split("\n"))
+
+    def value(self, name: str, value: str) -> str:
+        """A single word of another part, as `name` calls it: a mode, a phase of homing, ..."""
+        return SENTENCES[self.language].value(name, value)
+
+    def _told(self, problem: Problem) -> str:
+        """By the sentence; where that is not known, by the code, with the sentence as it came."""
+        of = SENTENCES[self.language].of
+        known = of(problem.text) or of(problem.reason)
+        about = CODES[self.language].get(problem.code)
+        return known or (f"{about} («{problem.text}»)" if about else self.said(problem.text))
 
 
 def language_of(browser: str) -> str:

@@ -48,7 +48,7 @@ class DeviceTab:
             kind = words("virtual_device") if status.virtual else words("real_device")
             rows.append((esc(words("device")), f"{esc(status.device)} ({esc(kind)}), {esc(status.firmware)}"))
         if state is not None:
-            rows.append((esc(words("mode")), esc(state.mode.name)))
+            rows.append((esc(words("mode")), esc(words(f"mode_{state.mode.name.lower()}"))))
             rows.append((esc(words("inputs")), esc(", ".join(state.inputs) or "-")))
             rows.append((esc(words("link")), f"{1000 * self._round_trip.of(state.round_trip):.0f} ms"))
             for name, handle in self._outputs.items():
@@ -56,7 +56,7 @@ class DeviceTab:
         set_if_new(self._facts, "content", table(rows) if rows else "")
         if self._gripper is not None:
             self._gripper.refresh(readings)
-        phases = ", ".join(f"{joint}: {phase}" for joint, phase in self._operator.homing.items())
+        phases = ", ".join(f"{joint}: {words.value('phase', phase)}" for joint, phase in self._operator.homing.items())
         set_if_new(self._homing, "content", box(esc(words("homing", phases=phases)), "#1c7ed6") if phases else "")
 
     def _output(self, name: str) -> viser.GuiCheckboxHandle:

@@ -11,11 +11,12 @@ from gemelo.programs import (
     StepPath,
     export_script,
     path_text,
-    words_of,
 )
+from services.panel.model.problems import problem_of
 from services.panel.model.readings import Readings
 from services.panel.view.kit import Kit, box, esc, note, set_if_new
 from services.panel.view.tabs.new_step import NewStep
+from services.panel.words.step_text import step_text
 
 COLORS = {
     RunStatus.RUNNING: "#2f9e44", RunStatus.PAUSED: "#f59f00", RunStatus.FAILED: "#e03131",
@@ -82,7 +83,7 @@ class ProgramsTab:
         chosen = self._paths.get(str(self._step.value), ())
         steps = self._teaching.program.all_steps()
         self._paths = {self._kit.words("whole_program"): ()}
-        self._paths |= {f"{path_text(path)}  {words_of(step)}"[:60]: path for path, step in steps}
+        self._paths |= {f"{path_text(path)}  {step_text(step, self._kit.words)}"[:60]: path for path, step in steps}
         options = tuple(self._paths)
         if tuple(self._step.options) != options:
             self._step.options = options
@@ -99,24 +100,39 @@ class ProgramsTab:
     def _run_text(self, state: RunState | None) -> str:
         if state is None:
             return ""
-        return box(
-            f"<b>{esc(self._kit.words(f'run_{state.status.value}'))}</b> {esc(state.message)}", COLORS[state.status]
-        )
+        words = self._kit.words
+        return box(f"<b>{esc(words(f'run_{state.status.value}'))}</b> {esc(self._why(state))}", COLORS[state.status])
+
+    def _why(self, state: RunState) -> str:
+        """Why it has failed, paused or stopped, and in which step."""
+        words, step = self._kit.words, path_text(state.step)
+        if state.failure is not None:
+            text = words.problem(problem_of(state.failure))[1]
+            return words("at_step", step=step, text=text) if step else text
+        return words("in_step", step=step) if state.status is RunStatus.STOPPED and step else words.said(state.message)
 
     def _check_text(self, check: ProgramCheck | None) -> str:
         if check is None:
             return ""
+        words = self._kit.words
+        notes = dict.fromkeys(filter(None, (*(leg.note for leg in check.legs), check.note)))
+        told = [words.said(str(mistake)) for mistake in check.mistakes]
+        for leg in check.legs:
+            if leg.refusal is not None:
+                text = words.problem(problem_of(leg.refusal))[1]
+                told.append(words("at_step", step=path_text(leg.path), text=text))
         if check.ok:
-            return box(esc(self._kit.words("check_ok", duration=f"{check.duration:.1f}")), "#2f9e44")
-        told = [str(mistake) for mistake in check.mistakes] + list(check.refusals)
-        return box("<br>".join(esc(text) for text in told), "#e03131")
+            told.append(words("check_ok", duration=f"{check.duration:.1f}"))
+        said = box("<br>".join(map(esc, told)), "#2f9e44" if check.ok else "#e03131")
+        return said + note("<br>".join(esc(words.said(each)) for each in notes))
 
     def _list_text(self, state: RunState | None) -> str:
         teaching = self._teaching
         legs = {path: leg for leg in (teaching.check.legs if teaching.check is not None else ()) for path in leg.paths}
         lit = state.steps if state is not None and not state.status.is_over else ()
         rows = [
-            self._row(path, words_of(step), legs.get(path), path in lit) for path, step in teaching.program.all_steps()
+            self._row(path, step_text(step, self._kit.words), legs.get(path), path in lit)
+            for path, step in teaching.program.all_steps()
         ]
         return f'<div style="margin:0 0.8em 0.6em;font-size:0.82em">{"".join(rows)}</div>' if rows else ""
 
@@ -165,9 +181,6 @@ class ProgramsTab:
         after = self._first()
         place = self._teaching.insert(self._form.make(), after)
         self._choose(place if after else ())
-
-    def _change(self) -> None:
-        self._teaching.change(self._chosen(), self._form.make())
 
     def _shift(self, by: int) -> None:
         self._choose(self._teaching.shift(self._chosen(), by))

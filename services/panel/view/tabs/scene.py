@@ -89,7 +89,7 @@ class SceneTab:
 
     def _about(self, item: SceneObject) -> str:
         carried = self._kit.words("carried_by", link=item.frame) if item.attached else self._kit.words("stands")
-        return f"{item.name}: {type(item.shape).__struct_config__.tag}, {carried}"
+        return f"{item.name}: {self._kit.words(str(type(item.shape).__struct_config__.tag))}, {carried}"
 
     def _make_gizmo(self, item: SceneObject) -> viser.TransformControlsHandle:
         """For this browser alone; the object moves when it is let go."""

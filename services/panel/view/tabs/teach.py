@@ -64,9 +64,6 @@ class TeachTab:
     def _take(self, overwrite: str = "") -> None:
         self._teaching.remember(overwrite or self._name.value, self._drawn(), overwrite=bool(overwrite))
 
-    def _rename(self) -> None:
-        self._teaching.rename_point(self._require(), self._name.value)
-
     def _drawn(self) -> bytes | None:
         """What this browser sees, as JPEG; None where it does not draw in time."""
         try:

@@ -1,0 +1,258 @@
+"""What is said of the scene, things, jogging, what is asked for and who does not answer, in Spanish.
+
+A key is the sentence as `gemelo` or the planner say it; `sentences.py` says how it is found.
+"""
+
+from __future__ import annotations
+
+# The scene and its files
+_SCENE: dict[str, str] = {
+    "the scene has {count} objects, more than {most}: merge some into meshes": "La escena tiene {count} objetos, más "
+    "de "
+    "{most}: una algunos en mallas.",
+    'object "{name}" is a plane, which has no end and cannot be carried; make it a box': "«{name}» es un plano sin "
+    "fin y "
+    "no se puede llevar: haga de él una caja.",
+    'object "{name}" cannot be attached: {robot} has no link "{link}"': "«{name}» no se puede sujetar: {robot} no "
+    "tiene "
+    "un eslabón «{link}».",
+    'object "{name}" cannot touch it: {robot} has no link "{link}"': "«{name}» no puede tocarlo: {robot} no tiene un "
+    "eslabón «{link}».",
+    'the pair "{first}" and "{second}" allows {which}; name two different things': "Nombre dos cosas distintas que "
+    "puedan "
+    "tocarse, no «{first}» y «{second}».",
+    '"{name}" is no name for an object; give 1 to {most} printable characters without blanks at the ends': "«{name}» "
+    "no "
+    "es un nombre para un objeto: de 1 a {most} caracteres que se vean, sin espacios a los lados.",
+    '"*" stands for any name and cannot be an object\'s; give it another one': "«*» vale por cualquier nombre: elija "
+    "otro "
+    "para el objeto.",
+    '"{name}" is a jaw of the gripper; give the object another name': "«{name}» es una mordaza de la pinza: elija otro "
+    "nombre para el objeto.",
+    '"{name}" is a link of {robot}; give the object another name': "«{name}» es un eslabón de {robot}: elija otro "
+    "nombre "
+    "para el objeto.",
+    'the scene has two objects "{name}"; give one of them another name': "La escena tiene dos objetos «{name}»: "
+    "cambie el "
+    "nombre de uno.",
+    'object "{name}" stands in "{link}" without being attached to it': "«{name}» está en «{link}» sin estar sujeto.",
+    'there is no link or object "{name}"': "No hay un eslabón ni un objeto «{name}».",
+    'there is no object "{name}"': "No hay un objeto «{name}».",
+    'object "{name}" is not attached to any link; there is nothing to detach': "«{name}» no está sujeto: no hay nada "
+    "que "
+    "soltar.",
+    '"{first}" and "{second}" are not allowed to touch by this scene: allowed is {names} (what the SRDF allows is '
+    "changed "
+    "there)": "La escena no permite que «{first}» y «{second}» se toquen; permite: {names}.",
+    'object "{name}" cannot be placed by "{link}": it is not known where the arm is (no fresh joint_states); start the '
+    "stepper_gateway, or give the pose in the base frame": "«{name}» no se puede poner respecto a «{link}»: no se sabe "
+    "dónde está el brazo.",
+    "it is not known where the arm is (no fresh joint_states): start the stepper_gateway": "No se sabe dónde está el "
+    "brazo: vea si el equipo está conectado.",
+    "the scene is changed, but {file} cannot be written ({error}): a restart forgets it": "La escena cambió, pero "
+    "{file} "
+    "no se puede escribir ({error}): se olvidará al reiniciar.",
+    '"{path}" would be {size} m long: if it is drawn in mm, give scale=0.001': "«{path}» mediría {size} m: si está "
+    "dibujado en mm, elija mm.",
+    '"{path}" would be {size} m long': "«{path}» mediría {size} m.",
+    'there is no file "{path}"': "No hay un archivo «{path}».",
+    '"{path}" cannot be read: {error}': "«{path}» no se puede leer ({error}).",
+    "{path} holds no scene: {error}": "{path} no tiene una escena ({error}).",
+    '"{path}": {reason}': "{reason}",
+    "it holds no triangle": "La malla no tiene ningún triángulo.",
+    "it holds {count} triangles, more than {most}; simplify it": "La malla tiene {count} triángulos, más de {most}: "
+    "simplifíquela.",
+    "a corner of it is not finite": "Un vértice de la malla no es un número.",
+    "none of its triangles has an area": "Ningún triángulo de la malla tiene área.",
+    "it is no STL file: {count} bytes that are neither the binary form nor begin with solid": "No es un archivo STL "
+    "({count} bytes).",
+    "it has {count} vertex lines, no multiple of three: was it cut off?": "La malla tiene {count} líneas de vértices, "
+    "que "
+    "no son de tres en tres: ¿se cortó?",
+    "a vertex line of it is not three numbers ({error})": "Una línea de vértices de la malla no tiene tres números "
+    "({error}).",
+}
+
+# Things, cameras and picking
+_THINGS: dict[str, str] = {
+    "the twin has no cell file: urdf/rm1/cell.toml is a sample; start it with GEMELO_CELL=urdf/rm1/cell.toml make up": (
+        "No hay archivo de la celda: urdf/rm1/cell.toml es un ejemplo; arranque con GEMELO_CELL=urdf/rm1/cell.toml "
+        "make "
+        "up."
+    ),
+    '{path} has no thing or place "{name}": it has {names}': "{path} no tiene una cosa ni un lugar «{name}»; tiene "
+    "{names}.",
+    "{path} has no [[camera]]": "{path} no tiene [[camera]].",
+    "{name} is not seen by {cameras}, and nothing else: is it in the image, lit, and not behind the arm? `gemelo "
+    "camera "
+    "view`": "{cameras} no ve {name}, ni nada más: ¿está en la imagen, con luz, y no detrás del brazo?",
+    "{name} is not seen by {cameras}; it sees {others}: is it in the image, lit, and not behind the arm? `gemelo "
+    "camera "
+    "view`": "{cameras} no ve {name}; ve {others}: ¿está en la imagen, con luz, y no detrás del brazo?",
+    "{name}: {reason}": "{name}: {reason}",
+    'camera "{camera}": {reason}': "Cámara «{camera}»: {reason}",
+    'no image of camera "{camera}" within {time} s: `gemelo camera list`': "Ninguna imagen de la cámara «{camera}» en "
+    "{time} s.",
+    "it is not known where the camera {camera} stands: measure it, and write it into camera.toml": "no se sabe dónde "
+    "está "
+    "la cámara {camera}: mídala, y escríbalo en camera.toml.",
+    "its tag may be tilted one way or the other ({ratio} of 1): look at it from aside": "no se sabe hacia qué lado se "
+    "inclina su etiqueta ({ratio} de 1): mírela de lado.",
+    "it is known to +-{error} mm only (limit {limit}): bring the camera nearer": "solo se sabe a +-{error} mm (límite "
+    "{limit}): acerque la cámara.",
+    "it is seen {count} times: take the others away, or give each a tag of its own": "se ve {count} veces: quite las "
+    "otras, o dé a cada una su etiqueta.",
+    "the arm moves: images of it are blurred; wait until it stands": "El brazo se mueve y las imágenes salen movidas: "
+    "espere a que esté quieto.",
+    'the newest image of camera "{camera}" was taken {time} s before it was asked for: what lags there?': "La última "
+    "imagen de la cámara «{camera}» es de {time} s antes de pedirla.",
+    "nothing is heard of the detector for {time} s: is the process `detector` running?": "El detector calla desde hace "
+    "{time} s: ¿está en marcha?",
+    "{name} is {height} mm high: the jaws, {long} mm long, would be beside {beside} mm of it (at least "
+    "{least})": "{name} mide {height} mm de alto: las mordazas, de {long} mm, tomarían {beside} mm (al menos {least}).",
+    "{name} stands {angle} deg turned between the jaws, {width} mm wide there, and they open to {open} mm: turn it": (
+        "{name} está girada {angle}° entre las mordazas y mide ahí {width} mm; se abren {open} mm: gírela."
+    ),
+    "{robot} cannot turn its tool, and {place} asks for a turn: leave out its yaw": "{robot} no puede girar su "
+    "herramienta, y {place} pide un giro: quítele yaw.",
+    "no side of it is narrower than the open jaws": "Ningún lado suyo es más estrecho que las mordazas abiertas.",
+    "{name} was not gripped: the jaws closed on nothing, {count} times; where is it? `gemelo detect`": "No se agarró "
+    "{name}: las mordazas se cerraron sobre nada {count} veces; ¿dónde está?",
+    "{name} was picked and is still between the jaws: {reason}": "{name} sigue entre las mordazas: {reason}",
+    "the pick was cancelled: the arm stands": "se canceló: el brazo está quieto.",
+    "{name} ({kind}): {x} {y} {z} mm, +-{error} mm by {camera}": "{name}: {x} {y} {z} mm, +-{error} mm por {camera}",
+    "{name} ({kind}): {x} {y} {z} mm, +-{error} mm by {camera}: {reason}": "{name}: {x} {y} {z} mm, +-{error} mm por "
+    "{camera}: {reason}",
+    "{to}: {x} {y} {z} mm": "{to}: {x} {y} {z} mm",
+    "above it": "encima",
+    "carrying it": "llevándola",
+    "gripper: {value}, {what}": "pinza: {value}, {what}",
+    "gripper: {value}, {what}, holds {name}": "pinza: {value}, {what}, lleva {name}",
+    "gripper: {value}, {what}, has let go of {name}": "pinza: {value}, {what}, soltó {name}",
+    "{name} is at {place}: seen +-{error} mm, {time} s": "{name} está en {place}: vista a +-{error} mm, {time} s",
+    "{name} is at {place}: seen +-{error} mm, at attempt {count}, {time} s": "{name} está en {place}: vista a "
+    "+-{error} "
+    "mm, al intento {count}, {time} s",
+    "{name} is at {place}: seen +-{error} mm, turned {angle} deg by the jaws, {time} s": "{name} está en {place}: "
+    "vista a "
+    "+-{error} mm, girada {angle}° por las mordazas, {time} s",
+    "{name} is at {place}: seen +-{error} mm, turned {angle} deg by the jaws, at attempt {count}, {time} s": "{name} "
+    "está "
+    "en {place}: vista a +-{error} mm, girada {angle}° por las mordazas, al intento {count}, {time} s",
+    "the jaws have closed on nothing": "las mordazas se cerraron sobre nada.",
+}
+
+# Jogging, planning and what is asked for
+_ASKED: dict[str, str] = {
+    "the planner does not answer to jogging: is it running? `gemelo node list`": "El planificador no responde: ¿está "
+    "en "
+    "marcha?",
+    "the planner does not say within {time} s that the jog has ended": "El planificador no dijo en {time} s que el "
+    "brazo "
+    "ya no se mueve a mano.",
+    "jogging was interrupted ({reason}), and nothing resumes by itself: let go for {time} s": "Mover a mano se "
+    "interrumpió y nada sigue solo: suelte {time} s. {reason}",
+    "a goal has taken over": "El brazo va hacia una meta.",
+    "no fresh joint_states: is the stepper_gateway running?": "No se sabe dónde está el brazo: vea si el equipo está "
+    "conectado.",
+    "{joint} does not follow its targets: see what `gemelo state` says of the device": "{joint} no sigue lo que se le "
+    "pide: vea la pestaña Equipo.",
+    "{robot} cannot turn its tool as it likes: only the linear part counts": "{robot} no puede girar su herramienta "
+    "libremente: solo se desplaza.",
+    "collision of {first} and {second} ({away} apart, {clearance} stay free)": "{first} y {second} están a {away}; "
+    "deben "
+    "quedar {clearance} libres.",
+    "contact of {first} and {second} ({away} apart: they may only come away, slowly)": "{first} y {second} están a "
+    "{away}: solo pueden separarse, despacio.",
+    "contact of {first} and {second} ({away} inside one another: they may only come away, slowly)": "{first} y "
+    "{second} "
+    "se tocan ({away}): solo pueden separarse, despacio.",
+    "joint limit of {joint} ({limit})": "{joint} está en su límite, {limit}.",
+    "singularity (manipulability at {share} % of where slowing begins)": "El brazo está casi estirado, o con dos ejes "
+    "alineados (singularidad).",
+    "speed limit of {joint} ({limit})": "{joint} no va más rápido que {limit}.",
+    'joint "{joint}": {value} is beyond its limits, {limits}: if it is in {unit}, write gemelo.{helper}({number})': (
+        "{joint}: {value} está más allá de sus límites, {limits}."
+    ),
+    'joint "{joint}": {value} is beyond its limits, {limits}; nearest that can: {nearest}': "{joint}: {value} está más "
+    "allá de sus límites, {limits}; lo más cercano es {nearest}.",
+    'joint "{joint}": {value} is far beyond {most}: if it is in {unit}, write gemelo.{helper}({number})': "{joint}: "
+    "{value} pasa mucho de {most}.",
+    "twist: {value} is far beyond {most}: if it is in {unit}, write gemelo.{helper}({number})": "Herramienta: {value} "
+    "pasa mucho de {most}.",
+    'no named state "{name}"': "No hay una posición con nombre «{name}».",
+    'there is no frame "{name}"': "No hay un marco «{name}».",
+    "{owner}: {value} is not a number": "{owner}: {value} no es un número.",
+    "{owner}= has {value} m: if it is in millimetres, write gemelo.mm({value})": "{owner}: {value} m es demasiado; se "
+    "da "
+    "en metros.",
+    "speed({value}) is not in [0, 1], a share of the planned speed": "La velocidad va de 0 a 100 %, no {value}.",
+    "speed({value}) is not in [0, 1], a share of the planned speed: {cent} per cent is {share}": "La velocidad va de "
+    "0 a "
+    "100 %, no {value}.",
+    "{name}={value} is not in (0, 1], a share of the joints' limits": "{name} va de más de 0 a 1, no {value}.",
+    "{name}={value} is not in (0, 1], a share of the joints' limits: {cent} per cent is {share}": "{name} va de más "
+    "de 0 "
+    "a 1, no {value}.",
+    "clearance={value} m is not from {least} to {most} m": "Lo que queda libre va de {least} a {most} m, no {value} m.",
+    "{name}={value} is not above 0": "{name} debe ser más de 0, no {value}.",
+    "{name}={value} is more than {most}": "{name} es {value}, más de {most}.",
+    '"{kind}" needs a target; there is no "{name}"': "«{kind}» necesita un nombre; «{name}» no lo hay.",
+    'there is no "{name}" to inject': "No hay «{name}».",
+    "cancelled when the plan was just made: nothing moves": "Se canceló: nada se mueve.",
+    "{reason}: nothing moves": "{reason} Nada se mueve.",
+    "the plan was cancelled": "El plan fue cancelado.",
+    "refused: the planner answered {status} without a trajectory": "El planificador no dio ningún camino ({status}).",
+    "refused: it is {sure} sure that no step is lost, {wanted} are required: {why}": "Solo es seguro al {sure} que no "
+    "se "
+    "perdió ningún paso, y se pide {wanted}: verifique el brazo.",
+    "no switch can verify {joints}: they have no [joint.homing] in robot.toml; look where they stand and declare it: "
+    "arm.reference({example})": "Ningún interruptor puede verificar {joints}: mire dónde están y declare la "
+    "referencia.",
+}
+
+# Who does not answer
+_SILENT: dict[str, str] = {
+    "{server} did not answer {key} within {time} s: is it busy, or gone?": "{server} no respondió en {time} s: está "
+    "ocupado, o ya no está.",
+    "{server} dropped {key} unread: it takes {most} of one client, and nothing of one that asks for more; wait for "
+    "each "
+    "answer, and ask again after {pause} (or it has just ended: `gemelo node list`)": "{server} no leyó la petición: "
+    "se "
+    "le pide demasiado a la vez. Pruebe en {pause}.",
+    "{server} has not answered {key}: it answers {most} of that kind of one client, and carries out the others all the "
+    "same; ask again after {pause} (or it has just ended: `gemelo node list`)": "{server} no respondió: se le pide "
+    "demasiado a la vez. Pruebe en {pause}.",
+    "{key}: the router is away; start it with `make up`": "Falta el router: arranque todo con `make up`.",
+    "nobody serves {key}: is {server} running? `gemelo node list` shows who is": "Nadie responde: ¿está en marcha "
+    "{server}?",
+    "nobody serves {key} to {certificate}: is {server} running, and may this role ask it? schemas/roles.py says who "
+    "may": ("Nadie responde: ¿está en marcha {server}, y puede pedírselo esta página?"),
+    "the answer of {server} to {key} cannot be read: {error}": "La respuesta de {server} no se puede leer ({error}).",
+    "nothing heard of {key} for {time} s: is {server} running? `gemelo node list`": "No se oye {key} desde hace "
+    "{time} s: "
+    "¿está en marcha {server}?",
+    "the arm was told to stop, but did not say within {time} s that it rests": "Se le dijo al brazo que parase, y no "
+    "dijo "
+    "en {time} s que esté quieto.",
+    "this connection is closed: call gemelo.connect() anew": "La conexión se cerró: recargue la página.",
+    "the connection has ended: {error}": "La conexión terminó ({error}): recargue la página.",
+    "{key}: {count} requests are waiting already": "Se piden demasiadas cosas a la vez: espere un momento.",
+    "{key}: {count} requests are waiting already, all of this client": "Se piden demasiadas cosas a la vez: espere un "
+    "momento.",
+    "refused by {server}: {reason}": "{reason}",
+    "refused: {reason}": "{reason}",
+    "stop refused: {reason}": "No se pudo parar: {reason}",
+    "{command} refused: {reason}": "{reason}",
+    "{command} refused: {reason} (device mode {mode})": "{reason} (modo «{mode}»)",
+    "{what} control refused: {reason}": "{reason}",
+}
+
+# What may follow any sentence
+_HINTS: dict[str, str] = {
+    '{reason}; did you mean "{near}"?': "{reason} ¿Quiso decir «{near}»?",
+    "{reason}; known are {names}": "{reason} Hay: {names}.",
+    "{reason}; none is known": "{reason} No hay ninguno.",
+}
+
+WORK: dict[str, str] = _SCENE | _THINGS | _ASKED | _SILENT | _HINTS
