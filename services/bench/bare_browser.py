@@ -44,6 +44,12 @@ class BareBrowser:
         socket.send(msgspec.msgpack.encode(CAMERA))  # with its first camera a browser is there
         threading.Thread(target=self._hear, daemon=True, name="bare browser").start()
 
+    @property
+    def labels(self) -> set[str]:
+        """Of all buttons."""
+        with self._news:
+            return set(self._labels.values())
+
     def press(self, label: str) -> None:
         """Presses the newest button whose label begins so, once the page has it; raises TimeoutError if it has none."""
         self._set(self._button(label), True)

@@ -126,18 +126,18 @@ class MemoryPage:
 
 
 @contextmanager
-def memory_page(robot: str, folder: Path) -> Iterator[MemoryPage]:
-    """A page of the robot, with one browser that has got all of it."""
-    port = free_port()
+def memory_page(robot: str | Path, folder: Path) -> Iterator[MemoryPage]:
+    """A page of the robot, one of ours by its name or another's folder, with one browser that has got all of it."""
+    port, of_robot = free_port(), ROOT / "urdf" / robot
     deployment = load_deployment(
         environ={
             "GEMELO_PATHS_RUN": str(folder / "run"),
             "GEMELO_PATHS_PROGRAMS": str(folder / "programs"),
             "GEMELO_PANEL_PORT": str(port),
-            "GEMELO_ROBOT": f"urdf/{robot}",
+            "GEMELO_ROBOT": str(of_robot),
         }
     )
-    network, arm = MemoryNetwork(), load_arm(ROOT / "urdf" / robot)
+    network, arm = MemoryNetwork(), load_arm(of_robot)
     with (
         Node("stepper_gateway", deployment, bus=MemoryBus(network), robot=arm.name) as node,
         Node("planner", deployment, bus=MemoryBus(network), robot=arm.name) as planner,

@@ -119,13 +119,13 @@ def test_a_browser_that_dies_while_it_jogs_leaves_the_arm_at_rest(
 
 def test_live_sliders_do_not_jump_and_lead_the_arm(person: Person, arm: gemelo.Arm) -> None:
     person.types(f"{ARM} [°]", 60)
-    person.ticks("Live: the arm follows the sliders")
+    person.ticks("Live")
     until(lambda: person.value(f"{ARM} [°]"), lambda value: abs(value) < 0.1)
     assert not is_moving(arm)
     try:
         until(lambda: _led_to_25(person, arm), lambda now: abs(now - 25.0) < 0.2)
     finally:
-        person.ticks("Live: the arm follows the sliders")
+        person.ticks("Live")
     rests(arm)
 
 

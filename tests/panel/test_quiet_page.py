@@ -20,6 +20,7 @@ from services.panel.main import TEXTS
 from services.panel.model.pace import EARLY, PERIOD, Pace
 from services.panel.view.arms import DrawnArm, load_model
 from services.panel.view.browser import CHANNEL, STOP_SIGN
+from services.panel.view.world import ASPECT, FARTHEST
 from services.panel.words.en import ENGLISH
 from tests.panel.memory_page import ROOT, MemoryPage, memory_page
 from tests.runtime.support import until
@@ -71,6 +72,32 @@ def test_a_browser_that_tells_its_frame_rate_later_has_the_lag_that_it_had(page:
     lag, sent = shown.lag, shown.browser.sent
     shown._hear(f'{CHANNEL} {{"sent": {sent}, "language": "en", "rate": 5.0}}')
     assert (shown.lag, shown.browser.rate) == (lag, 5.0)
+
+
+def test_the_lag_of_a_page_that_was_loading_is_not_shown_for_ever(page: MemoryPage, monkeypatch: pytest.MonkeyPatch):
+    [shown] = page.panel._present()
+    monkeypatch.setattr(shown, "_hear", lambda text: None)  # the browser tells nothing besides
+    for lag, told in ((4.7, "4700 ms"), (0.03, "30 ms"), (0.04, "30 ms"), (0.2, "200 ms")):
+        shown.lag = lag
+        page.draw(2)
+        assert told in shown._header.content
+
+
+def test_in_a_narrow_picture_the_camera_stands_farther_away_on_the_same_line_and_in_a_wide_one_it_stays(
+    page: MemoryPage,
+):
+    [shown] = page.panel._present()
+    world, camera = page.panel._world, shown.client.camera
+    before = np.array(camera.position)
+    world.step_back(shown.client, 1.5)
+    assert np.array(camera.position) == pytest.approx(before)
+    away = []
+    for aspect in (1.0, 0.5, 0.1):
+        world.step_back(shown.client, aspect)
+        line = np.array(camera.position) - world._seen
+        away.append(np.linalg.norm(line) / np.linalg.norm(world._eye - world._seen))
+        assert np.cross(line, world._eye - world._seen) == pytest.approx(np.zeros(3), abs=1e-9)
+    assert away == pytest.approx([ASPECT, 2 * ASPECT, FARTHEST])
 
 
 def test_stop_goes_out_though_every_thread_is_busy_with_other_buttons(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

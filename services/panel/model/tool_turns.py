@@ -1,4 +1,4 @@
-"""About which of its own axes an arm's tool can be turned while it stays where it is: the rings of the gizmo."""
+"""Along and about which of its own axes an arm's tool can be moved: the arrows and the rings of the gizmo."""
 
 from __future__ import annotations
 
@@ -31,11 +31,17 @@ class ToolTurns:
     keeps_orientation: (
         bool  # along every axis the tool can be moved without being turned; else arrows lead its place only
     )
+    arrows: Rings = ALL_RINGS  # along the tool's x, y and z, however it is turned meanwhile
+    along_base: Rings = ALL_RINGS  # along the base's
 
 
 def tool_turns(arm: Arm) -> ToolTurns:
     """A ring about each of the tool's axes about which it can be turned wherever it is, while its place stays: all
-    three with six joints, the last joint's own with five, the vertical one of a SCARA with a wrist."""
+    three with six joints, the last joint's own with five, the vertical one of a SCARA with a wrist.
+
+    An arrow along each axis along which it can be moved: all three but for arms in one plane. An arm with none, as one
+    of two joints that tilts and pans, gets all of them, and its person the nearest that can.
+    """
     lower = [max(joint.lower, -np.pi) for joint in arm.joints]
     upper = [min(joint.upper, np.pi) for joint in arm.joints]
     samples = np.random.default_rng(1).uniform(lower, upper, (SAMPLES, len(arm.joints)))
@@ -47,11 +53,18 @@ def tool_turns(arm: Arm) -> ToolTurns:
         for axis in range(3)
     )
     keeps = all(_can(jacobian, direction) for jacobian in jacobians for direction in np.eye(6)[:3])
-    return ToolTurns((x, y, z), keeps)
+    arrows = _arrows([(jacobian, tool) for jacobian, tool in pairs])
+    return ToolTurns((x, y, z), keeps, arrows, _arrows([(jacobian, np.eye(3)) for jacobian in jacobians]))
+
+
+def _arrows(samples: list[tuple[Array, Array]]) -> Rings:
+    """Along which of its axes (3, 3), the columns, each of the Jacobians can move the tool."""
+    x, y, z = (all(_can(jacobian[:3], axes[:, axis]) for jacobian, axes in samples) for axis in range(3))
+    return (x, y, z) if x or y or z else ALL_RINGS
 
 
 def _can(jacobian: Array, twist: Array) -> bool:
-    """True if some joint velocities give the tool this twist (6,), [m/s] above [rad/s], and nothing besides."""
+    """True if some joint velocities give the tool this twist (6,), [m/s] above [rad/s], or this velocity (3,)."""
     velocities = np.linalg.lstsq(jacobian, twist, rcond=RANK)[0]
     return float(np.linalg.norm(jacobian @ velocities - twist)) < MISSED
 

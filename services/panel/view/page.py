@@ -18,7 +18,7 @@ from services.panel.view.arm_pages import ArmPage, arms_line
 from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, read_browser, script_html
 from services.panel.view.camera_box import CameraBox
 from services.panel.view.control_box import ControlBox
-from services.panel.view.kit import Kit, Mirror, at_once, box, esc, set_if_new, without_event
+from services.panel.view.kit import Kit, Mirror, Steady, at_once, box, esc, set_if_new, without_event
 from services.panel.view.tabs.device import DeviceTab
 from services.panel.view.tabs.jog import JogTab
 from services.panel.view.tabs.move import MoveTab
@@ -61,7 +61,8 @@ class Page:
         self._built: Look | None = None
         self._is_plain = False  # drawn without shadows
         self._told = 0
-        self._said: tuple[str, bool] = ("", False)  # by the header, and whether the lag was known
+        self._said = ""  # by the header
+        self._shown_lag = Steady(share=0.5, least=0.05)  # [s] a page that has just loaded is late, and not for long
 
     def refresh(self, readings: Readings, now: float) -> None:
         """Shows what has changed, at `now` [s] monotonic. All is built in here, by one thread: callbacks only say what
@@ -168,14 +169,13 @@ class Page:
         for name, key, action in keys:
             gui.add_command(words(name), hotkey=key).on_trigger(without_event(action))
 
-        @self.client.scene.on_click(modifier="shift")
-        def _(event: viser.SceneClickEvent) -> None:
-            self._world.place_goal(event)
+        self.client.scene.remove_click_callback()  # of the page as it was built before
+        self.client.scene.on_click(modifier="shift")(self._world.place_goal)
 
     def _rebuild(self, look: Look) -> None:
         self.close()
         self.client.gui.reset()
-        self._told, self._said = 0, ("", False)
+        self._told, self._said = 0, ""
         self._build(look)
         self._built = look
 
@@ -193,24 +193,26 @@ class Page:
             self.client.scene.configure_default_lights(cast_shadow=False)
         if previous is None or browser.sent != previous.sent:
             self.lag = max(0.0, time.monotonic() - self._began - browser.sent / 1000.0)
+        if previous is None and browser.height:
+            self._world.step_back(self.client, max(1.0, browser.width - WIDTH) / browser.height)
         if not self._was_chosen:
             self._was_chosen = True
             self._wanted = Look(language_of(browser.language), browser.dark)
 
     def _show_header(self, readings: Readings, now: float) -> None:
-        """Sent where it says something new; the newest lag and a new mark go with it, but are no reason to send it."""
-        text, color = self._header_text(readings)
-        said = text, isfinite(self.lag)
+        """Sent where it says something new, with a new mark; that of its lag is new only where it has much changed."""
+        lag = f" · {1000 * self._shown_lag.of(self.lag):.0f} ms" if isfinite(self.lag) and readings.is_live else ""
+        text, color = self._header_text(readings, lag)
+        said = text
         if said == self._said:
             return
         self._said = said
         if now - self._marked > MARK:
             self._marked = now
         mark = f'<span data-gemelo-sent="{1000 * (self._marked - self._began):.0f}"></span>'
-        lag = f" · {1000 * self.lag:.0f} ms" if isfinite(self.lag) and readings.is_live else ""
-        set_if_new(self._header, "content", mark + box(f"{text}{lag}", color))
+        set_if_new(self._header, "content", mark + box(text, color))
 
-    def _header_text(self, readings: Readings) -> tuple[str, str]:
+    def _header_text(self, readings: Readings, lag: str) -> tuple[str, str]:
         """What it says, and its colour."""
         words, state = self._words, readings.state
         if state is None or not readings.is_live:
@@ -221,7 +223,7 @@ class Page:
         error = words("step_error", steps=f"{worst:.2f}")
         if readings.status is not None and readings.status.open_loop:
             error = words("sent_not_verified")
-        text = f"<b>{esc(words(f'mode_{state.mode.name.lower()}'))}</b> · {esc(error)} · {esc(words('live_data'))}"
+        text = f"<b>{esc(words(f'mode_{state.mode.name.lower()}'))}</b> · {esc(error)} · {esc(words('live_data'))}{lag}"
         if readings.fault:
             return f"{text}<br>{esc(words.said(readings.fault))}", BAD
         return text, GOOD if state.armed and all(state.referenced) else NEUTRAL

@@ -13,7 +13,7 @@ import viser
 import gemelo
 from services.panel.model.goal import Goal
 from services.panel.model.operator import Operator
-from services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, Rings
+from services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, ToolTurns
 from services.panel.view.arms import Array, DrawnArm
 from services.panel.view.obstacles import Obstacles
 from services.runtime.deployment import project_root
@@ -25,6 +25,9 @@ TRAIL = 400  # points of the executed path
 STEP = 0.002  # [m] between two of them
 REDRAWN = 0.25  # [s] between two drawings of the executed path
 ABOVE = 0.03  # [m] chosen: a goal by a click is so high above the surface that a gripper's finger is clear of it
+EYE, SEEN = (1.35, -1.15, 0.95), (0.35, 0.1, 0.1)  # where the camera is and looks at first, in reaches of the arm
+ASPECT = 1.1  # of a picture in which the arm is seen whole from there
+FARTHEST = 4.0  # times as far, at most
 GHOST_RATE = 20.0  # [Hz] of the plan that is played
 
 
@@ -42,7 +45,7 @@ class World:
         self.obstacles = Obstacles(server, (project_root(), arm.folder))
         reach = max(0.3, float(np.linalg.norm(operator.goal.goal.pose.position)))
         self._set_stage(server, reach)
-        self._gizmos = self._make_gizmos(0.35 * reach, operator.goal.turns.rings)
+        self._gizmos = self._make_gizmos(0.35 * reach, operator.goal.turns)
         on_tool = f"{self.measured.node_of(self._tool)}/axes"
         self._scene.add_frame(on_tool, axes_length=0.12 * reach, axes_radius=0.004 * reach)
         self._dragged: viser.TransformControlsHandle | None = None
@@ -85,19 +88,27 @@ class World:
             pose = gemelo.Pose((x, y, z), self._operator.goal.goal.pose.orientation)
             self._operator.goal.set_pose(pose, event.client_id)
 
+    def step_back(self, client: viser.ClientHandle, aspect: float) -> None:
+        """Shows all of the arm in a picture that is narrower than usual; `aspect` is its width by its height."""
+        if aspect < ASPECT:
+            client.camera.position = self._seen + min(FARTHEST, ASPECT / aspect) * (self._eye - self._seen)
+
     def _set_stage(self, server: viser.ViserServer, reach: float) -> None:
         size = 2.0 * ceil(4.0 * reach) / 2.0
         self._scene.add_grid("/ground", size, size, cell_size=0.1, section_size=0.5, infinite_grid=False)
         self._scene.configure_environment_map(None)
         self._scene.configure_default_lights(True)
         self._scene.add_light_ambient("/lights/ambient", intensity=0.9)
-        server.initial_camera.position = (1.35 * reach, -1.15 * reach, 0.95 * reach)
-        server.initial_camera.look_at = (0.35 * reach, 0.1 * reach, 0.1 * reach)
+        self._eye, self._seen = (reach * np.array(point) for point in (EYE, SEEN))
+        server.initial_camera.position, server.initial_camera.look_at = self._eye, self._seen
 
-    def _make_gizmos(self, scale: float, rings: Rings) -> list[viser.TransformControlsHandle]:
+    def _make_gizmos(self, scale: float, turns: ToolTurns) -> list[viser.TransformControlsHandle]:
         """Arrows and rings; where not all rings are to be had, which viser has together with the arrows only, two."""
-        add = self._scene.add_transform_controls
-        arrows = add("/gizmo", scale=scale, disable_rotations=rings != ALL_RINGS, depth_test=False)
+        add, rings = self._scene.add_transform_controls, turns.rings
+        along = ALL_RINGS if rings == ALL_RINGS else turns.arrows
+        arrows = add(
+            "/gizmo", scale=scale, active_axes=along, disable_rotations=rings != ALL_RINGS, depth_test=False
+        )  # fmt: skip
         if rings in (ALL_RINGS, NO_RINGS):
             return [arrows]
         turning = add(

@@ -39,8 +39,11 @@ ENGLISH: dict[str, str] = {
     "named_state": "Named state",
     "choose": "choose ...",
     "goal_is_measured": "Goal to where the arm is",
-    "live": "Live: the arm follows the sliders",
-    "live_hint": "It does not jump when switched on; limits and obstacles are watched and slow it.",
+    "click_goal": "Goal by click",
+    "click_hint": "A click on the ground or on an object sets the goal; with Shift it does so at any time.",
+    "live": "Live",
+    "live_hint": "The arm follows the sliders. It does not jump when switched on; limits and obstacles are watched "
+    "and slow it.",
     "how": "How it goes",
     "path_kind": "Path",
     "free_motion": "any that is free",
@@ -76,7 +79,7 @@ ENGLISH: dict[str, str] = {
     "tool": "Tool",
     "joints": "Joints",
     "keys_note": "Keys: arrows, page up and page down.",
-    "jogging": "{share} % of the speed is left {limits}",
+    "jogging": "{share} % of the speed is left",
     # device
     "device": "Device",
     "virtual_device": "virtual",

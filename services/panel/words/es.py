@@ -39,8 +39,11 @@ SPANISH: dict[str, str] = {
     "named_state": "Posición con nombre",
     "choose": "elegir ...",
     "goal_is_measured": "Meta donde está el brazo",
-    "live": "En vivo: el brazo sigue los deslizadores",
-    "live_hint": "No salta al encenderse; límites y obstáculos se vigilan y lo frenan.",
+    "click_goal": "Meta por clic",
+    "click_hint": "Un clic en el suelo o en un objeto pone la meta; con Mayúsculas, en cualquier momento.",
+    "live": "En vivo",
+    "live_hint": "El brazo sigue los deslizadores. No salta al encenderse; límites y obstáculos se vigilan y lo "
+    "frenan.",
     "how": "Cómo se mueve",
     "path_kind": "Camino",
     "free_motion": "cualquiera que esté libre",
@@ -76,7 +79,7 @@ SPANISH: dict[str, str] = {
     "tool": "Herramienta",
     "joints": "Articulaciones",
     "keys_note": "Teclas: flechas, avance y retroceso de página.",
-    "jogging": "queda el {share} % de la velocidad {limits}",
+    "jogging": "Queda el {share} % de la velocidad",
     # device
     "device": "Equipo",
     "virtual_device": "virtual",

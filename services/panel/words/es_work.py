@@ -167,7 +167,9 @@ _ASKED: dict[str, str] = {
     "contact of {first} and {second} ({away} inside one another: they may only come away, slowly)": "{first} y "
     "{second} "
     "se tocan ({away}): solo pueden separarse, despacio.",
-    "joint limit of {joint} ({limit})": "{joint} está en su límite, {limit}.",
+    "joint limit of {joint} ({limit})": "{joint} está cerca de su límite, {limit}.",
+    "joint limit of {joint} ({limit} deg)": "{joint} está cerca de su límite, {limit}°.",
+    "speed limit of {joint} ({limit} deg/s)": "{joint} no va más rápido que {limit}°/s.",
     "singularity (manipulability at {share} % of where slowing begins)": "El brazo está casi estirado, o con dos ejes "
     "alineados (singularidad).",
     "speed limit of {joint} ({limit})": "{joint} no va más rápido que {limit}.",

@@ -21,6 +21,11 @@ TABLES = {"en": ENGLISH, "es": SPANISH}
 REFUSED: dict[str, Mapping[str, str]] = {"en": {}, "es": REFUSALS}  # in English each part's own sentences are shown
 SENTENCES = {"en": Sentences({}, {}), "es": Sentences(GATEWAY | GOALS | FAULTS | PROGRAMS | WORK, VALUES)}
 CODES: dict[str, Mapping[int, str]] = {"en": {}, "es": GOAL_CODES}
+BUTTONS = {  # of the command line: what a person at the page presses instead
+    "gemelo home": "home", "gemelo reference": "reference", "gemelo reset": "reset", "gemelo device arm": "arm",
+    "gemelo stop": "stop", "gemelo resume": "resume", "gemelo control take --force": "force_control",
+    "gemelo control take": "take_control",
+}  # fmt: skip
 NAMES = {"en": "English", "es": "Español"}
 
 
@@ -48,16 +53,24 @@ class Words:
         """A heading for the check, and a sentence; where this language has none, that of the part that refused."""
         heading = self.check(problem.check) or self("check_other" if problem.is_refusal else "check_ended")
         known = self._table.get(f"text_{problem.text.replace(' ', '_')}")
-        return heading, known or sentence_of(problem, self._joints, REFUSED[self.language]) or self._told(problem)
+        known = known or sentence_of(problem, self._joints, REFUSED[self.language])
+        return heading, known or self._told(problem)
 
     def said(self, text: str) -> str:
         """What another part says, line by line; a line that this language does not have is left as it is."""
         sentences = SENTENCES[self.language]
-        return "\n".join(sentences.of(line) or line for line in text.split("\n"))
+        return "\n".join(sentences.of(line) or self._with_buttons(line) for line in text.split("\n"))
 
     def value(self, name: str, value: str) -> str:
         """A single word of another part, as `name` calls it: a mode, a phase of homing, ..."""
         return SENTENCES[self.language].value(name, value)
+
+    def _with_buttons(self, text: str) -> str:
+        """The page's buttons in the place of commands to type."""
+        for command, key in BUTTONS.items():
+            label = f"“{self(key)}”"
+            text = text.replace(f"run `{command}`", f"press {label}").replace(f"`{command}`", label)
+        return text
 
     def _told(self, problem: Problem) -> str:
         """By the sentence; where that is not known, by the code, with the sentence as it came."""

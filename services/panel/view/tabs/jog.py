@@ -39,10 +39,11 @@ class JogTab:
         self._status = kit.line()
         with gui.add_folder(words("tool")):
             kit.line(note(esc(words("keys_note"))))
-            for axis in ("x", "y", "z"):
-                for sign in (1, -1):
+            turns = self._operator.goal.turns
+            for axis, *can in zip(("x", "y", "z"), turns.along_base, turns.arrows, strict=True):
+                for sign in (1, -1) if any(can) else ():
                     self._tool_button(axis, sign, "")
-            for axis, can_turn in zip(("x", "y", "z"), self._operator.goal.turns.rings, strict=True):
+            for axis, can_turn in zip(("x", "y", "z"), turns.rings, strict=True):
                 for sign in (1, -1) if can_turn else ():
                     self._tool_button(axis, sign, "r")
         with gui.add_folder(words("joints")):
@@ -56,9 +57,9 @@ class JogTab:
         status = self._operator.bus.jog_status
         content = ""
         if status is not None and status.active:
-            names = ((self._kit.words.check(limit.check) or limit.check, limit.subject) for limit in status.limits)
-            told = ", ".join(f"{name} ({subject})" for name, subject in names)
-            content = box(esc(self._kit.words("jogging", share=round(100 * status.scale), limits=told)), "#1c7ed6")
+            told = "<br>".join(esc(self._kit.words.said(limit.message)) for limit in status.limits)
+            share = esc(self._kit.words("jogging", share=round(100 * status.scale)))
+            content = box(f"<b>{share}</b><br>{told}" if told else share, "#1c7ed6")
         set_if_new(self._status, "content", content)
 
     @property

@@ -34,12 +34,6 @@ class MoveTab:
         if self._state_names:
             named = kit.gui.add_dropdown(words("named_state"), (words("choose"), *self._state_names))
             named.on_update(lambda event: self._name(event))
-        kit.button(words("goal_is_measured"), self._operator.follow_measured, color="gray")
-        self._live = kit.gui.add_checkbox(words("live"), False, hint=words("live_hint"))
-        self._shown_live = Mirror(self._live)
-        self._live.on_update(lambda event: self._switch_live(event))
-        with kit.gui.add_folder(words("how"), expand_by_default=False):
-            self._choices()
         kit.button(words("plan"), self._operator.plan, color="blue")
         kit.button(words("execute"), self._operator.execute, color="green", needs="move")
         kit.button(words("plan_and_execute"), self._operator.plan_and_execute, color="green", needs="move")
@@ -49,6 +43,14 @@ class MoveTab:
         self._scrub = kit.gui.add_slider(words("scrub"), 0.0, SCRUB, 0.5, 0.0)
         self._scrub.on_update(lambda event: self._show_moment(False) if event.client_id is not None else None)
         self._play.on_update(lambda event: self._show_moment(self._play.value))
+        kit.button(words("goal_is_measured"), self._operator.follow_measured, color="gray")
+        by_click = kit.gui.add_checkbox(words("click_goal"), False, hint=words("click_hint"))
+        by_click.on_update(lambda event: self._set_by_click(event.target.value))
+        self._live = kit.gui.add_checkbox(words("live"), False, hint=words("live_hint"))
+        self._shown_live = Mirror(self._live)
+        self._live.on_update(lambda event: self._switch_live(event))
+        with kit.gui.add_folder(words("how"), expand_by_default=False):
+            self._choices()
 
     def refresh(self, readings: Readings) -> None:
         """What has changed since the last time."""
@@ -113,6 +115,14 @@ class MoveTab:
             self._operator.live.switch(event.target.value)
             if event.target.value:
                 self._operator.follow_measured()
+
+    def _set_by_click(self, is_wanted: bool) -> None:
+        """Without a key, for this browser: a finger on a tablet has none."""
+        scene = self._kit.client.scene
+        if is_wanted:
+            scene.on_click()(self._world.place_goal)
+        else:
+            scene.remove_click_callback(self._world.place_goal)
 
     def _take_nearest(self) -> None:
         problem = self._operator.goal.goal.problem

@@ -69,7 +69,8 @@ class StateTab:
             (esc(words("turned")), f"{roll:.1f}°, {pitch:.1f}°, {yaw:.1f}°"),
         ]
         rows += [(esc(words(key)), esc(words(f"{key}_is", **values))) for key, values in certainty(readings).items()]
-        rows += [(esc(name), f"{value:.4g}") for name, value in readings.sensors.items()]
+        units = {sensor.name: sensor.unit for sensor in self._operator.arm.description.sensors}
+        rows += [(esc(name), f"{value:.4g} {esc(units.get(name, ''))}") for name, value in readings.sensors.items()]
         if browser is not None:
             rows.append((esc(words("browser")), f"{browser.rate:.0f} fps, {1000 * lag:.0f} ms"))
         return rows
