@@ -219,6 +219,7 @@ ENGLISH: dict[str, str] = {
     "mesh_unit": "The mesh is drawn in",
     "upload": "Add a mesh (STL)",
     "file": "File",
+    "saved_scenes": "Saved",
     "file_name": "File name",
     "save": "Save",
     "load": "Load",

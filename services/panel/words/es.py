@@ -219,6 +219,7 @@ SPANISH: dict[str, str] = {
     "mesh_unit": "La malla está dibujada en",
     "upload": "Añadir una malla (STL)",
     "file": "Archivo",
+    "saved_scenes": "Guardadas",
     "file_name": "Nombre del archivo",
     "save": "Guardar",
     "load": "Cargar",

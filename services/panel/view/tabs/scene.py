@@ -18,6 +18,7 @@ from services.panel.view.world import World
 from services.panel.words.words import Words
 
 SIZE = (40.0, 40.0, 40.0)  # [mm] of a new object
+FOLDER = Path("scenes")
 SHAPES = ("box", "sphere", "cylinder")
 
 
@@ -47,8 +48,10 @@ class SceneTab:
             upload = gui.add_upload_button(words("upload"), mime_type=".stl")
             upload.on_upload(lambda event: self._upload(event.target.value))
         with gui.add_folder(words("file"), expand_by_default=False):
+            self._saved = gui.add_dropdown(words("saved_scenes"), (words("choose"), *saved_scenes()))
+            self._saved.on_update(lambda event: self._take_name() if event.client_id is not None else None)
             self._file = gui.add_text(words("file_name"), "cell.json")
-            kit.button(words("save"), lambda: scene.save(self._path()), color="gray")
+            kit.button(words("save"), self._save, color="gray")
             kit.button(words("load"), lambda: scene.load(self._path()), color="gray")
             kit.button(words("clear"), scene.clear, color="red")
 
@@ -178,14 +181,26 @@ class SceneTab:
 
         self._operator.guarded(add)
 
+    def _take_name(self) -> None:
+        if self._saved.value != self._kit.words("choose"):
+            set_if_new(self._file, "value", self._saved.value)
+
+    def _save(self) -> None:
+        self._operator.arm.scene.save(self._path())
+        self._saved.options = (self._kit.words("choose"), *saved_scenes())
+
     def _path(self) -> Path:
         """A file of the folder `scenes`, by its name alone."""
         name = self._file.value.strip()
         if not name or Path(name).name != name or "\0" in name or name.startswith("."):
             raise gemelo.BadArgument(self._kit.words("bad_file_name", name=name))
-        folder = Path("scenes")
-        folder.mkdir(exist_ok=True)
-        return folder / (name if name.endswith(".json") else f"{name}.json")
+        FOLDER.mkdir(exist_ok=True)
+        return FOLDER / (name if name.endswith(".json") else f"{name}.json")
+
+
+def saved_scenes() -> tuple[str, ...]:
+    """The names of the files that can be loaded."""
+    return tuple(sorted(path.name for path in FOLDER.glob("*.json")))
 
 
 def require_small(size: int, words: Words) -> None:

@@ -1,0 +1,41 @@
+"""The scenes that were saved are offered by their names, and one that is chosen is the one that is loaded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from schemas.frames import Transform
+from schemas.scene import BoxShape, PlanningScene, SceneObject
+from services.panel.view.tabs import scene as scene_tab
+from tests.panel.memory_page import memory_page
+from tests.runtime.support import until
+
+POST = SceneObject(
+    name='a "post"',
+    shape=BoxShape(size=(0.04, 0.04, 0.16)),
+    pose=Transform(translation=(0.29, 0.27, 0.08), rotation=(0.0, 0.0, 0.0, 1.0)),
+)
+
+
+def test_a_scene_that_is_saved_is_offered_at_once_and_chosen_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(scene_tab, "FOLDER", tmp_path / "scenes")
+    assert scene_tab.saved_scenes() == ()
+    with memory_page("rm1", tmp_path) as page:
+        page.gateway.show_scene(PlanningScene(objects=(POST,)))
+        assert until(lambda: len(page.panel.operator.bus.scene.objects) == 1)
+        page.draw(5)
+        [shown] = page.panel._present()
+        tab = shown._scene
+        for name in ("table", "post"):
+            tab._file.value = name
+            tab._save()
+        assert tab._saved.options == ("choose ...", "post.json", "table.json")
+        tab._saved.value = "table.json"
+        tab._take_name()
+        assert tab._path() == tmp_path / "scenes/table.json"
+    assert POST.name in (tmp_path / "scenes/table.json").read_text().replace("\\", "")
+    assert scene_tab.saved_scenes() == ("post.json", "table.json")
