@@ -143,6 +143,19 @@ def breaks_it(person: Person, arm: gemelo.Arm) -> None:
     person.press("Soltar la parada de emergencia")
     person.press("Borrar el fallo")
     declares(person, arm)
+    before = steps_away(person)
+    person.tab("Equipo")
+    person.press("Hacer patinar brazo_joint 10 pasos")
+    until(lambda: steps_away(person), lambda away: away == before + 10)
+    assert arm.step_errors["brazo_joint"] == 0.0
+
+
+def steps_away(person: Person) -> int:
+    """By how many steps the first joint's shaft is not where its counter says."""
+    person.tab("Estado")
+    rows = person.page.locator("table").filter(has_text="eje real", visible=True).locator("tr")
+    _, _, executed, shaft = rows.filter(has_text="brazo_joint").first.locator("td").all_inner_texts()
+    return int(shaft) - int(executed)
 
 
 def text_of(folder: Path) -> str:

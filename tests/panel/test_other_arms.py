@@ -71,6 +71,8 @@ def test_every_tab_is_there_with_a_slider_and_two_jog_buttons_for_each_joint(pag
         assert slider.label == f"{joint.name} [{'mm' if joint.unit == 'm' else '°'}]"
         assert (slider.min, slider.max) == slider_range(joint)
         assert slider.step == STEP[joint.unit]
+        wanted = shown(joint, page.gateway.joints[joint.name])
+        assert slider.value == round(slider.value, 1) == pytest.approx(wanted, abs=0.05 + 1e-9)
 
 
 def test_a_slider_s_value_means_degrees_or_millimetres_and_never_leaves_the_limits(tmp_path: Path):

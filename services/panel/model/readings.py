@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 import gemelo
@@ -46,6 +46,7 @@ class Readings:
     ledger: StepLedger | None
     stopping: StoppingDistance | None
     control: ControlState | None = None
+    shaft: Mapping[str, int] = field(default_factory=dict)  # [steps] that the shafts have made; a virtual device knows
 
     @property
     def is_live(self) -> bool:
@@ -65,6 +66,7 @@ class Bus:
         self._arm, self._on_moved, self.pace = arm, on_moved, Pace()
         self._joints, self._commands = Latest(topics.JOINT_STATES), self._shown(topics.JOINT_COMMANDS)
         node.subscribe(topics.JOINT_STATES, self._on_joints)
+        self._shaft = self._shown(topics.DEVICE_SHAFT)
         self._errors, self._sensors = self._shown(topics.STEP_ERRORS), self._shown(topics.SENSORS)
         self._state, self._status = self._shown(topics.DEVICE_STATE), node.latest(topics.DEVICE_STATUS)
         self._scene, self._contacts = node.latest(topics.SCENE), node.latest(topics.CONTACTS)
@@ -79,7 +81,7 @@ class Bus:
         """Everything that has a value for every joint, now."""
         errors = self._errors.message
         commands, sensors = self._commands.message, self._sensors.message
-        state = self._state.message
+        state, shaft = self._state.message, self._shaft.message
         return Readings(
             joints=self.joints,
             age=self._joints.age(),
@@ -95,6 +97,7 @@ class Bus:
             ledger=self._ledger.message if not self._ledger.is_stale else None,
             stopping=self._stopping.message if not self._stopping.is_stale else None,
             control=self._control.message,
+            shaft=dict(zip(shaft.name, shaft.shaft, strict=False)) if shaft and not self._shaft.is_stale else {},
         )
 
     def _shown(self, topic: Topic[M]) -> Latest[M]:

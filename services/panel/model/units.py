@@ -28,6 +28,13 @@ def slider_range(joint: Joint) -> tuple[float, float]:
     return round(shown(joint, joint.lower), 1), round(shown(joint, joint.upper), 1)
 
 
+def slider_value(joint: Joint, value: float) -> float:
+    """[deg] or [mm] where the slider stands for `value` [rad] or [m]: on one of its steps, which its field has room "
+    "for."""
+    lower, upper = slider_range(joint)
+    return round(min(max(shown(joint, value), lower), upper), 1)
+
+
 def text_of(joint: Joint, value: float) -> str:
     """The value with its unit."""
     return f"{shown(joint, value):.2f} {SHOWN[joint.unit]}"

@@ -82,7 +82,7 @@ SCRIPT = """
     tooLarge = size;
   }, true);
   const pair = () => buttons().forEach((b) => {
-    if (/ [+-]( |$)/.test(b.textContent) && b.parentElement.style.width === '')
+    if (/ [+-](  \\S+)?$/.test(b.textContent) && b.parentElement.style.width === '')
       Object.assign(b.parentElement.style, {display: 'inline-block', width: 'calc(50% - 1.25em)'});
   });
   const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;

@@ -240,6 +240,7 @@ ENGLISH: dict[str, str] = {
     "steps": "Steps",
     "commanded": "commanded",
     "executed": "executed",
+    "shaft": "true shaft",
     "turned": "Roll, pitch, yaw",
     "browser": "This browser",
     "dark": "Dark colours",

@@ -240,6 +240,7 @@ SPANISH: dict[str, str] = {
     "steps": "Pasos",
     "commanded": "pedidos",
     "executed": "dados",
+    "shaft": "eje real",
     "turned": "Alabeo, cabeceo, guiñada",
     "browser": "Este navegador",
     "dark": "Colores oscuros",

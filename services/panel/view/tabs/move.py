@@ -10,7 +10,7 @@ import gemelo
 from services.arm.model.description import Joint
 from services.panel.model.motions import PLANNERS, MotionChoice
 from services.panel.model.readings import Readings
-from services.panel.model.units import SHOWN, STEP, meant, shown, slider_range, text_of
+from services.panel.model.units import SHOWN, STEP, meant, slider_range, slider_value, text_of
 from services.panel.view.kit import Kit, Mirror, box, esc, note, set_if_new, table
 from services.panel.view.world import World
 
@@ -71,7 +71,7 @@ class MoveTab:
 
     def _slider(self, joint: Joint) -> viser.GuiSliderHandle[float]:
         lower, upper = slider_range(joint)
-        at = min(max(shown(joint, self._operator.goal.goal.joints[joint.name]), lower), upper)
+        at = slider_value(joint, self._operator.goal.goal.joints[joint.name])
         label = f"{joint.name} [{SHOWN[joint.unit]}]"
         slider = self._kit.gui.add_slider(label, lower, upper, STEP[joint.unit], at)
 
@@ -86,7 +86,7 @@ class MoveTab:
     def _write_sliders(self) -> None:
         for joint in self._operator.arm.description.joints:
             slider = self._sliders[joint.name]
-            at = min(max(shown(joint, self._operator.goal.goal.joints[joint.name]), slider.min), slider.max)
+            at = slider_value(joint, self._operator.goal.goal.joints[joint.name])
             if abs(slider.value - at) > STEP[joint.unit] / 2.0:
                 set_if_new(slider, "value", at)
 

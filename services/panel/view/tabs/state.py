@@ -44,7 +44,7 @@ class StateTab:
         set_if_new(self._log, "content", note("<br>".join(lines)))
 
     def _steps(self, readings: Readings) -> str:
-        """Executed steps beside those of the path, to the half step."""
+        """Executed steps beside those of the path, to the half step, and of a virtual device what its shafts made."""
         state = readings.state
         if state is None:
             return ""
@@ -54,8 +54,10 @@ class StateTab:
         for joint in arm.joints:
             if joint.name in readings.commanded and joint.name in executed:
                 wanted = joint.steps.to_steps(readings.commanded[joint.name])
-                rows.append((esc(joint.name), f"{wanted:.1f}", str(executed[joint.name])))
-        return table(rows, (esc(words("steps")), esc(words("commanded")), esc(words("executed"))))
+                true = [str(readings.shaft.get(joint.name, "-"))] if readings.shaft else []
+                rows.append((esc(joint.name), f"{wanted:.1f}", str(executed[joint.name]), *true))
+        columns = ("steps", "commanded", "executed", *(["shaft"] if readings.shaft else []))
+        return table(rows, tuple(esc(words(column)) for column in columns))
 
     def _numbers(
         self, readings: Readings, browser: Browser | None, lag: float, tool: tuple[float, ...]
