@@ -6,8 +6,8 @@ colours, its frame rate and the newest header that it has drawn come back throug
 that bears a new mark, and when the rate has changed; a page on which nothing changes says nothing. A click into the
 image of a camera comes at once: a press and its release are taken for it, since the image may have been replaced by the
 next one between the two.
-The tabs stand closer, so that all of them have room in one row, and the two jog buttons of an axis share a row. A file
-that is too large is not sent at all.
+The tabs stand closer, so that all of them have room in one row, and the two jog buttons of an axis share a row. Stop
+stays in sight when the controls are scrolled. A file that is too large is not sent at all.
 """
 
 from __future__ import annotations
@@ -81,16 +81,18 @@ SCRIPT = """
     e.target.value = '';
     tooLarge = size;
   }, true);
-  const pair = () => buttons().forEach((b) => {
-    if (/ [+-](  \\S+)?$/.test(b.textContent) && b.parentElement.style.width === '')
-      Object.assign(b.parentElement.style, {display: 'inline-block', width: 'calc(50% - 1.25em)'});
+  const arrange = () => buttons().forEach((b) => {
+    const place = b.parentElement.style;
+    if (b.textContent.trim().startsWith('STOP_SIGN')) Object.assign(place, {position: 'sticky', top: '0', zIndex: '5'});
+    const isOfPair = / [+-](  \\S+)?$/.test(b.textContent);
+    if (isOfPair) Object.assign(place, {display: 'inline-block', width: 'calc(50% - 1.25em)'});
   });
   const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;
   let frames = 0, began = performance.now(), rate = 0, told = '', toldClicks = 0, toldRate = 0;
   const tell = () => {
     frames += 1;
     const now = performance.now();
-    if (now - began > 1000) { rate = frames * 1000 / (now - began); frames = 0; began = now; pair(); }
+    if (now - began > 1000) { rate = frames * 1000 / (now - began); frames = 0; began = now; arrange(); }
     const field = [...document.querySelectorAll('input')].find((i) => i.value.startsWith('CHANNEL'));
     const sent = (document.querySelector('[data-gemelo-sent]') || {dataset: {}}).dataset.gemeloSent || '';
     if (field) {

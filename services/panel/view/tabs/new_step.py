@@ -48,6 +48,9 @@ SHOWN = {  # which fields each kind shows
     "wait_for": ("name", "on", "number"), "speed": ("number",),
     "attach": ("name",), "detach": ("name",), "repeat": ("number",), "call": ("name",),
 }  # fmt: skip
+USUAL = {  # what the number is at first, by kind: mm/s (0: as fast as the joints can), mm, s, per cent, times
+    "line": 0.0, "arc": 0.0, "grip": 20.0, "wait": 1.0, "wait_for": 0.0, "speed": 50.0, "repeat": 2.0,
+}  # fmt: skip
 LABELS = {  # of the fields "number" and "name", by kind
     "line": "number_tool_speed", "arc": "number_tool_speed", "grip": "number_opening",
     "wait": "number_seconds", "wait_for": "number_sensor",
@@ -72,6 +75,7 @@ class NewStep:
         self._number = gui.add_number(words("number"), 1.0, step=0.1)
         self._blend = gui.add_number(words("blend_mm"), 0.0, min=0.0, step=1.0)
         self._seen: object = None
+        self._kind_shown = ""
         self.refresh()
 
     def refresh(self) -> None:
@@ -82,6 +86,9 @@ class NewStep:
         if seen == self._seen:
             return
         self._seen = seen
+        if kind != self._kind_shown:
+            self._kind_shown = kind
+            set_if_new(self._number, "value", USUAL.get(kind, 0.0))
         fields: dict[str, object] = {
             "target": self._target,
             "through": self._through,

@@ -45,11 +45,11 @@ class TeachTab:
         """The list of points."""
         if self._teaching.version == self._version:
             return
-        self._version = self._teaching.version
+        is_first, self._version = self._version < 0, self._teaching.version
         names = tuple(self._teaching.points)
         if names != self._names:
             fresh = [name for name in names if name not in self._names]
-            chosen = fresh[-1] if fresh and self._names else self._chosen.value
+            chosen = fresh[-1] if fresh and not is_first else self._chosen.value
             self._names = names
             self._chosen.options = (self._kit.words("none"), *names)
             set_if_new(self._chosen, "value", chosen if chosen in names else self._kit.words("none"))
