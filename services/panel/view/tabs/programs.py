@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import gemelo
 from gemelo.programs import (
     CheckedLeg,
@@ -36,7 +38,7 @@ class ProgramsTab:
         self._file.on_update(lambda event: self._open() if event.client_id is not None else None)
         self._name = gui.add_text(words("name"), self._teaching.program.name)
         kit.button(words("save"), lambda: self._teaching.save(self._name.value), color="blue")
-        kit.button(words("new_program"), lambda: self._teaching.new(self._name.value), color="gray")
+        kit.button(words("new_program"), self._new, color="gray")
         self._state = kit.line()
         self._list = kit.line()
         self._step = gui.add_dropdown(words("step"), (words("whole_program"),))
@@ -157,8 +159,41 @@ class ProgramsTab:
     def _open(self) -> None:
         chosen = str(self._file.value)
         if chosen in self._teaching.programs and chosen != self._teaching.program.name:
-            self._operator.guarded(lambda: self._teaching.open(chosen))
+            self._leave(lambda: self._teaching.open(chosen))
         set_if_new(self._name, "value", self._teaching.program.name)
+
+    def _new(self) -> None:
+        name = str(self._name.value)
+        self._leave(lambda: self._teaching.new(name))
+
+    def _leave(self, action: Callable[[], object]) -> None:
+        """Does it; where that would lose steps that are not saved, once a person has said what becomes of them."""
+        teaching, words = self._teaching, self._kit.words
+
+        def go_on() -> None:
+            if self._operator.guarded(action):
+                set_if_new(self._name, "value", teaching.program.name)
+
+        if teaching.is_saved or not teaching.program.steps:
+            return go_on()
+        name = teaching.program.name
+        with self._kit.gui.add_modal(words("not_saved")) as modal:
+            self._kit.line(note(esc(words("unsaved_question", name=name))))
+
+            def save() -> None:
+                modal.close()
+                if self._operator.guarded(lambda: teaching.save(name)):
+                    go_on()
+
+            def discard() -> None:
+                modal.close()
+                go_on()
+
+            self._kit.button(words("save_first"), save, color="blue")
+            self._kit.button(words("discard"), discard, color="orange")
+            self._kit.button(words("cancel"), modal.close, color="gray")
+        set_if_new(self._file, "value", name if name in teaching.programs else words("none"))
+        return None
 
     def _chosen(self) -> StepPath:
         path = self._first()
