@@ -57,11 +57,11 @@ class MoveTab:
         goal, motions = self._operator.goal.goal, self._operator.motions
         if goal.version != self._goal_version:
             self._goal_version = goal.version
-            self._show_problem()
             if goal.source != self._client or time.monotonic() - self._touched > OWN_DRAG:
                 self._write_sliders()
         elif goal.source == self._client and time.monotonic() - self._touched > OWN_DRAG:
             self._write_sliders()
+        self._show_problem()
         self._shown_live.show(self._operator.live.is_on)
         if motions.version != self._plan_version or motions.is_moving or motions.is_planning:
             self._plan_version = motions.version
@@ -136,15 +136,18 @@ class MoveTab:
             self._world.is_playing, self._world.scrubbed = is_playing, self._scrub.value / SCRUB * plan.duration
 
     def _show_problem(self) -> None:
-        goal, words = self._operator.goal.goal, self._kit.words
+        """What is wrong with the goal, unless the same is told above the tabs already."""
+        goal, words, told = self._operator.goal.goal, self._kit.words, self._operator.newest_problem
         content = ""
-        if goal.problem is not None:
+        is_told = told is not None and goal.problem is not None and told.problem.text == goal.problem.text
+        if goal.problem is not None and not is_told:
             heading, text = words.problem(goal.problem)
             content = box(f"<b>{esc(heading)}</b><br>{esc(text)}", "#d9480f")
-        elif goal.jumped:
+        elif goal.jumped and goal.problem is None:
             content = box(esc(words("jumped", joints=", ".join(goal.jumped))), "#f59f00")
         set_if_new(self._problem, "content", content)
-        set_if_new(self._nearest, "visible", goal.problem is not None and goal.problem.has_nearest)
+        has_nearest = goal.problem is not None and goal.problem.has_nearest
+        set_if_new(self._nearest, "visible", has_nearest and not is_told)
 
     def _plan_text(self) -> str:
         words, motions = self._kit.words, self._operator.motions

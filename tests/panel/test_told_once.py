@@ -1,0 +1,34 @@
+"""What is wrong with a goal is told once: on the tab while it is set, above the tabs once a plan of it was refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import gemelo
+from services.panel.model.problems import problem_of
+from tests.panel.memory_page import memory_page
+
+
+def test_a_refusal_that_the_page_tells_is_not_told_by_the_tab_again(tmp_path: Path):
+    refused = gemelo.Refused(
+        "a and b would touch", check="collision", nearest=gemelo.Target(joints={"brazo_joint": 0.5})
+    )
+    with memory_page("rm1", tmp_path) as page:
+        page.draw(5)
+        operator, [shown] = page.panel.operator, page.panel._present()
+        problem = problem_of(refused)
+        operator.goal.goal = replace(operator.goal.goal, problem=problem, version=operator.goal.goal.version + 1)
+        page.draw(2)
+        assert "would touch" in shown._move._problem.content
+        assert shown._move._nearest.visible
+        operator.tell(problem)
+        page.draw(2)
+        assert "would touch" in shown._problem.content
+        assert shown._nearest.visible
+        assert shown._move._problem.content == ""
+        assert not shown._move._nearest.visible
+        operator.forget_problem()
+        page.draw(2)
+        assert "would touch" in shown._move._problem.content
+        assert shown._problem.content == ""
