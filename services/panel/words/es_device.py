@@ -134,6 +134,7 @@ VALUES: dict[str, dict[str, str]] = {
         "BAD_ARGUMENT": "el valor no vale",
         "ACCELERATION_LIMIT": "más allá de un límite de aceleración",
     },
+    "edge": {"radius": "el radio", "length": "la longitud"},
     "side": {"lower": "inferior", "upper": "superior"},
     "status": {
         "canceled": "cancelado",
@@ -152,6 +153,9 @@ VALUES: dict[str, dict[str, str]] = {
         "done": "terminado",
     },
     "kind": {
+        "box": "la caja",
+        "sphere": "la esfera",
+        "cylinder": "el cilindro",
         "joint": "articulación",
         "input": "interruptor",
         "sensor": "sensor",

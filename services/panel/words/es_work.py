@@ -52,6 +52,28 @@ _SCENE: dict[str, str] = {
     "the scene is changed, but {file} cannot be written ({error}): a restart forgets it": "La escena cambió, pero "
     "{file} "
     "no se puede escribir ({error}): se olvidará al reiniciar.",
+    'object "{name}" is attached to "{link}", which {robot} does not have': "«{name}» está sujeto a «{link}», que "
+    "{robot} "
+    "no tiene.",
+    'object "{name}": padding is {value} m; give 0 m or more': "«{name}»: el margen no puede ser {value} m.",
+    'object "{name}": {error}; give x y z in m and a unit quaternion x y z w': "«{name}»: su lugar no vale ({error}).",
+    'object "{name}" is at {place} m, beyond {limit} m: is that in mm?': "«{name}» está en {place} m, más allá de "
+    "{limit} "
+    "m: ¿serán mm?",
+    'object "{name}": a {kind} has {count} sizes ({names}), not {given}': "«{name}»: {kind} lleva {count} medidas "
+    "({names}), no {given}.",
+    'object "{name}": {edge} of the {kind} is {value} m; give more than 0 m': "«{name}»: {edge} no puede ser {value} "
+    "m: "
+    "dé más de 0 m.",
+    'object "{name}": scale of the mesh is {value}; give three numbers that are not 0': "«{name}»: la escala de la "
+    "malla "
+    "no puede ser {value}.",
+    'object "{name}": {path} is no usable STL file: {reason}': "«{name}»: el archivo no sirve. {reason}",
+    'object "{name}": mesh path "{path}" leads elsewhere; give one relative to the project or to the robot\'s folder, '
+    "or "
+    "the file's content": "«{name}»: la ruta «{path}» lleva a otra parte.",
+    'object "{name}": there is no mesh "{path}" in {folders}': "«{name}»: no hay una malla «{path}» en {folders}.",
+    'object "{name}": mesh {path} cannot be read: {error}': "«{name}»: la malla {path} no se puede leer ({error}).",
     '"{path}" would be {size} m long: if it is drawn in mm, give scale=0.001': "«{path}» mediría {size} m: si está "
     "dibujado en mm, elija mm.",
     '"{path}" would be {size} m long': "«{path}» mediría {size} m.",
@@ -89,7 +111,7 @@ _THINGS: dict[str, str] = {
     "{name} is not seen by {cameras}; it sees {others}: is it in the image, lit, and not behind the arm? `gemelo "
     "camera "
     "view`": "{cameras} no ve {name}; ve {others}: ¿está en la imagen, con luz, y no detrás del brazo?",
-    "{name}: {reason}": "{name}: {reason}",
+    "{word}: {reason}": "{word}: {reason}",
     'camera "{camera}": {reason}': "Cámara «{camera}»: {reason}",
     'no image of camera "{camera}" within {time} s: `gemelo camera list`': "Ninguna imagen de la cámara «{camera}» en "
     "{time} s.",

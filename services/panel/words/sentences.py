@@ -1,7 +1,8 @@
 """A sentence of another part in another language: known by its fixed words, its values taken over.
 
 A table has sentences with places for values, as `'joint "{joint}" is missing'`, and each in the other language. A value
-is what stands at its place; one that is called as in `INSIDE` has words of its own, which must be known too.
+is what stands at its place; one that is called as in `INSIDE` has words of its own, which must be known too, and one
+that is called `word` has no blank in it.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 
 INSIDE = ("reason", "remedy", "more", "what")  # values that are sentences, or in the table of their place
+ANY, WORD = ".+?", r"\S+?"
 REMEMBERED = 512  # sentences; chosen: more than are told in a day
 
 
@@ -63,6 +65,6 @@ def _pattern(template: str) -> re.Pattern[str]:
     for fixed, name in _parts(template):
         text += re.escape(fixed)
         if name is not None:
-            text += f"(?P={name})" if name in seen else f"(?P<{name}>.+?)"
+            text += f"(?P={name})" if name in seen else f"(?P<{name}>{WORD if name == 'word' else ANY})"
             seen.add(name)
     return re.compile(text, re.DOTALL)
