@@ -1,4 +1,4 @@
-"""How the page's script arranges buttons, in a real browser: jog buttons in pairs, and Stop always in sight."""
+"""How the page's script arranges buttons, in a real browser: jog buttons in pairs."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import pytest
 import viser
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser
 
-from services.panel.view.browser import CHANNEL, STOP_SIGN, script_html
-from tests.panel.person import OPENING, PATIENCE, until
+from services.panel.view.browser import CHANNEL, script_html
+from tests.panel.person import OPENING, until
 
 LABELS = ("Home", "x +  ▲", "x -  ▼", "z +  PgUp", "z -  PgDn", "a long_joint -", "a long_joint +", "Go + stop")
 
@@ -19,8 +19,7 @@ def server() -> Iterator[viser.ViserServer]:
     started = viser.ViserServer("127.0.0.1", 0, verbose=False)
     started.gui.add_html(script_html())
     started.gui.add_text(CHANNEL, CHANNEL)
-    started.gui.add_button(f"{STOP_SIGN} STOP")
-    for label in (*LABELS, *(f"other {number}" for number in range(40))):
+    for label in LABELS:
         started.gui.add_button(label)
     yield started
     started.stop()
@@ -42,10 +41,5 @@ def test_the_two_jog_buttons_of_an_axis_share_a_row(server: viser.ViserServer, c
         home, *pairs, stop = until(rows, lambda seen: seen[1] == seen[2])
         assert pairs[0::2] == pairs[1::2]
         assert len({home, *pairs, stop}) == 5
-        last = page.get_by_role("button", name="other 39")
-        last.scroll_into_view_if_needed()
-        expect(last).to_be_in_viewport(timeout=PATIENCE)
-        expect(page.get_by_role("button", name=f"{STOP_SIGN} STOP")).to_be_in_viewport(ratio=1.0, timeout=PATIENCE)
-        expect(page.get_by_role("button", name="Home")).not_to_be_in_viewport(timeout=PATIENCE)
     finally:
         context.close()

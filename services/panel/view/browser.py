@@ -6,8 +6,8 @@ colours, its frame rate and the newest header that it has drawn come back throug
 that bears a new mark, and when the rate has changed; a page on which nothing changes says nothing. A click into the
 image of a camera comes at once: a press and its release are taken for it, since the image may have been replaced by the
 next one between the two.
-The tabs stand closer, so that all of them have room in one row, and the two jog buttons of an axis share a row. Stop
-stays in sight when the controls are scrolled. A file that is too large is not sent at all.
+The tabs stand closer, so that all of them have room in one row, and the two jog buttons of an axis share a row. A file
+that is too large is not sent at all.
 """
 
 from __future__ import annotations
@@ -83,7 +83,6 @@ SCRIPT = """
   }, true);
   const arrange = () => buttons().forEach((b) => {
     const place = b.parentElement.style;
-    if (b.textContent.trim().startsWith('STOP_SIGN')) Object.assign(place, {position: 'sticky', top: '0', zIndex: '5'});
     const isOfPair = / [+-](  \\S+)?$/.test(b.textContent);
     if (isOfPair) Object.assign(place, {display: 'inline-block', width: 'calc(50% - 1.25em)'});
   });
