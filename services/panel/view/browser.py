@@ -6,6 +6,7 @@ colours, its frame rate and the newest header that it has drawn come back throug
 that bears a new mark, and when the rate has changed; a page on which nothing changes says nothing. A click into the
 image of a camera comes at once: a press and its release are taken for it, since the image may have been replaced by the
 next one between the two.
+Where the Stop button is scrolled out of sight or covered, a second one stands in the lower right corner.
 The tabs stand closer, so that all of them have room in one row, and the two jog buttons of an axis share a row. A file
 that is too large is not sent at all.
 """
@@ -30,6 +31,22 @@ SCRIPT = """
   window.gemelo = true;
   document.head.insertAdjacentHTML('beforeend', '<style>[role=tab] { padding-inline: 6px !important; }</style>');
   const buttons = () => [...document.querySelectorAll('button')];
+  const second = document.createElement('button');
+  const findStop = () => buttons().find((b) => b !== second && b.textContent.trim().startsWith('STOP_SIGN'));
+  Object.assign(second.style, {position: 'fixed', right: '1em', bottom: '1em', zIndex: 10000, display: 'none',
+    padding: '0.8em 1.6em', background: '#e03131', color: '#fff', font: 'bold 16px sans-serif', border: '2px solid #fff',
+    borderRadius: '8px', cursor: 'pointer'});
+  second.dataset.gemeloStop = '';
+  second.setAttribute('aria-hidden', 'true');
+  second.addEventListener('click', () => findStop() && findStop().click());
+  document.body.append(second);
+  const keepStop = () => {
+    const stop = findStop(), box = stop && stop.getBoundingClientRect();
+    const seen = box && box.width && document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+    second.style.display = stop && !(seen && (stop.contains(seen) || second.contains(seen))) ? 'block' : 'none';
+    second.textContent = stop ? stop.textContent : '';
+  };
+  ['scroll', 'resize', 'click'].forEach((kind) => window.addEventListener(kind, keepStop, true));
   const keys = {ArrowLeft: '◀', ArrowRight: '▶', ArrowUp: '▲', ArrowDown: '▼', PageUp: 'PgUp', PageDown: 'PgDn'};
   const isText = (t) => t.tagName === 'TEXTAREA' || t.isContentEditable || (t.tagName === 'INPUT'
     && !['range', 'checkbox', 'radio', 'button'].includes(t.type) && !['decimal', 'numeric'].includes(t.inputMode));
@@ -42,8 +59,7 @@ SCRIPT = """
     if (isText(e.target)) return;
     if (e.code === 'Space') {
       take(e);
-      const stop = buttons().find((b) => b.textContent.trim().startsWith('STOP_SIGN'));
-      if (!e.repeat && stop) stop.click();
+      if (!e.repeat && findStop()) findStop().click();
     } else if (keys[e.code] && !isNumber(e.target)) {
       const button = buttons().find((b) => b.offsetParent && b.textContent.includes(keys[e.code]));
       if (!button) return;
@@ -91,7 +107,7 @@ SCRIPT = """
   const tell = () => {
     frames += 1;
     const now = performance.now();
-    if (now - began > 1000) { rate = frames * 1000 / (now - began); frames = 0; began = now; arrange(); }
+    if (now - began > 1000) { rate = frames * 1000 / (now - began); frames = 0; began = now; arrange(); keepStop(); }
     const field = [...document.querySelectorAll('input')].find((i) => i.value.startsWith('CHANNEL'));
     const sent = (document.querySelector('[data-gemelo-sent]') || {dataset: {}}).dataset.gemeloSent || '';
     if (field) {
