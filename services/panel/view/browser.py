@@ -34,8 +34,8 @@ SCRIPT = """
   const second = document.createElement('button');
   const findStop = () => buttons().find((b) => b !== second && b.textContent.trim().startsWith('STOP_SIGN'));
   Object.assign(second.style, {position: 'fixed', right: '1em', bottom: '1em', zIndex: 10000, display: 'none',
-    padding: '0.8em 1.6em', background: '#e03131', color: '#fff', font: 'bold 16px sans-serif', border: '2px solid #fff',
-    borderRadius: '8px', cursor: 'pointer'});
+    padding: '0.8em 1.6em', background: '#e03131', color: '#fff', font: 'bold 16px sans-serif',
+    border: '2px solid #fff', borderRadius: '8px', cursor: 'pointer'});
   second.dataset.gemeloStop = '';
   second.setAttribute('aria-hidden', 'true');
   second.addEventListener('click', () => findStop() && findStop().click());

@@ -89,7 +89,7 @@ class World:
             self._operator.goal.set_pose(pose, event.client_id)
 
     def step_back(self, client: viser.ClientHandle, aspect: float) -> None:
-        """Shows all of the arm in a picture that is narrower than usual; `aspect` is its width by its height."""
+        """Shows all of the arm in a narrow picture; `aspect` is the ratio of its width to its height."""
         if aspect < ASPECT:
             client.camera.position = self._seen + min(FARTHEST, ASPECT / aspect) * (self._eye - self._seen)
 

@@ -53,7 +53,7 @@ def cover_shapes(shapes: Sequence[CollisionShape], bulge: float) -> SphereCover:
 
 
 def link_cover(shapes: Sequence[CollisionShape], bulge: float) -> SphereCover:
-    """As `cover_shapes`, but with as much more bulge as leaves some `MOST_SPHERES` spheres: those of large links."""
+    """As `cover_shapes`, with more than `bulge` [m] for large links: as much as leaves some `MOST_SPHERES` spheres."""
     look = longest_side(shapes) / LOOK
     if look <= bulge:
         return cover_shapes(shapes, bulge)
