@@ -62,13 +62,18 @@ class Spline : public JointPath {
         }
     }
 
-    // The derivative is a mean of the three differences, so it is never more than the largest.
+    // The derivative is a mean of the three differences, weighted by (1 - u)^2 / 2, 1/2 + u - u^2 and u^2 / 2: with
+    // their sizes it is a parabola, whose most is at an end or between.
     void speed(size_t span, double* speeds) const override {
         for (size_t i = 0; i < dof_; ++i) {
-            speeds[i] = 0.0;
-            for (size_t k = span; k < span + 3; ++k) {
-                speeds[i] = std::max(speeds[i], std::abs(points_[(k + 1) * dof_ + i] - points_[k * dof_ + i]));
+            double sizes[3];
+            for (size_t k = 0; k < 3; ++k) {
+                sizes[k] = std::abs(points_[(span + k + 1) * dof_ + i] - points_[(span + k) * dof_ + i]);
             }
+            const double begin = 0.5 * (sizes[0] + sizes[1]), end = 0.5 * (sizes[1] + sizes[2]);
+            const double rise = sizes[1] - sizes[0], fall = sizes[1] - sizes[2];  // slopes at the beginning and the end
+            const bool is_between = rise > 0.0 && fall > 0.0;
+            speeds[i] = is_between ? begin + 0.5 * rise * rise / (rise + fall) : std::max(begin, end);
         }
     }
 

@@ -21,43 +21,49 @@ struct PlanQuery {
     std::vector<Joints> goals;  // any of them will do
     uint64_t seed = 0;
     uint64_t enough = 0;  // configurations to check, after which no other search is begun; 0: one search
-    int patience = 30;    // of the shortener
+    int patience = 15;    // of the shortener
 };
 
 constexpr double kCloseEnough = 1.05;    // of the least length that any path can have: no other search is begun
 constexpr uint64_t kNextSeed = 1000003;  // from search to search: the next request's is another one
 
-// How finely lines are told apart while searching: a line that comes so near to something is no loss, unless the start
-// or a goal is as near itself.
-inline Tolerances while_searching(const World& world, const Kernel& kernel, const Tolerances& tolerances,
-                                  const PlanQuery& query) {
-    Tolerances hasty = tolerances;
-    hasty.finest = std::max(tolerances.finest, 1e-3);
-    Tolerances wide = tolerances;
-    wide.margin += 2.0 * hasty.finest;
+// How finely lines are told apart [m]: a line that comes so near to something is no loss where there is room. What is
+// shortened keeps clear by more than what is searched for: it is then smoothed and verified in fewer checks.
+constexpr double kFinestSearched = 1e-3, kFinestShortened = 6e-3;
+constexpr double kRoom = 1.2;  // times that, beyond the margin, which the start and the goals need
+
+// `otherwise`, or with lines told apart to `finest` [m] where the start and all goals have room for it.
+inline Tolerances told_to(double finest, const World& world, const Kernel& kernel, const PlanQuery& query,
+                          const Tolerances& otherwise) {
+    Tolerances wide = otherwise;
+    wide.margin += kRoom * finest;
     MotionValidator validator(world, kernel, wide);
-    bool has_room = validator.is_free(query.start.data());
+    bool has_room = finest > otherwise.finest && validator.is_free(query.start.data());
     for (const Joints& goal : query.goals) has_room = has_room && validator.is_free(goal.data());
-    return has_room ? hasty : tolerances;
+    Tolerances result = otherwise;
+    if (has_room) result.finest = finest;
+    return result;
 }
 
 // The shortest path of several searches into `result`; none where the first one was stopped. The others only look where
 // a shorter path may lead, and shorten what they find.
-inline void find_shortest(const Space& space, MotionValidator& validator, const PlanQuery& query,
-                          const std::vector<Joints>& goals, const StopCondition& stop, Plan& result) {
+inline void find_shortest(const Space& space, MotionValidator& searching, MotionValidator& shortening,
+                          const PlanQuery& query, const std::vector<Joints>& goals, const StopCondition& stop,
+                          Plan& result) {
     double least = std::numeric_limits<double>::infinity(), bound = least;
     for (const Joints& goal : goals) bound = std::min(bound, space.distance(query.start.data(), goal.data()));
     for (uint64_t seed = query.seed;; seed = (seed + kNextSeed) % (uint64_t{1} << 32)) {
         Random random(seed);
         const double began = stop.elapsed();
-        Search search(space, validator, random, stop);
+        Search search(space, searching, random, stop);
+        const uint64_t most = query.enough - std::min(query.enough, shortening.checks());
         std::vector<Joints> path = result.path.empty() ? search.find(query.start, goals)
-                                                       : search.find_shorter(query.start, goals, least, query.enough);
+                                                       : search.find_shorter(query.start, goals, least, most);
         const double found = stop.elapsed();
         result.search_s += found - began;
         result.iterations += search.iterations();
         if (path.empty()) return;
-        Shortener shortener(space, validator, random, stop);
+        Shortener shortener(space, shortening, random, stop);
         path = shortener.shorten(std::move(path), query.patience);
         const double length = shortener.length(path);
         result.shorten_s += stop.elapsed() - found;
@@ -65,20 +71,22 @@ inline void find_shortest(const Space& space, MotionValidator& validator, const 
             least = length;
             result.path = std::move(path);
         }
-        if (least <= kCloseEnough * bound || validator.checks() >= query.enough || stop()) return;
+        const uint64_t checks = searching.checks() + shortening.checks();
+        if (least <= kCloseEnough * bound || checks >= query.enough || stop()) return;
     }
 }
 
 inline Plan plan(const World& world, const Kernel& kernel, const Space& space, const Tolerances& tolerances,
                  const PlanQuery& query, const StopCondition& stop) {
     Plan result;
-    MotionValidator validator(world, kernel, while_searching(world, kernel, tolerances, query));
-    MotionValidator last(world, kernel, tolerances);
+    const Tolerances hasty = told_to(kFinestSearched, world, kernel, query, tolerances);
+    MotionValidator searching(world, kernel, hasty), last(world, kernel, tolerances);
+    MotionValidator shortening(world, kernel, told_to(kFinestShortened, world, kernel, query, hasty));
     std::vector<Joints> goals;
     for (const Joints& goal : query.goals) {
-        if (validator.is_free(goal.data())) goals.push_back(goal);
+        if (searching.is_free(goal.data())) goals.push_back(goal);
     }
-    if (!validator.is_free(query.start.data())) {
+    if (!searching.is_free(query.start.data())) {
         result.outcome = Outcome::kStartTouches;
         return result;
     }
@@ -86,15 +94,15 @@ inline Plan plan(const World& world, const Kernel& kernel, const Space& space, c
         result.outcome = Outcome::kGoalTouches;
         return result;
     }
-    find_shortest(space, validator, query, goals, stop, result);
+    find_shortest(space, searching, shortening, query, goals, stop, result);
     if (result.path.empty()) {
         result.outcome = stop.is_cancelled() ? Outcome::kCancelled : Outcome::kTimedOut;
-        result.checks = validator.checks();
+        result.checks = searching.checks() + shortening.checks();
         return result;
     }
     result.control = Smoother(last, stop).smooth(result.path);
     result.smooth_s = stop.elapsed() - result.search_s - result.shorten_s;
-    result.checks = validator.checks() + last.checks();
+    result.checks = searching.checks() + shortening.checks() + last.checks();
     result.outcome = stop.is_cancelled() ? Outcome::kCancelled : Outcome::kFound;
     return result;
 }
