@@ -1,4 +1,4 @@
-"""The goals of an action's server, with results kept for two minutes."""
+"""The goals of an action's server: results are kept for two minutes, and no id is decided upon twice."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ from services.runtime.requests.server import Pending
 
 KEPT = 120.0  # [s] that a result can be asked for after the end
 MAX_KEPT = 256  # goals
+MAX_DECIDED = 32_768  # ids of goals that were refused or are forgotten; some 4 MB
+FORGOTTEN = GoalResponse(reason="a goal of this id has ended already: send it again with an id of its own")
 MAX_RESULT_WAIT = 5.0  # [s] that the answer to a result request may be held back
 
 
@@ -55,6 +57,7 @@ class GoalRegistry:
 
     def __init__(self) -> None:
         self._goals: dict[str, GoalRecord] = {}
+        self._decided: dict[str, GoalResponse] = {}  # refused or forgotten, oldest first
 
     def __getitem__(self, goal_id: str) -> GoalRecord:
         return self._goals[goal_id]
@@ -65,8 +68,18 @@ class GoalRegistry:
     def add(self, goal: GoalRecord) -> None:
         self._goals[goal.goal_id] = goal
 
-    def remove(self, goal_id: str) -> None:
-        del self._goals[goal_id]
+    def refuse(self, goal_id: str, response: GoalResponse) -> GoalResponse:
+        """Removes a goal that is not accepted; whoever sends that id again is answered `response` too."""
+        self._goals.pop(goal_id, None)
+        self._decided[goal_id] = response
+        if len(self._decided) > MAX_DECIDED:
+            del self._decided[next(iter(self._decided))]
+        return response
+
+    def response_to(self, goal_id: str) -> GoalResponse | None:
+        """What a goal of that id is answered that comes again; None for a new one."""
+        goal = self._goals.get(goal_id)
+        return goal.response if goal else self._decided.get(goal_id)
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -87,7 +100,7 @@ class GoalRegistry:
         ended = [goal for goal in self._goals.values() if goal.status.is_terminal]
         for index, goal in enumerate(ended):
             if now - goal.ended > KEPT or index < len(ended) - MAX_KEPT:
-                self.remove(goal.goal_id)
+                self.refuse(goal.goal_id, FORGOTTEN)
         for goal in self._goals.values():
             goal.answer_overdue(now)
 

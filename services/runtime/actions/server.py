@@ -130,8 +130,7 @@ class ActionServer(Generic[G, F, R]):
         self._publish_status()
 
     def _answer_goal(self, request: GoalRequest, pending: Pending[GoalResponse]) -> None:
-        known = self._goals.get(request.goal_id)
-        pending.reply(known.response if known else self._decide(request, pending.client))
+        pending.reply(self._goals.response_to(request.goal_id) or self._decide(request, pending.client))
         self._publish_status()
 
     def _decide(self, request: GoalRequest, session: str) -> GoalResponse:
@@ -143,7 +142,7 @@ class ActionServer(Generic[G, F, R]):
             raise Refused(f"{self.action.key}: {error}", "bad request") from error
         if self._cancelled_early.pop(request.goal_id, None) is not None:
             reason = "it was cancelled before it was looked at"
-            return GoalResponse(accepted=False, reason=reason, stamp=time.time_ns())
+            return self._goals.refuse(request.goal_id, GoalResponse(reason=reason, stamp=time.time_ns()))
         response = GoalResponse(accepted=True, stamp=time.time_ns())
         goal = GoalRecord(request.goal_id, request.client, response, session=session)
         self._goals.add(goal)
@@ -152,12 +151,11 @@ class ActionServer(Generic[G, F, R]):
             decision = self._on_goal(request.goal_id, wanted)
         finally:
             if not decision.accepted:
-                self._goals.remove(request.goal_id)
-        if decision.accepted:
-            if request.attached and not goal.status.is_terminal:
-                self._clients.add(request.goal_id, request.client, time.monotonic())
-            return goal.response
-        return GoalResponse(accepted=False, code=decision.code, reason=decision.reason, stamp=time.time_ns())
+                refusal = GoalResponse(code=decision.code, reason=decision.reason, stamp=time.time_ns())
+                response = self._goals.refuse(request.goal_id, refusal)
+        if decision.accepted and request.attached and not goal.status.is_terminal:
+            self._clients.add(request.goal_id, request.client, time.monotonic())
+        return response
 
     def _answer_cancel(self, request: CancelRequest, pending: Pending[CancelResponse]) -> None:
         if request.goal_id and request.goal_id not in self.active:

@@ -1,0 +1,99 @@
+"""A goal that was sent before and is sent again, by its client or by another one, never moves the arm."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from schemas.actions import CancelRequest, GoalRequest, GoalResponse, GoalStatusCode, GoalStatuses, ResultRequest
+from schemas.message import encode
+from schemas.motion import FollowErrorCode
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
+from services.runtime.actions import GoalDecision, refuse
+from services.runtime.actions import keys as keys
+from services.runtime.actions.goal_registry import GoalRecord, GoalRegistry
+from services.runtime.node import Node
+from tests.runtime.support import Buses, until
+from tests.runtime.test_actions import goal_of, moving
+
+
+def request_of(goal_id: str) -> GoalRequest:
+    return GoalRequest(goal_id=goal_id, client="operator", goal=msgspec.Raw(encode(goal_of(3))))
+
+
+def send(node: Node, request: GoalRequest) -> GoalResponse:
+    return node.call(keys.goal_request(FOLLOW), request)
+
+
+def has_ended(node: Node, goal_id: str) -> bool:
+    asked = ResultRequest(goal_id=goal_id, wait=2.0)
+    return node.call(keys.result_request(FOLLOW), asked, timeout=3.0).status is GoalStatusCode.SUCCEEDED
+
+
+def is_forgotten(node: Node, goal_id: str) -> bool:
+    asked = ResultRequest(goal_id=goal_id)
+    return node.call(keys.result_request(FOLLOW), asked).status is GoalStatusCode.UNKNOWN
+
+
+def test_a_goal_that_has_ended_and_is_sent_again_by_another_client_moves_nothing(buses: Buses) -> None:
+    with moving(buses) as arm:
+        owner, other = buses.node("owner"), buses.node("other")
+        first = send(owner, request_of("g"))
+        assert has_ended(owner, "g")
+        moved = arm.moved
+        assert send(other, request_of("g")) == first
+        assert not arm.left
+        assert arm.moved == moved
+
+
+def test_a_goal_that_is_forgotten_and_sent_again_is_refused_and_a_new_one_is_not(
+    buses: Buses, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with moving(buses) as arm:
+        owner, other = buses.node("owner"), buses.node("other")
+        assert send(owner, request_of("g")).accepted
+        assert has_ended(owner, "g")
+        moved = arm.moved
+        monkeypatch.setattr("services.runtime.actions.goal_registry.KEPT", -1.0)
+        assert until(lambda: is_forgotten(owner, "g"))
+        again = send(other, request_of("g"))
+        assert not again.accepted
+        assert "has ended already" in again.reason
+        assert arm.moved == moved
+        assert send(other, request_of("new")).accepted
+        assert until(lambda: arm.moved == 2 * moved)
+
+
+def test_a_goal_that_was_refused_stays_refused_when_it_could_be_carried_out_later(buses: Buses) -> None:
+    with moving(buses) as arm:
+        owner, other = buses.node("owner"), buses.node("other")
+        accepting = arm.server._on_goal
+
+        def not_now(goal_id: str, goal: object) -> GoalDecision:
+            return refuse(FollowErrorCode.INVALID_JOINTS, "not now")
+
+        arm.server._on_goal = not_now
+        first = send(owner, request_of("g"))
+        arm.server._on_goal = accepting
+        assert (first.accepted, first.reason) == (False, "not now")
+        assert send(other, request_of("g")) == first
+        assert arm.moved == 0
+
+
+def test_every_try_of_a_goal_that_its_client_has_cancelled_is_refused(buses: Buses) -> None:
+    with moving(buses) as arm:
+        client = buses.node("client")
+        client.call(keys.cancel_request(FOLLOW), CancelRequest(goal_id="g"))
+        tries = [send(client, request_of("g")) for _ in range(2)]
+        assert [each.reason for each in tries] == ["it was cancelled before it was looked at"] * 2
+        assert arm.moved == 0
+
+
+def test_the_ids_that_are_remembered_are_bounded_and_the_oldest_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("services.runtime.actions.goal_registry.MAX_DECIDED", 3)
+    goals = GoalRegistry()
+    for number in range(5):
+        goals.add(GoalRecord(str(number), "c", GoalResponse(accepted=True)))
+        goals.refuse(str(number), GoalResponse(reason=str(number)))
+    assert [goals.response_to(str(number)) is not None for number in range(5)] == [False, False, True, True, True]
+    assert goals.statuses.goals == GoalStatuses().goals
