@@ -131,21 +131,24 @@ class Eyes:
         """What was found in the next images of a camera; raises `Refused` where none come, or they are old."""
         heard: list[Detections] = []
         status: list[CameraStatus] = []
-        late: list[int] = []  # [ns] how long before the question images were taken
+        late: list[float] = []  # [s] how old images were that are left out
+        node = self._session.node
 
         def on_found(message: Detections) -> None:
             with self._session.news:
-                if message.stamp >= begin:
+                age = (begin - message.stamp) / 1e9 + node.monotonic() - answered
+                if message.stamp >= begin and age <= OLDEST:
                     heard.append(message)
                 else:
-                    late.append(begin - message.stamp)
+                    late.append(age)
                 self._session.news.notify_all()
 
         # By the camera's own clock, which it looked at after this question: what it stamps from then on shows the rest.
         begin = self._session.call(info_request(CAMERA), Empty(), ANSWER).clock
+        answered = node.monotonic()
         subscriptions: list[Subscription[Any]] = [
-            self._session.node.subscribe(camera_detections(camera), on_found),
-            self._session.node.subscribe(camera_status(camera), status.append),
+            node.subscribe(camera_detections(camera), on_found),
+            node.subscribe(camera_status(camera), status.append),
         ]
         patience = PATIENCE + IMAGES / cell.camera(camera).fps
         try:
@@ -230,13 +233,13 @@ def _apart(first: Sequence[float], second: Sequence[float]) -> float:
     return float(sum((a - b) ** 2 for a, b in zip(first, second, strict=True)) ** 0.5)
 
 
-def _why_none(camera: str, status: Sequence[CameraStatus], late: Sequence[int], patience: float) -> str:
+def _why_none(camera: str, status: Sequence[CameraStatus], late: Sequence[float], patience: float) -> str:
     if status and status[-1].text:
         return status[-1].text
-    if late and min(late) > OLDEST * 1e9:
-        seconds = min(late) / 1e9
+    if late and min(late) > OLDEST:
         return (
-            f'the newest image of camera "{camera}" was taken {seconds:.1f} s before it was asked for: what lags there?'
+            f'every image of camera "{camera}" is {min(late):.1f} s old when it comes (at most {OLDEST:g}): what lags '
+            "there, the camera, the network, or a `detector` with too much to do?"
         )
     if status and status[-1].condition is CameraCondition.STREAMING:
         return f"nothing is heard of the detector for {patience:.1f} s: is the process `detector` running?"

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from gemelo.errors import Refused
 from gemelo.scene import Scene
 from gemelo.seeing import Eyes
 from gemelo.session import Session
@@ -78,28 +79,47 @@ def seen(stamp: int, x: float) -> Detections:
     return Detections(stamp=stamp, camera="overhead", items=(cup,))
 
 
+@contextmanager
+def speaking(session: Session, nodes: dict[str, Node], late: int) -> Iterator[None]:
+    """An arm that stands, and images that come `late` [ns]; those that were taken before now show the cup elsewhere."""
+    gateway, camera, detector = (nodes[name] for name in ("stepper_gateway", "camera", "detector"))
+    states, found = gateway.publisher(JOINT_STATES), detector.publisher(camera_detections("overhead"))
+    names = session.description.joint_names
+    end = threading.Event()
+
+    def speak() -> None:
+        began = camera.now()
+        while not end.wait(0.02):
+            states.put(JointState(stamp=gateway.now(), name=names, position=(0.0,) * 3, velocity=(0.0,) * 3))
+            stamp = camera.now() - late
+            found.put(seen(stamp, 0.1 if stamp < began else 0.2))
+
+    speaker = threading.Thread(target=speak)
+    speaker.start()
+    try:
+        yield
+    finally:
+        end.set()
+        speaker.join()
+
+
+def clocks_of_cameras(ahead: float, drift: float) -> tuple[tuple[str, Skewed], ...]:
+    return (
+        ("stepper_gateway", Skewed(-ahead, -drift)), ("camera", Skewed(ahead, drift)), ("detector", Skewed(2 * ahead)),
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize(("ahead", "drift"), APART)
 def test_a_thing_is_where_images_show_it_that_were_taken_after_the_arm_had_come_to_rest(deployment, ahead, drift):
-    clocks = (("stepper_gateway", Skewed(-ahead, -drift)), ("camera", Skewed(ahead, drift)))
-    with hosts(deployment, *clocks, ("detector", Skewed(2 * ahead))) as (session, nodes):
-        gateway, camera, detector = (nodes[name] for name in ("stepper_gateway", "camera", "detector"))
-        states, found = gateway.publisher(JOINT_STATES), detector.publisher(camera_detections("overhead"))
-        names = session.description.joint_names
-        end = threading.Event()
+    with hosts(deployment, *clocks_of_cameras(ahead, drift)) as (session, nodes), speaking(session, nodes, 200 * MS):
+        (cup,) = Eyes(session, Scene(session)).detect("cup", "overhead", False)
+        assert cup.pose.position[0] == pytest.approx(0.2)
 
-        def speak() -> None:
-            """Every image that was taken before now shows the cup elsewhere, and all come late."""
-            began = camera.now()
-            while not end.wait(0.02):
-                states.put(JointState(stamp=gateway.now(), name=names, position=(0.0,) * 3, velocity=(0.0,) * 3))
-                stamp = camera.now() - 200 * MS
-                found.put(seen(stamp, 0.1 if stamp < began else 0.2))
 
-        speaker = threading.Thread(target=speak)
-        speaker.start()
-        try:
-            (cup,) = Eyes(session, Scene(session)).detect("cup", "overhead", False)
-            assert cup.pose.position[0] == pytest.approx(0.2)
-        finally:
-            end.set()
-            speaker.join()
+@pytest.mark.parametrize(("ahead", "drift"), APART)
+def test_images_older_than_half_a_second_are_refused_with_their_age(deployment, ahead, drift):
+    with hosts(deployment, *clocks_of_cameras(ahead, drift)) as (session, nodes), speaking(session, nodes, 900 * MS):
+        late = r'"overhead" is (0\.9|1\.\d) s old when it comes \(at most 0\.5\)'
+        with pytest.raises(Refused, match=late) as refused:
+            Eyes(session, Scene(session)).detect("cup", "overhead", False)
+        assert (refused.value.check, refused.value.subject) == ("camera", "overhead")

@@ -126,8 +126,9 @@ _THINGS: dict[str, str] = {
     "otras, o dé a cada una su etiqueta.",
     "the arm moves: images of it are blurred; wait until it stands": "El brazo se mueve y las imágenes salen movidas: "
     "espere a que esté quieto.",
-    'the newest image of camera "{camera}" was taken {time} s before it was asked for: what lags there?': "La última "
-    "imagen de la cámara «{camera}» es de {time} s antes de pedirla.",
+    'every image of camera "{camera}" is {time} s old when it comes (at most {limit}): what lags there, the camera, '
+    "the network, or a `detector` with too much to do?": "Cada imagen de la cámara «{camera}» llega con {time} s (a lo "
+    "sumo {limit}): ¿qué se retrasa, la cámara, la red o un `detector` con demasiado trabajo?",
     "nothing is heard of the detector for {time} s: is the process `detector` running?": "El detector calla desde hace "
     "{time} s: ¿está en marcha?",
     "{name} is {height} mm high: the jaws, {long} mm long, would be beside {beside} mm of it (at least "
