@@ -28,6 +28,7 @@ from services.chaos.options import add_chaos_options
 from services.chaos.report import Report, page_of, text_of
 from services.chaos.site import Site, installed_broker
 from services.runtime.deployment import load_deployment
+from services.runtime.process.ending import ended_by_signals
 from services.stack.stack import StackError
 
 LAST_WORDS = 2.0  # [s] at the end of a run of which records may still be on their way
@@ -50,9 +51,12 @@ def main() -> None:
         wanted = itertools.islice(wanted, options.episode, options.episode + 1)
     broker = options.broker or installed_broker()
     try:
-        sys.exit(0 if run(wanted, seed, options.minutes * 60.0, broker, options.out.resolve()) else 1)
+        with ended_by_signals():
+            sys.exit(0 if run(wanted, seed, options.minutes * 60.0, broker, options.out.resolve()) else 1)
     except StackError as error:
         sys.exit(f"chaos: {error}")
+    except KeyboardInterrupt:
+        sys.exit("chaos: interrupted: its stack has been stopped, and there is no report")
 
 
 def chosen_faults(words: Sequence[str]) -> tuple[Fault, ...]:

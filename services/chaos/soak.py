@@ -25,6 +25,7 @@ from services.chaos.options import add_soak_options
 from services.chaos.person import Person
 from services.chaos.site import Site, installed_broker
 from services.runtime.deployment import load_deployment
+from services.runtime.process.ending import ended_by_signals
 from services.stack.stack import StackError
 
 EVERY = 5.0  # [s] between two samples
@@ -71,9 +72,12 @@ def main() -> None:
         sys.exit('soak: this deployment drives a real board (device = "board"): soak is for virtual devices only')
     broker = options.broker or installed_broker()
     try:
-        sys.exit(0 if run(options.hours * HOUR, options.seed, broker, options.out.resolve()) else 1)
+        with ended_by_signals():
+            sys.exit(0 if run(options.hours * HOUR, options.seed, broker, options.out.resolve()) else 1)
     except StackError as error:
         sys.exit(f"soak: {error}")
+    except KeyboardInterrupt:
+        sys.exit("soak: interrupted: its stack has been stopped, and there is no report")
 
 
 def run(seconds: float, seed: int, broker: str, out: Path) -> bool:

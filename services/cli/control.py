@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import getpass
-import signal
 import subprocess
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -20,15 +18,10 @@ from schemas.control import ControlState
 from services.cli.errors import CommandError, ExitCode
 from services.cli.parser import Options, Parser, json_option
 from services.cli.session import connect_arm, load_robot
+from services.runtime.process.ending import EndedBySignal, ended_by_signals
 
 if TYPE_CHECKING:
     from gemelo import Arm
-
-ENDING = (signal.SIGTERM, signal.SIGHUP)  # a closed terminal gives control back at once, as Ctrl-C does
-
-
-class EndedBySignal(KeyboardInterrupt):
-    """SIGTERM or SIGHUP, which nobody has told the command."""
 
 
 def take_options(parser: Parser) -> None:
@@ -131,18 +124,3 @@ def _run(arm: Arm, program: Sequence[str]) -> ExitCode:
     if code:
         raise CommandError(f"{Path(program[0]).name} has ended with exit code {code}")
     return ExitCode.OK
-
-
-@contextmanager
-def ended_by_signals() -> Iterator[None]:
-    """SIGTERM and SIGHUP end as Ctrl-C does."""
-
-    def end(number: int, frame: FrameType | None) -> None:
-        raise EndedBySignal
-
-    before = {number: signal.signal(number, end) for number in ENDING}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

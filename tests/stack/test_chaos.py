@@ -5,6 +5,9 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
+
+import psutil
 
 from tests.optional import need
 
@@ -23,3 +26,21 @@ def test_a_minute_of_chaos_violates_nothing(tmp_path, pytestconfig):
     assert len(report["episodes"]) >= 4
     assert (report["states_lost"], report["violations"]) == (0, [])
     assert (tmp_path / "out/report.html").read_text().count("<circle") == len(report["episodes"])
+
+
+def test_a_soak_that_is_terminated_leaves_no_process(tmp_path, pytestconfig):
+    soak = subprocess.Popen(
+        [sys.executable, "-m", "services.chaos.soak", "--broker", "amqtt", "--out", str(tmp_path)],
+        cwd=pytestconfig.rootpath, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        while not list(tmp_path.rglob("*.mcap")):  # its stack runs
+            assert soak.poll() is None
+            time.sleep(0.05)
+        started = psutil.Process(soak.pid).children(recursive=True)
+        assert len(started) > 5
+        soak.terminate()
+        assert "its stack has been stopped" in soak.communicate(timeout=60.0)[1]
+        assert not psutil.wait_procs(started, timeout=10.0)[1]
+    finally:
+        soak.kill()
