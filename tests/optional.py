@@ -27,3 +27,15 @@ def need(name: str) -> None:
     if "CI" in os.environ:
         pytest.fail(lack(name))
     pytest.skip(lack(name))
+
+
+def need_root(file: str, with_taps: bool = False) -> None:
+    """Skips all that a fixture is for where network namespaces (and TAP devices) cannot be made.
+
+    No package brings that: `deploy/optional` names it with its own remedy, and CI that is not root goes on without.
+    """
+    need("ip")
+    if os.geteuid() != 0:
+        pytest.skip(f"network namespaces are root's to make: sudo .venv/bin/pytest {file}")
+    if with_taps and not os.access("/dev/net/tun", os.W_OK):
+        pytest.skip("TAP devices cannot be made here: /dev/net/tun is missing or may not be written")

@@ -19,7 +19,7 @@ from services.runtime.bus import dead_links
 from services.runtime.bus.dead_links import UNACKNOWLEDGED_MS
 from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.bus.zenoh_config import locked_router
-from tests.optional import need
+from tests.optional import need_root
 from tests.runtime.locks import Lock
 from tests.runtime.support import ROOT, RouterProcess, until
 from tests.stack.ethernet import CUT, OPEN, Ethernet
@@ -45,7 +45,6 @@ def limits(port: int) -> list[int]:
     return found
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="TCP_USER_TIMEOUT is Linux's")
 def test_every_session_has_the_limit_on_its_link_also_after_the_router_was_away(tmp_path, monkeypatch):
     monkeypatch.setattr(dead_links, "is_loopback", lambda host: False)
     router = RouterProcess(tmp_path)
@@ -99,11 +98,7 @@ class Far:
 
 @pytest.fixture(scope="module")
 def far(tmp_path_factory) -> Iterator[tuple[Ethernet, dict[str, Far]]]:
-    need("ip")
-    if os.geteuid() != 0 or not os.access("/dev/net/tun", os.W_OK):
-        pytest.skip(
-            "network namespaces and TAP devices are root's: sudo .venv/bin/pytest tests/runtime/test_dead_links.py"
-        )
+    need_root("tests/runtime/test_dead_links.py", with_taps=True)
     folder, ethernet = tmp_path_factory.mktemp("far"), Ethernet()
     lock = Lock(folder / "lock", roles=("operator",))
     lock.authority.sign([ROUTER], *lock.files("router"), 1)

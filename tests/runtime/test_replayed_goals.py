@@ -9,8 +9,7 @@ from schemas.actions import CancelRequest, GoalRequest, GoalResponse, GoalStatus
 from schemas.message import encode
 from schemas.motion import FollowErrorCode
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from services.runtime.actions import GoalDecision, refuse
-from services.runtime.actions import keys as keys
+from services.runtime.actions import GoalDecision, keys, refuse
 from services.runtime.actions.goal_registry import GoalRecord, GoalRegistry
 from services.runtime.node import Node
 from tests.runtime.support import Buses, until

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
 
 import psutil
 
 from tests.optional import need
+from tests.runtime.support import until
 
 SEED = 1
 
@@ -34,9 +34,8 @@ def test_a_soak_that_is_terminated_leaves_no_process(tmp_path, pytestconfig):
         cwd=pytestconfig.rootpath, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
-        while not list(tmp_path.rglob("*.mcap")):  # its stack runs
-            assert soak.poll() is None
-            time.sleep(0.05)
+        assert until(lambda: list(tmp_path.rglob("*.mcap")) or soak.poll() is not None, 60.0)
+        assert soak.poll() is None
         started = psutil.Process(soak.pid).children(recursive=True)
         assert len(started) > 5
         soak.terminate()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -12,7 +11,7 @@ from contextlib import contextmanager
 import pytest
 
 from services.runtime.deployment import project_root
-from tests.optional import need
+from tests.optional import need, need_root
 from tests.stack.links import Links
 
 STOP_GOAL = 100.0  # [ms] said, not asserted: other things run on the machine
@@ -20,10 +19,8 @@ STOP_GOAL = 100.0  # [ms] said, not asserted: other things run on the machine
 
 @pytest.fixture(scope="module")
 def links(tmp_path_factory) -> Iterator[Links]:
-    need("ip")
     need("mosquitto")
-    if os.geteuid() != 0 or not os.access("/dev/net/tun", os.W_OK):
-        pytest.skip("namespaces are root's: sudo .venv/bin/pytest tests/stack/test_hostile_viewer.py")
+    need_root("tests/stack/test_hostile_viewer.py", with_taps=True)
     with Links(tmp_path_factory.mktemp("viewer")) as made:
         yield made
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import time
@@ -15,7 +14,7 @@ import pytest
 
 from services.hosts.checks import load_site
 from services.runtime.deployment import project_root
-from tests.optional import need
+from tests.optional import need, need_root
 from tests.stack.namespaces import Hosts, Lab
 
 SITE = """
@@ -44,10 +43,8 @@ ON = NODES | {"virtual_esp32": "cell", "broker": "cell", "router": "brain"}
 
 @pytest.fixture(scope="module")
 def hosts(tmp_path_factory) -> Iterator[tuple[Hosts, Lab]]:
-    need("ip")
     need("mosquitto")
-    if os.geteuid() != 0:
-        pytest.skip("network namespaces are root's to make: sudo .venv/bin/pytest tests/stack/test_hosts.py")
+    need_root("tests/stack/test_hosts.py")
     folder = tmp_path_factory.mktemp("lab")
     file = folder / "lab.toml"
     file.write_text(SITE)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
 from services.arm.device.device_config import device_config
-from tests.optional import need
+from tests.optional import need, need_root
 from tests.stack import slots
 from tests.stack.link_cases import CASES, Case
 from tests.stack.links import Links
@@ -22,10 +21,8 @@ CHOSEN = [case for case in CASES if case.name in FEW]
 
 @pytest.fixture(scope="module")
 def links(tmp_path_factory) -> Iterator[Links]:
-    need("ip")
     need("mosquitto")
-    if os.geteuid() != 0 or not os.access("/dev/net/tun", os.W_OK):
-        pytest.skip("network namespaces and TAP devices are root's: sudo .venv/bin/pytest tests/stack/test_links.py")
+    need_root("tests/stack/test_links.py", with_taps=True)
     with Links(tmp_path_factory.mktemp("links")) as made:
         yield made
 

@@ -25,13 +25,20 @@ from services.planner.timing.profile import (
 )
 from services.planner.timing.timing import timed_path, timed_path_in_python
 from services.planner.verification.verify import at_times
+from tests.optional import need
 
-pytestmark = pytest.mark.skipif(not IS_BUILT, reason="the core is not built")
 
 ARM = load_arm(Path(__file__).parents[3] / "urdf" / "parol6")
 LOWER, UPPER = np.array([(joint.lower, joint.upper) for joint in ARM.joints]).T
 LIMITS = joint_limits(ARM)
 SCALINGS = st.floats(0.01, 1.0)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def built() -> None:
+    """Without Python's headers the core is not built; with them it is."""
+    if not IS_BUILT:
+        need("headers")
 
 
 class HalfFree:
