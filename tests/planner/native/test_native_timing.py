@@ -27,7 +27,6 @@ from services.planner.timing.timing import timed_path, timed_path_in_python
 from services.planner.verification.verify import at_times
 from tests.optional import need
 
-
 ARM = load_arm(Path(__file__).parents[3] / "urdf" / "parol6")
 LOWER, UPPER = np.array([(joint.lower, joint.upper) for joint in ARM.joints]).T
 LIMITS = joint_limits(ARM)
