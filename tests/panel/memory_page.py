@@ -89,8 +89,8 @@ class Gateway:
 class MemoryPage:
     """The panel, drawn by hand, and a browser that looks at it."""
 
-    def __init__(self, panel: Panel, gateway: Gateway) -> None:
-        self.panel, self.gateway = panel, gateway
+    def __init__(self, panel: Panel, gateway: Gateway, port: int) -> None:
+        self.panel, self.gateway, self.port = panel, gateway, port
         self.now = time.monotonic()  # [s] as the panel is told
         self.said: Counter[str] = Counter()  # messages that the browser got, by their class
         self._marks: set[str] = set()
@@ -151,7 +151,7 @@ def memory_page(robot: str | Path, folder: Path) -> Iterator[MemoryPage]:
             gemelo.Arm(Session(deployment, arm, Node("panel", deployment, arm.name, MemoryBus(network)))) as connected,
         ):
             panel = Panel(connected, deployment, logging.getLogger("page"))
-            page = MemoryPage(panel, gateway)
+            page = MemoryPage(panel, gateway, port)
             try:
                 with bare_browser(f"127.0.0.1:{port}", page.hear) as page.browser:
                     assert until(lambda: bool(panel._present()), 20.0)

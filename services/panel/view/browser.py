@@ -6,7 +6,9 @@ colours, its frame rate and the newest header that it has drawn come back throug
 that bears a new mark, and when the rate has changed; a page on which nothing changes says nothing. A click into the
 image of a camera comes at once: a press and its release are taken for it, since the image may have been replaced by the
 next one between the two.
-Where the Stop button is scrolled out of sight or covered, a second one stands in the lower right corner.
+Where the Stop button is scrolled out of sight or covered, a second one stands in the lower right corner. While the
+controls are built anew there is no such button, or one that the page no longer knows: every Stop is counted, and told
+through the hidden field as well.
 The tabs stand closer, so that all of them have room in one row, and the two jog buttons of an axis share a row. A file
 that is too large is not sent at all.
 """
@@ -23,6 +25,7 @@ CAMERA_MARK = "data-gemelo-camera"  # the attribute of a camera's image that nam
 LARGEST_UPLOAD = 20_000_000  # [bytes] chosen: the planner takes 500,000 triangles, which are 25 MB
 DRAGGED = 6  # [pixels] of the page from the press to the release, from which on it was no click
 RATE_CHANGED = 0.3  # share of the frame rate by which it must change before the browser tells it by itself
+STILL_MEANT = 5000.0  # [ms] chosen: an older Stop that a browser tells when it is connected again stops nothing
 STOP_SIGN = "■"  # how the Stop button's text begins, in every language
 
 SCRIPT = """
@@ -38,8 +41,13 @@ SCRIPT = """
     border: '2px solid #fff', borderRadius: '8px', cursor: 'pointer'});
   second.dataset.gemeloStop = '';
   second.setAttribute('aria-hidden', 'true');
-  second.addEventListener('click', () => findStop() && findStop().click());
+  let stops = 0, toldStops = 0, stoppedAt = 0;
+  const noteStop = () => { stops += 1; stoppedAt = performance.now(); };
+  const callStop = () => { const stop = findStop(); if (stop) stop.click(); else noteStop(); };
+  second.addEventListener('click', callStop);
   document.body.append(second);
+  window.addEventListener('click', (e) => { const stop = findStop(); if (stop && stop.contains(e.target)) noteStop(); },
+    true);
   const keepStop = () => {
     const stop = findStop(), box = stop && stop.getBoundingClientRect();
     const seen = box && box.width && document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
@@ -59,7 +67,7 @@ SCRIPT = """
     if (isText(e.target)) return;
     if (e.code === 'Space') {
       take(e);
-      if (!e.repeat && findStop()) findStop().click();
+      if (!e.repeat) callStop();
     } else if (keys[e.code] && !isNumber(e.target)) {
       const button = buttons().find((b) => b.offsetParent && b.textContent.includes(keys[e.code]));
       if (!button) return;
@@ -113,13 +121,15 @@ SCRIPT = """
     if (field) {
       field.parentElement.parentElement.parentElement.parentElement.style.display = 'none';
       const hasNewRate = Math.abs(rate - toldRate) > RATE_CHANGED * toldRate;
-      if (sent !== told || clicks !== toldClicks || tooLarge || hasNewRate) {
+      const isNew = field.value === 'CHANNEL';
+      if (isNew || sent !== told || clicks !== toldClicks || stops !== toldStops || tooLarge || hasNewRate) {
         told = sent;
         toldClicks = clicks;
+        toldStops = stops;
         toldRate = rate;
         set.call(field, 'CHANNEL ' + JSON.stringify({sent: Number(sent), language: navigator.language, rate: rate,
           dark: matchMedia('(prefers-color-scheme: dark)').matches, width: innerWidth, height: innerHeight,
-          too_large: tooLarge, clicked: clicked}));
+          too_large: tooLarge, clicked: clicked, stops: stops, stopped_ago: now - stoppedAt}));
         tooLarge = 0;
         field.dispatchEvent(new Event('input', {bubbles: true}));
       }
@@ -153,6 +163,22 @@ class Browser:
     height: int = 0
     too_large: int = 0  # [bytes] of a file that it was asked to upload and did not
     clicked: Click | None = None  # the newest
+    stops: int = 0  # how often Stop was called since the browser has loaded the page
+    stopped_ago: float = 0.0  # [ms] since the newest of these
+
+
+@dataclass
+class Stops:
+    """Those of one browser that have come: a button that is built anew loses what is still on its way."""
+
+    come: int = 0
+
+    def has_missed(self, browser: Browser) -> bool:
+        """True if the browser has called for a Stop that did not come, and still means it; asked in the order in which
+        the browser's words come, so that none is carried out twice."""
+        is_missed = browser.stops > self.come
+        self.come = max(self.come, browser.stops)
+        return is_missed and browser.stopped_ago < STILL_MEANT
 
 
 def script_html() -> str:

@@ -15,7 +15,7 @@ from services.panel.model.availability import reasons
 from services.panel.model.operator import Operator
 from services.panel.model.readings import Readings
 from services.panel.view.arm_pages import ArmPage, arms_line
-from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, read_browser, script_html
+from services.panel.view.browser import CHANNEL, STOP_SIGN, Browser, Stops, read_browser, script_html
 from services.panel.view.camera_box import CameraBox
 from services.panel.view.control_box import ControlBox
 from services.panel.view.kit import Kit, Mirror, Steady, at_once, box, esc, set_if_new, without_event
@@ -61,6 +61,7 @@ class Page:
         self._built: Look | None = None
         self._is_plain = False  # drawn without shadows
         self._told = 0
+        self._stops = Stops()
         self._said = ""  # by the header
         self._shown_lag = Steady(share=0.5, least=0.05)  # [s] a page that has just loaded is late, and not for long
 
@@ -106,7 +107,7 @@ class Page:
         if self._arms:
             kit.line(arms_line(self._arms, self._operator.arm.name, words))
         self._header = kit.line()
-        kit.urgent(f"{STOP_SIGN} {words('stop')}", self._operator.stop, color="red")
+        kit.urgent(f"{STOP_SIGN} {words('stop')}", self._stop, color="red")
         self._hold = kit.button(words("hold"), self._operator.arm.hold, color="gray", needs="hold")
         self._resume = kit.button(words("resume"), self._operator.arm.resume, color="gray", needs="resume")
         self._speed = gui.add_slider(words("speed"), 0, 100, 1, 100)
@@ -137,6 +138,7 @@ class Page:
             self._settings(look)
         self._add_commands()
         self._channel = gui.add_text(CHANNEL, CHANNEL)
+        self._channel.on_update(at_once(self._hear_stops))  # before all that a thread is needed for
         self._channel.on_update(lambda event: self._hear(event.target.value))
 
     def _settings(self, look: Look) -> None:
@@ -198,6 +200,15 @@ class Page:
         if not self._was_chosen:
             self._was_chosen = True
             self._wanted = Look(language_of(browser.language), browser.dark)
+
+    def _stop(self) -> None:
+        self._stops.come += 1
+        self._operator.stop()
+
+    def _hear_stops(self) -> None:
+        browser = read_browser(self._channel.value)
+        if browser is not None and self._stops.has_missed(browser):
+            self._operator.stop()
 
     def _show_header(self, readings: Readings, now: float) -> None:
         """Sent where it says something new, with a new mark; that of its lag is new only where it has much changed."""
