@@ -50,6 +50,10 @@ class BareBrowser:
         with self._news:
             return set(self._labels.values())
 
+    def wait_for(self, label: str) -> None:
+        """Returns once the page has a button whose label begins so; raises TimeoutError if it has none."""
+        self._button(label)
+
     def press(self, label: str) -> None:
         """Presses the newest button whose label begins so, once the page has it; raises TimeoutError if it has none."""
         self._set(self._button(label), True)

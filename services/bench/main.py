@@ -19,6 +19,7 @@ import msgspec
 from services.bench.figures import Figure, guarded, report_of, text_of
 from services.bench.stack import Stacks
 from services.runtime.deployment import project_root
+from services.runtime.process.ending import ended_by_signals
 
 
 class Row(NamedTuple):
@@ -123,7 +124,11 @@ def main() -> None:
     parser.add_argument("--problems", type=int, default=FEW, metavar="N", help=said)
     parser.add_argument("--seed", type=int, default=SEED, metavar="N", help=f"by which picks are drawn ({SEED})")
     options = parser.parse_args()
-    sys.exit(bench(options.only or FIGURES, options.out, options.problems, options.seed))
+    try:
+        with ended_by_signals():
+            sys.exit(bench(options.only or FIGURES, options.out, options.problems, options.seed))
+    except KeyboardInterrupt:
+        sys.exit("bench: ended before all was measured; its stack has been stopped")
 
 
 def bench(names: Iterable[str], out: Path, problems: int = FEW, seed: int = SEED) -> int:

@@ -19,6 +19,7 @@ import gemelo
 from services.demo.performance import Performance
 from services.demo.report import complaints, report_of, text_of
 from services.runtime.deployment import load_deployment, project_root
+from services.runtime.process.ending import ended_by_signals
 from services.stack.stack import Stack, StackError
 
 MOSQUITTO = (shutil.which("mosquitto"), shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin"))
@@ -32,7 +33,10 @@ def main() -> None:
     parser.add_argument("--no-picture", action="store_true", help="leave out the PNG")
     options = parser.parse_args()
     try:
-        sys.exit(demonstrate(options.out.resolve(), options.broker or best_broker(), not options.no_picture))
+        with ended_by_signals():
+            sys.exit(demonstrate(options.out.resolve(), options.broker or best_broker(), not options.no_picture))
+    except KeyboardInterrupt:
+        sys.exit("demo: ended before it was over; its stack has been stopped")
     except StackError as error:
         sys.exit(f"demo: {error}")
 

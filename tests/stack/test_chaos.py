@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import psutil
+import pytest
 
 from tests.optional import need
 from tests.runtime.support import until
@@ -28,18 +29,31 @@ def test_a_minute_of_chaos_violates_nothing(tmp_path, pytestconfig):
     assert (tmp_path / "out/report.html").read_text().count("<circle") == len(report["episodes"])
 
 
-def test_a_soak_that_is_terminated_leaves_no_process(tmp_path, pytestconfig):
-    soak = subprocess.Popen(
-        [sys.executable, "-m", "services.chaos.soak", "--broker", "amqtt", "--out", str(tmp_path)],
-        cwd=pytestconfig.rootpath, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    try:
-        assert until(lambda: list(tmp_path.rglob("*.mcap")) or soak.poll() is not None, 60.0)
-        assert soak.poll() is None
-        started = psutil.Process(soak.pid).children(recursive=True)
-        assert len(started) > 5
-        soak.terminate()
-        assert "its stack has been stopped" in soak.communicate(timeout=60.0)[1]
-        assert not psutil.wait_procs(started, timeout=10.0)[1]
-    finally:
-        soak.kill()
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("services.chaos.soak", "--broker", "amqtt", "--out"),
+        ("services.bench", "--only", "move_accept_to_first_step_ms", "--out"),
+        ("services.demo", "--broker", "amqtt", "--no-picture", "--out"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_what_starts_a_stack_of_its_own_leaves_no_process_when_it_is_terminated(command, tmp_path, pytestconfig):
+    with subprocess.Popen(
+        [sys.executable, "-m", *command, str(tmp_path / "out")],
+        cwd=pytestconfig.rootpath, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    ) as running:  # fmt: skip
+        try:
+            assert until(lambda: running.poll() is not None or len(all_below(running)) > 8, 60.0)
+            assert running.poll() is None
+            started = all_below(running)
+            running.terminate()
+            said = running.communicate(timeout=60.0)[1]
+            assert "its stack has been stopped" in said
+            assert not psutil.wait_procs(started, timeout=10.0)[1]
+        finally:
+            running.kill()
+
+
+def all_below(running: subprocess.Popen[str]) -> list[psutil.Process]:
+    return psutil.Process(running.pid).children(recursive=True)
