@@ -89,14 +89,19 @@ class Eyes:
             raise Refused(f"{cell.path} has no [[camera]]", check="camera")
         stood = self._require_rest()
         found: dict[str, Seen] = {}
+        unclear = ""
         for each in cameras:
-            for seen in combined(self._images(cell, each), known):
+            images = self._images(cell, each)
+            unclear = unclear or why_unclear(images, name)
+            for seen in combined(images, known):
                 other = found.get(seen.name)
                 if other is None or (seen.trouble == "", -seen.sigma) > (other.trouble == "", -other.sigma):
                     found[seen.name] = seen
         moved = max(abs(a - b) for a, b in zip(stood, self._require_rest(), strict=True))
         if moved > STILL:
             raise _moving()
+        if name and name not in found and unclear:
+            raise Refused(f"{name} cannot be measured: {unclear}", check="detection", subject=name)
         if name and name not in found:
             others = f"; it sees {', '.join(sorted(found))}" if found else ", and nothing else"
             raise Refused(
@@ -199,6 +204,14 @@ def combined(images: Sequence[Detections], known: Iterable[str]) -> list[Seen]:
         elif len(once) >= ENOUGH:
             found.append(_seen(once, images[-1].camera, ""))
     return found
+
+
+def why_unclear(images: Sequence[Detections], name: str) -> str:
+    """Why something that most images of one camera show is not taken for the thing of that name; empty if nothing may
+    be it."""
+    reasons = [next((each.reason for each in image.unclear if name in each.names), "") for image in images]
+    told = [reason for reason in reasons if reason]
+    return told[-1] if len(told) >= ENOUGH else ""
 
 
 def _seen(once: Sequence[tuple[int, Detection]], camera: str, trouble: str) -> Seen:

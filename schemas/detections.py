@@ -30,10 +30,19 @@ class Detection(Message, frozen=True, kw_only=True):
     flip_ratio: float = 0.0  # reprojection error of the better over that of the other pose: 1 cannot be told apart
 
 
+class Unclear(Message, frozen=True, kw_only=True):
+    """Something in one image that may be a thing, and cannot be measured."""
+
+    names: tuple[str, ...] = ()  # of the things in the cell file that it may be
+    corners: tuple[Vector, ...] = ()  # (4, 2) [px] of the rectangle around it, in order
+    reason: str = ""  # why it is not taken for any of them
+
+
 class Detections(Message, frozen=True, kw_only=True):
     """Everything that was found in one image; with no items nothing was."""
 
     stamp: int = 0  # [ns] UNIX time of the image
     camera: str = ""
     items: tuple[Detection, ...] = ()
+    unclear: tuple[Unclear, ...] = ()
     doubt: str = ""  # why places in the base frame are not to be trusted; empty: nothing speaks against them

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 
 import cv2
@@ -13,11 +11,21 @@ import numpy as np
 
 from schemas.camera import CameraInfo
 from schemas.cell import BoxThing, Colour, ColourThing, OnnxThing, TagRecord, TagThing
-from schemas.detections import Detection, DetectionKind, Detections
+from schemas.detections import Detection, DetectionKind, Detections, Unclear
 from schemas.frames import Transform
 from services.arm.cell.cell_file import Cell, Tagged, height_of_frame
 from services.arm.cell.colours import RGB, nearest_colour
 from services.arm.frames.transforms import from_rpy
+from services.detector.regions import (
+    View,
+    distances_from,
+    in_base,
+    is_box,
+    is_known,
+    median_colour,
+    rows_of,
+    unclear_region,
+)
 from services.detector.user_models import BadModel, Found, Standing, UserModel, standing
 from services.vision.boxes import (
     BoxFit,
@@ -26,48 +34,20 @@ from services.vision.boxes import (
     coloured_regions,
     coloured_windows,
     fit_box,
-    raised,
 )
-from services.vision.camera_model import CameraModel, model_of
+from services.vision.camera_model import model_of
 from services.vision.rigid import Array, from_transform, inverse, to_transform
 from services.vision.tag_pose import plane_pose, tag_pose
 from services.vision.tags import Tag, find_tags
-from services.vision.windows import Mask, Window, halved, regions_of, windows_around
+from services.vision.windows import Mask, Window, regions_of, windows_around
 
 # Tuning constants: chosen, where a line does not say measured.
 FLAT = 0.003  # [m] a tag so near to the height at which it would lie is taken to lie there
 LEVEL = np.radians(8.0)  # and so little tilted
 MOVED = 0.003  # [m] a fixed tag that is seen so far away from its place says that the camera was moved
-LARGEST_ERROR = 0.7  # [px] RMS of an outline that is a box; measured: 0.1 to 0.3 for boxes, above 1 for what is none
-LIKE_AREA = (0.75, 1.35)  # of a region to that of the box which was fitted to it
 STANDS_OUT = 28.0  # grey levels from the table's colour
 LEAST_AREA = 100  # [px] of what stands out
 LARGEST_SHARE = 0.08  # of the image that a box may take: what is larger is the arm
-
-
-@dataclass(frozen=True)
-class View:
-    """One image with all that is known of it."""
-
-    image: ColourImage  # (h, w, 3) red first
-    model: CameraModel
-    base_from_camera: Array | None  # (4, 4); None where it is not known
-    mount_error: float  # [m] of `base_from_camera`, as it was measured
-
-    def plane(self, height: float) -> Array | None:
-        """camera_from_plane (4, 4) of the plane `height` [m] above the base; None if that is not known."""
-        if self.base_from_camera is None:
-            return None
-        return raised(inverse(self.base_from_camera), height)
-
-    @cached_property
-    def half(self) -> ColourImage:
-        """The image at half its size."""
-        return halved(self.image)
-
-    def within(self, window: Window) -> View:
-        """What the window shows of it."""
-        return replace(self, image=window.of(self.image), model=self.model.within(window))
 
 
 class Detector:
@@ -99,11 +79,18 @@ class Detector:
         view = View(image, model, base_from_camera, error)
         tags = list(self._tags(view))
         items = [item for _, item in tags]
+        unclear: list[Unclear] = []
         if base_from_camera is not None and self._cell.table is not None:
-            items += self._colours(view)
+            for found in self._colours(view):
+                if isinstance(found, Unclear):
+                    unclear.append(found)
+                else:
+                    items.append(found)
             items += self._classes(view)
             items += self._standing_out(view, items)
-        return Detections(stamp=stamp, camera=info.name, items=tuple(items), doubt=self._doubt(tags))
+        return Detections(
+            stamp=stamp, camera=info.name, items=tuple(items), unclear=tuple(unclear), doubt=self._doubt(tags)
+        )
 
     def _tags(self, view: View) -> Iterator[tuple[Tagged, Detection]]:
         grey = np.asarray(cv2.cvtColor(view.image, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
@@ -125,9 +112,9 @@ class Detector:
         return Detection(
             name=_name_of(record),
             kind=DetectionKind.TAG,
-            corners=_rows(tag.corners),
+            corners=rows_of(tag.corners),
             camera_from_thing=to_transform(pose),
-            base_from_thing=_in_base(view, pose),
+            base_from_thing=in_base(view, pose),
             is_located=view.base_from_camera is not None,
             sigma=float(np.hypot(sigma, view.mount_error)),
             flip_ratio=0.0 if normal is not None else solved.flip_ratio,
@@ -165,7 +152,7 @@ class Detector:
             "moved; put it back, or measure anew where the camera stands"
         )
 
-    def _colours(self, view: View) -> Iterator[Detection]:
+    def _colours(self, view: View) -> Iterator[Detection | Unclear]:
         for colour, things in self._coloured.items():
             for window, core in coloured_windows(view.half, view.image.shape[:2], RGB[colour]):
                 part = view.within(window)
@@ -175,6 +162,8 @@ class Detector:
                         best = self._best_box(part, strength, region, things)
                         if best is not None:
                             yield self._box_item(part, *best, DetectionKind.COLOUR, window)
+                        else:
+                            yield unclear_region(things, region, window)
 
     def _classes(self, view: View) -> Iterator[Detection]:
         """What the models of users find, as boxes of the things' size on the table."""
@@ -194,16 +183,16 @@ class Detector:
         """Boxes by nothing but that they have another colour than the table."""
         if not self._boxes:
             return
-        table, height, width = _median_colour(view.half), *view.image.shape[:2]
-        mask = _away(view.half, table) > STANDS_OUT
+        table, height, width = median_colour(view.half), *view.image.shape[:2]
+        mask = distances_from(view.half, table) > STANDS_OUT
         largest = LARGEST_SHARE * mask.size
         for window, core in windows_around(mask, (height, width), LEAST_AREA // 8, largest):
             part = view.within(window)
-            away = np.clip(_away(part.image, table), 0.0, 255.0).astype(np.uint8)
+            away = np.clip(distances_from(part.image, table), 0.0, 255.0).astype(np.uint8)
             for region in regions_of(cv2.medianBlur(away, 3) > STANDS_OUT, LEAST_AREA):
                 if not region[core].any() or region.sum() > LARGEST_SHARE * height * width:
                     continue
-                if _is_known(region, window, found):
+                if is_known(region, window, found):
                     continue
                 direction = np.median(part.image[region], axis=0) - table
                 strength = np.asarray((part.image - table) @ direction / (direction @ direction))
@@ -219,7 +208,7 @@ class Detector:
         plane = view.plane(self._cell.table)
         assert plane is not None
         fits = [(thing, fit_box(strength, region, view.model, plane, thing.box)) for thing in things]
-        good = [(thing, fit) for thing, fit in fits if fit is not None and _is_box(fit, region)]
+        good = [(thing, fit) for thing, fit in fits if fit is not None and is_box(fit, region)]
         return min(good, key=lambda each: each[1].error) if good else None
 
     def _box_item(
@@ -233,9 +222,9 @@ class Detector:
         return Detection(
             name=thing.name,
             kind=kind,
-            corners=_rows(fit.outline + np.array([window.left, window.top])),
+            corners=rows_of(fit.outline + np.array([window.left, window.top])),
             camera_from_thing=to_transform(pose),
-            base_from_thing=_in_base(view, pose),
+            base_from_thing=in_base(view, pose),
             is_located=True,
             sigma=float(np.hypot(fit.sigma, view.mount_error)),
         )
@@ -258,9 +247,9 @@ def _class_item(view: View, thing: OnnxThing, found: Found, plane: Array, place:
     return Detection(
         name=thing.name,
         kind=DetectionKind.ONNX,
-        corners=_rows(np.array([[left, upper], [right, upper], [right, lower], [left, lower]])),
+        corners=rows_of(np.array([[left, upper], [right, upper], [right, lower], [left, lower]])),
         camera_from_thing=to_transform(pose),
-        base_from_thing=_in_base(view, pose),
+        base_from_thing=in_base(view, pose),
         is_located=True,
         sigma=float(np.hypot(place.sigma, view.mount_error)),
     )
@@ -275,38 +264,3 @@ def _lies_on(plane: Array, pose: Array, sigma: float) -> bool:
     local = inverse(plane) @ pose
     tilt = float(np.arccos(np.clip(local[2, 2], -1.0, 1.0)))
     return abs(float(local[2, 3])) < FLAT + 3.0 * sigma and tilt < LEVEL
-
-
-def _in_base(view: View, pose: Array) -> Transform:
-    return Transform() if view.base_from_camera is None else to_transform(view.base_from_camera @ pose)
-
-
-def _is_box(fit: BoxFit, region: Mask) -> bool:
-    """True if the region is as large as the box that was fitted to it, and its outline as straight."""
-    area = float(cv2.contourArea(fit.outline.astype(np.float32)))
-    return fit.error < LARGEST_ERROR and LIKE_AREA[0] < float(region.sum()) / max(area, 1.0) < LIKE_AREA[1]
-
-
-def _median_colour(image: ColourImage) -> Array:
-    """(3,) the median of each of an image's colours."""
-    counts = [np.bincount(image[..., channel].ravel(), minlength=256) for channel in range(3)]
-    return np.array([float(np.searchsorted(np.cumsum(each), each.sum() / 2.0)) for each in counts])
-
-
-def _away(image: ColourImage, colour: Array) -> Array:
-    """(h, w) the distance of each pixel's colour from `colour` (3,)."""
-    off = image.astype(np.float32) - colour.astype(np.float32)
-    return np.asarray(np.sqrt(np.einsum("ijk,ijk->ij", off, off)), dtype=np.float64)
-
-
-def _is_known(region: Mask, window: Window, found: Sequence[Detection]) -> bool:
-    """True if the middle of something that was found already lies in the region of the window."""
-    for item in found:
-        column, row = np.rint(np.mean(item.corners, axis=0)).astype(int) - (window.left, window.top)
-        if 0 <= row < region.shape[0] and 0 <= column < region.shape[1] and region[row, column]:
-            return True
-    return False
-
-
-def _rows(points: Array) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(float(value) for value in row) for row in points)

@@ -170,6 +170,24 @@ def test_a_block_that_is_half_hidden_is_not_told_to_be_elsewhere(rm1: Arm) -> No
         assert item.name != "red_block" or off(item, table.truth()["red_block"]) < 2e-3
 
 
+def test_a_block_behind_a_post_is_told_to_be_unclear_with_its_place_in_the_image_and_why(rm1: Arm) -> None:
+    """Half of it is seen: too little to measure, and too much to say that nothing is there."""
+    table = Table(rm1)
+    corners = np.array(table.truth()["red_block"].corners)
+    middle = corners.mean(axis=0).astype(int)
+    image = table.image().copy()
+    image[middle[1] - 60 : middle[1] + 60, middle[0] : middle[0] + 60] = (128, 134, 142)
+    found = table.look(image)
+    assert "red_block" not in names(found)
+    (unclear,) = found.unclear
+    assert "red_block" in unclear.names
+    assert "something red is seen" in unclear.reason
+    around = np.array(unclear.corners)
+    assert (around.min(axis=0) < middle + 2).all()
+    assert (around.max(axis=0) > middle - 2).all()
+    assert table.look().unclear == ()
+
+
 @pytest.mark.parametrize("colour", list(Colour))
 def test_one_colour_is_not_taken_for_another(rm1: Arm, colour: Colour) -> None:
     cell = load_cell(rm1.folder / "cell.toml", rm1)

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from gemelo.seeing import Seen, add_to_scene, body_of, combined
+from gemelo.seeing import Seen, add_to_scene, body_of, combined, why_unclear
 from gemelo.units import Pose
 from schemas.cell import ColourThing, TagThing
-from schemas.detections import Detection, DetectionKind, Detections
+from schemas.detections import Detection, DetectionKind, Detections, Unclear
 from schemas.frames import Transform
 
 TURN = (0.0, 0.0, 0.0, 1.0)
@@ -38,6 +38,13 @@ def test_the_median_of_five_images_leaves_an_outlier_out() -> None:
 
 def test_what_only_two_of_five_images_show_is_not_seen() -> None:
     assert combined([image(1, cup(0.2)), image(2), image(3, cup(0.2)), image(4), image(5)], ["cup"]) == []
+
+
+def test_what_most_images_show_and_none_can_measure_is_told_with_the_reason_and_what_few_show_is_not() -> None:
+    hidden = Detections(camera="overhead", unclear=(Unclear(names=("red", "other"), reason="partly hidden?"),))
+    assert why_unclear([hidden, image(1), hidden, hidden, image(2)], "red") == "partly hidden?"
+    assert why_unclear([hidden, image(1), hidden, image(2), image(3)], "red") == ""
+    assert why_unclear([hidden] * 5, "cup") == ""
 
 
 def test_what_is_seen_twice_cannot_be_picked() -> None:

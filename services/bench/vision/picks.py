@@ -8,7 +8,7 @@ import random
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -169,7 +169,8 @@ def _reason_of(arm: gemelo.Arm, thing: str, place: str, aside: str) -> str:
         arm.pick(thing, to=place)
     except (gemelo.Refused, gemelo.Aborted) as error:
         if any(item.attached for item in arm.scene.objects.values()):
-            arm.grip("open")
+            with suppress(gemelo.Refused, gemelo.Aborted):  # then the next pick says why
+                arm.grip("open")
         return f"{error.check or 'refused' if isinstance(error, gemelo.Refused) else 'aborted'}: {error}"
     return ""
 
