@@ -26,7 +26,6 @@ from services.planner.verification.verify import (
     require_ends,
     require_jerk,
     require_within_limits,
-    sample,
     sample_between,
     states_of,
 )
@@ -76,7 +75,7 @@ class TrajectoryBuilder:
         ends = np.array((start, goal))
         with self._watch.phase("verification"):
             self._require_free(ends)
-        return self.verified(self._told(self._stopping(ends)), start, goal, ends)
+        return self._verified(self._stopping(ends), start, goal, ends)
 
     def path(self, path: Path) -> VerifiedTrajectory:
         """Around its corners or with a stop at each, whichever is faster and free; raises `TrajectoryTouches` or
@@ -89,15 +88,18 @@ class TrajectoryBuilder:
             several.append(self._along(path.control))
         faster, *slower = sorted(several, key=_duration)
         try:
-            return self.verified(self._told(faster), path.start, path.goal)
+            return self._verified(faster, path.start, path.goal)
         except TrajectoryTouches:
             if not slower:
                 raise
-        return self.verified(self._told(slower[0]), path.start, path.goal)
+        return self._verified(slower[0], path.start, path.goal)
 
-    def _told(self, states: States) -> JointTrajectory:
+    def _verified(
+        self, states: States, start: Start, goal: Start, free_line: Array | None = None
+    ) -> VerifiedTrajectory:
         with self._watch.phase("timing"):
-            return trajectory_of(self._arm.joint_names, states)
+            trajectory = trajectory_of(self._arm.joint_names, states)
+        return self.verified(trajectory, start, goal, free_line, states)
 
     def _stopping(self, corners: Array) -> States:
         """Straight from corner to corner (m, n), with a stop at each, timed as asked; raises `PlanRefused`."""
@@ -116,23 +118,30 @@ class TrajectoryBuilder:
             return _timed(lambda: timed_path(control, self._limits))
 
     def verified(
-        self, trajectory: JointTrajectory, start: Start, goal: Start, free_line: Array | None = None
+        self,
+        trajectory: JointTrajectory,
+        start: Start,
+        goal: Start,
+        free_line: Array | None = None,
+        states: States | None = None,
     ) -> VerifiedTrajectory:
         """The trajectory from `start` to `goal`, (n,) [rad] or [m], slowed where the steppers cannot follow it, then
         verified as it will be executed; raises `TrajectoryTouches` or `PlanRefused`.
 
-        Between the ends of `free_line` (2, n) all is known to be free.
+        Between the ends of `free_line` (2, n) all is known to be free; `states` are the points of `trajectory`, where
+        they are at hand.
         """
         with self._watch.phase("verification"):
-            states = states_of(trajectory)
+            states = states or states_of(trajectory)
             samples = sample_between(*states)
             self._require_free(samples.positions, free_line)
             trajectory, margins, scale = self._feasible(trajectory, states)
             if scale < 1.0:
-                samples = sample(trajectory)
+                states = states_of(trajectory)
+                samples = sample_between(*states)
                 self._require_free(samples.positions, free_line)
             try:
-                require_ends(trajectory, start, goal)
+                require_ends(trajectory, start, goal, states)
                 require_within_limits(self._arm, samples, self._limits)
                 if self._request.timing is Timing.JERK_LIMITED:
                     require_jerk(self._arm, samples, self._limits)

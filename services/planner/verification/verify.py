@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import chain, pairwise
+from functools import cache
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,9 +46,14 @@ def sample(trajectory: JointTrajectory, density: int = DENSITY) -> Samples:
 
 def sample_between(stamps: Array, p: Array, v: Array, a: Array, density: int = DENSITY) -> Samples:
     """As `sample`, through positions, velocities and accelerations (m, n) at `stamps` (m,) [s]."""
-    shares = np.linspace(0.0, 1.0, density + 1)
-    times = (stamps[:-1, None] + shares * np.diff(stamps)[:, None]).reshape(-1)
-    return _evaluate(States(stamps, p, v, a), times, np.repeat(np.arange(len(stamps) - 1), density + 1))
+    times = (stamps[:-1, None] + _shares(density) * (stamps[1:] - stamps[:-1])[:, None]).reshape(-1)
+    return _evaluate(States(stamps, p, v, a), times, np.arange(len(times)) // (density + 1))
+
+
+@cache
+def _shares(density: int) -> Array:
+    """(density + 1,) from 0 to 1."""
+    return np.linspace(0.0, 1.0, density + 1)
 
 
 def at_times(trajectory: JointTrajectory, times: Array) -> Samples:
@@ -136,12 +142,16 @@ def require_jerk(arm: Arm, samples: Samples, limits: JointLimits) -> None:
         raise BadTrajectory(f'jerk of "{name}" is {share[row, column]:.3g} times its limit at {t:.3f} s')
 
 
-def require_ends(trajectory: JointTrajectory, start: tuple[float, ...], goal: tuple[float, ...]) -> None:
+def require_ends(
+    trajectory: JointTrajectory, start: tuple[float, ...], goal: tuple[float, ...], states: States | None = None
+) -> None:
     """Raises `BadTrajectory` unless the trajectory leads exactly from `start` to `goal`, (n,) [rad] or [m], at rest at
-    both, with increasing times."""
-    for before, after in pairwise(point.time_from_start for point in trajectory.points):
-        if not before < after:
-            raise BadTrajectory(f"the trajectory goes from {before:.6f} s to {after:.6f} s")
+    both, with increasing times; `states` are its points, where they are at hand."""
+    times = (states or states_of(trajectory)).times
+    early = np.flatnonzero(~(times[:-1] < times[1:]))
+    if early.size:
+        before, after = times[early[0] : early[0] + 2].tolist()
+        raise BadTrajectory(f"the trajectory goes from {before:.6f} s to {after:.6f} s")
     first, last = trajectory.points[0], trajectory.points[-1]
     if first.positions != start or last.positions != goal or first.time_from_start != 0.0:
         raise BadTrajectory("the trajectory does not lead from the start to the goal")
