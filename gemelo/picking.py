@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from gemelo.errors import Aborted, BadArgument, Canceled, Refused
+from gemelo.errors import Aborted, BadArgument, Canceled, Lost, Refused
+from gemelo.grasping import grasp_point, lift_above, looking_down, turn_between, yaw_of
 from gemelo.seeing import Eyes, Seen, add_to_scene, body_of
 from gemelo.targets import FULL
 from gemelo.units import Point, Pose
@@ -16,8 +17,7 @@ from schemas.actions import GoalStatusCode
 from schemas.cell import Place, PosePlace, Thing
 from schemas.robot import Gripper
 from services.arm.errors import DescriptionError
-from services.arm.frames.transforms import IDENTITY, Quaternion, Rigid, compose, from_axis_angle, rotate
-from services.arm.model.gripper import jaw_edges
+from services.arm.frames.transforms import IDENTITY, Rigid, compose, from_axis_angle
 
 if TYPE_CHECKING:
     from gemelo.arguments import Grip
@@ -27,12 +27,11 @@ if TYPE_CHECKING:
     from gemelo.planning import Plan
 
 APPROACH = 0.04  # [m] the straight way down to a thing, and up with it
-GAP = 0.003  # [m] between the thing's top and the tool, and between the jaws' tips and the table
-OVERLAP = 0.004  # [m] of the jaws' length that must be beside the thing
 SLOW = 0.05  # [m/s] down and up
 BESIDE = 0.001  # [m] that the open jaws must have in all beside the thing
 MOST_TURN = math.radians(35.0)  # that closing jaws may turn a thing by: beyond it a square one jams
 ATTEMPTS = 2
+STAYED = 0.01  # [m] a thing that is seen nearer than that to where it stood was not taken
 DOWN = (0.0, 0.0, -1.0)
 SOLUTIONS = 8  # configurations of a tool pose that are considered
 
@@ -43,7 +42,7 @@ IsCancelled = Callable[[], bool]
 class Picked(NamedTuple):
     """A thing that was taken and put down.
 
-    >>> picked = gemelo.Picked("cup", "bin", gemelo.Pose((0.2, 0.1, 0.04)), 0.0001, 0.1, 1, 12.5)
+    >>> picked = gemelo.Picked("cup", "bin", gemelo.Pose((0.2, 0.1, 0.04)), 0.0001, 0.1, 1, 12.5, None)
     >>> print(picked)
     cup is at bin: seen +-0.1 mm, turned 6 deg by the jaws, 12.5 s
     """
@@ -55,6 +54,7 @@ class Picked(NamedTuple):
     turned: float  # [rad] by the jaws, as they closed
     attempts: int
     took: float  # [s]
+    after: Pose | None  # in the base frame, as it was seen afterwards; None where it was not, as behind the arm
 
     def __str__(self) -> str:
         """One line for a person."""
@@ -114,8 +114,8 @@ def pick(arm: Arm, eyes: Eyes, name: str, to: str, camera: str, tell: OnPicking,
     for attempt in range(1, ATTEMPTS + 1):
         seen = eyes.one(name, camera)
         tell(str(seen))
-        lift = _lift(thing, gripper, seen)
-        grasp = _grasp_point(thing, seen)
+        lift = lift_above(thing, gripper, seen)
+        grasp = grasp_point(thing, seen)
         way = _way_to(arm, thing, seen, (grasp[0], grasp[1], grasp[2] + lift), gripper)
         spot = _spot(eyes, place, camera)
         tell(f"{to}: {1e3 * spot[0]:.1f} {1e3 * spot[1]:.1f} {1e3 * spot[2]:.1f} mm")
@@ -124,13 +124,34 @@ def pick(arm: Arm, eyes: Eyes, name: str, to: str, camera: str, tell: OnPicking,
         try:
             if _take(hand, thing, seen, way):
                 _put(hand, name, release)
+                after = _seen_afterwards(hand, eyes, seen, camera, spot)
                 took = arm.node.monotonic() - began
-                return Picked(name, to, seen.pose, seen.sigma, way.turned, attempt, took)
+                return Picked(name, to, seen.pose, seen.sigma, way.turned, attempt, took, after)
         finally:
             if name in arm.scene.objects and not arm.scene.objects[name].attached:
                 arm.scene.remove(name)
         tell("the jaws have closed on nothing")
     raise Aborted(f"{name} was not gripped: the jaws closed on nothing, {ATTEMPTS} times; where is it? `gemelo detect`")
+
+
+def _seen_afterwards(hand: Hand, eyes: Eyes, before: Seen, camera: str, spot: Point) -> Pose | None:
+    """Where the thing is seen now, None if it is not; raises `Aborted` where it still stands where it was.
+
+    Jaws that measure nothing are said to hold what the scene has between them: what is believed, not what is there.
+    """
+    try:
+        now = eyes.one(before.name, camera)
+    except (Refused, Lost):
+        return None
+    hand.tell(str(now))
+    here, stood = now.pose.position, before.pose.position
+    if math.dist(here, stood) < STAYED < math.dist(spot[:2], stood[:2]):
+        x, y, z = (1e3 * value for value in here)
+        raise Aborted(
+            f"{before.name} was not picked: it still stands at {x:.1f} {y:.1f} {z:.1f} mm, where it was; the jaws "
+            "closed beside it: is the camera where camera.toml says? `gemelo camera check`"
+        )
+    return now.pose
 
 
 def named(arm: Arm, eyes: Eyes, name: str, to: str) -> tuple[Thing, Place, Gripper]:
@@ -145,28 +166,6 @@ def named(arm: Arm, eyes: Eyes, name: str, to: str) -> tuple[Thing, Place, Gripp
         raise BadArgument(str(error)) from error
 
 
-def _grasp_point(thing: Thing, seen: Seen) -> Point:
-    """Where [m] the point between the jaws is to come."""
-    return compose((seen.pose.position, seen.pose.orientation), (thing.grasp_offset, IDENTITY[1]))[0]
-
-
-def _lift(thing: Thing, gripper: Gripper, seen: Seen) -> float:
-    """[m] of the tool above the grasp point; raises `Refused` where the jaws do not reach beside the thing."""
-    (_, _, height), center = body_of(thing)
-    middle = compose((seen.pose.position, seen.pose.orientation), center)[0][2]
-    top, bottom, grasp = middle + height / 2.0, middle - height / 2.0, _grasp_point(thing, seen)[2]
-    beyond = jaw_edges(gripper)[2]
-    tool = max(grasp + beyond / 2.0, top + GAP, bottom + GAP + beyond)
-    beside = top - (tool - beyond)
-    if beside < OVERLAP:
-        raise Refused(
-            f"{thing.name} is {1e3 * height:.0f} mm high: the jaws, {1e3 * beyond:.0f} mm long, would be beside "
-            f"{1e3 * max(beside, 0.0):.1f} mm of it (at least {1e3 * OVERLAP:g})",
-            check="grasp", subject=thing.name, value=beside, limit=OVERLAP,
-        )  # fmt: skip
-    return tool - grasp
-
-
 def _way_to(arm: Arm, thing: Thing, seen: Seen, tool: Point, gripper: Gripper) -> Way:
     """The configuration above the thing at which the jaws turn it least; raises `Refused`."""
     size, center = body_of(thing)
@@ -175,7 +174,7 @@ def _way_to(arm: Arm, thing: Thing, seen: Seen, tool: Point, gripper: Gripper) -
     ways = []
     for joints in _configurations_above(arm, above, body, size, gripper):
         pose = arm.fk(joints)
-        turned, side = _turn_between(pose, body, size)
+        turned, side = turn_between(pose, body, size)
         ways.append((turned, side, joints))
     ways.sort(key=lambda each: abs(each[0]))
     turned, side, joints = ways[0]
@@ -196,7 +195,7 @@ def _configurations_above(
     """With the jaws along the thing's sides where the arm can turn its tool, else as they come; raises `Refused`."""
     if len(arm.joint_names) < FULL:
         return list(arm.ik(position=above, solutions=SOLUTIONS))
-    yaw = _yaw(body[1])
+    yaw = yaw_of(body[1])
     refused: Refused | None = None
     found: list[Mapping[str, float]] = []
     for quarter in range(4):
@@ -204,7 +203,7 @@ def _configurations_above(
         if side + BESIDE > gripper.open:
             continue
         try:
-            turn = _looking_down(yaw + quarter * math.pi / 2.0)
+            turn = looking_down(yaw + quarter * math.pi / 2.0)
             found += arm.ik(pose=Pose(above, turn), solutions=2)
         except Refused as error:
             refused = refused or error
@@ -218,7 +217,7 @@ def _configuration_above(arm: Arm, tool: Point, yaw: float | None) -> Mapping[st
     if len(arm.joint_names) < FULL:
         return arm.ik(position=above)[0]
     if yaw is not None:
-        return arm.ik(pose=Pose(above, _looking_down(yaw)))[0]
+        return arm.ik(pose=Pose(above, looking_down(yaw)))[0]
     return arm.ik(position=above, along=DOWN)[0]
 
 
@@ -230,15 +229,7 @@ def _yaw_at(arm: Arm, place: Place, seen: Seen, way: Way) -> float | None:
         raise Refused(
             f"{arm.name} cannot turn its tool, and {place.name} asks for a turn: leave out its yaw", check="orientation"
         )
-    return place.yaw + _yaw(arm.fk(way.above).orientation) - _yaw(seen.pose.orientation)
-
-
-def _turn_between(tool: Pose, body: Rigid, size: Point) -> tuple[float, float]:
-    """[rad] from the thing's nearest side to the way of the jaws, and the edge [m] that is then between them."""
-    x, y, _ = rotate(tool.orientation, (0.0, 1.0, 0.0))
-    off = math.atan2(y, x) - _yaw(body[1])  # from the thing's x to the way of the jaws
-    quarters = round(off / (math.pi / 2.0))
-    return off - quarters * math.pi / 2.0, size[0] if quarters % 2 == 0 else size[1]
+    return place.yaw + yaw_of(arm.fk(way.above).orientation) - yaw_of(seen.pose.orientation)
 
 
 def _spot(eyes: Eyes, place: Place, camera: str) -> Point:
@@ -269,8 +260,8 @@ def _take(hand: Hand, thing: Thing, seen: Seen, way: Way) -> bool:
 def _turn_with_the_jaws(arm: Arm, thing: Thing, seen: Seen, way: Way) -> None:
     """What closing jaws do to a thing that stands askew between them."""
     _, center = body_of(thing)
-    pose = (seen.pose.position, from_axis_angle((0.0, 0.0, 1.0), _yaw(seen.pose.orientation) + way.turned))
-    grasp = _grasp_point(thing, seen)
+    pose = (seen.pose.position, from_axis_angle((0.0, 0.0, 1.0), yaw_of(seen.pose.orientation) + way.turned))
+    grasp = grasp_point(thing, seen)
     local = compose(pose, (thing.grasp_offset, IDENTITY[1]))[0]
     shifted: Point = (pose[0][0] + grasp[0] - local[0], pose[0][1] + grasp[1] - local[1], pose[0][2])
     at, turn = compose((shifted, pose[1]), center)
@@ -302,15 +293,3 @@ def _touching(arm: Arm, name: str) -> Iterator[None]:
         yield
     finally:
         arm.scene.disallow(name, "*")
-
-
-def _looking_down(yaw: float) -> Quaternion:
-    """A tool whose z looks down, and whose jaws move along `yaw` [rad] + 90 degrees of the base."""
-    half_turn = from_axis_angle((1.0, 0.0, 0.0), math.pi)
-    return compose((IDENTITY[0], from_axis_angle((0.0, 0.0, 1.0), yaw)), (IDENTITY[0], half_turn))[1]
-
-
-def _yaw(turn: Quaternion) -> float:
-    """[rad] of the frame's x axis about the base's z."""
-    x, y, _ = rotate(turn, (1.0, 0.0, 0.0))
-    return math.atan2(y, x)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gemelo import Refused
-from gemelo.picking import _lift, _looking_down, _turn_between, _yaw
+from gemelo.grasping import lift_above, looking_down, turn_between, yaw_of
 from gemelo.seeing import Seen
 from gemelo.units import Pose
 from schemas.cell import ColourThing, TagThing
@@ -35,7 +35,7 @@ def block(height: float, **fields: object) -> ColourThing:
 
 
 def test_the_tool_stays_above_a_block_and_the_jaws_beside_it(gripper: Gripper) -> None:
-    lift = _lift(block(0.03), gripper, seen(0.015))
+    lift = lift_above(block(0.03), gripper, seen(0.015))
     tool = 0.015 + lift
     assert tool > 0.03
     assert tool - BEYOND < 0.03 - 0.004
@@ -44,23 +44,23 @@ def test_the_tool_stays_above_a_block_and_the_jaws_beside_it(gripper: Gripper) -
 
 def test_a_grasp_point_near_the_top_of_a_high_thing_is_between_the_jaws(gripper: Gripper) -> None:
     cup = TagThing(name="thing", id=1, size=0.028, box=(0.036, 0.036, 0.1), grasp_offset=(0.0, 0.0, -0.006))
-    lift = _lift(cup, gripper, seen(0.1))
+    lift = lift_above(cup, gripper, seen(0.1))
     assert 0.094 + lift - BEYOND < 0.094 < 0.094 + lift
 
 
 def test_a_thing_that_is_too_flat_for_the_jaws_is_refused_with_both_lengths(gripper: Gripper) -> None:
     with pytest.raises(Refused, match="5 mm high: the jaws, 16 mm long") as refused:
-        _lift(block(0.005), gripper, seen(0.0025))
+        lift_above(block(0.005), gripper, seen(0.0025))
     assert refused.value.check == "grasp"
 
 
 @pytest.mark.parametrize("yaw", [-2.0, 0.0, 0.4, 3.0])
 def test_a_tool_that_looks_down_has_its_jaws_along_the_side_that_is_asked_for(yaw: float) -> None:
-    turn = _looking_down(yaw)
+    turn = looking_down(yaw)
     assert rotate(turn, (0.0, 0.0, 1.0)) == pytest.approx((0.0, 0.0, -1.0))
-    assert math.remainder(_yaw(turn) - yaw, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-9)
+    assert math.remainder(yaw_of(turn) - yaw, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-9)
     body = ((0.3, 0.0, 0.015), from_axis_angle((0.0, 0.0, 1.0), yaw))
-    turned, side = _turn_between(Pose((0.3, 0.0, 0.1), turn), body, (0.05, 0.02, 0.03))
+    turned, side = turn_between(Pose((0.3, 0.0, 0.1), turn), body, (0.05, 0.02, 0.03))
     assert turned == pytest.approx(0.0, abs=1e-9)
     assert side == 0.02  # the jaws move along y of the thing
 
@@ -70,5 +70,5 @@ def test_a_tool_that_looks_down_has_its_jaws_along_the_side_that_is_asked_for(ya
 )
 def test_jaws_turn_a_thing_by_the_way_to_its_nearest_side(askew: float, turned: float, side: float) -> None:
     body = ((0.3, 0.0, 0.015), from_axis_angle((0.0, 0.0, 1.0), askew))
-    found = _turn_between(Pose((0.3, 0.0, 0.1), _looking_down(0.0)), body, (0.05, 0.02, 0.03))
+    found = turn_between(Pose((0.3, 0.0, 0.1), looking_down(0.0)), body, (0.05, 0.02, 0.03))
     assert found == (pytest.approx(turned), side)

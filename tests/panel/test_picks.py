@@ -29,7 +29,7 @@ class Arm:
             if is_cancelled():
                 raise gemelo.Canceled("the pick was cancelled", gemelo.GoalStatusCode.CANCELED)
         on_progress("carrying it")
-        return gemelo.Picked(thing, to, gemelo.Pose((0.26, 0.16, 0.04)), 0.0001, 0.0, 1, 12.5)
+        return gemelo.Picked(thing, to, gemelo.Pose((0.26, 0.16, 0.04)), 0.0001, 0.0, 1, 12.5, None)
 
 
 @pytest.fixture

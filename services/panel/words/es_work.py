@@ -145,6 +145,9 @@ _THINGS: dict[str, str] = {
     "no side of it is narrower than the open jaws": "Ningún lado suyo es más estrecho que las mordazas abiertas.",
     "{name} was not gripped: the jaws closed on nothing, {count} times; where is it? `gemelo detect`": "No se agarró "
     "{name}: las mordazas se cerraron sobre nada {count} veces; ¿dónde está?",
+    "{name} was not picked: it still stands at {x} {y} {z} mm, where it was; the jaws closed beside it: is the camera "
+    "where camera.toml says? `gemelo camera check`": "No se tomó {name}: sigue en {x} {y} {z} mm, donde estaba; las "
+    "mordazas se cerraron a su lado: ¿está la cámara donde dice camera.toml? `gemelo camera check`",
     "{name} was picked and is still between the jaws: {reason}": "{name} sigue entre las mordazas: {reason}",
     "the pick was cancelled: the arm stands": "se canceló: el brazo está quieto.",
     "{name} ({kind}): {x} {y} {z} mm, +-{error} mm by {camera}": "{name}: {x} {y} {z} mm, +-{error} mm por {camera}",
