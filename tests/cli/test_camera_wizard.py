@@ -26,14 +26,17 @@ from services.bench.vision.images import Surface, render
 from services.camera.virtual.virtual_camera import VirtualCamera
 from services.camera.virtual.world import World
 from services.cli import camera_mount
-from services.cli.camera_boards import CHESS_BOARD, TAG_BOARD
+from services.cli.camera_boards import CHESS_BOARD, TAG_BOARD, tag_board
+from services.cli.camera_calibrate import take
 from services.cli.errors import ExitCode
 from services.cli.main import run
-from services.vision.boards import picture
+from services.vision.boards import TagBoard, picture
+from services.vision.calibration.lens import fit_lens
 from services.vision.calibration.touches import spread_points
 from services.vision.camera_model import model_of
 from services.vision.pages import BAR, POINT, page_of
 from services.vision.rigid import apply, from_transform, inverse, rigid, turn
+from services.vision.tags import GreyImage
 
 BOARD_AT = np.array([0.28, -0.02, 0.0])  # [m] of the board with tags on the table
 CELL = """
@@ -53,14 +56,18 @@ distortion = [0.08, -0.16, 0.0008, -0.0005, 0.02]
 @pytest.fixture
 def cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A cell with the board with tags on its table."""
-    tags = [
-        f"[[tag]]\nid = {number}\nsize = {TAG_BOARD.tag}\nposition = {(BOARD_AT + centre).tolist()}\n"
-        for number, centre in TAG_BOARD.centres().items()
-    ]
     path = tmp_path / "cell.toml"
-    path.write_text(CELL + "\n".join(tags))
+    path.write_text(CELL + tags_of(TAG_BOARD))
     monkeypatch.setenv("GEMELO_CELL", str(path))
     return path
+
+
+def tags_of(board: TagBoard) -> str:
+    """As a cell has them."""
+    return "\n".join(
+        f"[[tag]]\nid = {number}\nsize = {board.tag}\nposition = {(BOARD_AT + centre).tolist()}\n"
+        for number, centre in board.centres().items()
+    )
 
 
 def squares_of(page: bytes) -> list[tuple[float, float, float, float]]:
@@ -102,18 +109,17 @@ def test_a_bar_that_cannot_be_is_refused(cell: Path, tmp_path: Path, capsys: pyt
     assert "the bar of 100 mm was measured as 10 mm" in capsys.readouterr().err
 
 
-def write_shots(folder: Path, info_path: Path, arm: Arm, tilt: float, count: int) -> None:
+def shots(info_path: Path, arm: Arm, tilt: float, count: int) -> Iterator[GreyImage]:
     """Images of the chess board at random places before the cell's camera."""
     record = load_cell(info_path, arm).camera("overhead")
     model = model_of(exact_info(record, arm.base_frame))
     random = np.random.default_rng(3)
     texture = picture(CHESS_BOARD.squares(), CHESS_BOARD.size, 0.0125, 4000.0).astype(float) * 0.85 + 20.0
     size = tuple(edge + 0.025 for edge in CHESS_BOARD.size)
-    for number in range(count):
+    for _ in range(count):
         facing = turn(np.array([np.pi, 0.0, 0.0])) @ turn(np.append(random.uniform(-tilt, tilt, 2), 0.0))
         place = np.array([random.uniform(-0.09, 0.09), random.uniform(-0.06, 0.06), random.uniform(0.3, 0.45)])
-        image = render(model, [Surface(rigid(facing, place), size, texture)], random)  # type: ignore[arg-type]
-        cv2.imwrite(str(folder / f"{number:02d}.png"), image)
+        yield render(model, [Surface(rigid(facing, place), size, texture)], random)  # type: ignore[arg-type]
 
 
 def test_tilted_shots_give_the_lens_and_flat_ones_are_refused(
@@ -127,7 +133,8 @@ def test_tilted_shots_give_the_lens_and_flat_ones_are_refused(
     monkeypatch.setattr(images, "SAMPLES", 3)  # as fine as the noise lets matter
     for folder, tilt, count in ((flat, 0.05, 9), (tilted, 0.6, 14)):
         folder.mkdir()
-        write_shots(folder, cell, rm1, tilt, count)
+        for number, image in enumerate(shots(cell, rm1, tilt, count)):
+            cv2.imwrite(str(folder / f"{number:02d}.png"), image)
     assert run(["camera", "calibrate", "overhead", "--images", str(flat)]) is ExitCode.FAILED
     assert "the focal length is known to" in capsys.readouterr().err
     assert not cell.with_name(CAMERA_FILE).exists()
@@ -139,6 +146,31 @@ def test_tilted_shots_give_the_lens_and_flat_ones_are_refused(
     assert found.date
     pixel = np.array([[120.0, 90.0], [520.0, 390.0], [320.0, 240.0]])  # where the shots were
     assert np.abs(model_of(found).rays(pixel) - model_of(exact).rays(pixel)).max() < 4e-3
+
+
+def test_a_camera_that_streams_is_calibrated_by_shots_that_stand_still_and_differ_until_it_is_enough(
+    cell: Path, rm1: Arm, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(images, "SAMPLES", 3)
+    taken: list[GreyImage] = []
+
+    def stream() -> Iterator[GreyImage]:
+        """Every shot is on its way once, then held still, and once more: one of the three is a new one that stands."""
+        for image in shots(cell, rm1, 0.6, 40):
+            taken.append(image)
+            yield np.roll(image, 6, axis=1)
+            yield from (image,) * 3
+
+    kept = take(stream(), CHESS_BOARD, 640, 480, 40)
+    assert len(kept) <= len(taken) < 40
+    said = capsys.readouterr().out.splitlines()
+    assert len(said) == len(kept)
+    assert said[-1].endswith("; enough")
+    assert not any(line.endswith("; enough") for line in said[:-1])
+    assert fit_lens(kept, 640, 480).is_accepted
+    seen = [CHESS_BOARD.find(image) for image in taken]
+    for sighting in kept:
+        assert any(each is not None and np.array_equal(each.pixels, sighting.pixels) for each in seen)
 
 
 @dataclass
@@ -153,30 +185,23 @@ class Hand:
         return Pose((x, y, z + self.jaw), from_rpy(np.pi, 0.0, 0.0))
 
 
-@pytest.mark.parametrize(("off", "code"), [(0.0003, ExitCode.OK), (0.02, ExitCode.FAILED)])
-def test_touched_tags_tell_where_the_camera_stands_and_bad_ones_write_nothing(
-    cell: Path,
-    rm1: Arm,
-    off: float,
-    code: ExitCode,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    known = load_cell(cell, rm1)
-    record, world = known.camera("overhead"), World(rm1, known)
-    world.on_joint_state(JointState(stamp=1, name=rm1.joint_names, position=rm1.named_states["folded"]))
+def touched(
+    cell: Path, arm: Arm, board: TagBoard, off: float, monkeypatch: pytest.MonkeyPatch, *options: str
+) -> ExitCode:
+    """`gemelo camera mount` where a person touches nine points of the board, `off` [m] beside them."""
+    known = load_cell(cell, arm)
+    record, world = known.camera("overhead"), World(arm, known)
+    world.on_joint_state(JointState(stamp=1, name=arm.joint_names, position=arm.named_states["folded"]))
     assert isinstance(record.source, VirtualSource)
-    exact = exact_info(record, rm1.base_frame)
+    exact = exact_info(record, arm.base_frame)
     image = VirtualCamera(record, record.source, exact, world.snapshot).image(world.snapshot())
     grey = cv2.cvtColor(np.ascontiguousarray(image), cv2.COLOR_RGB2GRAY)
     random = np.random.default_rng(1)
-    outer = ["the upper left corner of tag 200", "the lower right corner of tag 208"]
-    outer += ["the upper right corner of tag 202", "the lower left corner of tag 206"]
-    chosen = spread_points(list(TAG_BOARD.points()), 9)
+    chosen = spread_points(list(board.points()), 9)
     beside = np.array([0.0015, -0.0004, 0.0])  # where the arm's steps end, as the person says for the first
-    tips = [BOARD_AT + TAG_BOARD.points()[index] + random.normal(0.0, off, 3) for index in chosen]
+    tips = [BOARD_AT + board.points()[index] + random.normal(0.0, off, 3) for index in chosen]
     tips[0] = tips[0] + beside
-    gripper = rm1.gripper
+    gripper = arm.gripper
     assert gripper is not None
     assert gripper.jaw is not None
     hand = Hand(iter(tips), gripper.jaw[2])
@@ -191,20 +216,51 @@ def test_touched_tags_tell_where_the_camera_stands_and_bad_ones_write_nothing(
     monkeypatch.setattr(camera_mount, "step_floor", lambda arm: 0.0016)
     monkeypatch.setattr(camera_mount, "info_of", lambda session, name: exact)
     monkeypatch.setattr("sys.stdin", io.StringIO("1.5mm -0.4mm\n" + "\n" * len(chosen)))
-    assert run(["camera", "mount", "overhead"]) is code
+    return run(["camera", "mount", "overhead", *options])
+
+
+def off_by(cell: Path, arm: Arm) -> float:
+    """[m] of points over the table, seen by the camera as it is believed to stand."""
+    record = load_cell(cell, arm).camera("overhead")
+    found = believed_info(load_cell(cell, arm), record, arm.base_frame)
+    assert found.is_mounted
+    points = np.array([[0.2, -0.15, 0.0], [0.35, 0.15, 0.0], [0.3, 0.0, 0.05]])
+    ours = from_transform(found.parent_from_camera)
+    truth = from_transform(exact_info(record, arm.base_frame).parent_from_camera)
+    return float(np.linalg.norm(apply(ours, apply(inverse(truth), points)) - points, axis=1).max())
+
+
+@pytest.mark.parametrize(("off", "code"), [(0.0003, ExitCode.OK), (0.02, ExitCode.FAILED)])
+def test_touched_tags_tell_where_the_camera_stands_and_bad_ones_write_nothing(
+    cell: Path,
+    rm1: Arm,
+    off: float,
+    code: ExitCode,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    outer = ["the upper left corner of tag 200", "the lower right corner of tag 208"]
+    outer += ["the upper right corner of tag 202", "the lower left corner of tag 206"]
+    assert touched(cell, rm1, TAG_BOARD, off, monkeypatch) is code
     said = capsys.readouterr()
     assert re.findall(r"the tip onto (.*) \(", said.out)[:4] == outer
-    assert said.out.count("the arm's steps end up to 1.6 mm beside") == len(chosen) - 1
+    assert said.out.count("the arm's steps end up to 1.6 mm beside") == 9 - 1
     if code is not ExitCode.OK:
         assert "nothing was written" in said.err
         assert not cell.with_name(CAMERA_FILE).exists()
         return
-    found = believed_info(load_cell(cell, rm1), record, rm1.base_frame)
-    assert found.is_mounted
-    points = np.array([[0.2, -0.15, 0.0], [0.35, 0.15, 0.0], [0.3, 0.0, 0.05]])
-    ours, truth = from_transform(found.parent_from_camera), from_transform(exact.parent_from_camera)
-    seen = apply(inverse(truth), points)
-    assert np.linalg.norm(apply(ours, seen) - points, axis=1).max() < 1.5e-3
+    assert off_by(cell, rm1) < 1.5e-3
+
+
+@pytest.mark.parametrize("bar", ["108mm", "100mm"])
+def test_a_board_that_was_printed_too_large_is_measured_by_its_bar(
+    cell: Path, rm1: Arm, bar: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    printed = tag_board("108mm")
+    cell.write_text(CELL + tags_of(printed))
+    code = touched(cell, rm1, printed, 0.0003, monkeypatch, "--bar", bar)
+    is_good = code is ExitCode.OK and off_by(cell, rm1) < 1.5e-3
+    assert is_good == (bar == "108mm")
 
 
 def test_with_nobody_at_the_keyboard_nothing_is_measured(
