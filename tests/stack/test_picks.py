@@ -26,6 +26,7 @@ from tests.stack import gemelo as command
 
 BIN, RED = (0.1, 0.3), (0.3, -0.12)  # [m] of rm1's sample cell: the place, and where the red block stands
 ASTRAY = 0.04  # [m]
+FAR = '[[place]]\nname = "far"\nkind = "pose"\nposition = [0.9, 0.1, 0.06]\n'
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +79,21 @@ def test_a_person_detects_and_picks_what_the_sample_cell_has(stack, monkeypatch)
         arm.stop()
 
 
+def test_a_thing_that_cannot_be_carried_on_is_said_to_be_between_the_jaws(stack, monkeypatch):
+    """What stands in the bin is below the jaws, and in the way of the cup that they carry."""
+    for name, value in stack.deployment.items():
+        monkeypatch.setenv(name, value)
+    with gemelo.connect() as arm:
+        arm.move(named="ready")
+        arm.scene.add_box("full", (0.04, 0.04, 0.07), at=(*BIN, 0.035))
+        with pytest.raises(gemelo.Aborted, match="cup was picked and is still between the jaws: .*full"):
+            arm.pick("cup", to="bin")
+        assert arm.scene.objects["cup"].attached
+        arm.scene.remove("full")
+        arm.grip("open")
+        arm.scene.remove("cup")
+
+
 def stop_a_program_that_picks():
     """It ends within a second, wherever it is; the arm stands, and nothing is left in the scene."""
     picks_cup = Program("take", (Pick(thing="cup", place="bin"), Go(state="left")))
@@ -104,7 +120,7 @@ def astray(tmp_path):
     rm1 = project_root() / "urdf/rm1"
     path = tmp_path / "cell.toml"
     text = (rm1 / "cell.toml").read_text()
-    path.write_text(re.sub(r"\[\[tag\]\].*?(?=\[\[thing)", "", text, flags=re.DOTALL))
+    path.write_text(re.sub(r"\[\[tag\]\].*?(?=\[\[thing)", "", text, flags=re.DOTALL) + FAR)
     arm = load_arm(rm1)
     (record,) = load_cell(path, arm).cameras
     info = exact_info(record, arm.base_frame)
