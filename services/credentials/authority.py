@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ipaddress
 import os
-import ssl
 import subprocess
 import tempfile
 from collections.abc import Iterable
@@ -69,12 +68,6 @@ class Authority:
             by = ("-CA", str(self._certificate), "-CAkey", str(self._key), "-set_serial", _serial())
             files = ("-in", str(request), "-out", str(certificate), "-extfile", str(wanted))
             openssl("x509", "-req", *by, "-days", str(days), *files)
-
-
-def expiry(certificate: Path) -> float:
-    """[s] UNIX time after which a certificate is not valid; raises `AccessError`."""
-    said = openssl("x509", "-in", str(certificate), "-noout", "-enddate")
-    return float(ssl.cert_time_to_seconds(said.strip().removeprefix("notAfter=")))
 
 
 def openssl(*arguments: str) -> str:

@@ -6,37 +6,25 @@ The authority's key stays in its own folder below out/; every host's folder hold
 from __future__ import annotations
 
 import shutil
-import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from schemas.site import Site
 from services.arm.model.description import load_arm
-from services.credentials.authority import Authority, expiry
+from services.credentials.authority import Authority
+from services.credentials.expiry import WARN_WITHIN, days_left, expiry
 from services.credentials.private_files import write
+from services.hosts.certificates import Certificate
 from services.hosts.layout import listening, processes, roles
 from services.mqtt import secure_folder
 from services.mqtt.access import AUTHORITY, GATEWAY
 
-DAY = 86_400.0  # [s]
-RENEW_WITHIN = 30.0  # [days] before its end a certificate is made anew
 LOOPBACK = ("localhost", "127.0.0.1")
 UNSPECIFIED = ("0.0.0.0", "::")
 
 
-@dataclass(frozen=True)
-class Certificate:
-    """One certificate of a site."""
-
-    host: str
-    name: str  # the role, "router" or "broker"
-    expires: float  # [s] UNIX time
-    is_new: bool
-
-
-def make_keys(site: Site, folder: Path, project: Path, renew_within: float = RENEW_WITHIN) -> tuple[Certificate, ...]:
+def make_keys(site: Site, folder: Path, project: Path, renew_within: float = WARN_WITHIN) -> tuple[Certificate, ...]:
     """Writes what is missing, wrong or ends within `renew_within` [days] below `folder`; raises `AccessError`."""
     _private(folder)
     own = _private(folder / "authority")
@@ -63,7 +51,7 @@ def _of_host(
     for name, sign in wanted.items():
         certificate, key = folder / f"{name}.pem", folder / f"{name}.key"
         is_sound = authority.has_signed(certificate, key, names if name == "router" else ())
-        is_new = not is_sound or expiry(certificate) - time.time() < renew_within * DAY
+        is_new = not is_sound or days_left(expiry(certificate)) < renew_within
         if is_new:
             sign(certificate, key)
         yield Certificate(host, name, expiry(certificate), is_new)

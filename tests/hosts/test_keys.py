@@ -7,7 +7,8 @@ import time
 import pytest
 
 from schemas.roles import ROLES
-from services.credentials.authority import Authority, expiry, openssl
+from services.credentials.authority import Authority, openssl
+from services.credentials.expiry import expiry
 from services.hosts.keys import make_keys
 from services.runtime.deployment import project_root
 from tests.hosts.sites import site
