@@ -38,6 +38,15 @@ def keys_options(parser: Parser) -> None:
         "--renew-within", type=positive_number, default=30.0, metavar="DAYS",
         help="renew what ends within this time [30]; a number above the certificates' own life renews all",
     )  # fmt: skip
+    change = parser.add_mutually_exclusive_group()
+    change.add_argument(
+        "--renew-authority", action="store_true",
+        help="make another authority, and all certificates anew; hosts that have not got theirs yet are still believed",
+    )  # fmt: skip
+    change.add_argument(
+        "--retire-authority", action="store_true",
+        help="trust the former authority no more: when every host has what --renew-authority has made",
+    )  # fmt: skip
 
 
 def install_options(parser: Parser) -> None:
@@ -49,7 +58,7 @@ def install_options(parser: Parser) -> None:
 
 def run_check(options: Options) -> ExitCode:
     """Says what runs where and how long certificates last, or everything that is wrong, with lines."""
-    from services.hosts.certificates import days_by_host, endings, renewal
+    from services.hosts.certificates import authority_told, days_by_host, endings, renewal
     from services.hosts.layout import extras, processes
 
     site = site_named(options.site)
@@ -62,8 +71,10 @@ def run_check(options: Options) -> ExitCode:
         rows.append((name, host.address, running or "-", ", ".join(host.roles) or "-", days.get(name, "-"), needed))
     print(table(("host", "address", "runs", "people", "certificates", "make setup"), rows))
     near = endings(made)
-    if near:
-        print("\n".join((*near, renewal(site))))
+    try:
+        print("\n".join((*near, *((renewal(site),) if near else ()), *authority_told(site, site_folder(site)))))
+    except ConfigurationError as error:
+        raise CommandError(str(error)) from error
     return ExitCode.OK
 
 
@@ -87,10 +98,15 @@ def run_render(options: Options) -> ExitCode:
 
 def run_keys(options: Options) -> ExitCode:
     """Makes and renews certificates and passwords below out/."""
-    from services.hosts.keys import make_keys
+    from services.hosts.certificates import authority_told
+    from services.hosts.keys import authority_in, make_keys
 
     site = site_named(options.site)
     try:
+        if options.renew_authority:
+            authority_in(site_folder(site)).renew()
+        if options.retire_authority:
+            authority_in(site_folder(site)).retire()
         made = make_keys(site, site_folder(site), project_root(), options.renew_within)
     except ConfigurationError as error:
         raise CommandError(str(error)) from error
@@ -100,6 +116,7 @@ def run_keys(options: Options) -> ExitCode:
     ]
     print(table(("host", "certificate of", "valid until", ""), rows))
     print(f"in {said_folder(site)}, for you alone. Its authority/ stays here; keys/ and broker/ of a host go to it")
+    print("\n".join(authority_told(site, site_folder(site))))
     return ExitCode.OK
 
 

@@ -87,8 +87,8 @@ def shown_certificates(site: Site, deployment: Deployment) -> dict[str, float | 
 
 
 def certificates_told(site: Site, found: Iterable[ServiceStatus], deployment: Deployment) -> Iterator[str]:
-    """How many days each host's certificates still have; those that end within a month, or have ended."""
-    from services.hosts.certificates import Certificate, days_by_host, endings, in_days, renewal
+    """How many days each host's certificates still have; those that end within a month, have ended, or are old."""
+    from services.hosts.certificates import Certificate, days_by_host, endings, in_days, older, renewal
     from services.hosts.layout import ROLE_OF
     from services.hosts.status import Standing
 
@@ -108,6 +108,7 @@ def certificates_told(site: Site, found: Iterable[ServiceStatus], deployment: De
     near = [*endings((*running, Certificate("this host", own.stem, expiry(own))))]
     near += [f"{each}, by the file in {said_folder(site)}" for each in endings(c for c in here if c.host in silent)]
     yield from (*near, renewal(site)) if near else ()
+    yield from older(running, here)
 
 
 def seen_robot(deployment: Deployment, robot: str) -> SeenRobot:

@@ -5,16 +5,20 @@ from __future__ import annotations
 import os
 import socket
 import ssl
+import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from schemas.site import Site
+from services.credentials.authority import FORMER
 from services.credentials.expiry import WARN_WITHIN, days_left, ending, expiry, not_after
 from services.hosts.layout import BROKER, ROUTER, roles
 from services.mqtt.secure_folder import CERTIFICATE
 
 HANDSHAKE = 2.0  # [s]
+AUTHORITY_FOLDER = "authority"  # below the site's; it stays where it was made
+SAME = 1.0  # [s] between the ends of two certificates that are one
 
 
 @dataclass(frozen=True)
@@ -95,4 +99,35 @@ def renewal(site: Site) -> str:
     return (
         f"`gemelo deploy keys {site.name}` renews what ends within {WARN_WITHIN:.0f} days; then give these hosts their "
         "folders again, and restart what runs there"
+    )
+
+
+def authority_told(site: Site, folder: Path, now: float | None = None) -> tuple[str, ...]:
+    """When the authority ends whose keys are below `folder`, and what to do about it; `now` in [s] UNIX time."""
+    file = folder / AUTHORITY_FOLDER / "ca.pem"
+    if not _is_ours(file):
+        return ()
+    ends = expiry(file)
+    said = [f"the authority ends on {time.strftime('%Y-%m-%d', time.gmtime(ends))} ({in_days(ends, now)})"]
+    if days_left(ends, now) < site.certificate_days + WARN_WITHIN:
+        said.append(
+            f"certificates of {site.certificate_days} days will soon outlive it: `gemelo deploy keys {site.name} "
+            "--renew-authority` makes another one, without an outage"
+        )
+    if file.with_name(FORMER).exists():
+        said.append(
+            f"the former authority is trusted too, until `gemelo deploy keys {site.name} --retire-authority`: when "
+            f"every host has its folder of today, and `gemelo deploy status {site.name}` names no older certificate"
+        )
+    return tuple(said)
+
+
+def older(running: Iterable[Certificate], made_here: Iterable[Certificate]) -> tuple[str, ...]:
+    """A sentence for each that runs with another certificate than the newest that was made for it."""
+    newest = {(each.host, each.name): each.expires for each in made_here}
+    return tuple(
+        f"{each.name} on {each.host} runs with an older certificate than the one that is here for it: give that host "
+        "its folder, and restart what runs there"
+        for each in running
+        if newest.get((each.host, each.name), each.expires) - each.expires > SAME
     )

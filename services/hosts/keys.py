@@ -15,7 +15,7 @@ from services.arm.model.description import load_arm
 from services.credentials.authority import Authority
 from services.credentials.expiry import WARN_WITHIN, days_left, expiry
 from services.credentials.private_files import write
-from services.hosts.certificates import Certificate
+from services.hosts.certificates import AUTHORITY_FOLDER, Certificate
 from services.hosts.layout import listening, processes, roles
 from services.mqtt import secure_folder
 from services.mqtt.access import AUTHORITY, GATEWAY
@@ -26,16 +26,20 @@ UNSPECIFIED = ("0.0.0.0", "::")
 
 def make_keys(site: Site, folder: Path, project: Path, renew_within: float = WARN_WITHIN) -> tuple[Certificate, ...]:
     """Writes what is missing, wrong or ends within `renew_within` [days] below `folder`; raises `AccessError`."""
-    _private(folder)
-    own = _private(folder / "authority")
-    authority = Authority(own / "ca.pem", own / "ca.key")
+    authority = authority_in(folder)
     made = [
         certificate for host in site.hosts
         for certificate in _of_host(site, host, authority, _private(folder / host / "keys"), renew_within)
     ]  # fmt: skip
     for host in site.hosts:
-        shutil.copyfile(own / "ca.pem", folder / host / "keys" / "ca.pem")
+        (folder / host / "keys" / "ca.pem").write_text(authority.trusted)
     return (*made, _broker(site, folder, project, authority))
+
+
+def authority_in(folder: Path) -> Authority:
+    """The authority of the site whose keys are below `folder`; made if it is not there. Raises `AccessError`."""
+    own = _private(_private(folder) / AUTHORITY_FOLDER)
+    return Authority(own / "ca.pem", own / "ca.key")
 
 
 def _of_host(
@@ -66,7 +70,7 @@ def _broker(site: Site, folder: Path, project: Path, authority: Authority) -> Ce
     devices = {robot: load_arm(project / settings.folder).device.name for robot, settings in site.robots.items()}
     names = tuple(addresses(site, site.broker.host))
     secure_folder.make(home, names, devices.values(), authority, site.certificate_days)
-    shutil.copyfile(folder / "authority" / "ca.pem", home / AUTHORITY)
+    (home / AUTHORITY).write_text(authority.trusted)
     for host in site.hosts:
         for process in processes(site, host):
             user = {"stepper_gateway": GATEWAY, "virtual_esp32": devices.get(process.robot)}.get(process.service.name)

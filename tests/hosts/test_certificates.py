@@ -16,7 +16,7 @@ from schemas.topics import DEVICE_STATUS
 from services.cli.main import run
 from services.credentials.authority import Authority
 from services.credentials.expiry import DAY, expiry
-from services.hosts.certificates import Certificate, days_by_host, endings, shown_at
+from services.hosts.certificates import Certificate, days_by_host, endings, older, shown_at
 from services.mqtt import secure_folder
 from services.runtime.node import Node
 from services.runtime.process.shutdown import ShutdownRequest
@@ -34,6 +34,14 @@ def test_the_first_that_ends_counts_for_a_host_and_what_ends_within_a_month_is_n
     assert endings(found, now) == (
         "the certificate of router on cell ends in 29 days", "the certificate of operator on desk has expired",
     )  # fmt: skip
+
+
+def test_what_runs_with_an_older_certificate_than_was_made_for_it_is_named():
+    now = time.time()
+    here = [Certificate("cell", "gateway", now + 365 * DAY), Certificate("brain", "planner", now + 365 * DAY)]
+    running = [Certificate("cell", "gateway", now + 200 * DAY), here[1], Certificate("desk", "panel", now)]
+    (said,) = older(running, here)
+    assert said.startswith("gateway on cell runs with an older certificate than the one that is here for it")
 
 
 def test_check_says_it_of_the_keys_that_are_here(tmp_path, monkeypatch, capsys):
@@ -107,6 +115,7 @@ def test_status_says_it_of_every_host_and_names_what_ends_within_a_month(router,
             assert f"the certificate of {name} ends in 20 days" in said
         assert f"the certificate of state_publisher on one ends in 20 days, by the file in {router.folder}" in said
         assert "`gemelo deploy keys lab` renews what ends within 30 days" in said
+        assert "an older certificate" not in said
         run(["deploy", "status", str(router.site_file), "--json"])
         found = {each["service"]: each["certificate_ends"] for each in json.loads(capsys.readouterr().out)}
     ends = {each.name: each.expires for each in router.made}
