@@ -33,7 +33,7 @@ def make_keys(site: Site, folder: Path, project: Path, renew_within: float = WAR
     ]  # fmt: skip
     for host in site.hosts:
         (folder / host / "keys" / "ca.pem").write_text(authority.trusted)
-    return (*made, _broker(site, folder, project, authority))
+    return (*made, _broker(site, folder, project, authority, renew_within))
 
 
 def authority_in(folder: Path) -> Authority:
@@ -54,8 +54,7 @@ def _of_host(
         wanted["router"] = partial(authority.sign, names, days=days)
     for name, sign in wanted.items():
         certificate, key = folder / f"{name}.pem", folder / f"{name}.key"
-        is_sound = authority.has_signed(certificate, key, names if name == "router" else ())
-        is_new = not is_sound or days_left(expiry(certificate)) < renew_within
+        is_new = _is_due(authority, certificate, key, names if name == "router" else (), renew_within)
         if is_new:
             sign(certificate, key)
         yield Certificate(host, name, expiry(certificate), is_new)
@@ -64,19 +63,26 @@ def _of_host(
             (folder / f"{stray}{end}").unlink(missing_ok=True)
 
 
-def _broker(site: Site, folder: Path, project: Path, authority: Authority) -> Certificate:
+def _is_due(authority: Authority, certificate: Path, key: Path, names: tuple[str, ...], renew_within: float) -> bool:
+    """True if it is missing, wrong, or ends within `renew_within` [days]."""
+    return not authority.has_signed(certificate, key, names) or days_left(expiry(certificate)) < renew_within
+
+
+def _broker(site: Site, folder: Path, project: Path, authority: Authority, renew_within: float) -> Certificate:
     """The broker's lock on its host, and on the others the password of each end that runs there."""
     home = folder / site.broker.host / "broker"
     devices = {robot: load_arm(project / settings.folder).device.name for robot, settings in site.robots.items()}
     names = tuple(addresses(site, site.broker.host))
-    secure_folder.make(home, names, devices.values(), authority, site.certificate_days)
+    certificate, key = home / secure_folder.CERTIFICATE, home / secure_folder.KEY
+    is_new = _is_due(authority, certificate, key, names, renew_within)
+    secure_folder.make(home, names, devices.values(), authority, site.certificate_days, is_new)
     (home / AUTHORITY).write_text(authority.trusted)
     for host in site.hosts:
         for process in processes(site, host):
             user = {"stepper_gateway": GATEWAY, "virtual_esp32": devices.get(process.robot)}.get(process.service.name)
             if host != site.broker.host and user:
                 _give(home, _private(folder / host / "broker"), user)
-    return Certificate(site.broker.host, "broker", expiry(home / secure_folder.CERTIFICATE), True)
+    return Certificate(site.broker.host, "broker", expiry(certificate), is_new)
 
 
 def _give(home: Path, folder: Path, user: str) -> None:
