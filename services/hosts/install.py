@@ -12,6 +12,8 @@ from services.hosts.site_file import SiteError
 from services.hosts.units import TARGET
 
 Command = tuple[str, ...]
+# Keys of roles that have left a host go from it; all else that stands there stays.
+KEPT = tuple(f"--filter=protect {each}" for each in ("/*", "/systemd/***", "/broker/***"))
 MADE_BY = {"systemd": "gemelo deploy render", "keys": "gemelo deploy keys"}  # folders of a host
 
 
@@ -36,7 +38,7 @@ def commands(site: Site, host: str, folder: Path) -> tuple[Command, ...]:
     return (
         ("ssh", f"root@{address}", prepare),
         ("ssh", f"root@{address}", _look(site, host)),
-        ("rsync", "--archive", "--protect-args", "--chmod=go=", f"--chown={user}:", f"{folder}/",
+        ("rsync", "--archive", "--protect-args", "--delete", *KEPT, "--chmod=go=", f"--chown={user}:", f"{folder}/",
          f"root@{_bracketed(address)}:{site.config}/"),
         ("ssh", f"root@{address}", start),
     )  # fmt: skip

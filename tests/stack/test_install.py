@@ -140,6 +140,18 @@ def test_what_is_renewed_goes_out_again_by_the_same_command(installed: Lab) -> N
     assert after == (installed.out / "deploy/lab/one/keys/planner.pem").read_text()
 
 
+def test_the_key_of_a_role_that_has_left_goes_from_the_host_and_what_others_put_there_stays(installed: Lab) -> None:
+    own = ("own.txt", "systemd/own.service", "broker/own.password", "own/keys/own.pem")
+    gone = ("keys/viewer.pem", "keys/viewer.key")
+    installed.host.run(f"cd /etc/gemelo && mkdir -p own/keys && touch {' '.join((*own, *gone))}")
+    assert installed.deploy("install", "one").returncode == 0
+    left = installed.host.run("cd /etc/gemelo && find . -type f -printf '%P\\n'").stdout.splitlines()
+    assert not set(gone) & set(left)
+    assert set(own) <= set(left)
+    assert "keys/operator.key" in left
+    installed.host.run(f"cd /etc/gemelo && rm -r own {' '.join(own[:3])}")
+
+
 def test_its_files_start_the_stack_as_that_user_and_who_works_there_moves_it(installed: Lab, tmp_path: Path) -> None:
     need("mosquitto")
     gemelo = f"{installed.site.project}/.venv/bin/gemelo"
