@@ -35,6 +35,7 @@ class GoalRequest(Message, frozen=True, kw_only=True):
     client: str = ""  # key of its liveliness token
     goal: msgspec.Raw = NIL
     attached: bool = False  # cancel the goal when the client's token vanishes
+    epoch: int = 0  # of the server that is to take it, as its `ResultResponse` says; for another one it is void
 
 
 class GoalResponse(Message, frozen=True, kw_only=True):
@@ -71,6 +72,7 @@ class ResultResponse(Message, frozen=True, kw_only=True):
 
     status: GoalStatusCode = GoalStatusCode.UNKNOWN
     result: msgspec.Raw = NIL
+    epoch: int = 0  # of the server, where it does not know the goal: random, drawn when it starts
 
 
 class GoalFeedback(Message, frozen=True, kw_only=True):

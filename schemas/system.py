@@ -65,6 +65,7 @@ class NodeInfo(Message, frozen=True, kw_only=True):
     clock: int = 0  # [ns] UNIX time by its own clock, as it answered
     ready: bool = False  # its state is valid
     problem: str = ""  # why it is not, where it says so
+    certificate_ends: float | None = None  # [s] UNIX time, of the one that it shows to the router; None: it shows none
 
 
 class TopicInterface(Message, frozen=True, kw_only=True):

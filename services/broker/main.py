@@ -10,16 +10,22 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
-from schemas.deployment import Broker, Deployment
+from schemas.deployment import Broker, Deployment, MqttSection
 from services.broker import mosquitto
 from services.credentials.private_files import AccessError
 from services.mqtt.access import gateway_access
+from services.mqtt.secure_folder import CERTIFICATE
+from services.runtime.certificate_watch import CertificateWatch
 from services.runtime.deployment import DeploymentError, exposure, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
 from services.runtime.process.readiness import Readiness
 
 BEAT = 1.0  # [s] of the readiness file
+RENEWAL = (
+    "`gemelo deploy keys` renews it, or `gemelo broker secure` where that made it; then start this process anew and, "
+    "on another host, give it its folder before"
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -48,9 +54,12 @@ def run(deployment: Deployment, log: logging.Logger) -> int:
         log.warning("%s", warning)
     require_free(host, port, "mqtt", "listen_port" if section.listen_port else "port")
 
+    certificate = CertificateWatch(shown(section), log.warning, RENEWAL)
+
     def beat() -> None:
         readiness.ready()
         readiness.beat()
+        certificate.beat()
 
     if section.broker is Broker.MOSQUITTO:
         mosquitto.find()  # raises where it is not installed
@@ -64,6 +73,11 @@ def run(deployment: Deployment, log: logging.Logger) -> int:
         return embedded.serve(section, beat)
     finally:
         readiness.not_ready()
+
+
+def shown(section: MqttSection) -> str:
+    """The file of the certificate that a broker of ours shows; empty without TLS."""
+    return str(Path(section.secure_folder) / CERTIFICATE) if section.secure_folder else ""
 
 
 def stand_aside(readiness: Readiness) -> int:

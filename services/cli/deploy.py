@@ -5,16 +5,19 @@ from __future__ import annotations
 import shlex
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from schemas.errors import ConfigurationError
 from schemas.site import Site
 from services.cli.errors import CommandError, ExitCode, unknown
 from services.cli.parser import Options, Parser, positive_number
 from services.cli.text_table import table
-from services.runtime.deployment import load_deployment, project_root
+from services.runtime.deployment import DEFAULT_FILE, load_deployment, project_root
+
+if TYPE_CHECKING:
+    from services.hosts.certificates import Certificate
 
 FOLDER = "deploy/hosts"
-DAY = 86_400.0  # [s]
 
 
 def site_option(parser: Parser) -> None:
@@ -35,6 +38,15 @@ def keys_options(parser: Parser) -> None:
         "--renew-within", type=positive_number, default=30.0, metavar="DAYS",
         help="renew what ends within this time [30]; a number above the certificates' own life renews all",
     )  # fmt: skip
+    change = parser.add_mutually_exclusive_group()
+    change.add_argument(
+        "--renew-authority", action="store_true",
+        help="make another authority, and all certificates anew; hosts that have not got theirs yet are still believed",
+    )  # fmt: skip
+    change.add_argument(
+        "--retire-authority", action="store_true",
+        help="trust the former authority no more: when every host has what --renew-authority has made",
+    )  # fmt: skip
 
 
 def install_options(parser: Parser) -> None:
@@ -45,16 +57,24 @@ def install_options(parser: Parser) -> None:
 
 
 def run_check(options: Options) -> ExitCode:
-    """Says what runs where, or everything that is wrong, with lines."""
+    """Says what runs where and how long certificates last, or everything that is wrong, with lines."""
+    from services.hosts.certificates import authority_told, days_by_host, endings, renewal
     from services.hosts.layout import extras, processes
 
     site = site_named(options.site)
+    made = made_here(site)
+    days = days_by_host(made)
     rows = []
     for name, host in site.hosts.items():
         running = ", ".join(process.unit.removeprefix("gemelo-") for process in processes(site, name))
         needed = f'EXTRAS="{" ".join(extras(site, name))}"'
-        rows.append((name, host.address, running or "-", ", ".join(host.roles) or "-", needed))
-    print(table(("host", "address", "runs", "people", "make setup"), rows))
+        rows.append((name, host.address, running or "-", ", ".join(host.roles) or "-", days.get(name, "-"), needed))
+    print(table(("host", "address", "runs", "people", "certificates", "make setup"), rows))
+    near = endings(made)
+    try:
+        print("\n".join((*near, *((renewal(site),) if near else ()), *authority_told(site, site_folder(site)))))
+    except ConfigurationError as error:
+        raise CommandError(str(error)) from error
     return ExitCode.OK
 
 
@@ -67,8 +87,9 @@ def run_render(options: Options) -> ExitCode:
         if host not in site.hosts:
             raise unknown("host", host, site.hosts)
     for host in options.hosts or site.hosts:
-        folder = _folder(site) / host
-        print(f"{_said(folder)}: {', '.join(str(file.relative_to(folder)) for file in write(site, host, folder))}")
+        folder = site_folder(site) / host
+        files = ", ".join(str(file.relative_to(folder)) for file in write(site, host, folder))
+        print(f"{said_folder(site, host)}: {files}")
     print(
         f"the folder of a host goes to {site.config} there, and its systemd/ to /etc/systemd/system (deploy/README.md)"
     )
@@ -77,11 +98,16 @@ def run_render(options: Options) -> ExitCode:
 
 def run_keys(options: Options) -> ExitCode:
     """Makes and renews certificates and passwords below out/."""
-    from services.hosts.keys import make_keys
+    from services.hosts.certificates import authority_told
+    from services.hosts.keys import authority_in, make_keys
 
     site = site_named(options.site)
     try:
-        made = make_keys(site, _folder(site), project_root(), options.renew_within)
+        if options.renew_authority:
+            authority_in(site_folder(site)).renew()
+        if options.retire_authority:
+            authority_in(site_folder(site)).retire()
+        made = make_keys(site, site_folder(site), project_root(), options.renew_within)
     except ConfigurationError as error:
         raise CommandError(str(error)) from error
     rows = [
@@ -89,7 +115,8 @@ def run_keys(options: Options) -> ExitCode:
         for each in made
     ]
     print(table(("host", "certificate of", "valid until", ""), rows))
-    print(f"in {_said(_folder(site))}, for you alone. Its authority/ stays here; keys/ and broker/ of a host go to it")
+    print(f"in {said_folder(site)}, for you alone. Its authority/ stays here; keys/ and broker/ of a host go to it")
+    print("\n".join(authority_told(site, site_folder(site))))
     return ExitCode.OK
 
 
@@ -101,7 +128,7 @@ def run_install(options: Options) -> ExitCode:
     if options.host not in site.hosts:
         raise unknown("host", options.host, site.hosts)
     try:
-        commands = install.commands(site, options.host, _folder(site) / options.host)
+        commands = install.commands(site, options.host, site_folder(site) / options.host)
         for command in commands:
             print(shlex.join(command), flush=True)
         if not options.dry_run:
@@ -124,10 +151,22 @@ def site_named(name: str) -> Site:
         raise CommandError(str(error)) from error
 
 
-def _folder(site: Site) -> Path:
-    return Path(load_deployment().paths.out) / "deploy" / site.name
+def made_here(site: Site) -> tuple[Certificate, ...]:
+    """The certificates of the site made here, if they may be read; raises `CommandError` for a file that is none."""
+    from services.hosts.certificates import made
+
+    try:
+        return made(site, site_folder(site))
+    except ConfigurationError as error:
+        raise CommandError(str(error)) from error
 
 
-def _said(folder: Path) -> Path:
-    root = project_root()
+def site_folder(site: Site) -> Path:
+    """Where the files and keys of a site are made on this machine, whichever deployment its user works with."""
+    return Path(load_deployment(project_root() / DEFAULT_FILE).paths.out) / "deploy" / site.name
+
+
+def said_folder(site: Site, host: str = "") -> Path:
+    """As `site_folder`, or that of a host in it, short where it is below the project."""
+    folder, root = site_folder(site) / host, project_root()
     return folder.relative_to(root) if folder.is_relative_to(root) else folder

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -12,11 +13,12 @@ from schemas.deployment import Deployment
 from schemas.errors import ConfigurationError
 from schemas.site import Site
 from schemas.topics import DEVICE_STATUS
-from services.cli.deploy import site_named, site_option
+from services.cli.deploy import made_here, said_folder, site_named, site_option
 from services.cli.errors import CommandError, ExitCode, usage
 from services.cli.parser import Options, Parser, json_option
 from services.cli.session import own_name, require_router
 from services.cli.text_table import table
+from services.credentials.expiry import expiry
 from services.runtime.clock_offset import ClockOffset
 from services.runtime.deployment import load_deployment
 
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from services.hosts.status import SeenNode, SeenRobot, ServiceStatus
     from services.runtime.node import Node
 
-HEADINGS = ("host", "robot", "service", "is", "machine", "version", "clock", "why")
+HEADINGS = ("host", "robot", "service", "is", "machine", "version", "clock", "certificate", "why")
 TO_ANSWER = 2.0  # [s] of one node
 TO_TELL = 1.0  # [s] until what is latched has come
 
@@ -43,12 +45,15 @@ def run(options: Options) -> ExitCode:
     deployment = _deployment(site)
     require_router(deployment)
     names = dict.fromkeys((*site.robots, *gemelo.robots(deployment)))
-    found = site_status(site, {name: seen_robot(deployment, name) for name in names})
+    seen = {name: seen_robot(deployment, name) for name in names}
+    found = site_status(site, seen, shown_certificates(site, deployment))
     if options.json:
         print(msgspec.json.encode(found).decode())
     else:
         print(table(HEADINGS, [_row(each) for each in found]))
         print(summary(found))
+        for line in certificates_told(site, found, deployment):
+            print(line)
     return ExitCode.OK if is_well(found) else ExitCode.FAILED
 
 
@@ -65,6 +70,45 @@ def summary(found: Iterable[ServiceStatus]) -> str:
         told = ", ".join(f"{version} ({each.service} on {each.machine})" for version, each in sorted(versions.items()))
         lines.append(f"versions differ: {told}: install one on all hosts")
     return "\n".join(lines)
+
+
+def shown_certificates(site: Site, deployment: Deployment) -> dict[str, float | None]:
+    """[s] UNIX time at which the certificates end that router and broker show now."""
+    from services.hosts.certificates import shown_at
+    from services.hosts.layout import BROKER, ROUTER
+
+    own = deployment.router
+    if not own.tls:
+        return {}
+    return {
+        ROUTER: shown_at(own.host, own.port, own.certificate, own.key),
+        BROKER: shown_at(site.hosts[site.broker.host].address, site.broker.port),
+    }
+
+
+def certificates_told(site: Site, found: Iterable[ServiceStatus], deployment: Deployment) -> Iterator[str]:
+    """How many days each host's certificates still have; those that end within a month, have ended, or are old."""
+    from services.hosts.certificates import Certificate, days_by_host, endings, in_days, older, renewal
+    from services.hosts.layout import ROLE_OF
+    from services.hosts.status import Standing
+
+    if not deployment.router.tls:
+        return
+    rows = [each for each in found if each.host]
+    running = dict.fromkeys(
+        Certificate(each.host, ROLE_OF.get(each.service, each.service), each.certificate_ends)
+        for each in rows if each.certificate_ends is not None
+    )  # fmt: skip
+    own = Path(deployment.router.certificate)
+    days = days_by_host(running)
+    told = (f"{host} {days.get(host, 'not known')}" for host in site.hosts)
+    yield f"certificates: {', '.join(told)}, yours {in_days(expiry(own))}"
+    silent = {each.host for each in rows if each.standing is Standing.SILENT}
+    here = made_here(site)
+    near = [*endings((*running, Certificate("this host", own.stem, expiry(own))))]
+    near += [f"{each}, by the file in {said_folder(site)}" for each in endings(c for c in here if c.host in silent)]
+    yield from (*near, renewal(site)) if near else ()
+    yield from older(running, here)
 
 
 def seen_robot(deployment: Deployment, robot: str) -> SeenRobot:
@@ -118,8 +162,11 @@ def _deployment(site: Site) -> Deployment:
 
 
 def _row(each: ServiceStatus) -> tuple[str, ...]:
+    from services.hosts.certificates import in_days
+
     clock = "-" if each.clock_offset is None else str(ClockOffset(each.clock_offset, each.clock_bound))
+    certificate = "-" if each.certificate_ends is None else in_days(each.certificate_ends)
     return (
         each.host or "-", each.robot or "-", each.service, each.standing, each.machine or "-", each.version or "-",
-        clock, each.reason or "-",
+        clock, certificate, each.reason or "-",
     )  # fmt: skip

@@ -1,15 +1,23 @@
-"""A certificate authority of a few files, made by the openssl command: P-256 keys that never leave their folder."""
+"""A certificate authority of a few files, made by the openssl command: P-256 keys that never leave their folder.
+
+A new authority takes the place of a former one without an outage: what it signs carries a certificate by which the
+former one vouches for it (the "new with old" of RFC 4210, 4.4). Who trusts only the former believes it, and who trusts
+both believes everybody.
+"""
 
 from __future__ import annotations
 
 import ipaddress
+import math
 import os
-import ssl
+import secrets
+import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
+from services.credentials.expiry import CERTIFICATE, days_left, expiry
 from services.credentials.private_files import AccessError
 
 DAYS = 3650  # of the authority and of what it signs
@@ -24,13 +32,59 @@ authorityKeyIdentifier = keyid
 """
 
 
+AUTHORITY_EXTENSIONS = """\
+basicConstraints = critical, CA:TRUE
+keyUsage = critical, keyCertSign, cRLSign
+subjectKeyIdentifier = hash
+authorityKeyIdentifier = keyid
+"""
+FORMER, VOUCHER = "former.pem", "voucher.pem"  # beside the authority's certificate
+
+
 class Authority:
-    """An authority in two files, made when they are not there yet."""
+    """An authority in two files, made when they are not there yet; two more while a former one is still trusted."""
 
     def __init__(self, certificate: Path, key: Path) -> None:
         self._certificate, self._key = certificate, key
+        self._former, self._voucher = certificate.with_name(FORMER), certificate.with_name(VOUCHER)
         if not (certificate.exists() and key.exists()):
-            self._make()
+            _make(certificate, key)
+
+    @property
+    def has_former(self) -> bool:
+        """True from `renew` to `retire`."""
+        return self._former.exists()
+
+    @property
+    def trusted(self) -> str:
+        """PEM of all whose certificates are to be believed: this authority, and a former one."""
+        return "".join(file.read_text() for file in (self._certificate, self._former) if file.exists())
+
+    def renew(self) -> None:
+        """Makes another authority, for which the present one vouches; that one signs nothing any more.
+
+        Raises `AccessError` while an earlier one is trusted.
+        """
+        if self.has_former:
+            raise AccessError("an authority before this one is still trusted: retire that one before this is renewed")
+        with tempfile.TemporaryDirectory(dir=self._certificate.parent) as scratch:
+            certificate, key, request, wanted, voucher = (Path(scratch, name) for name in ("c", "k", "r", "e", "v"))
+            subject = _make(certificate, key)
+            openssl("req", "-new", "-key", str(key), "-subj", subject, "-out", str(request))
+            wanted.write_text(AUTHORITY_EXTENSIONS)
+            left = max(1, math.ceil(days_left(expiry(self._certificate))))
+            self._sign(request, wanted, voucher, left)
+            os.replace(voucher, self._voucher)
+            shutil.copyfile(self._certificate, self._former)
+            os.replace(key, self._key)
+            os.replace(certificate, self._certificate)
+
+    def retire(self) -> None:
+        """The former authority is trusted no more; raises `AccessError` if there is none."""
+        if not self.has_former:
+            raise AccessError("no former authority is trusted: there is nothing to retire")
+        self._former.unlink()
+        self._voucher.unlink()
 
     def sign(self, hosts: Iterable[str], certificate: Path, key: Path, days: int = DAYS) -> None:
         """Makes a key and a certificate for a broker at `hosts`: names and IP addresses; raises `AccessError`."""
@@ -44,8 +98,10 @@ class Authority:
         self._issue(name, EXTENSIONS.format(use="clientAuth", names=""), certificate, key, days, unit)
 
     def has_signed(self, certificate: Path, key: Path, hosts: Iterable[str] = ()) -> bool:
-        """True if both files are there, signed by this authority, and for all `hosts`."""
+        """True if both files are there, signed by this authority, as it stands now, and for all `hosts`."""
         if not (certificate.exists() and key.exists()):
+            return False
+        if CERTIFICATE.findall(certificate.read_text())[1:] != CERTIFICATE.findall(self._vouched):
             return False
         try:
             openssl("verify", "-no_check_time", "-CAfile", str(self._certificate), str(certificate))
@@ -54,11 +110,9 @@ class Authority:
             return False
         return {_alternative_name(host) for host in hosts} <= set(_named_in(named))
 
-    def _make(self) -> None:
-        usage = ("-addext", "keyUsage = critical, keyCertSign, cRLSign")
-        subject = ("-subj", "/CN=gemelo authority", "-days", str(DAYS))
-        files = ("-keyout", str(self._key), "-out", str(self._certificate))
-        openssl("req", "-x509", *KEY, *subject, *usage, *files)
+    @property
+    def _vouched(self) -> str:
+        return self._voucher.read_text() if self.has_former else ""
 
     def _issue(self, name: str, extensions: str, certificate: Path, key: Path, days: int, unit: str = "") -> None:
         subject = f"/OU={unit}/CN={name}" if unit else f"/CN={name}"
@@ -66,15 +120,14 @@ class Authority:
             request, wanted = Path(scratch, "request"), Path(scratch, "extensions")
             wanted.write_text(extensions)
             openssl("req", "-new", *KEY, "-subj", subject, "-keyout", str(key), "-out", str(request))
-            by = ("-CA", str(self._certificate), "-CAkey", str(self._key), "-set_serial", _serial())
-            files = ("-in", str(request), "-out", str(certificate), "-extfile", str(wanted))
-            openssl("x509", "-req", *by, "-days", str(days), *files)
+            self._sign(request, wanted, certificate, days)
+        with certificate.open("a") as file:
+            file.write(self._vouched)
 
-
-def expiry(certificate: Path) -> float:
-    """[s] UNIX time after which a certificate is not valid; raises `AccessError`."""
-    said = openssl("x509", "-in", str(certificate), "-noout", "-enddate")
-    return float(ssl.cert_time_to_seconds(said.strip().removeprefix("notAfter=")))
+    def _sign(self, request: Path, extensions: Path, certificate: Path, days: int) -> None:
+        by = ("-CA", str(self._certificate), "-CAkey", str(self._key), "-set_serial", _serial())
+        files = ("-in", str(request), "-out", str(certificate), "-extfile", str(extensions))
+        openssl("x509", "-req", *by, "-days", str(days), *files)
 
 
 def openssl(*arguments: str) -> str:
@@ -90,6 +143,15 @@ def openssl(*arguments: str) -> str:
     if done.returncode:
         raise AccessError(f"openssl {arguments[0]} failed: {done.stderr.strip().splitlines()[-1:]}")
     return done.stdout
+
+
+def _make(certificate: Path, key: Path) -> str:
+    """An authority's certificate and key; returns its name, which no other has, as openssl writes it."""
+    name = f"/CN=gemelo authority {secrets.token_hex(4)}"
+    usage = ("-addext", "keyUsage = critical, keyCertSign, cRLSign")
+    files = ("-keyout", str(key), "-out", str(certificate))
+    openssl("req", "-x509", *KEY, "-subj", name, "-days", str(DAYS), *usage, *files)
+    return name
 
 
 def _named_in(extension: str) -> list[str]:

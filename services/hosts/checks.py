@@ -40,7 +40,7 @@ def _addresses(site: Site, problems: Problems) -> None:
     seen: dict[str, str] = {}
     for name, host in site.hosts.items():
         for key, address in (("address", host.address), ("listen", host.listen)):
-            if address and not _is_address(address):
+            if (address or key == "address") and not _is_address(address):
                 problems.add(("hosts", name, key), f"{address!r} is neither a host name nor an IP address")
         if host.address in seen:
             problems.add(("hosts", name, "address"), f"{host.address} is the address of {seen[host.address]} too")

@@ -12,6 +12,8 @@ from services.hosts.site_file import SiteError
 from services.hosts.units import TARGET
 
 Command = tuple[str, ...]
+# Keys of roles that have left a host go from it; all else that stands there stays.
+KEPT = tuple(f"--filter=protect {each}" for each in ("/*", "/systemd/***", "/broker/***"))
 MADE_BY = {"systemd": "gemelo deploy render", "keys": "gemelo deploy keys"}  # folders of a host
 
 
@@ -35,10 +37,23 @@ def commands(site: Site, host: str, folder: Path) -> tuple[Command, ...]:
     )
     return (
         ("ssh", f"root@{address}", prepare),
-        ("rsync", "--archive", "--protect-args", "--chmod=go=", f"--chown={user}:", f"{folder}/",
+        ("ssh", f"root@{address}", _look(site, host)),
+        ("rsync", "--archive", "--protect-args", "--delete", *KEPT, "--chmod=go=", f"--chown={user}:", f"{folder}/",
          f"root@{_bracketed(address)}:{site.config}/"),
         ("ssh", f"root@{address}", start),
     )  # fmt: skip
+
+
+def _look(site: Site, host: str) -> str:
+    """Ends with 1 and a sentence where the services could not be started, or files not be copied."""
+    program = f"{site.project}/.venv/bin/gemelo"
+    remedy = f"`make setup` in {site.project} there, with a Python that everybody may run"
+    wanted = {
+        f"runuser -u {site.user} -- {shlex.quote(program)} --help >/dev/null":
+            f"{site.user} cannot run {program} on {host}: {remedy}",
+        "command -v rsync >/dev/null": f"rsync is missing on {host}: apt-get install rsync",
+    }  # fmt: skip
+    return "; ".join(f"{there} || {{ echo {shlex.quote(said)} >&2; exit 1; }}" for there, said in wanted.items())
 
 
 def run(wanted: tuple[Command, ...]) -> None:

@@ -6,48 +6,40 @@ The authority's key stays in its own folder below out/; every host's folder hold
 from __future__ import annotations
 
 import shutil
-import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from schemas.site import Site
 from services.arm.model.description import load_arm
-from services.credentials.authority import Authority, expiry
+from services.credentials.authority import Authority
+from services.credentials.expiry import WARN_WITHIN, days_left, expiry
 from services.credentials.private_files import write
+from services.hosts.certificates import AUTHORITY_FOLDER, Certificate
 from services.hosts.layout import listening, processes, roles
 from services.mqtt import secure_folder
 from services.mqtt.access import AUTHORITY, GATEWAY
 
-DAY = 86_400.0  # [s]
-RENEW_WITHIN = 30.0  # [days] before its end a certificate is made anew
 LOOPBACK = ("localhost", "127.0.0.1")
 UNSPECIFIED = ("0.0.0.0", "::")
 
 
-@dataclass(frozen=True)
-class Certificate:
-    """One certificate of a site."""
-
-    host: str
-    name: str  # the role, "router" or "broker"
-    expires: float  # [s] UNIX time
-    is_new: bool
-
-
-def make_keys(site: Site, folder: Path, project: Path, renew_within: float = RENEW_WITHIN) -> tuple[Certificate, ...]:
+def make_keys(site: Site, folder: Path, project: Path, renew_within: float = WARN_WITHIN) -> tuple[Certificate, ...]:
     """Writes what is missing, wrong or ends within `renew_within` [days] below `folder`; raises `AccessError`."""
-    _private(folder)
-    own = _private(folder / "authority")
-    authority = Authority(own / "ca.pem", own / "ca.key")
+    authority = authority_in(folder)
     made = [
         certificate for host in site.hosts
         for certificate in _of_host(site, host, authority, _private(folder / host / "keys"), renew_within)
     ]  # fmt: skip
     for host in site.hosts:
-        shutil.copyfile(own / "ca.pem", folder / host / "keys" / "ca.pem")
-    return (*made, _broker(site, folder, project, authority))
+        (folder / host / "keys" / "ca.pem").write_text(authority.trusted)
+    return (*made, _broker(site, folder, project, authority, renew_within))
+
+
+def authority_in(folder: Path) -> Authority:
+    """The authority of the site whose keys are below `folder`; made if it is not there. Raises `AccessError`."""
+    own = _private(_private(folder) / AUTHORITY_FOLDER)
+    return Authority(own / "ca.pem", own / "ca.key")
 
 
 def _of_host(
@@ -62,8 +54,7 @@ def _of_host(
         wanted["router"] = partial(authority.sign, names, days=days)
     for name, sign in wanted.items():
         certificate, key = folder / f"{name}.pem", folder / f"{name}.key"
-        is_sound = authority.has_signed(certificate, key, names if name == "router" else ())
-        is_new = not is_sound or expiry(certificate) - time.time() < renew_within * DAY
+        is_new = _is_due(authority, certificate, key, names if name == "router" else (), renew_within)
         if is_new:
             sign(certificate, key)
         yield Certificate(host, name, expiry(certificate), is_new)
@@ -72,19 +63,26 @@ def _of_host(
             (folder / f"{stray}{end}").unlink(missing_ok=True)
 
 
-def _broker(site: Site, folder: Path, project: Path, authority: Authority) -> Certificate:
+def _is_due(authority: Authority, certificate: Path, key: Path, names: tuple[str, ...], renew_within: float) -> bool:
+    """True if it is missing, wrong, or ends within `renew_within` [days]."""
+    return not authority.has_signed(certificate, key, names) or days_left(expiry(certificate)) < renew_within
+
+
+def _broker(site: Site, folder: Path, project: Path, authority: Authority, renew_within: float) -> Certificate:
     """The broker's lock on its host, and on the others the password of each end that runs there."""
     home = folder / site.broker.host / "broker"
     devices = {robot: load_arm(project / settings.folder).device.name for robot, settings in site.robots.items()}
     names = tuple(addresses(site, site.broker.host))
-    secure_folder.make(home, names, devices.values(), authority, site.certificate_days)
-    shutil.copyfile(folder / "authority" / "ca.pem", home / AUTHORITY)
+    certificate, key = home / secure_folder.CERTIFICATE, home / secure_folder.KEY
+    is_new = _is_due(authority, certificate, key, names, renew_within)
+    secure_folder.make(home, names, devices.values(), authority, site.certificate_days, is_new)
+    (home / AUTHORITY).write_text(authority.trusted)
     for host in site.hosts:
         for process in processes(site, host):
             user = {"stepper_gateway": GATEWAY, "virtual_esp32": devices.get(process.robot)}.get(process.service.name)
             if host != site.broker.host and user:
                 _give(home, _private(folder / host / "broker"), user)
-    return Certificate(site.broker.host, "broker", expiry(home / secure_folder.CERTIFICATE), True)
+    return Certificate(site.broker.host, "broker", expiry(certificate), is_new)
 
 
 def _give(home: Path, folder: Path, user: str) -> None:

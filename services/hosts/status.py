@@ -42,6 +42,7 @@ class ServiceStatus(msgspec.Struct, frozen=True, kw_only=True):
     pid: int = 0
     clock_offset: float | None = None  # [s] its clock against the asker's; None: not measured
     clock_bound: float = 0.0  # [s] by how much at most that is wrong
+    certificate_ends: float | None = None  # [s] UNIX time, of the one that it shows; None: none, or it is not known
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,14 @@ class SeenRobot:
     device: DeviceStatus | None = None
 
 
-def site_status(site: Site, seen: Mapping[str, SeenRobot]) -> tuple[ServiceStatus, ...]:
-    """`seen` by the robot's name, through the router: of the site's robots, and of others that live there."""
-    return (*_expected(site, seen), *_not_expected(site, seen))
+def site_status(
+    site: Site, seen: Mapping[str, SeenRobot], shown: Mapping[str, float | None] | None = None
+) -> tuple[ServiceStatus, ...]:
+    """`seen` by the robot's name, through the router: of the site's robots, and of others that live there.
+
+    `shown` says when the certificates of router and broker end, in [s] UNIX time.
+    """
+    return (*_expected(site, seen, shown or {}), *_not_expected(site, seen))
 
 
 def is_well(found: tuple[ServiceStatus, ...]) -> bool:
@@ -70,7 +76,9 @@ def is_well(found: tuple[ServiceStatus, ...]) -> bool:
     return all(each.standing is Standing.READY for each in found)
 
 
-def _expected(site: Site, seen: Mapping[str, SeenRobot]) -> Iterator[ServiceStatus]:
+def _expected(
+    site: Site, seen: Mapping[str, SeenRobot], shown: Mapping[str, float | None]
+) -> Iterator[ServiceStatus]:  # fmt: skip
     for host in site.hosts:
         for process in processes(site, host):
             robot, service = process.robot, process.service.name
@@ -79,7 +87,10 @@ def _expected(site: Site, seen: Mapping[str, SeenRobot]) -> Iterator[ServiceStat
                 yield _node(site, host, robot, service, at.nodes.get(service))
             else:
                 standing, reason = _from_others(service, robot, seen)
-                yield ServiceStatus(host=host, robot=robot, service=service, standing=standing, reason=reason)
+                yield ServiceStatus(
+                    host=host, robot=robot, service=service, standing=standing, reason=reason,
+                    certificate_ends=shown.get(service),
+                )  # fmt: skip
 
 
 def _node(site: Site, host: str, robot: str, service: str, seen: SeenNode | None) -> ServiceStatus:
@@ -99,7 +110,7 @@ def _node(site: Site, host: str, robot: str, service: str, seen: SeenNode | None
     return ServiceStatus(
         host=host, robot=robot, service=service, standing=standing, reason=reason, machine=info.host,
         version=info.version, pid=info.pid, clock_offset=None if clock is None else clock.offset,
-        clock_bound=0.0 if clock is None else clock.bound,
+        clock_bound=0.0 if clock is None else clock.bound, certificate_ends=info.certificate_ends,
     )  # fmt: skip
 
 

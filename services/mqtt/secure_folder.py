@@ -38,19 +38,21 @@ log_type warning
 
 
 def make(
-    folder: Path, hosts: Iterable[str], devices: Iterable[str], authority: Authority | None = None, days: int = DAYS
-) -> tuple[str, ...]:
+    folder: Path, hosts: Iterable[str], devices: Iterable[str], authority: Authority | None = None, days: int = DAYS,
+    renews: bool = True,
+) -> tuple[str, ...]:  # fmt: skip
     """Writes or renews the folder; returns the devices that now have a user.
 
     `authority` signs, else one of the folder's own, which is made if it is not there; `days` are the certificate's.
     The authority and the passwords that are there stay, so that boards need not be told anew; the broker's certificate
-    is made anew for `hosts` (names and IP addresses). Raises `AccessError`.
+    is made anew for `hosts` (names and IP addresses), unless it is there and not `renews`. Raises `AccessError`.
     """
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     folder.chmod(0o700)
     write(folder / ".gitignore", "*\n")
     signer = authority or Authority(folder / AUTHORITY, folder / "ca.key")
-    signer.sign(hosts, folder / CERTIFICATE, folder / KEY, days)
+    if renews or not (folder / CERTIFICATE).exists():
+        signer.sign(hosts, folder / CERTIFICATE, folder / KEY, days)
     names = tuple(sorted({*map(_require_name, devices), *devices_in(folder)}))
     passwords = {user: _password(folder, user) for user in (GATEWAY, *names)}
     write(folder / USERS, "".join(f"{user}:{hashed(password)}\n" for user, password in passwords.items()))

@@ -28,6 +28,7 @@ from services.runtime.actions.server import ActionServer, OnCancel, OnGoal
 from services.runtime.bus import identity
 from services.runtime.bus.connection import connect
 from services.runtime.bus.interface import Bus, Declaration
+from services.runtime.certificate_watch import CertificateWatch
 from services.runtime.client_watch import Absences, ClientWatch
 from services.runtime.deployment import load_deployment, project_root, robot_name
 from services.runtime.endpoints import LoopStatistics, NodeEndpoints, info_request, interfaces_request
@@ -86,6 +87,8 @@ class Node:
         from_file = self.deployment.parameters.get(name, {})
         self._parameters = ParameterRegistry(name, from_file, overrides or {}, self.log)
         self._is_closed = False
+        self._certificate = CertificateWatch(self.deployment.router.certificate, self.log.warning)
+        self._certificate.beat()
         with stop_on_signals(self._stop) if self._signals else nullcontext():
             self._bus = bus or connect(self.deployment.router, self.robot, self.log, self._stop)
         try:
@@ -215,7 +218,9 @@ class Node:
     def info(self) -> NodeInfo:
         """The node's identity, endpoints, readiness, and its clock."""
         about = self._endpoints.info(self._identity, self.robot)
-        return msgspec.structs.replace(about, clock=self.now(), ready=self.is_ready, problem=self._problem)
+        return msgspec.structs.replace(
+            about, clock=self.now(), ready=self.is_ready, problem=self._problem, certificate_ends=self._certificate.ends
+        )
 
     def statistics(self) -> tuple[TopicStatistics, ...]:
         """The messages received, dropped and bad since the start, by key: of topics and of requests served."""
@@ -340,6 +345,7 @@ class Node:
         if self._readiness is not None:
             self._readiness.beat()
         self._bus.require_reconnection()
+        self._certificate.beat()
         self._endpoints.report_losses()
         report = self._statistics.report(self._loop.take_figures(), self._endpoints.statistics())
         if report is not None:

@@ -15,6 +15,7 @@ import zenoh
 from schemas.deployment import RouterSection
 from services.runtime.bus.dead_links import end_dead_links
 from services.runtime.bus.zenoh_config import router_config
+from services.runtime.certificate_watch import CertificateWatch
 from services.runtime.deployment import DeploymentError, exposure, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
@@ -48,7 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 watch = end_dead_links(session)
                 locked = " with TLS, for certificates of its authority" if is_locked else ""
                 log.info("listening on %s port %d%s", host, port, locked)
-                _beat_until(stop, Readiness(Path(deployment.paths.run), "router"))
+                certificate = CertificateWatch(shown(config), log.warning)
+                _beat_until(stop, Readiness(Path(deployment.paths.run), "router"), certificate)
                 del watch
     except (DeploymentError, PortTaken, zenoh.ZError) as error:
         log.error("%s", error)
@@ -77,11 +79,18 @@ def configured(section: RouterSection) -> tuple[zenoh.Config, tuple[str, int], b
     return config, (host.strip("[]"), int(port)), protocol == "tls" and is_locked
 
 
-def _beat_until(stop: ShutdownRequest, readiness: Readiness) -> None:
+def shown(config: zenoh.Config) -> str:
+    """The file of the certificate that a router shows; empty without TLS."""
+    return str(json.loads(config.get_json("transport/link/tls/listen_certificate")) or "")
+
+
+def _beat_until(stop: ShutdownRequest, readiness: Readiness, certificate: CertificateWatch) -> None:
     readiness.ready()
+    certificate.beat()
     try:
         while not stop.wait(BEAT):
             readiness.beat()
+            certificate.beat()
     finally:
         readiness.not_ready()
 

@@ -15,7 +15,7 @@ import pytest
 import gemelo
 from gemelo import control_file
 from gemelo.session import Session
-from schemas.actions import GoalRequest, GoalResponse
+from schemas.actions import GoalRequest, GoalResponse, ResultRequest
 from schemas.control import ControlAnswer, ControlState, ControlTake
 from schemas.deployment import Deployment, PathsSection
 from schemas.joints import JointTargets
@@ -25,7 +25,7 @@ from schemas.system import Failure
 from schemas.topics import CONTROL, CONTROL_TAKE, DEVICE_EVENTS, FOLLOW_JOINT_TRAJECTORY, GATEWAY_INPUTS, LOG
 from services.arm.model.description import load_arm
 from services.cli.control import describe
-from services.runtime.actions.keys import goal_request
+from services.runtime.actions.keys import goal_request, result_request
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.client_watch import RETURN, Absence
@@ -343,9 +343,9 @@ def test_a_holder_whose_token_was_never_there_loses_control_by_itself(lab: Lab) 
 def test_a_goal_that_bears_the_holders_token_from_another_session_is_refused(lab: Lab) -> None:
     ana = lab.arm("ana-1")
     with ana.take_control("Ana"):
-        question = GoalRequest(
-            goal_id="x", client=ana.node.token, goal=msgspec.Raw(encode(FollowJointTrajectoryGoal()))
-        )
+        epoch = ana.node.call(result_request(FOLLOW_JOINT_TRAJECTORY), ResultRequest()).epoch
+        goal = msgspec.Raw(encode(FollowJointTrajectoryGoal()))
+        question = GoalRequest(goal_id="x", client=ana.node.token, goal=goal, epoch=epoch)
         answer = raw(lab, goal_request(FOLLOW_JOINT_TRAJECTORY).key, "GoalRequest", encode(question))
         assert answer is not None
         response = msgspec.msgpack.decode(answer.payload, type=GoalResponse)

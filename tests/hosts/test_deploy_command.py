@@ -82,15 +82,16 @@ def test_an_install_stops_at_the_first_command_that_fails(out, tmp_path, capsys,
     log = recording(tmp_path, monkeypatch, rsync=23)
     assert gemelo("deploy", "install", "example", "brain") == 1
     assert "ended with 23: rsync" in capsys.readouterr().err
-    assert len(log.read_text().splitlines()) == 2
+    assert len(log.read_text().splitlines()) == 3
 
 
 def test_a_path_with_quotes_stays_one_word_of_the_other_hosts_shell(tmp_path):
     lab = site(tmp_path, "# A lab", "config = \"/etc/a 'b'; reboot\"\n# A lab")
     for name in ("systemd", "keys"):
         (tmp_path / "brain" / name).mkdir(parents=True)
-    prepare, copy, _ = commands(lab, "brain", tmp_path / "brain")
+    prepare, look, copy, _ = commands(lab, "brain", tmp_path / "brain")
     assert shlex.split(prepare[2])[-2:] == [lab.config, lab.state]
     assert "reboot" not in shlex.split(prepare[2])
+    assert "/opt/gemelo/.venv/bin/gemelo" in shlex.split(look[2])
     assert copy[-1] == f"root@10.0.0.12:{lab.config}/"
     assert project_root() not in Path(copy[-1]).parents

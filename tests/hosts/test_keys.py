@@ -7,7 +7,8 @@ import time
 import pytest
 
 from schemas.roles import ROLES
-from services.credentials.authority import Authority, expiry, openssl
+from services.credentials.authority import Authority, openssl
+from services.credentials.expiry import expiry
 from services.hosts.keys import make_keys
 from services.runtime.deployment import project_root
 from tests.hosts.sites import site
@@ -67,19 +68,23 @@ def test_what_is_sound_is_kept_and_what_ends_soon_or_has_another_address_is_rene
     assert all(364 * DAY < each.expires - time.time() < 366 * DAY for each in first.values())
     key = (tmp_path / "out/brain/keys/planner.key").read_bytes()
     again = {(each.host, each.name): each for each in make_keys(lab, tmp_path / "out", project_root())}
-    assert not any(each.is_new for name, each in again.items() if name != ("cell", "broker"))
+    assert not any(each.is_new for each in again.values())
     assert (tmp_path / "out/brain/keys/planner.key").read_bytes() == key
 
     moved = site(tmp_path, '"10.0.0.12"', '"10.0.0.99"')
     renewed = {(each.host, each.name) for each in make_keys(moved, tmp_path / "out", project_root()) if each.is_new}
-    assert renewed == {("brain", "router"), ("cell", "broker")}
+    assert renewed == {("brain", "router")}
 
     authority = Authority(tmp_path / "out/authority/ca.pem", tmp_path / "out/authority/ca.key")
     old = tmp_path / "out/brain/keys"
     authority.sign_client("planner", old / "planner.pem", old / "planner.key", days=29)
     renewed = {(each.host, each.name) for each in make_keys(moved, tmp_path / "out", project_root()) if each.is_new}
-    assert renewed == {("brain", "planner"), ("cell", "broker")}
+    assert renewed == {("brain", "planner")}
     assert expiry(old / "planner.pem") - time.time() > 300 * DAY
+
+    elsewhere = site(tmp_path, '"10.0.0.11"', '"10.0.0.98"')
+    renewed = {(each.host, each.name) for each in make_keys(elsewhere, tmp_path / "out", project_root()) if each.is_new}
+    assert renewed == {("cell", "broker"), ("brain", "router")}  # whose address is again the first one
 
 
 def test_a_new_authority_renews_everything_and_a_role_that_left_is_taken_away(tmp_path):

@@ -116,6 +116,9 @@ def test_whatever_a_person_writes_is_refused_or_stays_one_value(tmp_path, writte
         lab = load_site(file, project_root())
     except (SiteError, UnicodeEncodeError):
         return
+    look = next(command[2] for command in install_commands(lab, "brain", tmp_path) if "rsync" in command[2])
+    assert f"{lab.project}/.venv/bin/gemelo" in shlex.split(look)
+    assert shlex.split(look).count("exit") == 2
     wire = '[robots.rm1]\nwire = "serial"' if "serial" in written else "[robots.rm1]"
     require_nothing_injected(lab, site(tmp_path, "[robots.rm1]", wire))
     require_readable(lab, tmp_path)
@@ -154,7 +157,7 @@ def test_whatever_is_written_as_an_address_is_refused_or_stays_one_word(tmp_path
         (endpoint,) = json.loads(files["router.json5"])["listen"]["endpoints"]
         assert endpoint == f"tls/[{at}]:7447" if ":" in at else f"tls/{at}:7447"
     shown = install_commands(lab, host, tmp_path)
-    assert [command[1].partition("@")[2] for command in shown if command[0] == "ssh"] == [lab.hosts[host].address] * 2
+    assert [command[1].partition("@")[2] for command in shown if command[0] == "ssh"] == [lab.hosts[host].address] * 3
     assert not any(word.startswith("-") for command in shown for word in command[1:2] if command[0] == "ssh")
 
 

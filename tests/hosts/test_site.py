@@ -39,6 +39,7 @@ def problem(folder, old: str, new: str) -> str:
         ('roles = ["operator"', 'roles = ["gateway"', '"gateway" has no permission that a person or script'),
         ('address = "10.0.0.13"', 'address = "10.0.0.12"', "10.0.0.12 is the address of brain too"),
         ('address = "10.0.0.13"', 'address = "a b"', "'a b' is neither a host name nor an IP address"),
+        ('address = "10.0.0.13"', 'address = ""', "'' is neither a host name nor an IP address"),
         ('address = "10.0.0.13"', 'address = "0.0.0.0"', "nobody can connect to 0.0.0.0: that is for `listen`"),
         ('address = "10.0.0.13"', "address = 13", 'key "hosts.desk.address": Expected `str`, got `int`'),
         ('address = "10.0.0.13"', 'adress = "10.0.0.13"', 'unknown key "hosts.desk.adress": did you mean'),

@@ -36,11 +36,14 @@ class Arm:
         self.node = node
         self.left: dict[str, int] = {}
         self.moved = 0
+        self.is_busy = False
         self.server: Server = node.serve_action(FOLLOW, self.on_goal, self.on_cancel)
 
     def on_goal(self, goal_id: str, goal: FollowJointTrajectoryGoal) -> GoalDecision:
         if not goal.trajectory.joint_names:
             return refuse(FollowErrorCode.INVALID_JOINTS, "the trajectory names no joint")
+        if self.is_busy:
+            return refuse(FollowErrorCode.INVALID_JOINTS, "not now")
         for running in list(self.left):
             self.end(running, GoalStatusCode.PREEMPTED)
         self.left[goal_id] = len(goal.trajectory.joint_names)
@@ -192,7 +195,8 @@ def test_the_same_goal_sent_twice_is_accepted_once(buses: Buses) -> None:
 
     with moving(buses) as arm:
         node = buses.node("client")
-        request = GoalRequest(goal_id="twice", client="c", goal=msgspec.Raw(encode(goal_of(10))))
+        goal = msgspec.Raw(encode(goal_of(10)))
+        request = GoalRequest(goal_id="twice", client="c", goal=goal, epoch=arm.server.epoch)
         first = node.call(keys.goal_request(FOLLOW), request)
         assert node.call(keys.goal_request(FOLLOW), request) == first
         assert until(lambda: arm.moved == 11)
@@ -253,10 +257,10 @@ def test_goals_that_are_no_goals_are_refused_and_nothing_dies(buses: Buses) -> N
         node = buses.node("client")
         for goal in (Raw(b"\xc0"), Raw(b"\x93\x01\x02\x03"), Raw(b"\x81\xaatrajectory\x05")):
             with pytest.raises(Refused, match="FollowJointTrajectoryGoal") as refusal:
-                node.call(keys.goal_request(FOLLOW), GoalRequest(goal_id="x", goal=goal))
+                node.call(keys.goal_request(FOLLOW), GoalRequest(goal_id="x", goal=goal, epoch=arm.server.epoch))
             assert refusal.value.kind == "bad request"
         with pytest.raises(Refused, match="needs an id"):
-            node.call(keys.goal_request(FOLLOW), GoalRequest())
+            node.call(keys.goal_request(FOLLOW), GoalRequest(epoch=arm.server.epoch))
         assert node.call(keys.cancel_request(FOLLOW), CancelRequest()).reason == "no goal is active"
         assert "no such goal" in node.call(keys.cancel_request(FOLLOW), CancelRequest(goal_id="x")).reason
         assert arm.moved == 0

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from schemas.actions import CancelRequest, GoalRequest, GoalResponse, GoalStatusCode, GoalStatuses, ResultRequest
 from schemas.message import encode
-from schemas.motion import FollowErrorCode
 from schemas.topics import FOLLOW_JOINT_TRAJECTORY as FOLLOW
-from services.runtime.actions import GoalDecision, keys, refuse
+from services.runtime.actions import keys
 from services.runtime.actions.goal_registry import GoalRecord, GoalRegistry
 from services.runtime.node import Node
 from tests.runtime.support import Buses, until
-from tests.runtime.test_actions import goal_of, moving
+from tests.runtime.test_actions import Arm, goal_of, moving
 
 
-def request_of(goal_id: str) -> GoalRequest:
-    return GoalRequest(goal_id=goal_id, client="operator", goal=msgspec.Raw(encode(goal_of(3))))
+def request_of(goal_id: str, arm: Arm) -> GoalRequest:
+    goal = msgspec.Raw(encode(goal_of(3)))
+    return GoalRequest(goal_id=goal_id, client="operator", goal=goal, epoch=arm.server.epoch)
 
 
 def send(node: Node, request: GoalRequest) -> GoalResponse:
@@ -37,10 +38,10 @@ def is_forgotten(node: Node, goal_id: str) -> bool:
 def test_a_goal_that_has_ended_and_is_sent_again_by_another_client_moves_nothing(buses: Buses) -> None:
     with moving(buses) as arm:
         owner, other = buses.node("owner"), buses.node("other")
-        first = send(owner, request_of("g"))
+        first = send(owner, request_of("g", arm))
         assert has_ended(owner, "g")
         moved = arm.moved
-        assert send(other, request_of("g")) == first
+        assert send(other, request_of("g", arm)) == first
         assert not arm.left
         assert arm.moved == moved
 
@@ -50,32 +51,27 @@ def test_a_goal_that_is_forgotten_and_sent_again_is_refused_and_a_new_one_is_not
 ) -> None:
     with moving(buses) as arm:
         owner, other = buses.node("owner"), buses.node("other")
-        assert send(owner, request_of("g")).accepted
+        assert send(owner, request_of("g", arm)).accepted
         assert has_ended(owner, "g")
         moved = arm.moved
         monkeypatch.setattr("services.runtime.actions.goal_registry.KEPT", -1.0)
         assert until(lambda: is_forgotten(owner, "g"))
-        again = send(other, request_of("g"))
+        again = send(other, request_of("g", arm))
         assert not again.accepted
         assert "has ended already" in again.reason
         assert arm.moved == moved
-        assert send(other, request_of("new")).accepted
+        assert send(other, request_of("new", arm)).accepted
         assert until(lambda: arm.moved == 2 * moved)
 
 
 def test_a_goal_that_was_refused_stays_refused_when_it_could_be_carried_out_later(buses: Buses) -> None:
     with moving(buses) as arm:
         owner, other = buses.node("owner"), buses.node("other")
-        accepting = arm.server._on_goal
-
-        def not_now(goal_id: str, goal: object) -> GoalDecision:
-            return refuse(FollowErrorCode.INVALID_JOINTS, "not now")
-
-        arm.server._on_goal = not_now
-        first = send(owner, request_of("g"))
-        arm.server._on_goal = accepting
+        arm.is_busy = True
+        first = send(owner, request_of("g", arm))
+        arm.is_busy = False
         assert (first.accepted, first.reason) == (False, "not now")
-        assert send(other, request_of("g")) == first
+        assert send(other, request_of("g", arm)) == first
         assert arm.moved == 0
 
 
@@ -83,9 +79,46 @@ def test_every_try_of_a_goal_that_its_client_has_cancelled_is_refused(buses: Bus
     with moving(buses) as arm:
         client = buses.node("client")
         client.call(keys.cancel_request(FOLLOW), CancelRequest(goal_id="g"))
-        tries = [send(client, request_of("g")) for _ in range(2)]
+        tries = [send(client, request_of("g", arm)) for _ in range(2)]
         assert [each.reason for each in tries] == ["it was cancelled before it was looked at"] * 2
         assert arm.moved == 0
+
+
+def test_a_goal_from_before_a_restart_of_its_server_moves_nothing_whether_or_not_it_was_carried_out_then(
+    buses: Buses,
+) -> None:
+    owner, other = buses.node("owner"), buses.node("other")
+    with moving(buses) as arm:
+        done, late = request_of("g", arm), request_of("late", arm)
+        assert send(owner, done).accepted
+        assert has_ended(owner, "g")
+    arm.node.close()
+    with moving(buses) as arm:
+        for node in (owner, other):
+            for request in (done, late):
+                again = send(node, request)
+                assert not again.accepted
+                assert "a stepper_gateway that was started anew since" in again.reason
+        assert arm.moved == 0
+        assert not arm.left
+
+
+def test_a_client_from_before_a_restart_of_the_server_moves_it_as_before_with_a_new_goal(buses: Buses) -> None:
+    client = buses.node("client").action(FOLLOW)
+    for _ in range(3):
+        with moving(buses) as arm:
+            assert client.send(goal_of(3)).wait(3.0).status is GoalStatusCode.SUCCEEDED
+        arm.node.close()
+
+
+def test_a_goal_that_names_no_epoch_is_refused_with_where_to_learn_it(buses: Buses) -> None:
+    with moving(buses) as arm:
+        node = buses.node("client")
+        refused = send(node, replace(request_of("g", arm), epoch=0))
+        assert (refused.accepted, arm.moved) == (False, 0)
+        assert "follow_joint_trajectory/result says" in refused.reason
+        told = node.call(keys.result_request(FOLLOW), ResultRequest()).epoch
+        assert send(node, replace(request_of("g", arm), epoch=told)).accepted
 
 
 def test_the_ids_that_are_remembered_are_bounded_and_the_oldest_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -137,7 +137,7 @@ def test_what_a_stop_has_overtaken_is_refused(buses: Buses) -> None:
     assert client.wait_served(DEVICE_STOP.key, 1.0)
     goals: Answers = []
     for _ in range(MAX_WAITING_OF_A_CLIENT + 1):  # the answer to the last one says that the others have arrived
-        ask(client, goal_key, _goal("early"), goals)
+        ask(client, goal_key, _goal("early", action.epoch), goals)
     assert until(lambda: len(goals) == 1)
     stops: Answers = []
     ask(client, DEVICE_STOP.key, DeviceStopRequest(), stops)
@@ -146,14 +146,14 @@ def test_what_a_stop_has_overtaken_is_refused(buses: Buses) -> None:
         assert until(lambda: len(goals) == MAX_WAITING_OF_A_CLIENT + 1 and len(stops) == 1)
         assert "was asked for after it" in words(goals[1])
         assert not started
-        ask(client, goal_key, _goal("later"), goals)
+        ask(client, goal_key, _goal("later", action.epoch), goals)
         assert until(lambda: started == ["later"])
 
 
 def test_a_goal_that_its_own_cancel_has_overtaken_does_not_start(buses: Buses) -> None:
     server, client = buses.node("gateway"), buses.open()
     started: list[str] = []
-    server.serve_action(FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: "")
+    action = server.serve_action(FOLLOW, lambda goal_id, goal: started.append(goal_id) or accept(), lambda goal_id: "")
     goal_key, cancel_key = keys.goal_request(FOLLOW).key, keys.cancel_request(FOLLOW).key
     assert client.wait_served(goal_key, 1.0)
     assert client.wait_served(cancel_key, 1.0)
@@ -164,15 +164,16 @@ def test_a_goal_that_its_own_cancel_has_overtaken_does_not_start(buses: Buses) -
         assert cancels[0] is not None
         assert "within 2 s is refused" in decode(CancelResponse, cancels[0].payload).reason
         goals: Answers = []
-        ask(client, goal_key, _goal("g"), goals)
+        ask(client, goal_key, _goal("g", action.epoch), goals)
         assert until(lambda: len(goals) == 1)
     assert goals[0] is not None
     assert decode(GoalResponse, goals[0].payload).reason == "it was cancelled before it was looked at"
     assert not started
 
 
-def _goal(goal_id: str) -> GoalRequest:
-    return GoalRequest(goal_id=goal_id, client="c", goal=msgspec.Raw(encode(FollowJointTrajectoryGoal())))
+def _goal(goal_id: str, epoch: int) -> GoalRequest:
+    goal = msgspec.Raw(encode(FollowJointTrajectoryGoal()))
+    return GoalRequest(goal_id=goal_id, client="c", goal=goal, epoch=epoch)
 
 
 def test_a_flood_of_stops_that_are_not_read_in_time_fills_no_link_but_its_own(router: RouterProcess) -> None:

@@ -6,11 +6,17 @@ import subprocess
 import time
 
 import pytest
+from msgspec.structs import replace
 
-from schemas.actions import GoalStatusCode
+from schemas.actions import GoalRequest, GoalStatusCode, ResultRequest
 from schemas.device import ReferenceCommand
+from schemas.message import decode
 from schemas.motion import FollowErrorCode
+from schemas.system import Exchange
+from schemas.topics import FOLLOW_JOINT_TRAJECTORY
+from services.runtime.actions.keys import goal_request, result_request
 from services.runtime.errors import NoAnswer, ServerLost
+from services.runtime.requests.exchanges import exchange_topic
 from tests.stack.person import jumps
 
 SPEED = 0.6  # slow enough that the kill falls into the middle
@@ -73,6 +79,32 @@ def test_when_the_gateway_dies_the_arm_comes_to_rest_on_its_path_and_the_client_
     again, _ = operator.move_again()
     assert again.status is GoalStatusCode.SUCCEEDED
     assert not jumps(operator.arm, operator.seen)
+
+
+def test_a_goal_that_was_heard_before_the_gateway_died_moves_nothing_when_it_is_said_to_the_next_one(stack, operator):
+    """The arm stands where that goal begins, so that it could be carried out again; under the new epoch it is."""
+    heard: list[Exchange] = []
+    operator.node.subscribe(exchange_topic(goal_request(FOLLOW_JOINT_TRAJECTORY)), heard.append)
+    operator.move_again()
+    for _ in range(2):
+        assert operator.move().status is GoalStatusCode.SUCCEEDED
+    assert operator.wait_for(lambda: len(heard) >= 3, 5.0)
+    there, back = (decode(GoalRequest, bytes(each.question)) for each in heard[-2:])
+    assert there.epoch == back.epoch != 0
+    stack.kill("stepper_gateway")
+    stack.wait_ready(15.0, ["stepper_gateway"])
+    operator._free()
+    operator.seen.clear()
+    for goal in (there, back):
+        again = operator.node.call(goal_request(FOLLOW_JOINT_TRAJECTORY), goal)
+        assert (again.accepted, "stepper_gateway that was started anew since" in again.reason) == (False, True)
+    assert operator.wait_for(lambda: len(operator.seen) >= 50, 10.0)
+    assert len({state.position for state in operator.seen}) == 1
+    epoch = operator.node.call(result_request(FOLLOW_JOINT_TRAJECTORY), ResultRequest()).epoch
+    forged = operator.node.call(goal_request(FOLLOW_JOINT_TRAJECTORY), replace(there, epoch=epoch))
+    assert forged.accepted, forged.reason
+    assert operator.wait_for(operator.is_moving, 10.0)
+    assert operator.wait_for(lambda: not operator.is_moving(), 20.0)
 
 
 def test_when_the_broker_dies_the_move_ends_with_a_reason_and_the_next_one_works(stack, operator):

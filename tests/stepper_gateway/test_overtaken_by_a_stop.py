@@ -9,16 +9,16 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from schemas.actions import GoalRequest
+from schemas.actions import GoalRequest, ResultRequest, ResultResponse
 from schemas.deployment import Deployment, PathsSection
 from schemas.device import DeviceCommandRequest, DeviceStopRequest, SpeedCommand, StopKind
 from schemas.gripper import GripperCommandGoal
 from schemas.message import Message, decode, encode
 from schemas.motion import FollowJointTrajectoryGoal
 from schemas.system import Empty, Failure
-from schemas.topics import DEVICE_COMMAND, DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, GATEWAY, GRIPPER_COMMAND
+from schemas.topics import ACTIONS, DEVICE_COMMAND, DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, GATEWAY, GRIPPER_COMMAND
 from services.arm.model.description import load_arm
-from services.runtime.actions.keys import goal_request
+from services.runtime.actions.keys import goal_request, result_request
 from services.runtime.bus.interface import BusReply
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.endpoints import info_request
@@ -31,14 +31,9 @@ from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.shell import Shell
 from tests.runtime.support import ROOT, spinning, until
 
-
-def goal(wanted: Message) -> GoalRequest:
-    return GoalRequest(goal_id=type(wanted).__name__, client="test", goal=msgspec.Raw(encode(wanted)))
-
-
 MOVING = (
-    (goal_request(FOLLOW_JOINT_TRAJECTORY).key, goal(FollowJointTrajectoryGoal())),
-    (goal_request(GRIPPER_COMMAND).key, goal(GripperCommandGoal())),
+    (goal_request(FOLLOW_JOINT_TRAJECTORY).key, FollowJointTrajectoryGoal()),
+    (goal_request(GRIPPER_COMMAND).key, GripperCommandGoal()),
     (DEVICE_COMMAND.key, DeviceCommandRequest(command=SpeedCommand())),
 )
 
@@ -59,6 +54,17 @@ def client(tmp_path: Path) -> Iterator[MemoryBus]:
         yield stack.enter_context(closing(MemoryBus(network)))
 
 
+def asked_with(client: MemoryBus, key: str, wanted: Message) -> Message:
+    """A goal as it is sent to the server of `key`; a command as it is."""
+    for action in ACTIONS:
+        if key == goal_request(action).key:
+            answer = ask(client, result_request(action).key, ResultRequest())
+            epoch = decode(ResultResponse, answer.payload).epoch
+            goal = msgspec.Raw(encode(wanted))
+            return GoalRequest(goal_id=type(wanted).__name__, client="test", goal=goal, epoch=epoch)
+    return wanted
+
+
 def ask(client: MemoryBus, key: str, question: Message, number: int = 0) -> BusReply:
     answers: list[BusReply | None] = []
     client.ask(key, type(question).__name__, encode(question), 20.0, answers.append, number=number)
@@ -67,11 +73,12 @@ def ask(client: MemoryBus, key: str, question: Message, number: int = 0) -> BusR
     return answers[0]
 
 
-@pytest.mark.parametrize(("key", "question"), MOVING, ids=[key for key, _ in MOVING])
+@pytest.mark.parametrize(("key", "wanted"), MOVING, ids=[key for key, _ in MOVING])
 @pytest.mark.parametrize("kind", StopKind)
 def test_what_was_asked_before_a_stop_is_void_and_what_is_asked_after_it_is_not(
-    client: MemoryBus, key: str, question: Message, kind: StopKind
+    client: MemoryBus, key: str, wanted: Message, kind: StopKind
 ) -> None:
+    question = asked_with(client, key, wanted)
     before = client.take_number()
     stop = DeviceStopRequest(kind=kind)  # it is answered only when the device has been silent for long
     client.ask(DEVICE_STOP.key, type(stop).__name__, encode(stop), 20.0, lambda answer: None, True)

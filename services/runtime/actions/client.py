@@ -9,9 +9,9 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from schemas.actions import CancelRequest, GoalFeedback, GoalRequest, GoalStatuses
+from schemas.actions import CancelRequest, GoalFeedback, GoalRequest, GoalStatuses, ResultRequest
 from schemas.message import BadMessage, Message, decode, encode
-from schemas.topics import Action, Topic
+from schemas.topics import Action, Request, Topic
 from services.runtime.actions import keys as keys
 from services.runtime.actions.goal_handle import GoalHandle
 from services.runtime.bus.interface import Bus
@@ -22,6 +22,8 @@ from services.runtime.requests import client as requests
 G = TypeVar("G", bound=Message)
 F = TypeVar("F", bound=Message)
 R = TypeVar("R", bound=Message)
+Q = TypeVar("Q", bound=Message)
+A = TypeVar("A", bound=Message)
 
 PAUSE = 0.05  # [s] between two tries
 ATTEMPT = 1.0  # [s] of one try to send a goal; further tries carry the same id, so it is accepted once
@@ -61,9 +63,13 @@ class ActionClient(Generic[G, F, R]):
         goal_id = uuid.uuid4().hex
         handle: GoalHandle[F, R] = GoalHandle(self.action, goal_id, self._bus, self._loop, on_feedback)
         self._handles[goal_id] = handle
+        end, number = time.monotonic() + timeout, self._bus.take_number()  # one for all: no try overtakes a stop
         try:
-            request = GoalRequest(goal_id=goal_id, client=self._client, goal=_raw(goal), attached=attached)
-            response = self._ask(request, timeout)
+            epoch = self._ask(keys.result_request(self.action), ResultRequest(), end).epoch
+            request = GoalRequest(
+                goal_id=goal_id, client=self._client, goal=_raw(goal), attached=attached, epoch=epoch
+            )  # fmt: skip
+            response = self._ask(keys.goal_request(self.action), request, end, number)
         except (NoAnswer, KeyboardInterrupt):
             handle.cancel()  # it may have been accepted all the same
             del self._handles[goal_id]
@@ -93,12 +99,12 @@ class ActionClient(Generic[G, F, R]):
             if handle.is_over:
                 del self._handles[handle.goal_id]
 
-    def _ask(self, request: GoalRequest, timeout: float) -> Any:
-        end, number = time.monotonic() + timeout, self._bus.take_number()  # one for all: no try overtakes a stop
+    def _ask(self, request: Request[Q, A], question: Q, end: float, number: int = 0) -> A:
+        """Asks until it is answered; raises `NoAnswer` after `end` [s] monotonic. `number` as that of `Bus.ask`."""
         while True:
             left = max(0.05, min(ATTEMPT, end - time.monotonic()))
             try:
-                return requests.call(self._bus, keys.goal_request(self.action), request, left, number)
+                return requests.call(self._bus, request, question, left, number)
             except NoAnswer:
                 if time.monotonic() >= end - PAUSE:
                     raise

@@ -1,7 +1,12 @@
-"""The goals of an action's server: results are kept for two minutes, and no id is decided upon twice."""
+"""The goals of an action's server: results are kept for two minutes, and no id is decided upon twice.
+
+A server that was started anew knows no ids. It has another epoch, and takes only goals for that: one that was meant for
+the server before it, and comes late or is said again, is void.
+"""
 
 from __future__ import annotations
 
+import secrets
 import time
 from dataclasses import dataclass, field
 
@@ -22,6 +27,7 @@ KEPT = 120.0  # [s] that a result can be asked for after the end
 MAX_KEPT = 256  # goals
 MAX_DECIDED = 32_768  # ids of goals that were refused or are forgotten; some 4 MB
 FORGOTTEN = GoalResponse(reason="a goal of this id has ended already: send it again with an id of its own")
+EPOCH_BITS = 62  # of a random number; it is never 0, which a client says that does not know it
 MAX_RESULT_WAIT = 5.0  # [s] that the answer to a result request may be held back
 
 
@@ -56,6 +62,7 @@ class GoalRegistry:
     """Goals by id, oldest first."""
 
     def __init__(self) -> None:
+        self.epoch = secrets.randbits(EPOCH_BITS) + 1
         self._goals: dict[str, GoalRecord] = {}
         self._decided: dict[str, GoalResponse] = {}  # refused or forgotten, oldest first
 
@@ -108,7 +115,7 @@ class GoalRegistry:
         """At once, or when the goal ends, if the request may be held back."""
         goal = self._goals.get(request.goal_id)
         if goal is None:
-            pending.reply(ResultResponse(status=GoalStatusCode.UNKNOWN))
+            pending.reply(ResultResponse(status=GoalStatusCode.UNKNOWN, epoch=self.epoch))
         elif goal.status.is_terminal or request.wait <= 0.0:
             pending.reply(ResultResponse(status=goal.status, result=goal.result))
         else:

@@ -84,6 +84,11 @@ class ActionServer(Generic[G, F, R]):
         serve(keys.result_request(action), self._goals.answer_result)
         self.beat()
 
+    @property
+    def epoch(self) -> int:
+        """That a goal must name to be taken; another one each time that the server starts."""
+        return self._goals.epoch
+
     def feedback(self, goal_id: str, feedback: F) -> None:
         """Publishes feedback of a goal."""
         self._feedback.put(GoalFeedback(goal_id=goal_id, feedback=msgspec.Raw(encode(feedback))))
@@ -130,8 +135,21 @@ class ActionServer(Generic[G, F, R]):
         self._publish_status()
 
     def _answer_goal(self, request: GoalRequest, pending: Pending[GoalResponse]) -> None:
-        pending.reply(self._goals.response_to(request.goal_id) or self._decide(request, pending.client))
+        pending.reply(
+            self._void(request) or self._goals.response_to(request.goal_id) or self._decide(request, pending.client)
+        )
         self._publish_status()
+
+    def _void(self, request: GoalRequest) -> GoalResponse | None:
+        """The refusal of a goal that was meant for another process in this one's place, or for none."""
+        if request.epoch == self.epoch:
+            return None
+        if request.epoch:
+            why = f"it was sent to a {self.action.server} that was started anew since: ask again for what is wanted"
+        else:
+            key = keys.result_request(self.action).key
+            why = f"it does not name the epoch of {self.action.server}, which {key} says of a goal that is not known"
+        return GoalResponse(reason=why, stamp=time.time_ns())
 
     def _decide(self, request: GoalRequest, session: str) -> GoalResponse:
         if not request.goal_id:

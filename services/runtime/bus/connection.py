@@ -7,19 +7,15 @@ import os
 import socket
 import ssl
 import time
-from pathlib import Path
 
 from schemas.deployment import RouterSection
-from services.credentials.authority import expiry
-from services.credentials.private_files import AccessError, require_private
+from services.credentials.private_files import require_private
 from services.runtime.bus.interface import Bus
 from services.runtime.errors import BusError
 from services.runtime.process.shutdown import ShutdownRequest
 
 RETRY_PERIOD = 0.1  # [s]
 HANDSHAKE = 1.0  # [s] for the router to say why it refuses a certificate
-DAY = 86_400.0  # [s]
-WARN_WITHIN = 30.0  # [days] before the end of a certificate, as `gemelo deploy keys` renews it
 SILENT_WAIT = 1.0  # [s] of waiting that are not worth a word: all processes start at once
 
 
@@ -28,8 +24,6 @@ def connect(router: RouterSection, robot: str, log: logging.Logger, stop: Shutdo
     from services.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus, router_answers
 
     require_certificate(router)
-    if soon := ends_soon(router):
-        log.warning("%s", soon)
     is_said = False
     started = time.monotonic()
     while not stop.is_set:
@@ -64,20 +58,6 @@ def require_certificate(router: RouterSection) -> None:
         if not os.access(path, os.R_OK):
             raise BusError(f"router.{name}: cannot read {path}: `gemelo deploy keys` makes it")
     require_private(router.key)
-
-
-def ends_soon(router: RouterSection) -> str:
-    """Says when the certificate ends, with the remedy; empty where that is far off or cannot be read."""
-    if not router.tls:
-        return ""
-    try:
-        left = (expiry(Path(router.certificate)) - time.time()) / DAY
-    except AccessError:
-        return ""  # no openssl on this host; the router judges it
-    if left > WARN_WITHIN:
-        return ""
-    when = f"ends in {left:.0f} days, and then every link with it" if left > 0.0 else "has expired"
-    return f"{router.certificate} {when}: `gemelo deploy keys` renews it, then give this host its folder again"
 
 
 def refusal(router: RouterSection) -> str:
