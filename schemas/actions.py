@@ -35,7 +35,7 @@ class GoalRequest(Message, frozen=True, kw_only=True):
     client: str = ""  # key of its liveliness token
     goal: msgspec.Raw = NIL
     attached: bool = False  # cancel the goal when the client's token vanishes
-    epoch: int = 0  # of the server that is to take it, as its `ResultResponse` says; for another one it is void
+    epoch: int = 0  # of the server that is to take it, as its `ResultResponse` says: void for another one; 0 for any
 
 
 class GoalResponse(Message, frozen=True, kw_only=True):

@@ -111,14 +111,15 @@ def test_a_client_from_before_a_restart_of_the_server_moves_it_as_before_with_a_
         arm.node.close()
 
 
-def test_a_goal_that_names_no_epoch_is_refused_with_where_to_learn_it(buses: Buses) -> None:
+def test_a_goal_that_names_no_epoch_is_taken_and_one_of_another_is_not(buses: Buses) -> None:
     with moving(buses) as arm:
         node = buses.node("client")
-        refused = send(node, replace(request_of("g", arm), epoch=0))
-        assert (refused.accepted, arm.moved) == (False, 0)
-        assert "follow_joint_trajectory/result says" in refused.reason
         told = node.call(keys.result_request(FOLLOW), ResultRequest()).epoch
-        assert send(node, replace(request_of("g", arm), epoch=told)).accepted
+        refused = send(node, replace(request_of("g", arm), epoch=told ^ 1))
+        assert (refused.accepted, arm.moved) == (False, 0)
+        assert "started anew since" in refused.reason
+        assert send(node, replace(request_of("h", arm), epoch=0)).accepted
+        assert send(node, replace(request_of("i", arm), epoch=told)).accepted
 
 
 def test_the_ids_that_are_remembered_are_bounded_and_the_oldest_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:

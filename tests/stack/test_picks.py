@@ -86,7 +86,7 @@ def test_a_thing_that_cannot_be_carried_on_is_said_to_be_between_the_jaws(stack,
     with gemelo.connect() as arm:
         arm.move(named="ready")
         arm.scene.add_box("full", (0.04, 0.04, 0.07), at=(*BIN, 0.035))
-        with pytest.raises(gemelo.Aborted, match="cup was picked and is still between the jaws: .*full"):
+        with pytest.raises(gemelo.Aborted, match=r"cup was picked and is still between the jaws: .*full"):
             arm.pick("cup", to="bin")
         assert arm.scene.objects["cup"].attached
         arm.scene.remove("full")

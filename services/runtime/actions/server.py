@@ -141,14 +141,10 @@ class ActionServer(Generic[G, F, R]):
         self._publish_status()
 
     def _void(self, request: GoalRequest) -> GoalResponse | None:
-        """The refusal of a goal that was meant for another process in this one's place, or for none."""
-        if request.epoch == self.epoch:
+        """The refusal of a goal meant for another process in this one's place; one that names none is taken."""
+        if request.epoch in (0, self.epoch):
             return None
-        if request.epoch:
-            why = f"it was sent to a {self.action.server} that was started anew since: ask again for what is wanted"
-        else:
-            key = keys.result_request(self.action).key
-            why = f"it does not name the epoch of {self.action.server}, which {key} says of a goal that is not known"
+        why = f"it was sent to a {self.action.server} that was started anew since: ask again for what is wanted"
         return GoalResponse(reason=why, stamp=time.time_ns())
 
     def _decide(self, request: GoalRequest, session: str) -> GoalResponse:
