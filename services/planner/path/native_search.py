@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 NATIVE = "native"
 # Tuning constants: chosen, where a line does not say measured or standard.
-ENOUGH = 6_000  # configurations checked; measured: the median of a first search is 3,000 (plan_any_ms)
+ENOUGH = 10_000  # configurations checked; measured: 9 of 10 drawn paths are then within 8 % of the best known
 REASONS = {"START_TOUCHES": SearchFailure.START_TOUCHES, "GOAL_TOUCHES": SearchFailure.GOAL_TOUCHES}
 
 
