@@ -140,7 +140,7 @@ class Campaign:
         try:
             self._site.stack.wait_ready(READY)
         except StackError as error:
-            violations.append(str(error).splitlines()[0])
+            violations += words_of(error)
         return time.monotonic() - healed
 
     def _judge(self, motion: gemelo.Motion, ended: str, fault: Fault, late_before: int) -> list[str]:
@@ -164,6 +164,11 @@ class Campaign:
                 found += misses(arm, motion.plan.trajectory.points[-1].positions, person.shaft())
         person.pause(0.5)
         return found + moved(arm, at_rest, person.position)
+
+
+def words_of(error: StackError) -> list[str]:
+    """What a report says of a stack that is not ready: the names, then a line for each process with its reason."""
+    return [str(error).partition("\n")[0], *(each.sentence for each in error.unready)]
 
 
 def unexpected_hands(fault: Fault, hands: Sequence[str], was_late: bool = False) -> list[str]:

@@ -19,7 +19,7 @@ from services.broker import mosquitto
 from services.chaos.slow_link import SlowLink
 from services.runtime.actions.keys import feedback_topic, status_topic
 from services.runtime.bus.zenoh_bus import ZenohBus
-from services.stack.stack import Stack, free_ports
+from services.stack.stack import Stack, StackError, free_ports
 
 KEPT = 200  # frames of the wire that can be said again
 TO_CONNECT = 30.0  # [s] for the arm to be there
@@ -57,7 +57,7 @@ class Site:
             closing.callback(self.link.close)
             closing.enter_context(self.stack)
             os.environ.update(self.stack.deployment)  # where the arm is found
-            self.arm = closing.enter_context(gemelo.connect(name="chaos", timeout=TO_CONNECT))
+            self.arm = closing.enter_context(self._connect())
             self.wire = WireStranger(self._broker_port)
             closing.callback(self.wire.close)
             self.bus = BusStranger(int(self.stack.deployment["GEMELO_ROUTER_PORT"]), self.arm.name)
@@ -69,6 +69,14 @@ class Site:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._closing.close()
+
+    def _connect(self) -> gemelo.Arm:
+        """Raises `StackError` with the reason of each process that is not ready."""
+        try:
+            return gemelo.connect(name="chaos", timeout=TO_CONNECT)
+        except gemelo.Error as error:
+            unready = self.stack.why_not_ready()
+            raise StackError("\n".join([f"no arm to move: {error}", *map(str, unready)]), unready) from error
 
 
 class WireStranger:

@@ -226,10 +226,12 @@ class Node:
         self._problem = "" if ok else reason
         if self._readiness is None:
             self._readiness = Readiness(project_root() / Path(self.deployment.paths.run), self.name)
-        if ok == self._readiness.is_ready:
-            return
-        self.log.info("%s%s", "ready" if ok else "not ready", f": {reason}" if reason else "")
-        (self._readiness.ready if ok else self._readiness.not_ready)()
+        if ok != self._readiness.is_ready:
+            self.log.info("%s%s", "ready" if ok else "not ready", f": {reason}" if reason else "")
+        if ok:
+            self._readiness.ready()
+        else:
+            self._readiness.not_ready(reason)
 
     @property
     def is_ready(self) -> bool:

@@ -7,11 +7,12 @@ import json
 
 import msgspec
 
-from services.chaos.campaign import Episode, order, unexpected_hands
+from services.chaos.campaign import Episode, order, unexpected_hands, words_of
 from services.chaos.faults import FAULTS, Fault
 from services.chaos.main import chosen_faults, unfit
 from services.chaos.report import Report, page_of, rows_of, summary, text_of
-from services.stack.stack import PROCESSES
+from services.stack.not_ready import NotReady
+from services.stack.stack import PROCESSES, StackError
 
 
 def fault(name: str) -> Fault:
@@ -81,6 +82,15 @@ def test_the_reports_name_each_violation_and_the_command_that_repeats_it() -> No
     assert "<b>jumped" not in page
     assert page.count("<circle") == 3
     assert json.loads(msgspec.json.encode(found))["episodes"][1]["violations"] == ["<b>jumped"]
+
+
+def test_a_report_says_of_each_process_that_is_not_ready_why_and_what_it_said_last() -> None:
+    unready = (NotReady("planner", "it is frozen", ("one", "two")), NotReady("logger", "it does not run", ()))
+    assert words_of(StackError("not ready after 20 s: planner, logger\n--- planner", unready)) == [
+        "not ready after 20 s: planner, logger",
+        "planner is not ready: it is frozen; its last lines: one | two",
+        "logger is not ready: it does not run; it has printed nothing",
+    ]
 
 
 def test_what_cannot_be_run_is_said(monkeypatch) -> None:

@@ -132,7 +132,7 @@ class VirtualEsp32:
                 self._device.report_status()
             case Disconnected():
                 self._wires.network.on_disconnected(item.reason)
-                self._readiness.not_ready()
+                self._readiness.not_ready(f"no connection to the broker: {item.reason}")
             case Denied():
                 self._wires.network.on_denied(item.reason)
             case ShutdownRequested():
