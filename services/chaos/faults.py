@@ -14,7 +14,7 @@ from random import Random
 import psutil
 
 import gemelo
-from services.chaos.site import Site
+from services.chaos.site import Site, program
 from services.stack.stack import StackError
 
 Begin = Callable[[Site, Random], str]  # does it; the words for what was chosen
@@ -23,6 +23,7 @@ Heal = Callable[[Site], None]
 READY = 20.0  # [s] after the heal in which every process is ready again: ARCHITECTURE.md's table, on a busy machine
 FEW, MANY = 20, 200  # frames
 SLIP = 0.05  # of a joint's travel, to either side
+LEAST_STEP, MOST_STEP = 0.2, 3600.0  # [s] of a clock
 
 
 def nothing(site: Site) -> None:
@@ -177,6 +178,22 @@ def disk_freed(site: Site) -> None:
         resource.prlimit(site.stack.pid("logger"), resource.RLIMIT_FSIZE, unlimited)
 
 
+def clocks_stepped(of_all: bool) -> Begin:
+    """The wall clock of the host, or of one process as if it were on a host of its own, steps to either side."""
+
+    def begin(site: Site, random: Random) -> str:
+        ahead = random.choice((-1.0, 1.0)) * LEAST_STEP * (MOST_STEP / LEAST_STEP) ** random.random()
+        names = site.clocks.names if of_all else (random.choice([*map(program, site.stack.processes)]),)
+        site.clocks.set_ahead(ahead, names)
+        return f"the clock of {'the host' if of_all else names[0]} steps by {ahead:+.1f} s"
+
+    return begin
+
+
+def clocks_set_back(site: Site) -> None:
+    site.clocks.set_ahead(0.0)
+
+
 def stopped(site: Site, random: Random) -> str:
     site.arm.stop()
     return "a person's stop"
@@ -224,6 +241,10 @@ FAULTS: tuple[Fault, ...] = (
     Fault("device offline", "its network is away", injected("offline", (0.2, 3.0)), (0.2, 3.0)),
     Fault("device frozen", "its path task hangs", injected("freeze", (0.05, 2.0)), (0.05, 2.0), trips=True),
     Fault("device reboots", "it starts anew", injected("reboot"), boots=True),
+    Fault("host clock steps", "the wall clock of all processes steps, and back", clocks_stepped(True), LONG,
+          clocks_set_back),
+    Fault("one clock steps", "the wall clock of one process steps, and back", clocks_stepped(False), LONG,
+          clocks_set_back),
     Fault("clock drifts", "the device's clock is fast or slow", injected("drift", (-400.0, 400.0)), LONG,
           lambda site: site.arm.device.inject("drift", value=0.0)),
     Fault("e-stop", "pressed and released", injected("estop"), SHORT, released("estop"), trips=True, slips=True),

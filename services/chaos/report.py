@@ -92,9 +92,10 @@ def summary(report: Report) -> str:
     bad = sum(bool(each.violations) for each in report.episodes)
     verdict = "every invariant held" if report.is_good else f"{bad} faults and {len(report.violations)} checks violated"
     lost = f"{report.states_lost} of {report.states_heard} joint states heard are not recorded"
-    count = len(report.episodes)
+    count, slots = len(report.episodes), sum(each.slots for each in report.episodes)
     rate = f"{60.0 * count / report.seconds:.1f} a minute" if report.seconds else "none"
-    return f"{count} faults in {report.seconds:.0f} s ({rate}), seed {report.seed}: {verdict}; {lost}"
+    faults = f"{count} faults in {report.seconds:.0f} s ({rate}), seed {report.seed}"
+    return f"{faults}: {verdict}; {slots} slots with steps judged; {lost}"
 
 
 def page_of(report: Report) -> str:
