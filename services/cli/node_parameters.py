@@ -10,15 +10,8 @@ from typing import NamedTuple
 
 from schemas.system import Parameter, ParameterValue
 from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.node import (
-    change_parameter,
-    living,
-    parameter_of,
-    parameters_of,
-    require_in_range,
-    value_of,
-    written,
-)
+from services.cli.node import living
+from services.cli.param import change_parameter, parameter_of, parameters_of, require_in_range, value_of, written
 from services.cli.parser import Options, Parser
 from services.cli.session import Session, connect
 
@@ -62,7 +55,7 @@ def dumped(session: Session, names: list[str]) -> str:
     blocks = []
     for name in names or living(session):
         lines = [
-            f"{json.dumps(each.name)} = {_toml(each.value)}{f'  # {each.description}' if each.description else ''}"
+            f"{json.dumps(each.name)} = {json.dumps(each.value)}{f'  # {each.description}' if each.description else ''}"
             for each in parameters_of(session, name)
         ]
         if lines:
@@ -111,7 +104,3 @@ def _change(session: Session, node: str, name: str, value: object) -> Change:
     wanted = value_of(parameter, written(value))
     require_in_range(node, parameter, wanted)
     return Change(node, parameter, wanted)
-
-
-def _toml(value: ParameterValue) -> str:
-    return json.dumps(value)
