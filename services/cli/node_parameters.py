@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import tomllib
 from pathlib import Path
@@ -14,6 +13,7 @@ from services.cli.node import living
 from services.cli.param import change_parameter, parameter_of, parameters_of, require_in_range, value_of, written
 from services.cli.parser import Options, Parser
 from services.cli.session import Session, connect
+from services.runtime.saved_parameters import toml
 
 
 class Change(NamedTuple):
@@ -55,11 +55,11 @@ def dumped(session: Session, names: list[str]) -> str:
     blocks = []
     for name in names or living(session):
         lines = [
-            f"{json.dumps(each.name)} = {json.dumps(each.value)}{f'  # {each.description}' if each.description else ''}"
+            f"{toml(each.name)} = {toml(each.value)}{f'  # {each.description}' if each.description else ''}"
             for each in parameters_of(session, name)
         ]
         if lines:
-            blocks.append("\n".join([f"[{json.dumps(name)}]", *lines]))
+            blocks.append("\n".join([f"[{toml(name)}]", *lines]))
     return "\n\n".join(blocks) + "\n"
 
 

@@ -9,7 +9,7 @@ import msgspec
 
 from schemas.system import Empty, Parameter, Parameters, ParameterValue, SetParameter
 from schemas.topics import Request
-from services.cli.errors import ExitCode, nearest, usage
+from services.cli.errors import CommandError, ExitCode, nearest, usage
 from services.cli.forms import print_value
 from services.cli.messages import dump
 from services.cli.node import TIMEOUT, living, node_option, require_alive
@@ -59,15 +59,16 @@ def run_describe(options: Options) -> ExitCode:
 
 
 def set_options(parser: Parser) -> None:
-    """Adds node, parameter and value."""
+    """Adds node, parameter, value and --save."""
     named_options(parser)
+    parser.add_argument("--save", action="store_true", help="keep it beyond the end of the process")
     parser.add_argument("value", metavar="VALUE", help="in the parameter's own type and unit")
 
 
 def run_set(options: Options) -> ExitCode:
     """Sets a parameter."""
     with connect() as session:
-        print(set_parameter(session, options.node, options.parameter, options.value))
+        print(set_parameter(session, options.node, options.parameter, options.value, options.save))
     return ExitCode.OK
 
 
@@ -117,17 +118,23 @@ def parameter_of(session: Session, node: str, name: str) -> Parameter:
     return known[name]
 
 
-def set_parameter(session: Session, node: str, name: str, text: str) -> str:
+def set_parameter(session: Session, node: str, name: str, text: str, save: bool = False) -> str:
     """Sets a parameter and returns a line about it; the node itself refuses a value out of range."""
     parameter = parameter_of(session, node, name)
-    return change_parameter(session, node, parameter, value_of(parameter, text))
+    return change_parameter(session, node, parameter, value_of(parameter, text), save)
 
 
-def change_parameter(session: Session, node: str, parameter: Parameter, value: ParameterValue) -> str:
-    """Sets `parameter` of `node` to `value` and returns a line about it."""
+def change_parameter(
+    session: Session, node: str, parameter: Parameter, value: ParameterValue, save: bool = False
+) -> str:
+    """Sets `parameter` of `node` to `value`, also for later starts if `save`, and returns a line about it."""
     request = Request(f"@node/{node}/parameters/set", SetParameter, Parameter, node, "")
-    after = session.node.call(request, SetParameter(name=parameter.name, value=value), timeout=TIMEOUT)
-    return f"{node} {after.name}: {written(parameter.value)} -> {written(after.value)}"
+    question = SetParameter(name=parameter.name, value=value, save=save)
+    after = session.node.call(request, question, timeout=TIMEOUT)
+    if save and not after.saved_in:  # an older node knows of no `save`
+        raise CommandError(f"{node} {after.name} is {written(after.value)} now, and not saved: {node} cannot save")
+    kept = f", saved in {after.saved_in}" if save else ""
+    return f"{node} {after.name}: {written(parameter.value)} -> {written(after.value)}{kept}"
 
 
 def require_in_range(node: str, parameter: Parameter, value: ParameterValue) -> None:

@@ -41,6 +41,7 @@ from services.runtime.requests import client as requests
 from services.runtime.requests.exchanges import exchange_topic
 from services.runtime.requests.limits import RequestRates
 from services.runtime.requests.server import Pending, RequestServer, UrgentServer
+from services.runtime.saved_parameters import SavedParameters
 from services.runtime.topics import Latest, LatestOnDemand, Publisher, Subscription
 
 M = TypeVar("M", bound=Message)
@@ -84,7 +85,8 @@ class Node:
         self._endpoints = NodeEndpoints()
         self._rates = RequestRates()
         from_file = self.deployment.parameters.get(name, {})
-        self._parameters = ParameterRegistry(name, from_file, overrides or {}, self.log)
+        saved = SavedParameters(project_root() / self.deployment.paths.run, name)
+        self._parameters = ParameterRegistry(name, from_file, overrides or {}, saved, self.log)
         self._is_closed = False
         with stop_on_signals(self._stop) if self._signals else nullcontext():
             self._bus = bus or connect(self.deployment.router, self.robot, self.log, self._stop)
