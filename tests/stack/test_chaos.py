@@ -25,7 +25,7 @@ def test_a_minute_of_chaos_violates_nothing(tmp_path, pytestconfig):
     report = json.loads((tmp_path / "out/report.json").read_text())
     assert len(report["episodes"]) >= 4
     assert (report["states_lost"], report["violations"]) == (0, [])
-    assert all(each["slots"] > 100 for each in report["episodes"])  # of 1 ms with a step, each within the limits
+    assert sum(each["slots"] for each in report["episodes"]) > 1000  # of 1 ms with a step, each within the limits
     assert (tmp_path / "out/report.html").read_text().count("<circle") == len(report["episodes"])
 
 
