@@ -222,7 +222,7 @@ COMMANDS = (
     Command(("param", "dump"), "the parameters of nodes as TOML, for `param load`",
             "node_parameters:run_dump", "node_parameters:dump_options", "gemelo param dump > parameters.toml"),
     Command(("param", "load"), "set what a file of `param dump` says; nothing is set if one of them is refused",
-            "node_parameters:run_load", "node_parameters:load_options", "gemelo param load parameters.toml"),
+            "node_parameters:run_load", "node_parameters:load_options", "gemelo param load parameters.toml --save"),
     Command(("top",), "CPU, memory, loop and losses of every node, until Ctrl-C", "top:run", "top:add_options",
             "gemelo top --once --json"),
     Command(("log",), "follow the log of every node, until Ctrl-C", "log:run_log", "log:log_options"),

@@ -37,15 +37,16 @@ def run_dump(options: Options) -> ExitCode:
 
 
 def load_options(parser: Parser) -> None:
-    """Adds the file."""
+    """Adds the file and --save."""
     parser.add_argument("file", metavar="FILE", help="as `param dump` writes it, or - for standard input")
+    parser.add_argument("--save", action="store_true", help="keep all of it beyond the end of the processes")
 
 
 def run_load(options: Options) -> ExitCode:
     """Sets parameters."""
     tables = read(options.file)
     with connect() as session:
-        for line in load(session, tables):
+        for line in load(session, tables, options.save):
             print(line)
     return ExitCode.OK
 
@@ -76,19 +77,19 @@ def read(file: str) -> dict[str, dict[str, object]]:
     return tables
 
 
-def load(session: Session, tables: dict[str, dict[str, object]]) -> list[str]:
-    """Sets what differs, and returns a line for each; where one is refused, what was set before it is set back."""
+def load(session: Session, tables: dict[str, dict[str, object]], save: bool = False) -> list[str]:
+    """Sets what differs, or saves all; a line for each. Where one is refused, those before it are set back."""
     changes = [_change(session, node, name, value) for node, table in tables.items() for name, value in table.items()]
     lines: list[str] = []
     done: list[Change] = []
     for change in changes:
-        if change.value == change.parameter.value:
+        if change.value == change.parameter.value and not save:
             continue
         try:
-            lines.append(change_parameter(session, change.node, change.parameter, change.value))
+            lines.append(change_parameter(session, change.node, change.parameter, change.value, save))
         except Exception:
             for before in reversed(done):
-                change_parameter(session, before.node, before.parameter, before.parameter.value)
+                change_parameter(session, before.node, before.parameter, before.parameter.value, save)
             raise
         done.append(change)
     return lines or ["every parameter has that value already"]

@@ -8,6 +8,7 @@ import json
 import math
 import re
 import threading
+import tomllib
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -276,6 +277,17 @@ def test_parameters_are_dumped_and_loaded(session, knobs, tmp_path: Path):
     file.write_text(text.replace("1.0", "1.5").replace("false", "true"))
     lines = node_parameters.load(session, node_parameters.read(str(file)))
     assert lines == ["thing gain: 1.0 -> 1.5", "thing on: false -> true"]
+
+
+def test_a_file_is_loaded_for_later_starts_too(session, knobs, deployment, tmp_path: Path):
+    saved = Path(deployment.paths.run) / "parameters/thing.toml"
+    (tmp_path / "knobs.toml").write_text('[thing]\ngain = 1.5\nname = "a \\"b\\""\n')
+    lines = node_parameters.load(session, node_parameters.read(str(tmp_path / "knobs.toml")), save=True)
+    assert lines == [
+        f"thing gain: 1.0 -> 1.5, saved in {saved}",
+        f'thing name: a "b" -> a "b", saved in {saved}',  # as it was, and kept
+    ]
+    assert tomllib.loads(saved.read_text()) == {"gain": 1.5, "name": 'a "b"'}
 
 
 @pytest.mark.parametrize(
