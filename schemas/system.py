@@ -111,6 +111,7 @@ class Parameter(Message, frozen=True, kw_only=True):
     description: str = ""
     minimum: float | None = None
     maximum: float | None = None
+    saved_in: str = ""  # in an answer: the file on the node's host that now has it for later starts
 
 
 class Parameters(Message, frozen=True, kw_only=True):
@@ -132,6 +133,7 @@ class SetParameter(Message, frozen=True, kw_only=True):
 
     name: str = ""
     value: ParameterValue = False
+    save: bool = False  # also for later starts of the process
 
 
 class Exchange(Message, frozen=True, kw_only=True):

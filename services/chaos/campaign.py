@@ -9,10 +9,13 @@ from random import Random
 import msgspec
 
 import gemelo
+from services.arm.device.device_config import device_config
 from services.chaos.faults import FAULTS, READY, Fault
 from services.chaos.invariants import jerks, jumps, misses, moved, segments
 from services.chaos.person import Person, quietly_cancel
 from services.chaos.site import Site
+from services.chaos.slots import steps_in
+from services.chaos.slots import violations as slot_violations
 from services.stack.stack import StackError
 
 TO_END = 25.0  # [s] beyond the move's own time in which its client must know its end
@@ -32,6 +35,7 @@ class Episode(msgspec.Struct, frozen=True, kw_only=True):
     to_ready: float = 0.0  # [s] from the heal until every process is ready
     hands: tuple[str, ...] = ()  # what a person had to do
     was_late: bool = False  # the machine gave the virtual device no time: whether its shaft arrived was not judged
+    slots: int = 0  # of 1 ms in which a joint made a step, each held against the limits
     violations: tuple[str, ...] = ()
 
 
@@ -57,6 +61,7 @@ class Campaign:
         self.person = Person(site.arm)
         self.muted: list[tuple[int, int]] = []  # [ns] UNIX, from and to when records may be lost
         self._site, self._say = site, say
+        self._config = device_config(site.arm.description)
 
     def episode(self, number: int, fault: Fault, random: Random) -> Episode:
         """One move with one fault; never raises for what the stack does."""
@@ -68,6 +73,7 @@ class Campaign:
         motion = self._start(random, violations)
         if motion is None:
             return Episode(number=number, fault=fault.name, chosen="", ended="not begun", violations=tuple(violations))
+        self._site.slots.forget()  # a reference before the move has set the counters
         self._reach(motion, random.uniform(0.1, 0.8))
         begun_at, begun = time.monotonic(), time.time_ns()
         chosen = self._begin(fault, random, violations)
@@ -82,6 +88,10 @@ class Campaign:
         if fault.mutes:
             self.muted.append((begun - int(MUTED * 1e9), time.time_ns() + int(MUTED * 1e9)))
         violations += self._judge(motion, ended, fault, late_before)
+        slots, beyond = self._judge_slots(fault)
+        if beyond:
+            self._site.slots.keep_as(self._site.stack.out / f"episode_{number}.slots")
+        violations += beyond
         was_late = len(person.late) > late_before  # a shaft that stops from full speed has lost steps
         person.hands.clear()
         if unready := person.make_ready(READY, reference=fault.slips or was_late):
@@ -89,7 +99,7 @@ class Campaign:
         violations += unexpected_hands(fault, person.hands, was_late)
         return Episode(
             number=number, fault=fault.name, chosen=chosen, ended=ended, reason=reason, to_end=to_end,
-            to_ready=to_ready, hands=tuple(person.hands), was_late=was_late, violations=tuple(violations),
+            to_ready=to_ready, hands=tuple(person.hands), was_late=was_late, slots=slots, violations=tuple(violations),
         )  # fmt: skip
 
     def _start(self, random: Random, violations: list[str]) -> gemelo.Motion | None:
@@ -140,7 +150,7 @@ class Campaign:
         try:
             self._site.stack.wait_ready(READY)
         except StackError as error:
-            violations.append(str(error).splitlines()[0])
+            violations += words_of(error)
         return time.monotonic() - healed
 
     def _judge(self, motion: gemelo.Motion, ended: str, fault: Fault, late_before: int) -> list[str]:
@@ -164,6 +174,16 @@ class Campaign:
                 found += misses(arm, motion.plan.trajectory.points[-1].positions, person.shaft())
         person.pause(0.5)
         return found + moved(arm, at_rest, person.position)
+
+    def _judge_slots(self, fault: Fault) -> tuple[int, list[str]]:
+        """In how many slots there was a step, and what of them was beyond the limits of velocity or acceleration."""
+        rows = self._site.slots.rows()
+        return steps_in(rows), slot_violations(self._config, rows, may_stop_at_once=fault.trips)
+
+
+def words_of(error: StackError) -> list[str]:
+    """What a report says of a stack that is not ready: the names, then a line for each process with its reason."""
+    return [str(error).partition("\n")[0], *(each.sentence for each in error.unready)]
 
 
 def unexpected_hands(fault: Fault, hands: Sequence[str], was_late: bool = False) -> list[str]:

@@ -31,6 +31,7 @@ from services.runtime.deployment import load_deployment
 from services.runtime.process.ending import ended_by_signals
 from services.stack.stack import StackError
 
+Order = Iterator[tuple[int, Fault, Random]]  # number, fault and chance of each episode
 LAST_WORDS = 2.0  # [s] at the end of a run of which records may still be on their way
 
 
@@ -52,7 +53,8 @@ def main() -> None:
     broker = options.broker or installed_broker()
     try:
         with ended_by_signals():
-            sys.exit(0 if run(wanted, seed, options.minutes * 60.0, broker, options.out.resolve()) else 1)
+            is_good = run(wanted, seed, options.minutes * 60.0, broker, options.out.resolve(), tuple(options.only))
+            sys.exit(0 if is_good else 1)
     except StackError as error:
         sys.exit(f"chaos: {error}")
     except KeyboardInterrupt:
@@ -75,7 +77,14 @@ def unfit(minutes: float, faults: Sequence[Fault], words: Sequence[str]) -> str:
     return ""
 
 
-def run(wanted: Iterator[tuple[int, Fault, Random]], seed: int, seconds: float, broker: str, out: Path) -> bool:
+def run(
+    wanted: Iterator[tuple[int, Fault, Random]],
+    seed: int,
+    seconds: float,
+    broker: str,
+    out: Path,
+    only: tuple[str, ...],
+) -> bool:
     """Runs episodes for `seconds` [s] or until there are no more; writes and prints the report; True if all is good."""
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
@@ -98,7 +107,7 @@ def run(wanted: Iterator[tuple[int, Fault, Random]], seed: int, seconds: float, 
               if "Traceback" in text]  # fmt: skip
     report = Report(
         seed=seed, robot=robot, broker=broker, seconds=time.monotonic() - begun, episodes=tuple(episodes),
-        states_heard=len(heard), states_lost=len(missing), violations=tuple(found),
+        only=only, states_heard=len(heard), states_lost=len(missing), violations=tuple(found),
     )  # fmt: skip
     (out / "report.json").write_bytes(msgspec.json.format(msgspec.json.encode(report), indent=2) + b"\n")
     (out / "report.html").write_text(page_of(report))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import shlex
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from statistics import median
@@ -22,6 +23,7 @@ class Report(msgspec.Struct, frozen=True, kw_only=True):
     robot: str
     broker: str
     seconds: float
+    only: tuple[str, ...] = ()  # the words that chose the faults; none: all of them
     episodes: tuple[Episode, ...]
     states_heard: int
     states_lost: int  # heard, not recorded, and not while logger or router were away
@@ -83,8 +85,14 @@ def text_of(report: Report) -> str:
     for episode in report.episodes:
         lines += [f"episode {episode.number}, {episode.chosen or episode.fault}: {each}" for each in episode.violations]
         if episode.violations:
-            lines.append(f"  again: gemelo chaos --seed {report.seed} --episode {episode.number}")
+            lines.append(f"  again: {again(report, episode)}")
     return "\n".join([*lines, *report.violations])
+
+
+def again(report: Report, episode: Episode) -> str:
+    """The command that repeats one episode: which fault it was depends on the faults that were chosen too."""
+    only = f" --only {shlex.join(report.only)}" if report.only else ""
+    return f"gemelo chaos --seed {report.seed}{only} --broker {report.broker} --episode {episode.number}"
 
 
 def summary(report: Report) -> str:
@@ -92,9 +100,10 @@ def summary(report: Report) -> str:
     bad = sum(bool(each.violations) for each in report.episodes)
     verdict = "every invariant held" if report.is_good else f"{bad} faults and {len(report.violations)} checks violated"
     lost = f"{report.states_lost} of {report.states_heard} joint states heard are not recorded"
-    count = len(report.episodes)
+    count, slots = len(report.episodes), sum(each.slots for each in report.episodes)
     rate = f"{60.0 * count / report.seconds:.1f} a minute" if report.seconds else "none"
-    return f"{count} faults in {report.seconds:.0f} s ({rate}), seed {report.seed}: {verdict}; {lost}"
+    faults = f"{count} faults in {report.seconds:.0f} s ({rate}), seed {report.seed}"
+    return f"{faults}: {verdict}; {slots} slots with steps judged; {lost}"
 
 
 def page_of(report: Report) -> str:

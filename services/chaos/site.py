@@ -13,16 +13,24 @@ from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
 import gemelo
+from firmware.platform.host.slot_record import VARIABLE
 from schemas.deployment import RouterSection
 from schemas.topics import ACTIONS, TOPICS, Delivery
 from services.broker import mosquitto
+from services.chaos.clocks import ClockError, SteppingClocks
+from services.chaos.slots import SlotFile
 from services.chaos.slow_link import SlowLink
 from services.runtime.actions.keys import feedback_topic, status_topic
 from services.runtime.bus.zenoh_bus import ZenohBus
-from services.stack.stack import Stack, free_ports
+from services.stack.stack import PROCESSES, Stack, StackError, free_ports
 
 KEPT = 200  # frames of the wire that can be said again
 TO_CONNECT = 30.0  # [s] for the arm to be there
+
+
+def program(process: str) -> str:
+    """What is in the command line of a process of the stack."""
+    return f"gemelo-{process.replace('_', '-')}"
 
 
 def installed_broker() -> str:
@@ -34,9 +42,18 @@ def installed_broker() -> str:
 
 
 class Site:
-    """Starts on entering, stops on leaving; `out` gets recordings and logs."""
+    """Starts on entering, stops on leaving; `out` gets recordings and logs.
 
-    def __init__(self, out: Path, broker: str, seed: int) -> None:
+    `is_judged`: clocks can step, and `out` gets the slots of the device. Raises `StackError` where it cannot.
+    """
+
+    def __init__(self, out: Path, broker: str, seed: int, is_judged: bool = True) -> None:
+        out.mkdir(parents=True, exist_ok=True)
+        self.slots = SlotFile(out / "slots")
+        try:
+            self.clocks = SteppingClocks(out, [*map(program, PROCESSES), "mosquitto"])  # which takes a broker's place
+        except ClockError as error:
+            raise StackError(str(error)) from error
         self._port, self._broker_port = free_ports(2)
         self.stack = Stack(
             broker=broker,
@@ -46,6 +63,7 @@ class Site:
                 "GEMELO_MQTT_LISTEN_PORT": str(self._broker_port),
                 "GEMELO_DEVICE": "virtual",
                 "GEMELO_WIRE": "mqtt",
+                **({VARIABLE: str(self.slots.path), **self.clocks.environment} if is_judged else {}),
             },
         )
         self._seed = seed
@@ -57,7 +75,7 @@ class Site:
             closing.callback(self.link.close)
             closing.enter_context(self.stack)
             os.environ.update(self.stack.deployment)  # where the arm is found
-            self.arm = closing.enter_context(gemelo.connect(name="chaos", timeout=TO_CONNECT))
+            self.arm = closing.enter_context(self._connect())
             self.wire = WireStranger(self._broker_port)
             closing.callback(self.wire.close)
             self.bus = BusStranger(int(self.stack.deployment["GEMELO_ROUTER_PORT"]), self.arm.name)
@@ -69,6 +87,14 @@ class Site:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._closing.close()
+
+    def _connect(self) -> gemelo.Arm:
+        """Raises `StackError` with the reason of each process that is not ready."""
+        try:
+            return gemelo.connect(name="chaos", timeout=TO_CONNECT)
+        except gemelo.Error as error:
+            unready = self.stack.why_not_ready()
+            raise StackError("\n".join([f"no arm to move: {error}", *map(str, unready)]), unready) from error
 
 
 class WireStranger:

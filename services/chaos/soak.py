@@ -85,7 +85,7 @@ def run(seconds: float, seed: int, broker: str, out: Path) -> bool:
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
     random, samples, failures, moves = Random(seed), dict[str, list[Sample]](), list[str](), 0
-    with Site(out, broker, seed) as site:
+    with Site(out, broker, seed, is_judged=False) as site:
         person, begun = Person(site.arm), time.monotonic()
         due, told = begun, begun + TOLD_EVERY
         while (now := time.monotonic()) < begun + seconds:

@@ -9,8 +9,9 @@ from schemas.actions import GoalStatusCode
 from schemas.message import Message
 from schemas.topics import ACTIONS, Action
 from services.cli.errors import CommandError, ExitCode, unknown, usage
+from services.cli.forms import print_value
 from services.cli.messages import dump, fields_of, message_of
-from services.cli.parser import Choices, Options, Parser
+from services.cli.parser import Choices, Options, Parser, json_option
 from services.cli.session import Session, connect, share_control
 from services.cli.terminal import CANCELLING, two_stage_interrupt
 from services.cli.text_table import table
@@ -24,8 +25,7 @@ LONGEST_HOLD = 3600.0  # [s] that a person may hold the arm on its path
 
 def run_list(options: Options) -> ExitCode:
     """Prints the table of actions."""
-    print(listing())
-    return ExitCode.OK
+    return print_value([head_of(each) for each in ACTIONS], options.json, listing)
 
 
 def action_option(parser: Parser) -> None:
@@ -33,10 +33,16 @@ def action_option(parser: Parser) -> None:
     parser.add_argument("action", metavar="ACTION", help="a key of `gemelo action list`")
 
 
+def info_options(parser: Parser) -> None:
+    """Adds action and --json."""
+    action_option(parser)
+    json_option(parser)
+
+
 def run_info(options: Options) -> ExitCode:
     """Prints one action."""
-    print(information(action_of(options.action)), end="")
-    return ExitCode.OK
+    action = action_of(options.action)
+    return print_value(about(action), options.json, lambda: information(action))
 
 
 def goal_options(parser: Parser) -> None:
@@ -76,9 +82,21 @@ def action_of(name: str) -> Action[Message, Message, Message]:
 
 def information(action: Action[Message, Message, Message]) -> str:
     """One action and the fields of its three messages as YAML."""
+    return dump(about(action))
+
+
+def head_of(action: Action[Any, Any, Any]) -> dict[str, str]:
+    """A row of the table, by its names."""
+    parts = {"goal": action.goal, "feedback": action.feedback, "result": action.result}
+    names = {part: kind.__name__ for part, kind in parts.items()}
+    return {"action": action.key, **names, "server": action.server, "about": action.about}
+
+
+def about(action: Action[Any, Any, Any]) -> dict[str, object]:
+    """One action and the fields of its three messages, by their names."""
     parts = {"goal": action.goal, "feedback": action.feedback, "result": action.result}
     fields = {part: {"message": kind.__name__, "fields": fields_of(kind)} for part, kind in parts.items()}
-    return dump({"action": action.key, "about": action.about, "server": action.server, **fields})
+    return {"action": action.key, "about": action.about, "server": action.server, **fields}
 
 
 def goal_text(source: str) -> str:

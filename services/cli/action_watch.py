@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+import sys
+from typing import Any, NamedTuple
 
 from schemas.actions import CancelRequest, GoalFeedback, GoalStatus, GoalStatuses, ResultRequest
-from schemas.message import decode
+from schemas.message import Message, decode
 from schemas.topics import Action
 from services.cli.action import action_of, action_option, indented
-from services.cli.errors import CommandError, ExitCode
-from services.cli.parser import Options, Parser, positive_integer
+from services.cli.errors import CommandError, ExitCode, unknown, usage
+from services.cli.field_path import FieldPath
+from services.cli.forms import Form, count_options, csv_lines, form_options, json_line, yaml_document
+from services.cli.parser import Options, Parser
 from services.cli.session import Session, connect
 from services.runtime.actions import keys
 from services.runtime.errors import NoAnswer
@@ -34,16 +37,75 @@ def run_cancel(options: Options) -> ExitCode:
 
 
 def echo_options(parser: Parser) -> None:
-    """Adds action and count."""
-    action_option(parser)
-    parser.add_argument("-n", "--count", type=positive_integer, metavar="N", help="end after N goals have ended")
+    """Adds action with part and field, count and form."""
+    about = "a key of `gemelo action list`, and of it only the status, feedback or result, or a field of one"
+    parser.add_argument("action", metavar="ACTION[.PART[.FIELD]]", help=about)
+    count_options(parser, "goals have ended, or lines of the part have come")
+    form_options(parser)
 
 
 def run_echo(options: Options) -> ExitCode:
     """Follows the goals of an action, until Ctrl-C."""
-    action = action_of(options.action)
+    key, _, wanted = options.action.partition(".")
+    action = action_of(key)
+    part, _, path = wanted.partition(".")
+    shown = Shown(action, part, path, csv_lines() if options.csv else json_line if options.json else None)
+    if options.csv and not part:
+        raise usage(f"--csv has the columns of one part: write {' or '.join(f'{key}.{each}' for each in PARTS)}")
     with connect() as session:
-        return echo(session, action, options.count)
+        return echo(session, action, options.count, shown)
+
+
+PARTS = ("status", "feedback", "result")
+
+
+class Said(NamedTuple):
+    """One thing that was said of a goal."""
+
+    part: str  # of PARTS
+    goal: str
+    message: Message | None  # None: nobody has answered, and
+    problem: str = ""  # says why
+
+    def fields(self) -> dict[str, object]:
+        """Under their names, for a program."""
+        if isinstance(self.message, GoalStatus):
+            return {"goal": self.goal, "client": self.message.client, "status": self.message.status.name}
+        return {"goal": self.goal, self.part: self.message}
+
+    def text(self) -> str:
+        """For a person."""
+        if isinstance(self.message, GoalStatus):
+            return f"goal {self.goal} of {self.message.client or 'nobody'}: {self.message.status.name}"
+        of_goal = f" of {self.goal}" if self.part == "feedback" else ""
+        told = indented(self.message) if self.message is not None else f"  # {self.problem}\n"
+        return f"{self.part}{of_goal}:\n{told}---"
+
+
+class Shown:
+    """What is printed of an action, and how; an empty `part` is all of them, `form` None is text for a person.
+
+    Raises `CommandError` for a part or a field that is none.
+    """
+
+    def __init__(self, action: Action[Any, Any, Any], part: str = "", path: str = "", form: Form | None = None) -> None:
+        if part and part not in PARTS:
+            raise unknown("part of an action", part, PARTS)
+        kinds: dict[str, type[Message]] = {"status": GoalStatus, "feedback": action.feedback, "result": action.result}
+        self.part, self._form = part, form
+        self._field = FieldPath(kinds[part], path) if path else None
+
+    def print(self, said: Said) -> bool:
+        """True if it was wanted, and is printed."""
+        if self.part not in ("", said.part):
+            return False
+        if self._field is None:
+            print(said.text() if self._form is None else self._form(said.fields()), flush=True)
+        elif said.message is None:
+            print(f"{said.goal}: {said.problem}", file=sys.stderr, flush=True)
+        else:
+            print((self._form or yaml_document)(self._field.of(said.message)), flush=True)
+        return True
 
 
 def cancel(session: Session, action: Action[Any, Any, Any], begin: str) -> tuple[str, ...]:
@@ -69,28 +131,35 @@ def _whole(session: Session, action: Action[Any, Any, Any], begin: str) -> str:
     return found[0]
 
 
-def echo(session: Session, action: Action[Any, Any, Any], count: int | None) -> ExitCode:
-    """Prints what becomes of each goal, its feedback and its result; ends after `count` results."""
+def echo(session: Session, action: Action[Any, Any, Any], count: int | None, shown: Shown) -> ExitCode:
+    """Prints what becomes of each goal, its feedback and its result.
+
+    Ends after `count` goals have ended, or so many lines of the only part that is shown.
+    """
     known: dict[str, GoalStatus] = {}
-    node, ended = session.node, 0
+    node, counted = session.node, 0
+
+    def say(said: Said) -> None:
+        nonlocal counted
+        if count is not None and counted >= count:
+            return
+        if shown.print(said):
+            counted += said.part == (shown.part or "result")
+        if counted == count:
+            node.stop()
 
     def on_statuses(statuses: GoalStatuses) -> None:
-        nonlocal ended
         for goal in statuses.goals:
             before = known.get(goal.goal_id)
             known[goal.goal_id] = goal
             if before is not None and before.status is goal.status:
                 continue
-            print(f"goal {goal.goal_id} of {goal.client or 'nobody'}: {goal.status.name}", flush=True)
+            say(Said("status", goal.goal_id, goal))
             if goal.status.is_terminal:
-                print(f"result:\n{_result(session, action, goal.goal_id)}---", flush=True)
-                ended += 1
-        if count is not None and ended >= count:
-            node.stop()
+                say(_result(session, action, goal.goal_id))
 
     def on_feedback(feedback: GoalFeedback) -> None:
-        message = decode(action.feedback, bytes(feedback.feedback))
-        print(f"feedback of {feedback.goal_id}:\n{indented(message)}---", flush=True)
+        say(Said("feedback", feedback.goal_id, decode(action.feedback, bytes(feedback.feedback))))
 
     node.subscribe(keys.status_topic(action), on_statuses)
     node.subscribe(keys.feedback_topic(action), on_feedback)
@@ -98,9 +167,9 @@ def echo(session: Session, action: Action[Any, Any, Any], count: int | None) -> 
     return ExitCode.OK
 
 
-def _result(session: Session, action: Action[Any, Any, Any], goal: str) -> str:
+def _result(session: Session, action: Action[Any, Any, Any], goal: str) -> Said:
     try:
         answer = session.node.call(keys.result_request(action), ResultRequest(goal_id=goal), timeout=TIMEOUT)
     except NoAnswer as error:
-        return f"  # {error}\n"
-    return indented(decode(action.result, bytes(answer.result)))
+        return Said("result", goal, None, str(error))
+    return Said("result", goal, decode(action.result, bytes(answer.result)))

@@ -15,7 +15,8 @@ from schemas.topics import DEVICE_CONFIGURATION, DEVICE_EVENTS, DEVICE_STATE, DE
 from services.cli.device_snapshot import DeviceView, snapshot_of
 from services.cli.device_status import text_of
 from services.cli.errors import ExitCode
-from services.cli.parser import Options, Parser, json_option, positive_integer
+from services.cli.forms import count_options
+from services.cli.parser import Options, Parser, json_option
 from services.cli.session import Session, connect
 from services.cli.terminal import LiveBlock
 from services.cli.units import positive_seconds
@@ -28,7 +29,7 @@ REFRESH = 5.0  # [Hz]
 
 def add_options(parser: Parser) -> None:
     """Adds the end of monitoring and --json."""
-    parser.add_argument("-n", "--count", type=positive_integer, metavar="N", help="end after N lines")
+    count_options(parser, "lines")
     parser.add_argument("-d", "--duration", type=positive_seconds, metavar="TIME", help="end after it, as 10 or 10s")
     json_option(parser)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import tomllib
 from pathlib import Path
@@ -10,17 +9,11 @@ from typing import NamedTuple
 
 from schemas.system import Parameter, ParameterValue
 from services.cli.errors import CommandError, ExitCode, usage
-from services.cli.node import (
-    change_parameter,
-    living,
-    parameter_of,
-    parameters_of,
-    require_in_range,
-    value_of,
-    written,
-)
+from services.cli.node import living
+from services.cli.param import change_parameter, parameter_of, parameters_of, require_in_range, value_of, written
 from services.cli.parser import Options, Parser
 from services.cli.session import Session, connect
+from services.runtime.saved_parameters import toml
 
 
 class Change(NamedTuple):
@@ -44,15 +37,16 @@ def run_dump(options: Options) -> ExitCode:
 
 
 def load_options(parser: Parser) -> None:
-    """Adds the file."""
+    """Adds the file and --save."""
     parser.add_argument("file", metavar="FILE", help="as `param dump` writes it, or - for standard input")
+    parser.add_argument("--save", action="store_true", help="keep all of it beyond the end of the processes")
 
 
 def run_load(options: Options) -> ExitCode:
     """Sets parameters."""
     tables = read(options.file)
     with connect() as session:
-        for line in load(session, tables):
+        for line in load(session, tables, options.save):
             print(line)
     return ExitCode.OK
 
@@ -62,11 +56,11 @@ def dumped(session: Session, names: list[str]) -> str:
     blocks = []
     for name in names or living(session):
         lines = [
-            f"{json.dumps(each.name)} = {_toml(each.value)}{f'  # {each.description}' if each.description else ''}"
+            f"{toml(each.name)} = {toml(each.value)}{f'  # {each.description}' if each.description else ''}"
             for each in parameters_of(session, name)
         ]
         if lines:
-            blocks.append("\n".join([f"[{json.dumps(name)}]", *lines]))
+            blocks.append("\n".join([f"[{toml(name)}]", *lines]))
     return "\n\n".join(blocks) + "\n"
 
 
@@ -83,19 +77,19 @@ def read(file: str) -> dict[str, dict[str, object]]:
     return tables
 
 
-def load(session: Session, tables: dict[str, dict[str, object]]) -> list[str]:
-    """Sets what differs, and returns a line for each; where one is refused, what was set before it is set back."""
+def load(session: Session, tables: dict[str, dict[str, object]], save: bool = False) -> list[str]:
+    """Sets what differs, or saves all; a line for each. Where one is refused, those before it are set back."""
     changes = [_change(session, node, name, value) for node, table in tables.items() for name, value in table.items()]
     lines: list[str] = []
     done: list[Change] = []
     for change in changes:
-        if change.value == change.parameter.value:
+        if change.value == change.parameter.value and not save:
             continue
         try:
-            lines.append(change_parameter(session, change.node, change.parameter, change.value))
+            lines.append(change_parameter(session, change.node, change.parameter, change.value, save))
         except Exception:
             for before in reversed(done):
-                change_parameter(session, before.node, before.parameter, before.parameter.value)
+                change_parameter(session, before.node, before.parameter, before.parameter.value, save)
             raise
         done.append(change)
     return lines or ["every parameter has that value already"]
@@ -111,7 +105,3 @@ def _change(session: Session, node: str, name: str, value: object) -> Change:
     wanted = value_of(parameter, written(value))
     require_in_range(node, parameter, wanted)
     return Change(node, parameter, wanted)
-
-
-def _toml(value: ParameterValue) -> str:
-    return json.dumps(value)

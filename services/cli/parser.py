@@ -96,8 +96,8 @@ def complete(leaf: Parser, command: Command) -> None:
     leaf.set_defaults(command=command)
 
 
-def json_option(parser: Parser) -> None:
-    """Adds --json."""
+def json_option(parser: argparse._ActionsContainer) -> None:
+    """Adds --json to a parser, or to a group of one."""
     parser.add_argument("--json", action="store_true", help="JSON in SI units instead of text")
 
 

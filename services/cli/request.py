@@ -8,12 +8,13 @@ from schemas.message import Message
 from schemas.topics import ACTIONS, DEVICE_COMMAND, REQUESTS, Request
 from services.cli.errors import ExitCode, unknown
 from services.cli.field_path import FieldPath
+from services.cli.forms import count_options, form_of, form_options, print_value, yaml_document
 from services.cli.messages import dump, message_of
 from services.cli.node import information_of, living
-from services.cli.parser import Choices, Options, Parser, positive_integer
+from services.cli.parser import Choices, Options, Parser, json_option
 from services.cli.session import Session, connect, share_control
 from services.cli.text_table import table
-from services.cli.topic import echo, json_line, yaml_document
+from services.cli.topic import echo
 from services.recordings.table import exchanges_of, goal_request_of
 from services.runtime.actions import keys
 
@@ -25,12 +26,16 @@ CALL_TIMEOUT = 5.0  # [s]
 
 def run_list(options: Options) -> ExitCode:
     """Prints the table of requests."""
-    print(listing())
-    return ExitCode.OK
+    rows = [
+        {"request": r.key, "asked_with": r.request.__name__, "answered_with": r.response.__name__, "server": r.server,
+         "about": r.about} for r in REQUESTS
+    ]  # fmt: skip
+    return print_value(rows, options.json, listing)
 
 
 def call_options(parser: Parser) -> None:
-    """Adds request and message."""
+    """Adds request, message and --json."""
+    json_option(parser)
     parser.add_argument("request", metavar="REQUEST", help="a key of `gemelo request list`")
     parser.add_argument("message", metavar="JSON", nargs="?", default="{}", help="what is asked")
 
@@ -40,24 +45,24 @@ def run_call(options: Options) -> ExitCode:
     request = request_of(options.request)
     message = message_of(request.request, options.message)
     with connect() as session:
-        return call(session, request, message)
+        return call(session, request, message, options.json)
 
 
 def echo_options(parser: Parser) -> None:
-    """Adds request, count and --json."""
-    parser.add_argument("request", metavar="REQUEST", help="a key of `gemelo request list`, or of a living node's own")
-    count = parser.add_mutually_exclusive_group()
-    count.add_argument("--once", dest="count", action="store_const", const=1, help="the first one only")
-    count.add_argument("-n", "--count", type=positive_integer, metavar="N", help="end after N answers")
-    parser.add_argument("--json", action="store_true", help="a JSON value per line")
+    """Adds request with field, count and form."""
+    about = "a key of `gemelo request list`, or of a living node's own, and a field, as plan.answer.refusal"
+    parser.add_argument("request", metavar="REQUEST[.FIELD]", help=about)
+    count_options(parser, "answers")
+    form_options(parser)
 
 
 def run_echo(options: Options) -> ExitCode:
     """Prints each question with its answer, until Ctrl-C."""
-    form = json_line if options.json else yaml_document
+    key, _, path = options.request.partition(".")
+    form = form_of(options, yaml_document)
     with connect() as session:
-        exchanges = exchanges_of(asked_on(session, options.request))
-        return echo(session, exchanges, FieldPath(exchanges.message, ""), form, options.count)
+        exchanges = exchanges_of(asked_on(session, key))
+        return echo(session, exchanges, FieldPath(exchanges.message, path), form, options.count)
 
 
 def choices(robot: Robot | None) -> Choices:
@@ -94,9 +99,9 @@ def asked_on(session: Session, name: str) -> Request[Any, Any]:
     return Request(key, Message, Message, others[key], "")
 
 
-def call(session: Session, request: Request[Message, Message], message: Message) -> ExitCode:
-    """Sends `message` and prints the answer as YAML."""
+def call(session: Session, request: Request[Message, Message], message: Message, as_json: bool = False) -> ExitCode:
+    """Sends `message` and prints the answer as YAML or JSON."""
     if request.key == DEVICE_COMMAND.key:
         share_control(session)
-    print(dump(session.node.call(request, message, timeout=CALL_TIMEOUT)), end="")
-    return ExitCode.OK
+    answer = session.node.call(request, message, timeout=CALL_TIMEOUT)
+    return print_value(answer, as_json, lambda: dump(answer))

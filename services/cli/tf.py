@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -17,7 +17,9 @@ from schemas.topics import FRAMES, STATIC_FRAMES
 from services.arm.frames.frame_buffer import FrameBuffer, FrameError
 from services.arm.frames.transforms import to_rpy
 from services.cli.errors import CommandError, ExitCode, unknown
-from services.cli.parser import Choices, Options, Parser, positive_integer, positive_number
+from services.cli.field_path import FieldPath
+from services.cli.forms import Form, count_options, form_of, form_options, print_value, rows_form_of, yaml_document
+from services.cli.parser import Choices, Options, Parser, json_option, positive_number
 from services.cli.session import Session, connect
 from services.cli.text_table import table
 
@@ -37,24 +39,26 @@ class Link(NamedTuple):
 
 
 def echo_options(parser: Parser) -> None:
-    """Adds both frames, rate and count."""
+    """Adds both frames, rate, field, count and form."""
     parser.add_argument("target", metavar="PARENT", help="the frame in which it is said")
     parser.add_argument("source", metavar="CHILD", help="the frame whose pose it is")
     parser.add_argument("-r", "--rate", type=positive_number, default=1.0, metavar="HZ", help="else once a second")
-    count = parser.add_mutually_exclusive_group()
-    count.add_argument("--once", dest="count", action="store_const", const=1, help="the first one only")
-    count.add_argument("-n", "--count", type=positive_integer, metavar="N", help="end after N poses")
-    parser.add_argument("--json", action="store_true", help="a JSON object per line, in SI units")
+    parser.add_argument("--field", default="", metavar="PATH", help="of it only this, as transform.translation[2] [m]")
+    count_options(parser, "poses")
+    form_options(parser)
 
 
 def run_echo(options: Options) -> ExitCode:
     """Prints poses until Ctrl-C."""
+    field = FieldPath(FrameTransform, options.field)  # a mistake is told before anything is connected
+    form = form_of(options, yaml_document if options.field else pose_text)
     with connect() as session:
-        return echo(session, options.target, options.source, options.rate, options.count, options.json)
+        return echo(session, options.target, options.source, options.rate, options.count, form, field)
 
 
 def tree_options(parser: Parser) -> None:
-    """Adds --svg."""
+    """Adds --svg and --json."""
+    json_option(parser)
     parser.add_argument("--svg", type=Path, metavar="FILE", help="also as a picture")
 
 
@@ -62,7 +66,7 @@ def run_tree(options: Options) -> ExitCode:
     """Prints the tree."""
     with connect() as session:
         links = heard(session).links
-    print(tree_text(links))
+    print_value(tree_frames(links), options.json, lambda: tree_text(links))
     if options.svg is not None:
         try:
             options.svg.write_text(tree_picture(links), encoding="utf-8")
@@ -72,14 +76,15 @@ def run_tree(options: Options) -> ExitCode:
 
 
 def monitor_options(parser: Parser) -> None:
-    """Adds the number of reports."""
-    parser.add_argument("-n", "--count", type=positive_integer, metavar="N", help="end after N reports")
+    """Adds count and form."""
+    count_options(parser, "reports")
+    form_options(parser)
 
 
 def run_monitor(options: Options) -> ExitCode:
     """Prints a table a second, until Ctrl-C."""
     with connect() as session:
-        return monitor(session, options.count)
+        return monitor(session, options.count, rows_form_of(options, monitor_table))
 
 
 def choices(robot: Robot | None) -> Choices:
@@ -118,8 +123,13 @@ def _listen(session: Session) -> Heard:
     return known
 
 
-def echo(session: Session, target: str, source: str, rate: float, count: int | None, as_json: bool) -> ExitCode:
-    """Prints the pose of `source` in `target`, `rate` [1/s] times; raises `CommandError` where a frame is unknown."""
+def echo(
+    session: Session, target: str, source: str, rate: float, count: int | None, form: Form, field: FieldPath
+) -> ExitCode:
+    """Prints the pose of `source` in `target`, or a field of it, `rate` [1/s] times.
+
+    Raises `CommandError` where a frame is unknown.
+    """
     known = heard(session)
     for name in (target, source):
         if name not in known.buffer.frames:
@@ -132,7 +142,7 @@ def echo(session: Session, target: str, source: str, rate: float, count: int | N
             found = known.buffer.look_up_stamped(target, source)
         except FrameError as error:
             raise CommandError(str(error)) from error
-        print(msgspec.json.encode(found).decode() if as_json else pose_text(found), flush=True)
+        print(form(field.of(found)), flush=True)
         printed += 1
         if printed == count:
             session.node.stop()
@@ -172,6 +182,15 @@ def tree_rows(links: Mapping[str, Link]) -> list[tuple[int, str]]:
         rows.append((depth, name))
         waiting += [(depth + 1, child) for child in reversed(below.get(name, ()))]
     return rows
+
+
+def tree_frames(links: Mapping[str, Link]) -> list[dict[str, object]]:
+    """Every frame with its parent, None for a root, in the same order."""
+    parents = {name: link.parent for name, link in links.items()}
+    return [
+        {"frame": name, "parent": parents.get(name), "fixed": name in links and links[name].is_static}
+        for _, name in tree_rows(links)
+    ]
 
 
 def tree_text(links: Mapping[str, Link]) -> str:
@@ -225,7 +244,16 @@ class Arrivals:
         return (len(self.times) - 1) / span if span > 0.0 else 0.0
 
 
-def monitor(session: Session, count: int | None) -> ExitCode:
+class FrameRate(msgspec.Struct, frozen=True, kw_only=True):
+    """How often and how late a moving frame came."""
+
+    frame: str
+    rate: float  # [Hz]
+    delay_mean: float  # [s]
+    delay_max: float  # [s]
+
+
+def monitor(session: Session, count: int | None, form: Form) -> ExitCode:
     """Prints rate and delay of every moving frame once a second."""
     arrivals: dict[str, Arrivals] = {}
     node, reports, last = session.node, 0, session.node.monotonic()
@@ -239,7 +267,9 @@ def monitor(session: Session, count: int | None) -> ExitCode:
         if node.monotonic() - last < REPORT_EVERY:
             return
         last = node.monotonic()
-        print(monitor_table(arrivals) if arrivals else "no moving frame has come", flush=True)
+        if not arrivals and form is not monitor_table:
+            return  # a program waits for the first frame
+        print(form(rates_of(arrivals)), flush=True)
         reports += 1
         if reports == count:
             node.stop()
@@ -249,15 +279,25 @@ def monitor(session: Session, count: int | None) -> ExitCode:
     return ExitCode.OK
 
 
-def monitor_table(arrivals: Mapping[str, Arrivals]) -> str:
-    """Rate and delay, by frame."""
-    rows = [
-        (
-            name,
-            f"{each.rate:.1f}",
-            f"{1000.0 * sum(each.delays) / len(each.delays):.1f}",
-            f"{1000.0 * max(each.delays):.1f}",
+def rates_of(arrivals: Mapping[str, Arrivals]) -> list[FrameRate]:
+    """Rate and delay, by the frame's name."""
+    return [
+        FrameRate(
+            frame=name,
+            rate=each.rate,
+            delay_mean=sum(each.delays) / len(each.delays),
+            delay_max=max(each.delays),
         )
         for name, each in sorted(arrivals.items())
+    ]
+
+
+def monitor_table(rates: Sequence[FrameRate]) -> str:
+    """The table for a person."""
+    if not rates:
+        return "no moving frame has come"
+    rows = [
+        (each.frame, f"{each.rate:.1f}", f"{1000.0 * each.delay_mean:.1f}", f"{1000.0 * each.delay_max:.1f}")
+        for each in rates
     ]
     return table(("frame", "rate [Hz]", "mean delay [ms]", "most [ms]"), rows)

@@ -6,11 +6,14 @@ import socket
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+import msgspec
+
 from schemas.system import NodeInfo, NodeStatistics
 from schemas.topics import STATISTICS, TOPICS
 from services.cli.errors import ExitCode
+from services.cli.forms import Form, count_options, csv_rows, form_options, json_line
 from services.cli.node import information_of
-from services.cli.parser import Options, Parser, positive_integer
+from services.cli.parser import Options, Parser
 from services.cli.session import Session, connect
 from services.cli.text_table import table
 
@@ -18,6 +21,43 @@ EVERY = 1.0  # [s] every node tells its figures once a second
 FIRST = 2.5  # [s] until two of every node have come
 LATE_SHARE = 0.9  # of the promised rate: chosen, less is named
 HEADINGS = ("node", "CPU [%]", "memory [MB]", "loop [Hz]", "worst lateness [ms]", "received [1/s]", "lost", "bad")
+
+
+class NodeFigures(msgspec.Struct, frozen=True, kw_only=True):
+    """A row of the table."""
+
+    node: str
+    cpu: float  # of a core
+    memory: int | None  # [bytes] resident; None for a process of another machine
+    loop_rate: float  # [Hz]
+    loop_late_max: float  # [s]
+    received: float  # [1/s] messages
+    lost: int  # since the node's start
+    bad: int
+
+
+class SlowTopic(msgspec.Struct, frozen=True, kw_only=True):
+    """A topic of which a node hears less than the table promises."""
+
+    node: str
+    topic: str
+    heard: float  # [Hz]
+    promised: float  # [Hz]
+    writer: str
+
+    def __str__(self) -> str:
+        heard = f"{self.node} hears {self.topic} {self.heard:.1f} times a second"
+        return f"{heard}; {self.writer} promises {self.promised:g}"
+
+
+class Report(msgspec.Struct, frozen=True, kw_only=True):
+    """What is said once a second."""
+
+    nodes: tuple[NodeFigures, ...]
+    slow_topics: tuple[SlowTopic, ...]
+
+    def __str__(self) -> str:
+        return "\n".join([table(HEADINGS, [_cells(each) for each in self.nodes]), *map(str, self.slow_topics)])
 
 
 class Figures(NamedTuple):
@@ -38,17 +78,26 @@ class Figures(NamedTuple):
 
 
 def add_options(parser: Parser) -> None:
-    """Adds the number of reports."""
-    parser.add_argument("-n", "--count", type=positive_integer, metavar="N", help="end after N reports")
+    """Adds count and form."""
+    count_options(parser, "reports")
+    form_options(parser)
 
 
 def run(options: Options) -> ExitCode:
     """Prints the tables once a second, until Ctrl-C."""
     with connect() as session:
-        return watch(session, options.count)
+        return watch(session, options.count, form_of_reports(options))
 
 
-def watch(session: Session, count: int | None) -> ExitCode:
+def form_of_reports(options: Options) -> Form:
+    """As text or JSON all of a report; as CSV its nodes."""
+    if not options.csv:
+        return json_line if options.json else str
+    rows = csv_rows()
+    return lambda report: rows(report.nodes)
+
+
+def watch(session: Session, count: int | None, form: Form = str) -> ExitCode:
     """Prints `count` reports."""
     reports: dict[str, list[NodeStatistics]] = {}
     infos: dict[str, NodeInfo] = {}
@@ -68,7 +117,7 @@ def watch(session: Session, count: int | None) -> ExitCode:
         for name in figures:
             if name not in infos:
                 infos[name] = information_of(session, name)
-        print(report(figures, infos), flush=True)
+        print(form(report(figures, infos)), flush=True)
         printed += 1
         if printed == count:
             node.stop()
@@ -78,42 +127,55 @@ def watch(session: Session, count: int | None) -> ExitCode:
     return ExitCode.OK
 
 
-def report(figures: Mapping[str, Figures], infos: Mapping[str, NodeInfo]) -> str:
-    """The table of nodes, and a line for each topic that comes too seldom."""
-    rows = [_row(name, each, infos.get(name)) for name, each in figures.items()]
-    return "\n".join([table(HEADINGS, rows), *slow_topics(figures)])
+def report(figures: Mapping[str, Figures], infos: Mapping[str, NodeInfo]) -> Report:
+    """A row for each node, and the topics that come too seldom."""
+    nodes = tuple(_row(name, each, infos.get(name)) for name, each in figures.items())
+    return Report(nodes=nodes, slow_topics=tuple(slow_topics(figures)))
 
 
-def _row(name: str, each: Figures, info: NodeInfo | None) -> Sequence[str]:
+def _row(name: str, each: Figures, info: NodeInfo | None) -> NodeFigures:
     topics = each.now.topics
-    return (
-        name,
-        f"{100.0 * each.now.cpu:.1f}",
-        memory(info),
-        f"{each.now.loop_rate:.0f}",
-        f"{1000.0 * each.now.loop_late_max:.1f}",
-        f"{sum(each.received().values()):.0f}",
-        str(sum(topic.dropped for topic in topics)),
-        str(sum(topic.bad for topic in topics)),
+    return NodeFigures(
+        node=name,
+        cpu=each.now.cpu,
+        memory=memory(info),
+        loop_rate=each.now.loop_rate,
+        loop_late_max=each.now.loop_late_max,
+        received=sum(each.received().values()),
+        lost=sum(topic.dropped for topic in topics),
+        bad=sum(topic.bad for topic in topics),
     )
 
 
-def memory(info: NodeInfo | None) -> str:
-    """[MB] of a process on this machine; "-" for others."""
+def _cells(each: NodeFigures) -> Sequence[str]:
+    return (
+        each.node,
+        f"{100.0 * each.cpu:.1f}",
+        "-" if each.memory is None else f"{each.memory / 1e6:.0f}",
+        f"{each.loop_rate:.0f}",
+        f"{1000.0 * each.loop_late_max:.1f}",
+        f"{each.received:.0f}",
+        str(each.lost),
+        str(each.bad),
+    )
+
+
+def memory(info: NodeInfo | None) -> int | None:
+    """[bytes] resident of a process on this machine; None for others."""
     import psutil  # 20 ms
 
     if info is None or info.host != socket.gethostname():
-        return "-"
+        return None
     try:
-        return f"{psutil.Process(info.pid).memory_info().rss / 1e6:.0f}"
+        return int(psutil.Process(info.pid).memory_info().rss)
     except psutil.Error:
-        return "-"
+        return None
 
 
-def slow_topics(figures: Mapping[str, Figures]) -> Iterator[str]:
+def slow_topics(figures: Mapping[str, Figures]) -> Iterator[SlowTopic]:
     """Topics of which a node hears less than the table promises; silent ones may have no writer, and are left out."""
     for topic in TOPICS:
         for name, each in figures.items():
             heard = each.received().get(topic.key, 0.0)
             if topic.rate is not None and 0.0 < heard < LATE_SHARE * topic.rate:
-                yield f"{name} hears {topic.key} {heard:.1f} times a second; {topic.writer} promises {topic.rate:g}"
+                yield SlowTopic(node=name, topic=topic.key, heard=heard, promised=topic.rate, writer=topic.writer)

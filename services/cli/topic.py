@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +10,11 @@ import msgspec
 from schemas.message import Message
 from schemas.topics import TOPICS, Topic
 from services.cli.errors import CommandError, ExitCode, unknown
-from services.cli.field_path import FieldPath, leaves
+from services.cli.field_path import FieldPath
+from services.cli.forms import Form, count_options, form_of, form_options, print_value, yaml_document
 from services.cli.living_topics import all_topics, connected, ends, known_topic
 from services.cli.messages import dump, fields_of, message_of
-from services.cli.parser import Choices, Options, Parser, positive_integer, positive_number
+from services.cli.parser import Choices, Options, Parser, json_option, positive_integer, positive_number
 from services.cli.session import Session, connect
 from services.cli.text_table import table
 from services.recordings.table import LivingTopic
@@ -25,15 +24,18 @@ if TYPE_CHECKING:
 
 
 def list_options(parser: Parser) -> None:
-    """Adds -t."""
-    parser.add_argument("-t", "--types", action="store_true", help="a line each: the key and its message, for a script")
+    """Adds -t and --json."""
+    form = parser.add_mutually_exclusive_group()
+    form.add_argument("-t", "--types", action="store_true", help="a line each: the key and its message, for a script")
+    json_option(form)
 
 
 def run_list(options: Options) -> ExitCode:
     """Prints the table of topics."""
     topics = all_topics()
-    print("\n".join(f"{each.key} [{each.message.__name__}]" for each in topics) if options.types else listing(topics))
-    return ExitCode.OK
+    if options.types:
+        return print_value(topics, False, lambda: "\n".join(f"{each.key} [{each.message.__name__}]" for each in topics))
+    return print_value([head_of(each) for each in topics], options.json, lambda: listing(topics))
 
 
 def topic_option(parser: Parser) -> None:
@@ -42,8 +44,9 @@ def topic_option(parser: Parser) -> None:
 
 
 def info_options(parser: Parser) -> None:
-    """Adds topic and --living."""
+    """Adds topic, --living and --json."""
     topic_option(parser)
+    json_option(parser)
     parser.add_argument("--living", action="store_true", help="also the nodes that write and read it now")
 
 
@@ -51,11 +54,10 @@ def run_info(options: Options) -> ExitCode:
     """Prints one topic."""
     known = known_topic(options.topic)
     if known is not None and not options.living:
-        print(information(known), end="")
-        return ExitCode.OK
+        return print_value(about(known), options.json, lambda: information(known))
     with connected(options.topic) as (session, topic):
-        print(information(topic) + dump(ends(session, topic.key)), end="")
-    return ExitCode.OK
+        told = about(topic) | ends(session, topic.key)
+    return print_value(told, options.json, lambda: dump(told))
 
 
 def echo_options(parser: Parser) -> None:
@@ -63,18 +65,14 @@ def echo_options(parser: Parser) -> None:
     parser.add_argument(
         "topic", metavar="TOPIC[.FIELD]", help="a key of `gemelo topic list`, and a field of its message"
     )
-    count = parser.add_mutually_exclusive_group()
-    count.add_argument("--once", dest="count", action="store_const", const=1, help="the first one only")
-    count.add_argument("-n", "--count", type=positive_integer, metavar="N", help="end after N messages")
-    how = parser.add_mutually_exclusive_group()
-    how.add_argument("--json", action="store_true", help="a JSON value per line")
-    how.add_argument("--csv", action="store_true", help="a line of numbers and words per message, under a heading")
+    count_options(parser, "messages")
+    form_options(parser)
 
 
 def run_echo(options: Options) -> ExitCode:
     """Prints the messages of a topic, or one of their fields."""
     key, _, path = options.topic.partition(".")
-    form = csv_lines() if options.csv else json_line if options.json else yaml_document
+    form = form_of(options, yaml_document)
     known = known_topic(key)
     if known is not None:
         FieldPath(known.message, path)  # a mistake is told before anything is connected
@@ -127,45 +125,24 @@ def rate_of(topic: Topic[Message]) -> str:
 
 def information(topic: Topic[Message]) -> str:
     """One topic and the fields of its message as YAML."""
-    head = {
+    return dump(about(topic))
+
+
+def about(topic: Topic[Message]) -> dict[str, object]:
+    """One topic and the fields of its message, by their names."""
+    fields = topic.fields if isinstance(topic, LivingTopic) else fields_of(topic.message)
+    return {**head_of(topic), "fields": fields}
+
+
+def head_of(topic: Topic[Message]) -> dict[str, object]:
+    """A row of the table of topics, by its names; the rate in [Hz]."""
+    return {
         "topic": topic.key, "about": topic.about, "message": topic.message.__name__, "rate_hz": topic.rate,
         "delivery": topic.delivery.value, "recorded": topic.recorded, "writer": topic.writer,
     }  # fmt: skip
-    fields = topic.fields if isinstance(topic, LivingTopic) else fields_of(topic.message)
-    return dump({**head, "fields": fields})
 
 
-def yaml_document(value: object) -> str:
-    """The value as YAML, with the line that ends a document."""
-    return f"{dump(value)}---"
-
-
-def json_line(value: object) -> str:
-    """The value as JSON on one line."""
-    return msgspec.json.encode(value).decode()
-
-
-def csv_lines() -> Callable[[object], str]:
-    """A function that gives each value as a line of CSV, the first one under a heading with the fields' paths."""
-    is_first = True
-
-    def lines(value: object) -> str:
-        nonlocal is_first
-        cells = list(leaves(value))
-        out = io.StringIO()
-        writer = csv.writer(out, lineterminator="\n")
-        if is_first:
-            writer.writerow([path or "value" for path, _ in cells])
-            is_first = False
-        writer.writerow([cell for _, cell in cells])
-        return out.getvalue().rstrip("\n")
-
-    return lines
-
-
-def echo(
-    session: Session, topic: Topic[Message], field: FieldPath, form: Callable[[object], str], count: int | None
-) -> ExitCode:
+def echo(session: Session, topic: Topic[Message], field: FieldPath, form: Form, count: int | None) -> ExitCode:
     """Prints messages, or their field, as they come, until Ctrl-C or `count` of them; raises `CommandError` where a
     message has no such element."""
     printed = 0

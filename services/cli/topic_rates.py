@@ -4,39 +4,97 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
+
+import msgspec
 
 from schemas.message import Message, encode
 from schemas.topics import Topic
 from services.cli.errors import ExitCode, usage
+from services.cli.forms import Form, count_options, form_of, form_options
 from services.cli.living_topics import connected
 from services.cli.parser import Options, Parser, positive_integer
 from services.cli.session import Session
 from services.cli.topic import listen, topic_option
 
 REPORT_EVERY = 1.0  # [s]
-Report = Callable[[], str | None]
+
+
+class Rate(msgspec.Struct, frozen=True, kw_only=True):
+    """How often messages came, in the form of `ros2 topic hz` for a person."""
+
+    rate: float  # [Hz]
+    gap_min: float  # [s] between two
+    gap_max: float  # [s]
+    gap_deviation: float  # [s]
+    window: int  # messages
+
+    def __str__(self) -> str:
+        return (
+            f"average rate: {self.rate:.3f}\n"
+            f"\tmin: {self.gap_min:.3f}s max: {self.gap_max:.3f}s "
+            f"std dev: {self.gap_deviation:.5f}s window: {self.window}"
+        )
+
+
+class Bandwidth(msgspec.Struct, frozen=True, kw_only=True):
+    """How many bytes came, in the form of `ros2 topic bw` for a person."""
+
+    bytes_per_second: float
+    size_mean: float  # [B] of a message
+    size_min: int  # [B]
+    size_max: int  # [B]
+    window: int  # messages
+
+    def __str__(self) -> str:
+        return (
+            f"{self.bytes_per_second / 1000.0:.2f} kB/s from {self.window} messages\n"
+            f"\tmessage size mean: {self.size_mean:.0f} B min: {self.size_min} B max: {self.size_max} B"
+        )
+
+
+class Delay(msgspec.Struct, frozen=True, kw_only=True):
+    """How old messages were when they came."""
+
+    delay_mean: float  # [s]
+    delay_min: float  # [s]
+    delay_max: float  # [s]
+    delay_deviation: float  # [s]
+    window: int  # messages
+
+    def __str__(self) -> str:
+        mean, least, most, deviation = (
+            1000.0 * each for each in (self.delay_mean, self.delay_min, self.delay_max, self.delay_deviation)
+        )
+        return (
+            f"average delay: {mean:.2f} ms\n\tmin: {least:.2f} ms max: {most:.2f} ms "
+            f"std dev: {deviation:.2f} ms window: {self.window}"
+        )
+
+
+Report = Callable[[], Rate | Bandwidth | Delay | None]
 
 
 def rate_options(parser: Parser) -> None:
-    """Adds topic, window and count."""
+    """Adds topic, window, count and form."""
     topic_option(parser)
     parser.add_argument("-w", "--window", type=positive_integer, default=10_000, metavar="N", help="messages averaged")
-    parser.add_argument("-n", "--count", type=positive_integer, metavar="N", help="end after N reports")
+    count_options(parser, "reports")
+    form_options(parser)
 
 
 def run_hz(options: Options) -> ExitCode:
     """Prints the rate of a topic."""
     with connected(options.topic) as (session, topic):
-        return hz(session, topic, options.window, options.count)
+        return hz(session, topic, options.window, options.count, form_of(options, str))
 
 
 def run_bw(options: Options) -> ExitCode:
     """Prints the bandwidth of a topic."""
     with connected(options.topic) as (session, topic):
-        return bandwidth(session, topic, options.window, options.count)
+        return bandwidth(session, topic, options.window, options.count, form_of(options, str))
 
 
 def run_delay(options: Options) -> ExitCode:
@@ -44,7 +102,7 @@ def run_delay(options: Options) -> ExitCode:
     with connected(options.topic) as (session, topic):
         if "stamp" not in topic.message.__struct_fields__:
             raise usage(f"{topic.message.__name__} has no stamp, so that nobody knows how old it is")
-        return delay(session, topic, options.window, options.count)
+        return delay(session, topic, options.window, options.count, form_of(options, str))
 
 
 class RateWindow:
@@ -59,18 +117,19 @@ class RateWindow:
         self._times.append(time)
         self.total += 1
 
-    def report(self) -> str | None:
-        """Two lines in the form of `ros2 topic hz`; None after fewer than two messages."""
+    def report(self) -> Rate | None:
+        """None after fewer than two messages."""
         if len(self._times) < 2:
             return None
         times = list(self._times)
         gaps = [after - before for before, after in pairwise(times)]
         mean = sum(gaps) / len(gaps)
-        deviation = math.sqrt(sum((gap - mean) ** 2 for gap in gaps) / len(gaps))
-        rate = 1.0 / mean if mean > 0.0 else math.inf
-        return (
-            f"average rate: {rate:.3f}\n"
-            f"\tmin: {min(gaps):.3f}s max: {max(gaps):.3f}s std dev: {deviation:.5f}s window: {len(times)}"
+        return Rate(
+            rate=1.0 / mean if mean > 0.0 else math.inf,
+            gap_min=min(gaps),
+            gap_max=max(gaps),
+            gap_deviation=deviation_of(gaps, mean),
+            window=len(times),
         )
 
 
@@ -87,39 +146,45 @@ class Window:
         self.total += 1
 
 
-def hz(session: Session, topic: Topic[Any], window: int, count: int | None) -> ExitCode:
+def deviation_of(values: Sequence[float], mean: float) -> float:
+    """The standard deviation of `values` from their mean, in their unit."""
+    return math.sqrt(sum((value - mean) ** 2 for value in values) / len(values))
+
+
+def hz(session: Session, topic: Topic[Any], window: int, count: int | None, form: Form = str) -> ExitCode:
     """Prints the rate of arrival once a second, until Ctrl-C or `count` reports."""
     arrivals = RateWindow(window)
 
     def on_message(message: Message) -> None:
         arrivals.add(session.node.monotonic())
 
-    return _reported(session, topic, on_message, lambda: arrivals.total, arrivals.report, count)
+    return _reported(session, topic, on_message, lambda: arrivals.total, arrivals.report, count, form)
 
 
-def bandwidth(session: Session, topic: Topic[Any], window: int, count: int | None) -> ExitCode:
-    """Prints the bytes of the messages' payloads once a second, in the form of `ros2 topic bw`."""
+def bandwidth(session: Session, topic: Topic[Any], window: int, count: int | None, form: Form = str) -> ExitCode:
+    """Prints the bytes of the messages' payloads once a second."""
     seen = Window(window)
 
     def on_message(message: Message) -> None:
         seen.add(session.node.monotonic(), len(encode(message)))
 
-    def report() -> str | None:
+    def report() -> Bandwidth | None:
         if len(seen.rows) < 2:
             return None
-        sizes = [size for _, size in seen.rows]
+        sizes = [round(size) for _, size in seen.rows]
         span = seen.rows[-1][0] - seen.rows[0][0]
-        rate = sum(sizes[1:]) / span if span > 0.0 else math.inf
-        mean = sum(sizes) / len(sizes)
-        return (
-            f"{rate / 1000.0:.2f} kB/s from {len(sizes)} messages\n"
-            f"\tmessage size mean: {mean:.0f} B min: {min(sizes):.0f} B max: {max(sizes):.0f} B"
+        return Bandwidth(
+            bytes_per_second=sum(sizes[1:]) / span if span > 0.0 else math.inf,
+            size_mean=sum(sizes) / len(sizes),
+            size_min=min(sizes),
+            size_max=max(sizes),
+            window=len(sizes),
         )
 
-    return _reported(session, topic, on_message, lambda: seen.total, report, count)
+    return _reported(session, topic, on_message, lambda: seen.total, report, count, form)
 
 
-def delay(session: Session, topic: Topic[Any], window: int, count: int | None) -> ExitCode:
+def delay(session: Session, topic: Topic[Any], window: int, count: int | None, form: Form = str) -> ExitCode:
     """Prints the time from the messages' stamps to their arrival once a second; both clocks must agree."""
     seen = Window(window)
 
@@ -128,18 +193,20 @@ def delay(session: Session, topic: Topic[Any], window: int, count: int | None) -
         if stamp:
             seen.add(session.node.monotonic(), (session.node.now() - stamp) / 1e9)
 
-    def report() -> str | None:
-        ages = [1000.0 * age for _, age in seen.rows]
+    def report() -> Delay | None:
+        ages = [age for _, age in seen.rows]
         if not ages:
             return None
         mean = sum(ages) / len(ages)
-        deviation = math.sqrt(sum((age - mean) ** 2 for age in ages) / len(ages))
-        return (
-            f"average delay: {mean:.2f} ms\n\tmin: {min(ages):.2f} ms max: {max(ages):.2f} ms "
-            f"std dev: {deviation:.2f} ms window: {len(ages)}"
+        return Delay(
+            delay_mean=mean,
+            delay_min=min(ages),
+            delay_max=max(ages),
+            delay_deviation=deviation_of(ages, mean),
+            window=len(ages),
         )
 
-    return _reported(session, topic, on_message, lambda: seen.total, report, count)
+    return _reported(session, topic, on_message, lambda: seen.total, report, count, form)
 
 
 def _reported(
@@ -149,8 +216,12 @@ def _reported(
     total: Callable[[], int],
     report: Report,
     count: int | None,
+    form: Form,
 ) -> ExitCode:
-    """Prints `report` once a second where `total` has grown, until Ctrl-C or `count` of them."""
+    """Prints `report` once a second where `total` has grown, until Ctrl-C or `count` of them.
+
+    That nothing has come is a sentence for a person; a program waits for what has come.
+    """
     reports, heard, last = 0, 0, session.node.monotonic()
 
     def step(now: int) -> None:
@@ -158,9 +229,11 @@ def _reported(
         if session.node.monotonic() - last < REPORT_EVERY:
             return
         last = session.node.monotonic()
-        text = report() if total() > heard else None
-        print(text or f"no new messages on {topic.key}", flush=True)
+        found = report() if total() > heard else None
         heard = total()
+        if found is None and form is not str:
+            return
+        print(f"no new messages on {topic.key}" if found is None else form(found), flush=True)
         reports += 1
         if reports == count:
             session.node.stop()

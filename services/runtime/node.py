@@ -42,6 +42,7 @@ from services.runtime.requests import client as requests
 from services.runtime.requests.exchanges import exchange_topic
 from services.runtime.requests.limits import RequestRates
 from services.runtime.requests.server import Pending, RequestServer, UrgentServer
+from services.runtime.saved_parameters import SavedParameters
 from services.runtime.topics import Latest, LatestOnDemand, Publisher, Subscription
 
 M = TypeVar("M", bound=Message)
@@ -85,7 +86,8 @@ class Node:
         self._endpoints = NodeEndpoints()
         self._rates = RequestRates()
         from_file = self.deployment.parameters.get(name, {})
-        self._parameters = ParameterRegistry(name, from_file, overrides or {}, self.log)
+        saved = SavedParameters(project_root() / self.deployment.paths.run, name)
+        self._parameters = ParameterRegistry(name, from_file, overrides or {}, saved, self.log)
         self._is_closed = False
         self._certificate = CertificateWatch(self.deployment.router.certificate, self.log.warning)
         self._certificate.beat()
@@ -231,10 +233,12 @@ class Node:
         self._problem = "" if ok else reason
         if self._readiness is None:
             self._readiness = Readiness(project_root() / Path(self.deployment.paths.run), self.name)
-        if ok == self._readiness.is_ready:
-            return
-        self.log.info("%s%s", "ready" if ok else "not ready", f": {reason}" if reason else "")
-        (self._readiness.ready if ok else self._readiness.not_ready)()
+        if ok != self._readiness.is_ready:
+            self.log.info("%s%s", "ready" if ok else "not ready", f": {reason}" if reason else "")
+        if ok:
+            self._readiness.ready()
+        else:
+            self._readiness.not_ready(reason)
 
     @property
     def is_ready(self) -> bool:

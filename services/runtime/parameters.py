@@ -13,6 +13,7 @@ import msgspec
 from schemas.system import Empty, Parameter, Parameters, ParameterValue, SetParameter
 from schemas.topics import Request
 from services.runtime.errors import Refused
+from services.runtime.saved_parameters import SavedParameters
 
 P = TypeVar("P", bound=msgspec.Struct)
 
@@ -116,16 +117,21 @@ def parameters_request(node: str) -> Request[Empty, Parameters]:
 
 
 class ParameterRegistry:
-    """All parameters of a node; the command line overrides the deployment file, and that the defaults."""
+    """All parameters of a node.
+
+    The command line overrides what was saved, that the deployment file, and that the defaults.
+    """
 
     def __init__(
         self,
         node: str,
         from_file: Mapping[str, ParameterValue],
         from_command_line: Mapping[str, ParameterValue],
+        saved: SavedParameters,
         log: logging.Logger,
     ) -> None:
         self._node, self._from_file, self._from_command_line = node, from_file, from_command_line
+        self._saved = saved
         self._log = log
         self._sets: list[ParameterSet[Any]] = []
         self.list_request = parameters_request(node)
@@ -136,9 +142,27 @@ class ParameterRegistry:
         """Raises `Refused` where a value given cannot be."""
         declared = ParameterSet(kind, self._node)
         declared.set_all(self._from_file, f"[parameters.{self._node}] of the deployment", strict=True)
+        self._take_saved(declared)
         declared.set_all(self._from_command_line, "--set", strict=False)
         self._sets.append(declared)
         return declared
+
+    def _take_saved(self, declared: ParameterSet[Any]) -> None:
+        """All that was saved, or nothing of it where one value cannot be: the log says which, and what to do."""
+        before, name = declared.value, ""
+        try:
+            for name, value in (values := self._saved.read()).items():
+                declared.set(name, value)
+        except Refused as error:
+            declared.value = before
+            where = f"{self._saved.path}{self._saved.line(name)}: " if name else ""
+            self._log.error(
+                "%s%s; nothing of this file is used, the parameters are those of the deployment: mend or remove it",
+                where, error,
+            )  # fmt: skip
+        else:
+            if values:
+                self._log.info("parameters of %s: %s", self._saved.path, ", ".join(values))
 
     def listed(self, question: Empty) -> Parameters:
         """All with their present values."""
@@ -148,8 +172,17 @@ class ParameterRegistry:
         """Raises `Refused` with the nearest name, the type or the range."""
         for declared in self._sets:
             if wanted.name in declared.names:
+                before = declared.value
                 parameter = declared.set(wanted.name, wanted.value)
-                self._log.info("parameter %s = %r", parameter.name, parameter.value)
+                if wanted.save:
+                    try:
+                        self._saved.keep(self._saved.read() | {parameter.name: parameter.value})
+                    except Refused:
+                        declared.value = before  # what was asked for was both
+                        raise
+                    parameter = msgspec.structs.replace(parameter, saved_in=str(self._saved.path))
+                kept = f", saved in {parameter.saved_in}" if parameter.saved_in else ""
+                self._log.info("parameter %s = %r%s", parameter.name, parameter.value, kept)
                 return parameter
         known = [name for declared in self._sets for name in declared.names]
         raise Refused(f'{self._node} has no parameter "{wanted.name}": {nearest(wanted.name, known)}')

@@ -17,6 +17,7 @@ from types import TracebackType
 from services.mqtt import secure_folder
 from services.runtime.deployment import project_root
 from services.stack.compose import Compose, ComposeError
+from services.stack.not_ready import NotReady, is_fresh, not_ready
 
 PROCESSES = (
     "router",
@@ -37,7 +38,14 @@ STOP = 20.0  # [s] for all to end by themselves
 
 
 class StackError(Exception):
-    """The stack did not start or did not do what was asked; the text holds the end of the logs concerned."""
+    """The stack did not start or did not do what was asked; the text holds the end of the logs concerned.
+
+    `unready` says of each process that is not ready why.
+    """
+
+    def __init__(self, text: str, unready: Sequence[NotReady] = ()) -> None:
+        super().__init__(text)
+        self.unready = tuple(unready)
 
 
 class Stack:
@@ -170,15 +178,23 @@ class Stack:
             if not missing:
                 return
             time.sleep(POLL)
-        tails = "\n".join(f"--- {name}\n{self.logs(name)[-1500:]}" for name in missing)
-        raise StackError(f"not ready after {timeout:.0f} s: {', '.join(missing)}\n{tails}")
+        unready = self.why_not_ready(missing)
+        head = f"not ready after {timeout:.0f} s: {', '.join(missing)} (load {os.getloadavg()[0]:.1f})"
+        silent = () if any(each.lines for each in unready) else (self.console()[-1000:],)
+        raise StackError("\n".join([head, *map(str, unready), *silent]), unready)
 
     def is_ready(self, name: str) -> bool:
         """True if `name` touched the file that deploy/probe looks at within the last 3 s."""
+        return is_fresh(self.run / f"{name}.ready")
+
+    def why_not_ready(self, names: Sequence[str] | None = None) -> tuple[NotReady, ...]:
+        """Of each of `names`, by default of all that are not ready at this moment, the reason and the last lines."""
         try:
-            return time.time() - (self.run / f"{name}.ready").stat().st_mtime < 3.0
-        except FileNotFoundError:
-            return False
+            states = {state.name: state for state in self.compose.processes()}
+        except ComposeError:
+            states = {}
+        names = [name for name in self.processes if not self.is_ready(name)] if names is None else names
+        return tuple(not_ready(name, states.get(name), self.run, self.logs(name)) for name in names)
 
     def pid(self, name: str) -> int:
         """The process id that `name` has now; 0 while it does not run."""

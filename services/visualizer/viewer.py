@@ -124,7 +124,7 @@ def _beat(connection: ViewerConnection, readiness: Readiness, where: str) -> Non
     elif connection.is_alive:
         readiness.beat()
     else:
-        readiness.not_ready()
+        readiness.not_ready("the rerun program does not accept a connection")
 
 
 def _ended(child: subprocess.Popen[bytes], mode: ViewerMode, age: float) -> int:

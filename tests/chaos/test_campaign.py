@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import itertools
 import json
+import shlex
+from argparse import ArgumentParser
 
 import msgspec
 
-from services.chaos.campaign import Episode, order, unexpected_hands
+from services.chaos.campaign import Episode, order, unexpected_hands, words_of
 from services.chaos.faults import FAULTS, Fault
 from services.chaos.main import chosen_faults, unfit
+from services.chaos.options import add_chaos_options
 from services.chaos.report import Report, page_of, rows_of, summary, text_of
-from services.stack.stack import PROCESSES
+from services.stack.not_ready import NotReady
+from services.stack.stack import PROCESSES, StackError
 
 
 def fault(name: str) -> Fault:
@@ -48,6 +52,19 @@ def test_one_episode_alone_has_the_chance_that_it_had_in_its_run() -> None:
     assert (number, chance.random()) == (13, whole[13])
 
 
+def test_the_command_that_repeats_an_episode_brings_its_fault_again() -> None:
+    """Also where only some faults were chosen."""
+    only = ("clock", "e-stop", "hold")
+    whole = [each.name for _, each, _ in itertools.islice(order(5, chosen_faults(only)), 12)]
+    found = msgspec.structs.replace(report(episode(9, whole[9], "it jumped")), seed=5, only=only)
+    (line,) = [each for each in text_of(found).splitlines() if "again: " in each]
+    parser = ArgumentParser()
+    add_chaos_options(parser)
+    typed = parser.parse_args(shlex.split(line.partition("gemelo chaos ")[2]))
+    ((_, again, _),) = itertools.islice(order(typed.seed, chosen_faults(typed.only)), typed.episode, typed.episode + 1)
+    assert again.name == whole[9]
+
+
 def test_every_fault_comes_once_before_any_comes_twice() -> None:
     names = [each.name for _, each, _ in itertools.islice(order(1), 2 * len(FAULTS))]
     assert sorted(names[: len(FAULTS)]) == sorted(names[len(FAULTS) :]) == sorted(each.name for each in FAULTS)
@@ -75,12 +92,23 @@ def test_the_reports_name_each_violation_and_the_command_that_repeats_it() -> No
         ("stop", 2, 1),
     ]
     assert "3 faults in 60 s (3.0 a minute), seed 7: 1 faults and 0 checks violated" in summary(found)
-    assert "gemelo chaos --seed 7 --episode 1" in text_of(found)
+    assert "again: gemelo chaos --seed 7 --broker mosquitto --episode 1\n" in f"{text_of(found)}\n"
+    some = msgspec.structs.replace(found, only=("stop", "clock steps"))
+    assert "--seed 7 --only stop 'clock steps' --broker mosquitto --episode 1" in text_of(some)
     page = page_of(found)
     assert "&lt;b&gt;jumped" in page
     assert "<b>jumped" not in page
     assert page.count("<circle") == 3
     assert json.loads(msgspec.json.encode(found))["episodes"][1]["violations"] == ["<b>jumped"]
+
+
+def test_a_report_says_of_each_process_that_is_not_ready_why_and_what_it_said_last() -> None:
+    unready = (NotReady("planner", "it is frozen", ("one", "two")), NotReady("logger", "it does not run", ()))
+    assert words_of(StackError("not ready after 20 s: planner, logger\n--- planner", unready)) == [
+        "not ready after 20 s: planner, logger",
+        "planner is not ready: it is frozen; its last lines: one | two",
+        "logger is not ready: it does not run; it has printed nothing",
+    ]
 
 
 def test_what_cannot_be_run_is_said(monkeypatch) -> None:

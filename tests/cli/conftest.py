@@ -43,7 +43,7 @@ from services.planner.core import Planner
 from services.runtime.actions import accept, refuse
 from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.node import Node
-from tests.runtime.support import spinning
+from tests.runtime.support import RouterProcess, spinning
 
 MOVE_TIME = 0.4  # [s] that every goal takes here
 
@@ -158,3 +158,15 @@ def connected(arm: Arm, network: MemoryNetwork, deployment: Deployment) -> Itera
     node = Node("cli-2", deployment, robot="rm1", bus=MemoryBus(network), log_level="warning")
     with gemelo.Arm(ArmSession(deployment, arm, node)) as made:
         yield made
+
+
+@pytest.fixture
+def router(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RouterProcess]:
+    """A real router, which commands and nodes of this process find."""
+    made = RouterProcess(tmp_path)
+    monkeypatch.setenv("GEMELO_ROUTER_PORT", str(made.port))
+    monkeypatch.setenv("GEMELO_PATHS_RUN", str(tmp_path / "run"))
+    monkeypatch.setenv("GEMELO_PATHS_OUT", str(tmp_path / "out"))
+    monkeypatch.delenv("GEMELO_ROBOT", raising=False)
+    yield made
+    made.stop()

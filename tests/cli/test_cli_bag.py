@@ -21,7 +21,7 @@ from services.recordings.mcap_file import McapFile
 from services.runtime.deployment import load_deployment
 from services.runtime.node import Node
 from services.state_publisher.main import describe
-from tests.runtime.support import RouterProcess, spinning, until
+from tests.runtime.support import spinning, until
 
 START = 1_795_000_000_000_000_000
 ROOT = Path(__file__).parents[2]
@@ -37,17 +37,6 @@ def bag(tmp_path: Path) -> Path:
     file.write(Entry(JOINT_STATES, state, START + k * 20_000_000) for k, state in enumerate(states))
     file.close()
     return file.path
-
-
-@pytest.fixture
-def router(tmp_path: Path, monkeypatch):
-    made = RouterProcess(tmp_path)
-    monkeypatch.setenv("GEMELO_ROUTER_PORT", str(made.port))
-    monkeypatch.setenv("GEMELO_PATHS_RUN", str(tmp_path / "run"))
-    monkeypatch.setenv("GEMELO_PATHS_OUT", str(tmp_path / "out"))
-    monkeypatch.delenv("GEMELO_ROBOT", raising=False)
-    yield made
-    made.stop()
 
 
 def test_a_recording_is_played_as_a_shadow_that_a_reader_of_that_name_hears(router, bag, tmp_path, capsys):

@@ -8,6 +8,7 @@ import json
 import math
 import re
 import threading
+import tomllib
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -32,12 +33,15 @@ from services.arm.frames.transforms import from_rpy, to_rpy
 from services.cli import action_watch, interface, living_topics, node_parameters, request, tf, top, topic, topic_rates
 from services.cli.errors import CommandError, ExitCode
 from services.cli.field_path import FieldPath, leaves
+from services.cli.forms import csv_lines, json_line, yaml_document
 from services.cli.main import run
+from services.cli.session import Session
 from services.recordings.table import exchanges_of
 from services.runtime.bus.memory_bus import MemoryBus
 from services.runtime.node import Node
 from tests.runtime.support import spinning
 
+WHOLE = FieldPath(FrameTransform, "")
 STATE = JointState(stamp=5, name=("a", "b"), position=(0.5, -2.0))
 
 
@@ -97,13 +101,13 @@ def test_the_topic_of_a_user_s_node_is_found_with_its_fields(session, diver):
 
 def test_the_topic_of_a_user_s_node_is_echoed(session, diver, capsys):
     found = living_topics.topic_on(session, "sonar")
-    assert topic.echo(session, found, FieldPath(found.message, "echo.depth"), topic.json_line, 2) is ExitCode.OK
+    assert topic.echo(session, found, FieldPath(found.message, "echo.depth"), json_line, 2) is ExitCode.OK
     assert capsys.readouterr().out.splitlines() == ["1.5", "1.5"]
 
 
 def test_the_topic_of_a_user_s_node_is_echoed_whole(session, diver, capsys):
     found = living_topics.topic_on(session, "sonar")
-    assert topic.echo(session, found, FieldPath(found.message, ""), topic.yaml_document, 1) is ExitCode.OK
+    assert topic.echo(session, found, FieldPath(found.message, ""), yaml_document, 1) is ExitCode.OK
     assert yaml.safe_load(capsys.readouterr().out.removesuffix("---\n"))["echo"] == {"depth": 1.5}
 
 
@@ -156,12 +160,12 @@ def test_a_field_that_is_none_is_refused_by_name(path: str, said: str):
 
 def test_echo_of_a_field_is_a_value_a_line(session, stack, capsys):
     path = FieldPath(JointState, "position[1]")
-    assert topic.echo(session, JOINT_STATES, path, topic.json_line, 2) is ExitCode.OK
+    assert topic.echo(session, JOINT_STATES, path, json_line, 2) is ExitCode.OK
     assert [json.loads(line) for line in capsys.readouterr().out.splitlines()] == [0.25, 0.25]
 
 
 def test_echo_as_csv_has_a_heading_and_a_row_a_message(session, stack, capsys):
-    assert topic.echo(session, JOINT_STATES, FieldPath(JointState, ""), topic.csv_lines(), 2) is ExitCode.OK
+    assert topic.echo(session, JOINT_STATES, FieldPath(JointState, ""), csv_lines(), 2) is ExitCode.OK
     heading, *rows = csv.reader(io.StringIO(capsys.readouterr().out))
     assert heading[:3] == ["stamp", "name[0]", "name[1]"]
     assert [row[heading.index("position[2]")] for row in rows] == ["0.04", "0.04"]
@@ -192,20 +196,20 @@ def test_topics_with_their_messages_a_line_each(capsys):
 
 
 def test_the_pose_of_a_frame_in_another_is_said(session, frames, capsys):
-    assert tf.echo(session, "base", "hand <1>", 50.0, 1, as_json=False) is ExitCode.OK
+    assert tf.echo(session, "base", "hand <1>", 50.0, 1, tf.pose_text, WHOLE) is ExitCode.OK
     said = capsys.readouterr().out
     assert "point       50.00 0.00 200.00 mm" in said
     assert "rpy         0.000 0.000 90.000 deg" in said
 
 
 def test_the_pose_is_said_as_json_the_other_way_round(session, frames, capsys):
-    assert tf.echo(session, "hand <1>", "base", 50.0, 1, as_json=True) is ExitCode.OK
+    assert tf.echo(session, "hand <1>", "base", 50.0, 1, json_line, WHOLE) is ExitCode.OK
     assert json.loads(capsys.readouterr().out)["parent"] == "hand <1>"
 
 
 def test_a_frame_that_is_none_is_answered_with_the_nearest(session, frames):
     with pytest.raises(CommandError, match=r'no frame "bas".*"base"'):
-        tf.echo(session, "bas", "arm", 50.0, 1, as_json=False)
+        tf.echo(session, "bas", "arm", 50.0, 1, tf.pose_text, WHOLE)
 
 
 def test_without_frames_the_one_who_sends_them_is_named(session):
@@ -223,7 +227,7 @@ def test_the_tree_has_every_frame_below_its_parent(session, frames):
 
 
 def test_frames_are_monitored(session, frames, capsys):
-    assert tf.monitor(session, 1) is ExitCode.OK
+    assert tf.monitor(session, 1, tf.monitor_table) is ExitCode.OK
     (row,) = [line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("arm")]
     assert 25.0 < float(row[1]) < 100.0
     assert 0.0 <= float(row[2]) <= float(row[3]) < 1000.0
@@ -275,6 +279,17 @@ def test_parameters_are_dumped_and_loaded(session, knobs, tmp_path: Path):
     assert lines == ["thing gain: 1.0 -> 1.5", "thing on: false -> true"]
 
 
+def test_a_file_is_loaded_for_later_starts_too(session, knobs, deployment, tmp_path: Path):
+    saved = Path(deployment.paths.run) / "parameters/thing.toml"
+    (tmp_path / "knobs.toml").write_text('[thing]\ngain = 1.5\nname = "a \\"b\\""\n')
+    lines = node_parameters.load(session, node_parameters.read(str(tmp_path / "knobs.toml")), save=True)
+    assert lines == [
+        f"thing gain: 1.0 -> 1.5, saved in {saved}",
+        f'thing name: a "b" -> a "b", saved in {saved}',  # as it was, and kept
+    ]
+    assert tomllib.loads(saved.read_text()) == {"gain": 1.5, "name": 'a "b"'}
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -317,7 +332,7 @@ def test_a_topic_that_comes_too_seldom_is_named_and_a_silent_one_is_not():
     second = 1_000_000_000
     slow = {"planner": top.Figures(heard(0, 10), heard(second, 40))}
     (line,) = top.slow_topics(slow)
-    assert line == "planner hears joint_states 30.0 times a second; stepper_gateway promises 50"
+    assert str(line) == "planner hears joint_states 30.0 times a second; stepper_gateway promises 50"
     assert list(top.slow_topics({"planner": top.Figures(heard(0, 10), heard(second, 60))})) == []
 
 
@@ -335,11 +350,44 @@ def test_a_goal_of_somebody_else_is_cancelled_and_one_that_is_none_is_named(sess
 
 def test_a_goal_is_followed_to_its_result(session, connected, stack, planner, capsys):
     motion = connected.start(joints=dict(zip(session.arm.joint_names, (0.0, 0.0, 0.0), strict=True)))
-    assert action_watch.echo(session, FOLLOW_JOINT_TRAJECTORY, 1) is ExitCode.OK
+    shown = action_watch.Shown(FOLLOW_JOINT_TRAJECTORY)
+    assert action_watch.echo(session, FOLLOW_JOINT_TRAJECTORY, 1, shown) is ExitCode.OK
     said = capsys.readouterr().out
     assert f"goal {motion.goal_id} of" in said
     assert "SUCCEEDED" in said
     assert "executed_steps: [933, -50, 113]" in said
+
+
+def test_a_part_of_an_action_and_a_field_of_it_are_followed(
+    arm, deployment, network, connected, stack, planner, capsys
+):
+    goal = dict(zip(arm.joint_names, (0.0, 0.0, 0.0), strict=True))
+
+    def followed(part: str, path: str, form) -> list[str]:
+        shown = action_watch.Shown(FOLLOW_JOINT_TRAJECTORY, part, path, form)
+        with Node("cli-3", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+            connected.start(joints=goal)
+            session = Session(deployment, arm, node)
+            assert action_watch.echo(session, FOLLOW_JOINT_TRAJECTORY, 1, shown) is ExitCode.OK
+        return capsys.readouterr().out.splitlines()
+
+    assert followed("result", "executed_steps[1]", json_line) == ["-50"]
+    (feedback,) = followed("feedback", "", json_line)
+    assert json.loads(feedback)["feedback"]["duration"] == 0.4
+    heading, row = csv.reader(followed("result", "", csv_lines()))
+    assert row[heading.index("result.executed_steps[0]")] == "933"
+    parts = [set(json.loads(line)) for line in followed("", "", json_line)]
+    assert {"goal", "client", "status"} in parts
+    assert parts[-1] == {"goal", "result"}
+
+
+def test_a_part_that_an_action_has_not_is_answered_with_the_nearest(capsys):
+    assert run(["action", "echo", "follow_joint_trajectory.resul"]) is ExitCode.USAGE
+    assert 'did you mean "result"' in capsys.readouterr().err
+    assert run(["action", "echo", "follow_joint_trajectory.result.executed_step"]) is ExitCode.USAGE
+    assert 'did you mean "executed_steps"' in capsys.readouterr().err
+    assert run(["action", "echo", "follow_joint_trajectory", "--csv"]) is ExitCode.USAGE
+    assert "follow_joint_trajectory.feedback" in capsys.readouterr().err
 
 
 @contextmanager
@@ -364,11 +412,19 @@ def test_a_request_is_watched_with_its_question_and_its_answer(session, stack, d
     exchanges = exchanges_of(request.asked_on(session, "device/stop"))
     with asking(deployment, network, DeviceStopRequest(kind=StopKind.HOLD)):
         path = FieldPath(exchanges.message, "")
-        assert topic.echo(session, exchanges, path, topic.yaml_document, 1) is ExitCode.OK
+        assert topic.echo(session, exchanges, path, yaml_document, 1) is ExitCode.OK
     said = yaml.safe_load(capsys.readouterr().out.partition("---")[0])
     assert said["question"] == {"kind": "hold"}
     assert said["answer"]["accepted"] is True
     assert said["failure"] is None
+
+
+def test_a_field_of_an_answer_is_watched(session, stack, deployment, network, capsys):
+    exchanges = exchanges_of(request.asked_on(session, "device/stop"))
+    with asking(deployment, network, DeviceStopRequest(kind=StopKind.HOLD)):
+        path = FieldPath(exchanges.message, "answer.accepted")
+        assert topic.echo(session, exchanges, path, csv_lines(), 2) is ExitCode.OK
+    assert capsys.readouterr().out.splitlines() == ["value", "True", "True"]
 
 
 def test_a_request_of_nobody_is_answered_with_the_nearest_of_all(session, stack):

@@ -24,6 +24,7 @@ from schemas.topics import JOINT_STATES, JOINT_TARGETS
 from services.cli import action, device, node, state, topic, topic_rates
 from services.cli.errors import CommandError, ExitCode
 from services.cli.field_path import FieldPath
+from services.cli.forms import yaml_document
 from services.cli.messages import message_of
 from services.cli.move import move
 from services.cli.terminal import Interrupt
@@ -126,7 +127,7 @@ def test_nothing_heard_of_the_arm_is_no_stack(session, monkeypatch):
 
 
 def test_echo_prints_yaml_documents(session, stack, capsys):
-    assert topic.echo(session, JOINT_STATES, FieldPath(JointState, ""), topic.yaml_document, 3) is ExitCode.OK
+    assert topic.echo(session, JOINT_STATES, FieldPath(JointState, ""), yaml_document, 3) is ExitCode.OK
     *documents, rest = capsys.readouterr().out.split("---\n")
     assert len(documents) == 3
     assert rest == ""
@@ -195,13 +196,13 @@ def test_a_reference_says_where_the_joints_are_now(connected, stack, capsys):
 
 def test_nodes_are_listed_without_the_command_itself(session, stack):
     assert node.living(session) == ["planner", "stepper_gateway"]
-    assert "stepper_gateway  rm1" in node.listing(session)
-    assert "follow_joint_trajectory" in node.information(session, "stepper_gateway")
+    assert "stepper_gateway  rm1" in node.listing(node.standings(session))
+    assert "follow_joint_trajectory" in node.information_of(session, "stepper_gateway").actions
 
 
 def test_an_unknown_node_is_answered_with_the_nearest(session, stack):
     with pytest.raises(CommandError, match='did you mean "planner"'):
-        node.information(session, "planer")
+        node.information_of(session, "planer")
 
 
 def test_a_goal_can_be_sent_without_a_planner(session, gateway, capsys):

@@ -20,6 +20,17 @@ SPEAKING = (
     "topic hz log", "request call plan", "scene list", "node list", "param list", "log",
 )  # fmt: skip
 
+WATCHING = (
+    "topic echo joint_states.position[0]", "topic hz joint_states", "topic bw joint_states", "topic delay joint_states",
+    "tf echo base_link tool_link", "tf monitor", "request echo plan.answer",
+    "action echo follow_joint_trajectory.result", "top", "log",
+)  # fmt: skip
+TABLES = (
+    "topic list", "topic info joint_states", "tf tree", "request list", "request call plan", "action list",
+    "action info follow_joint_trajectory", "param list", "param get logger log_dir", "param describe logger log_dir",
+    "node list", "node info planner", "device monitor --once", "scene list", "doctor", "blackbox list",
+)  # fmt: skip
+
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: " ".join(command.words))
 def test_every_function_of_the_table_takes_one_argument(command):
@@ -36,6 +47,19 @@ def test_every_group_of_the_table_has_its_line_of_help():
 def test_every_example_of_the_table_can_be_typed(command):
     options = parse(command.example.split()[1:])
     assert options.command is command
+
+
+@pytest.mark.parametrize("line", WATCHING)
+def test_whatever_watches_the_bus_can_end_after_one_or_some_and_speak_to_programs(line):
+    once = parse([*line.split(), "--once", "--json"])
+    assert (once.count, once.json) == (1, True)
+    some = parse([*line.split(), "-n", "3", "--csv"])
+    assert (some.count, some.csv) == (3, True)
+
+
+@pytest.mark.parametrize("line", TABLES)
+def test_whatever_is_listed_is_listed_for_programs_too(line):
+    assert parse([*line.split(), "--json"]).json
 
 
 @pytest.mark.parametrize("line", SPEAKING)

@@ -37,6 +37,12 @@ def test_a_node_without_a_file_is_not_ready(tmp_path):
     assert "planner is not ready" in answer.stdout
 
 
+def test_a_node_that_says_why_it_is_not_ready_is_quoted(tmp_path):
+    (tmp_path / "planner.problem").write_text("no fresh joint_states\n")
+    answer = probe("planner", GEMELO_PATHS_RUN=str(tmp_path))
+    assert (answer.returncode, answer.stdout) == (1, "planner is not ready: no fresh joint_states\n")
+
+
 def test_the_folder_may_stand_in_the_deployment_file(tmp_path):
     (tmp_path / "logger.ready").write_text("1")
     config = tmp_path / "bench.toml"

@@ -498,14 +498,22 @@ def test_readiness_is_a_file_that_is_kept_fresh(buses: Buses) -> None:
 
     node = buses.node("planner")
     file = Path(node.deployment.paths.run) / "planner.ready"
+    problem = file.with_suffix(".problem")
     node.set_ready(False, "no description yet")
     assert not file.exists()
+    assert problem.read_text() == "no description yet\n"
     with spinning(node):
         node.set_ready(True)
+        assert not problem.exists()
         first = file.stat().st_mtime
         assert file.read_text() == f"{node.info().pid}\n"
         assert until(lambda: file.stat().st_mtime > first)
         node.set_ready(False, "no joint states for 2 s")
         assert not file.exists()
+        assert problem.read_text() == "no joint states for 2 s\n"
+        node.set_ready(False, "no joint states at all")
+        assert problem.read_text() == "no joint states at all\n"
         node.set_ready(True)
+        node.set_ready(False, "the last word")
     assert not file.exists()
+    assert not problem.exists()

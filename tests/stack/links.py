@@ -17,13 +17,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
+from firmware.platform.host.slot_record import ROW, VARIABLE
 from services.arm.device.device_config import device_config
 from services.arm.model.description import load_arm
+from services.chaos.slots import SlotFile, steps_in, violations
 from services.cli.text_table import table
 from services.hosts.checks import load_site
 from services.hosts.layout import processes
 from services.runtime.deployment import project_root
-from tests.stack import slots, witness
 from tests.stack.ethernet import Ethernet
 from tests.stack.link_cases import CASES, FINISHED, HELD, Case, expected
 from tests.stack.namespaces import Hosts, Lab
@@ -84,7 +85,7 @@ HEADINGS = ("case", "the arm", "the client hears", "after [s]", "ready [s]", "ne
 
 
 class Links:
-    """The site on a switch of ours, a witness on the device's motors, and a person at the desk."""
+    """The site on a switch of ours, a record of the device's motors, and a person at the desk."""
 
     def __init__(self, folder: Path) -> None:
         file = folder / "lab.toml"
@@ -93,12 +94,12 @@ class Links:
         self.ethernet = Ethernet()
         self._arm = load_arm(project_root() / "urdf/rm1")
         self._config = device_config(self._arm)
-        self._slots = folder / "slots"
+        self._slots = SlotFile(folder / "slots")
         self.hosts = Hosts(site, self.ethernet)
         self.lab = Lab(site, self.hosts, folder / "out")
         self._said: SimpleQueue[str] = SimpleQueue()
         self._closing = ExitStack()
-        _let_watch(folder / "out/board/process-compose.yaml", self._slots)
+        _let_record(folder / "out/board/process-compose.yaml", self._slots.path)
 
     def __enter__(self) -> Links:
         with ExitStack() as closing:
@@ -119,7 +120,7 @@ class Links:
 
     def run(self, case: Case) -> Row:
         """One move with the case's fault in its middle, and one after it."""
-        first = max(witness.size(self._slots) - witness.ROW.size, 0)
+        first = max(self._slots.size - ROW.size, 0)
         self._say("attached" if case.is_attached else "move")
         assert self._hear() == "moving\n"
         with self.ethernet.impaired(case.host, case.out, case.into):
@@ -131,10 +132,10 @@ class Links:
         ready = self._wait_ready() - healed
         heard = json.loads(self._hear()) if case.lasts else heard
         self._wait_rest()
-        faults = slots.violations(self._config, slots.read(self._slots, first))
-        stood = witness.size(self._slots)
+        faults = violations(self._config, self._slots.rows(first))
+        stood = self._slots.size
         time.sleep(WATCHED)
-        if slots.steps_in(slots.read(self._slots, stood)):
+        if steps_in(self._slots.rows(stood)):
             faults.append("it moved by itself")
         self._say("again")
         after = json.loads(self._hear())
@@ -150,12 +151,12 @@ class Links:
 
     def watched(self, word: str) -> tuple[dict[str, object], list[str]]:
         """What the desk says of a move, with what the judge of slots finds in it."""
-        first = max(witness.size(self._slots) - witness.ROW.size, 0)
+        first = max(self._slots.size - ROW.size, 0)
         self._say(word)
         assert self._hear() == "moving\n"
         came = json.loads(self._hear())
         self._wait_rest()
-        return came, slots.violations(self._config, slots.read(self._slots, first))
+        return came, violations(self._config, self._slots.rows(first))
 
     def logs(self) -> str:
         return self.lab.logs()
@@ -181,9 +182,9 @@ class Links:
     def _wait_rest(self) -> None:
         end = time.monotonic() + READY
         while time.monotonic() < end:
-            before = witness.size(self._slots)
+            before = self._slots.size
             time.sleep(REST)
-            if not slots.steps_in(slots.read(self._slots, before)):
+            if not steps_in(self._slots.rows(before)):
                 return
         raise AssertionError("the arm does not come to rest")
 
@@ -203,11 +204,10 @@ class Links:
             raise AssertionError(f"the desk says nothing for {TO_TELL:g} s\n{self.lab.logs()}") from None
 
 
-def _let_watch(file: Path, record: Path) -> None:
-    """Has the board's process started with a witness."""
+def _let_record(file: Path, record: Path) -> None:
+    """Has the board's process write down every slot."""
     content = json.loads(file.read_text())
-    content["processes"][BOARD]["command"] = f"cd {project_root()} && exec {sys.executable} -m tests.stack.witness 2>&1"
-    content["processes"][BOARD]["environment"].append(f"GEMELO_SLOTS={record}")
+    content["processes"][BOARD]["environment"].append(f"{VARIABLE}={record}")
     file.write_text(json.dumps(content))
 
 

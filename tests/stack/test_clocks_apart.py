@@ -11,10 +11,10 @@ import pytest
 import gemelo as api
 from schemas.topics import camera_truth
 from services.bench.vision.picks import FLOOR, PROCESSES
+from services.chaos.clocks import shifted
 from services.recordings.mcap_file import CLOCKS
 from services.recordings.reader import RecordingReader
 from services.stack.stack import Stack
-from tests.clocks import shifted
 from tests.stack.gemelo import gemelo
 
 AHEAD = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import os
 import queue
 import signal
 import sys
@@ -17,6 +18,7 @@ from firmware.platform.host.board import Board
 from firmware.platform.host.link import Item, ShutdownRequested
 from firmware.platform.host.network import Network
 from firmware.platform.host.pty import SerialLine
+from firmware.platform.host.slot_record import VARIABLE, SlotRecord
 from firmware.platform.host.virtual_esp32 import VirtualEsp32
 from firmware.platform.host.virtual_sketch import VirtualSketch
 from firmware.platform.host.wires import Wires
@@ -65,7 +67,9 @@ def run(deployment: Deployment, has_line: bool = False) -> None:
     network = Network(access, inbox)
     is_wired = deployment.wire is Wire.SERIAL or arm.device.dialect is Dialect.TEXT
     line = _serial_line(folder, inbox) if has_line or is_wired else None
-    VirtualEsp32(Board(arm, folder, NAME), Wires(network, line), inbox, Readiness(folder, NAME)).run()
+    board, wires = Board(arm, folder, NAME), Wires(network, line)
+    record = SlotRecord(os.environ[VARIABLE]) if os.environ.get(VARIABLE) else None
+    VirtualEsp32(board, wires, inbox, Readiness(folder, NAME), record).run()
 
 
 def _serial_line(folder: Path, inbox: queue.SimpleQueue[Item]) -> SerialLine:

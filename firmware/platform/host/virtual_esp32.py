@@ -22,6 +22,7 @@ from firmware.platform.host.link import (
     SerialBytes,
     ShutdownRequested,
 )
+from firmware.platform.host.slot_record import SlotRecord
 from firmware.platform.host.wires import Wires, say_event
 from schemas.device import InjectKind, InjectRequest
 from services.runtime.process.readiness import Readiness
@@ -39,12 +40,22 @@ TRIAL = 30.0  # [s] that a new firmware has to say status to somebody
 REPLY_TIME = 0.1  # [s] that an answer has to leave, before the wire is lost
 LARGEST_DRIFT = 10_000.0  # [ppm]
 LONGEST_OFFLINE = 3600.0  # [s]
+Passing = Callable[[Device, int], None]  # lets the device's time pass, up to then [us]
 
 
 class VirtualEsp32:
     """One board on its wires; everything but their threads happens in `run`."""
 
-    def __init__(self, board: Board, wires: Wires, inbox: queue.SimpleQueue[Item], readiness: Readiness) -> None:
+    def __init__(
+        self,
+        board: Board,
+        wires: Wires,
+        inbox: queue.SimpleQueue[Item],
+        readiness: Readiness,
+        record: SlotRecord | None = None,
+    ) -> None:
+        self._advance_device: Passing = Device.advance if record is None else record.advance
+        self._stand_still: Passing = Device.stand_still if record is None else record.stand_still
         self._board = board
         self._wires = wires
         self._inbox = inbox
@@ -132,7 +143,7 @@ class VirtualEsp32:
                 self._device.report_status()
             case Disconnected():
                 self._wires.network.on_disconnected(item.reason)
-                self._readiness.not_ready()
+                self._readiness.not_ready(f"no connection to the broker: {item.reason}")
             case Denied():
                 self._wires.network.on_denied(item.reason)
             case ShutdownRequested():
@@ -231,8 +242,8 @@ class VirtualEsp32:
         if late > STALL:
             level = logging.WARNING if self._device.moving else logging.INFO
             log.log(level, "the operating system kept us waiting for %.0f ms: they are not caught up", late * 1e3)
-            self._device.stand_still(max(0, until_us - LAST_SLOTS))
-        self._device.advance(until_us)
+            self._stand_still(self._device, max(0, until_us - LAST_SLOTS))
+        self._advance_device(self._device, until_us)
         self._advanced_to = max(self._advanced_to, monotonic)
 
     def _beat(self, now: float) -> None:

@@ -1,7 +1,7 @@
-"""`<run>/<name>.ready`: the file by which a process says that its state is valid. Read by deploy/probe.
+"""`<run>/<name>.ready`: the file by which a process says that its state is valid; `<name>.problem` says why it is not.
 
-Under systemd it is told too (sd_notify(3)): ready with the first valid state, and alive with every beat, so that a
-process whose loop stands still is started anew, and one whose board is off is not.
+Both are read by deploy/probe. Under systemd it is told too (sd_notify(3)): ready with the first valid state, and alive
+with every beat, so that a process whose loop stands still is started anew, and one whose board is off is not.
 """
 
 from __future__ import annotations
@@ -17,8 +17,11 @@ class Readiness:
 
     def __init__(self, run_dir: Path, name: str) -> None:
         self._file = run_dir / f"{name}.ready"
+        self._problem_file = run_dir / f"{name}.problem"
         self._is_ready = False
-        self._remove()
+        self._problem = ""  # as its file has it
+        _remove(self._file)
+        _remove(self._problem_file)
 
     @property
     def is_ready(self) -> bool:
@@ -26,16 +29,18 @@ class Readiness:
 
     def ready(self) -> None:
         """The state is valid from now on."""
+        self._tell("")
         if not self._is_ready:
             self._is_ready = True
             self._write()
             notify("READY=1\nSTATUS=ready")
 
-    def not_ready(self) -> None:
-        """The state is not valid (any more)."""
+    def not_ready(self, problem: str = "") -> None:
+        """The state is not valid (any more), because of `problem`; empty where there is no word for it."""
+        self._tell(problem)
         if self._is_ready:
             self._is_ready = False
-            self._remove()
+            _remove(self._file)
             notify("STATUS=not ready")
 
     def beat(self) -> None:
@@ -52,9 +57,21 @@ class Readiness:
         self._file.parent.mkdir(parents=True, exist_ok=True)
         self._file.write_text(f"{os.getpid()}\n", encoding="ascii")
 
-    def _remove(self) -> None:
-        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-            self._file.unlink()
+    def _tell(self, problem: str) -> None:
+        """Brings the file of the problem up to date; no process ends because that cannot be written."""
+        if problem == self._problem:
+            return
+        self._problem = problem
+        if not problem:
+            return _remove(self._problem_file)
+        with contextlib.suppress(OSError):
+            self._problem_file.parent.mkdir(parents=True, exist_ok=True)
+            self._problem_file.write_text(f"{problem}\n", encoding="utf-8")
+
+
+def _remove(file: Path) -> None:
+    with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+        file.unlink()
 
 
 def notify(state: str) -> None:
