@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import socket
 import ssl
+import struct
 import threading
 from contextlib import AbstractContextManager
 
@@ -13,6 +15,8 @@ from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
 from paho.mqtt.reasoncodes import ReasonCode
 
 from services.mqtt.access import BrokerAccess
+
+log = logging.getLogger("mqtt")
 
 CONNECT_TIMEOUT = 2.0  # [s]
 OLD_BROKER = 132  # CONNACK: Unsupported protocol version
@@ -76,6 +80,15 @@ class MqttClient(paho.Client):
         except OSError as error:
             self.failure = error
             raise
+
+    def _packet_handle(self) -> MQTTErrorCode:
+        """As paho's, whose thread ends without a word at a topic that is no UTF-8: a packet that is none ends the
+        connection (MQTT 3.1.1, 1.5.3 and 4.8), and another one is made."""
+        try:
+            return super()._packet_handle()
+        except (ValueError, IndexError, struct.error) as error:
+            log.warning("what the broker at %s:%d says is no MQTT (%s): connecting anew", self.host, self.port, error)
+            return MQTTErrorCode.MQTT_ERR_PROTOCOL
 
     def _ssl_wrap_socket(self, tcp_sock: socket.socket) -> ssl.SSLSocket:
         """As paho's, which leaves a connection open whose handshake has failed."""
