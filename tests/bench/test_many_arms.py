@@ -12,7 +12,7 @@ from tests.optional import need
 
 def load(arms: int, slowest: float = 50.0, late: float = 0.01) -> Load:
     return Load(
-        arms=arms, slowest=slowest, lag=0.004, late=late, gateway=4.0, device=4.0, router=1.0 * arms, broker=1.0 * arms,
+        arms=arms, slowest=slowest, lag=0.004, late=0.01, latest=late, gateway=4.0, device=4.0, router=1.0 * arms, broker=1.0 * arms,
         memory=100.0, machine=10.0 * arms,
     )  # fmt: skip
 
@@ -25,6 +25,7 @@ def test_two_arms_are_heard_apart_at_their_rate_and_their_cost_is_told(monkeypat
     assert two.arms == 2
     assert two.slowest > 5.0  # on a busy machine; the bench asks for 47.5
     assert two.lag < 1.0
+    assert two.late <= two.latest
     assert min(two.gateway, two.device, two.router, two.broker, two.memory) > 0.0
 
 

@@ -8,6 +8,7 @@ pair; Mirtich 1996). Joints that carry both shapes of a pair do not count.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,15 @@ Look = Callable[[Array, Sequence[int]], Array]
 # Tuning constants: chosen, where a line does not say measured or standard.
 FINEST = 0.25  # of the margin: so far at least does a look answer, whatever it sees
 MOST_LOOKS = 50_000
+
+
+class _Part(NamedTuple):
+    """From one fractional row number to another, and how far [m] a pair has moved at most by then."""
+
+    low: float
+    high: float
+    left: float
+    right: float
 
 
 class ContinuousCheck:
@@ -45,6 +55,13 @@ class ContinuousCheck:
         while waiting:
             deadline.check()
             low, high, pairs, left, right = waiting.pop()
+            if len(pairs) == 1:
+                part = _Part(low, high, float(left[0]), float(right[0]))
+                of_one = moved[:, pairs[0]].tolist()
+                touching = self._touching_one(int(among[pairs[0]]), part, positions, of_one, margin, finest, deadline)
+                if touching is not None:
+                    return touching
+                continue
             middle = 0.5 * (low + high)
             configuration = _at(middle, positions)
             spare = self._look(configuration, among[pairs].tolist()) - margin
@@ -56,6 +73,30 @@ class ContinuousCheck:
                 waiting.append((low, middle, pairs[before], left[before], reached[before]))
             if after.any():
                 waiting.append((middle, high, pairs[after], reached[after], right[after]))
+        return None
+
+    def _touching_one(
+        self, pair: int, part: _Part, positions: Array, moved: list[float], margin: float, finest: float,
+        deadline: Deadline,
+    ) -> Array | None:  # fmt: skip
+        """As `touching`, of one pair that has `moved` (m,) [m] by each row: without arrays, in half the time."""
+        waiting = [part]
+        while waiting:
+            deadline.check()
+            low, high, left, right = waiting.pop()
+            middle = 0.5 * (low + high)
+            configuration = _at(middle, positions)
+            spare = float(self._look(configuration, (pair,))[0]) - margin
+            if spare <= 0.0:
+                return configuration
+            row = min(int(middle), len(moved) - 1)
+            share = middle - row
+            reached = moved[row] if share == 0.0 else (1.0 - share) * moved[row] + share * moved[row + 1]
+            known = max(spare, finest)
+            if reached - left > known:
+                waiting.append(_Part(low, middle, left, reached))
+            if right - reached > known:
+                waiting.append(_Part(middle, high, reached, right))
         return None
 
     def _movement(self, positions: Array, among: NDArray[np.int_]) -> Array:

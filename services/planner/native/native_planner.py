@@ -193,7 +193,8 @@ class NativePlanner:
         effort = Effort(done.search_s, done.shorten_s, done.smooth_s, done.iterations, done.checks)
         if done.outcome != FOUND:
             return NoPath(FailureReason(done.outcome), effort)
-        return FreePath(done.path(len(self.arm.joints)), done.control(len(self.arm.joints)), effort)
+        dof = len(self.arm.joints)
+        return FreePath(done.path(dof), done.control(dof), done.shares(), effort)
 
     def sphere_centres(self, positions: ArrayLike) -> NDArray[np.float32]:
         """(rows, spheres, 3) [m] in the base, in the order of the trees: for tests and pictures."""

@@ -49,6 +49,7 @@ class FreePath:
 
     corners: Array
     control: Array
+    shares: Array  # (m,) of its edges, how far the curve cuts each corner; 0 where it goes to the corner itself
     effort: Effort
 
     @property

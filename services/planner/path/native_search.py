@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from services.planner.native.paths import NoPath
-from services.planner.path.path import Path, PathNotFound
+from services.planner.native.paths import FreePath, NoPath
+from services.planner.path.path import PathNotFound
 from services.planner.request.deadline import Deadline
 from services.planner.request.refusals import SearchFailure
 
@@ -23,7 +23,7 @@ ENOUGH = 10_000  # configurations checked; measured: 9 of 10 drawn paths are the
 REASONS = {"START_TOUCHES": SearchFailure.START_TOUCHES, "GOAL_TOUCHES": SearchFailure.GOAL_TOUCHES}
 
 
-def native_path(core: NativePlanner, start: Array, goals: Array, seed: int, deadline: Deadline) -> Path:
+def native_path(core: NativePlanner, start: Array, goals: Array, seed: int, deadline: Deadline) -> FreePath:
     """A path from `start` (n,) to one of `goals` (m, n), [rad] or [m]: the shortest of as many as `ENOUGH` checks find,
     or the first that is nearly as short as any can be; raises `PathNotFound`.
 
@@ -33,4 +33,4 @@ def native_path(core: NativePlanner, start: Array, goals: Array, seed: int, dead
     path = core.plan(start, goals, seed=seed, time_limit=deadline.left, cancel=deadline.cancel, enough=ENOUGH)
     if isinstance(path, NoPath):
         raise PathNotFound(REASONS.get(path.reason.name, SearchFailure.TIMED_OUT))
-    return Path(path.corners, path.control, NATIVE)
+    return path

@@ -15,13 +15,14 @@ from services.planner.path.native_search import NATIVE, native_path
 from services.planner.path.nearby_free import nearby_free
 from services.planner.path.ompl_search import PLANNERS, load_ompl, ompl_corners
 from services.planner.path.path import Path, PathNotFound
-from services.planner.path.smoothing import continued, shorten, smooth
+from services.planner.path.smoothing import Rounded, shorten, smooth, smooth_unknown
 from services.planner.path.validity import ValidityChecker
 from services.planner.request.deadline import Deadline, Stopwatch
 from services.planner.request.refusals import PlanRefused, SearchFailure, unknown_name
 
 if TYPE_CHECKING:
     from services.planner.native.native_planner import NativePlanner
+    from services.planner.native.paths import FreePath
 
 Array = NDArray[np.float64]
 
@@ -82,15 +83,19 @@ class Search:
         goal = next(goal for goal, near in ends if np.array_equal(near, path.corners[-1]))
         return self._joined(sought, start, path, goal, deadline)
 
-    def _joined(self, sought: _Sought, near: Array, path: Path, goal: Array, deadline: Deadline) -> Path:
-        """The native planner's path from near the start to near the goal, continued to both."""
+    def _joined(self, sought: _Sought, near: Array, path: FreePath, goal: Array, deadline: Deadline) -> Path:
+        """The native planner's path from near the start to near the goal, continued to both; where it is not, the curve
+        stays as it is."""
         is_at_goal = np.array_equal(goal, path.corners[-1])
         if near is sought.start and is_at_goal:
-            return path
+            return Path(path.corners, path.control, NATIVE)
         with sought.watch.phase("smoothing"):
-            corners = path.corners if near is sought.start else continued(path.corners, sought.start, sought.validity)
-            corners = corners if is_at_goal else continued(corners[::-1], goal, sought.validity)[::-1]
-            return Path(corners, smooth(corners, sought.validity, deadline), NATIVE)
+            rounded = Rounded(path.corners, path.shares)
+            if near is not sought.start:
+                rounded = rounded.continued(sought.start, sought.validity)
+            if not is_at_goal:
+                rounded = rounded.turned.continued(goal, sought.validity).turned
+            return Path(rounded.corners, smooth_unknown(rounded, sought.validity, deadline), NATIVE)
 
     def _sampled(self, planner_id: str, sought: _Sought, deadline: Deadline) -> Path:
         corners = ompl_corners(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -38,16 +39,49 @@ def shorten(corners: Array, validity: ValidityChecker, seed: int, deadline: Dead
     return _needed(corners, validity, deadline)
 
 
+@dataclass(frozen=True)
+class Rounded:
+    """A polyline, and how far each of its corners is to be cut."""
+
+    corners: Array  # (m, n) [rad] or [m]
+    shares: Array  # (m,) of its edges; 0 at both ends
+    unknown: frozenset[int] = frozenset()  # corners of which it is not known that the curve is free there
+
+    @property
+    def turned(self) -> Rounded:
+        """From its end to its beginning."""
+        last = len(self.corners) - 1
+        return Rounded(self.corners[::-1], self.shares[::-1], frozenset(last - corner for corner in self.unknown))
+
+    def continued(self, start: Array, validity: ValidityChecker) -> Rounded:
+        """From `start` (n,) [rad] or [m] straight to its first corner, or past it to the second where that is free."""
+        if len(self.corners) > 1 and validity.is_line_free(start, self.corners[1]):
+            return Rounded(np.vstack((start, self.corners[1:])), self.shares, self._inner(self.unknown | {1}))
+        shares = np.concatenate(([0.0, WIDEST], self.shares[1:]))
+        shifted = frozenset(corner + 1 for corner in self.unknown) | {1, 2}  # which share the edge between them
+        longer = Rounded(np.vstack((start, self.corners)), shares)
+        return Rounded(longer.corners, shares, longer._inner(shifted))
+
+    def _inner(self, numbers: frozenset[int]) -> frozenset[int]:
+        return numbers & frozenset(range(1, len(self.corners) - 1))
+
+
 def smooth(corners: Array, validity: ValidityChecker, deadline: Deadline) -> Array:
-    """Control points (k, n) [rad] or [m] of a uniform cubic B-spline along the polyline `corners` (m, n), free as a
-    whole.
+    """`smooth_unknown` of the polyline `corners` (m, n) [rad] or [m] of which nothing is known."""
+    shares = np.full(len(corners), WIDEST)
+    shares[[0, -1]] = 0.0
+    return smooth_unknown(Rounded(corners, shares, frozenset(range(1, len(corners) - 1))), validity, deadline)
+
+
+def smooth_unknown(path: Rounded, validity: ValidityChecker, deadline: Deadline) -> Array:
+    """Control points (k, n) [rad] or [m] of a uniform cubic B-spline along the polyline of `path`, free as a whole;
+    looked at where that is not known.
 
     Every corner keeps its own control point, with one before and one after it on its edges; where the curve touches,
     they come nearer to the corner, and at last the curve goes to the corner itself and stops there.
     """
-    shares = np.full(len(corners), WIDEST)
-    shares[[0, -1]] = 0.0
-    waiting = set(range(1, len(corners) - 1))
+    corners, shares = path.corners, path.shares.copy()
+    waiting = {corner for corner in path.unknown if shares[corner] > 0.0}
     control, places = _lay(corners, shares)
     while waiting and not deadline.has_passed():
         touching = {corner for corner in sorted(waiting) if not validity.is_curve_free(control[_bent(places, corner)])}
@@ -57,13 +91,6 @@ def smooth(corners: Array, validity: ValidityChecker, deadline: Deadline) -> Arr
         waiting = {corner for corner in near if shares[corner] > 0.0}
         control, places = _lay(corners, shares)
     return stopping(corners) if waiting else control
-
-
-def continued(corners: Array, end: Array, validity: ValidityChecker) -> Array:
-    """The polyline (m, n) [rad] or [m] from `end` (n,) straight to its first corner, or past it to the second where
-    that is free."""
-    is_needless = len(corners) > 1 and validity.is_line_free(end, corners[1])
-    return np.vstack((end, corners[1:] if is_needless else corners))
 
 
 def stopping(corners: Array) -> Array:

@@ -178,7 +178,7 @@ def test_a_curve_is_looked_at_where_it_goes():
     around = [left] * 3 + [[1.0, 2.6, 0.1], folded, folded, [-1.0, 2.6, 0.1]] + [right] * 3
     assert core.spline_free(around)
     truth = Truth(load("rm1"), [post])
-    path = FreePath(np.array(around), np.array(around), Effort(0.0, 0.0, 0.0, 0, 0))
+    path = FreePath(np.array(around), np.array(around), np.zeros(len(around)), Effort(0.0, 0.0, 0.0, 0, 0))
     rows, _, _ = path.at(np.linspace(0.0, path.spans, 500))
     assert min(truth.distance(row) for row in rows) > core.margin
 

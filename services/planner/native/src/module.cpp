@@ -377,6 +377,8 @@ NB_MODULE(_motion, module) {
                 return array_of(std::vector<double>(plan.control), {plan.control.size() / dof, dof});
             },
             "dof"_a)
+        .def("shares",
+             [](const Plan& plan) { return array_of(std::vector<double>(plan.shares), {plan.shares.size()}); })
         .def_ro("search_s", &Plan::search_s)
         .def_ro("shorten_s", &Plan::shorten_s)
         .def_ro("smooth_s", &Plan::smooth_s)

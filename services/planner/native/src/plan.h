@@ -12,6 +12,7 @@ struct Plan {
     Outcome outcome = Outcome::kTimedOut;
     std::vector<Joints> path;     // corners of the polyline, start and goal included
     std::vector<double> control;  // of the B-spline, by rows
+    std::vector<double> shares;   // of its edges, how far each corner is cut; 0 at both ends
     double search_s = 0.0, shorten_s = 0.0, smooth_s = 0.0;
     uint64_t iterations = 0, checks = 0;
 };
@@ -100,7 +101,10 @@ inline Plan plan(const World& world, const Kernel& kernel, const Space& space, c
         result.checks = searching.checks() + shortening.checks();
         return result;
     }
-    result.control = Smoother(last, stop).smooth(result.path);
+    Smoother smoother(last, stop);
+    result.control = smoother.smooth(result.path);
+    result.shares = smoother.shares();
+    result.shares.front() = result.shares.back() = 0.0;
     result.smooth_s = stop.elapsed() - result.search_s - result.shorten_s;
     result.checks = searching.checks() + shortening.checks() + last.checks();
     result.outcome = stop.is_cancelled() ? Outcome::kCancelled : Outcome::kFound;

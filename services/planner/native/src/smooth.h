@@ -37,6 +37,9 @@ class Smoother {
         return points_;
     }
 
+    // Of its edges, how far each corner of the last path is cut; 0 where the curve goes to the corner itself.
+    const std::vector<double>& shares() const { return shares_; }
+
   private:
     static constexpr double kLeast = 1.0 / 64.0;
     static constexpr size_t kShared = 2;  // control points between two corners that share the one between them
