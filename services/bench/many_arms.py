@@ -134,7 +134,8 @@ class Site:
         lags = [lag for arm in arms for lag in tuple(arm.lags)]
         return Load(
             arms=len(arms), slowest=min(len(arm.lags) for arm in arms) / took, lag=quantile(lags or [READY], 0.5),
-            late=quantile(lags or [READY], 0.99), latest=max(late), gateway=gateway / len(arms), device=device / len(arms),
+            late=quantile(lags or [READY], 0.99), latest=max(late), gateway=gateway / len(arms),
+            device=device / len(arms),
             router=router, broker=broker, memory=sum(map(rss_mb, parts)) / len(arms), machine=machine,
         )  # fmt: skip
 
@@ -213,7 +214,8 @@ def _robot(folder: Path, name: str) -> Path:
 def _sentence(load: Load) -> str:
     return (
         f"{load.arms} arms: {load.slowest:.1f} states a second of the slowest, lag {load.lag * 1e3:.1f} ms, p99 "
-        f"{load.late * 1e3:.1f} ms, of the latest arm {load.latest * 1e3:.1f} ms, {load.of_one_arm:.1f} % of a core each"
+        f"{load.late * 1e3:.1f} ms, of the latest arm {load.latest * 1e3:.1f} ms, "
+        f"{load.of_one_arm:.1f} % of a core each"
     )
 
 

@@ -63,6 +63,7 @@ def unclear_region(things: Sequence[ColourThing], region: Mask, window: Window) 
 
 
 def in_base(view: View, pose: Array) -> Transform:
+    """A pose (4, 4) [m] of the camera's frame in the base frame; the identity where the camera's is not known."""
     return Transform() if view.base_from_camera is None else to_transform(view.base_from_camera @ pose)
 
 
@@ -94,4 +95,5 @@ def is_known(region: Mask, window: Window, found: Sequence[Detection]) -> bool:
 
 
 def rows_of(points: Array) -> tuple[tuple[float, ...], ...]:
+    """Pixels (n, 2) as a message has them."""
     return tuple(tuple(float(value) for value in row) for row in points)

@@ -12,8 +12,8 @@ from tests.optional import need
 
 def load(arms: int, slowest: float = 50.0, late: float = 0.01) -> Load:
     return Load(
-        arms=arms, slowest=slowest, lag=0.004, late=0.01, latest=late, gateway=4.0, device=4.0, router=1.0 * arms, broker=1.0 * arms,
-        memory=100.0, machine=10.0 * arms,
+        arms=arms, slowest=slowest, lag=0.004, late=0.01, latest=late, gateway=4.0, device=4.0,
+        router=1.0 * arms, broker=1.0 * arms, memory=100.0, machine=10.0 * arms,
     )  # fmt: skip
 
 

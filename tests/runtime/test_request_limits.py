@@ -101,9 +101,9 @@ def test_a_caller_above_the_rate_hears_at_once_of_how_much_is_taken(buses: Buses
 def test_a_goal_that_is_dropped_is_sent_again_a_few_times_only(buses: Buses) -> None:
     server, client = limited(buses, "gateway", Rate(0.0, 0)), buses.node("script")
     server.serve_action(FOLLOW_JOINT_TRAJECTORY, lambda goal_id, goal: accept(), lambda goal_id: "")
-    with pytest.raises(NoAnswer, match="dropped follow_joint_trajectory/goal unread"):
+    with pytest.raises(NoAnswer, match="dropped follow_joint_trajectory/result unread"):
         client.action(FOLLOW_JOINT_TRAJECTORY).send(FollowJointTrajectoryGoal(), timeout=0.5)
-    assert 1 < dropped(server, f"{FOLLOW_JOINT_TRAJECTORY.key}/goal") <= 0.5 / PAUSE + 1
+    assert 1 < dropped(server, f"{FOLLOW_JOINT_TRAJECTORY.key}/result") <= 0.5 / PAUSE + 1
 
 
 def test_no_more_is_said_of_what_is_refused_than_the_rate(buses: Buses) -> None:

@@ -55,6 +55,9 @@ _DEVICE: dict[str, str] = {
     "run "
     "`gemelo device config --push`, which disarms, configures and arms it": "El equipo «{name}» trabaja con la "
     "configuración {present}, robot.toml pide {sum}, y con los motores encendidos no toma ninguna: apáguelos.",
+    "{reason}; the device says that it stands and answers nothing: does it hear this gateway? restart it, check its "
+    "network": "{reason}; el equipo dice que está quieto y no responde a nada: ¿oye a esta pasarela? reinícielo, y "
+    "revise su red.",
     "the device has not answered the configuration in time": "El equipo no respondió a tiempo a su configuración.",
     "the device was given another configuration ({sum})": "El equipo recibió otra configuración ({sum}).",
     "the device has another configuration": "El equipo tiene otra configuración.",

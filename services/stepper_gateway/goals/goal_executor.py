@@ -30,6 +30,7 @@ HELD = {  # by the detail of the device's event
 }
 HELD_SILENTLY = "the device holds by itself and has not said why: see its own log"
 NOT_VERIFIED = "sent, not verified: the board does not say what it has executed"
+UNHEARD = "the device says that it stands and answers nothing: does it hear this gateway? restart it, check its network"
 FAILED = GoalStatusCode.ABORTED, FollowErrorCode.DEVICE_FAILED
 
 
@@ -117,6 +118,10 @@ class GoalExecutor:
         if execution.ending is not None:
             if controller.has_stopped():
                 self._finish_current(execution.ending, moment)
+            elif controller.is_unheard(moment):
+                controller.lost()
+                reason = f"{execution.ending.reason}; {UNHEARD}"
+                self._finish_current(execution.ending._replace(reason=reason), moment)
             return
         stream = execution.stream
         if stream is not None and stream.failure:

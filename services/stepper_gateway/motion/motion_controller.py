@@ -19,6 +19,8 @@ from services.stepper_gateway.motion.stream import SentChunk, Stream
 from services.stepper_gateway.motion.transmission import Transmission
 
 HISTORY = 1.0  # [s] of measured positions: a trajectory may have been planned from any of them
+EXPIRED = 1.5  # [s] after which the device takes nothing any more that was sent before: its time to live, and a half
+STANDING = 0.5  # [s] without a step, after which an arm stands and does not only turn back
 STOP_AGAIN = 0.5  # [s] between STOPs for a device that does not obey
 MOVING = (DeviceMode.RUN, DeviceMode.HOLD)
 
@@ -55,6 +57,8 @@ class MotionController:
         self._stop_asked = -1.0e9  # [s] monotonic
         self._stopped_us = -1  # device time of its answer to the latest STOP
         self._awaits_stop = False
+        self._unheard_since = -1.0e9  # [s] monotonic: the first STOP of those that nobody has answered
+        self._moved = -1.0e9  # [s] monotonic: of the newest state with other steps than the one before
         self._is_silenced = False  # the latest STOP is ours, because targets fell silent
         self.held = (0, "")  # the stream that the device has held last, and why, in its own words
 
@@ -130,7 +134,10 @@ class MotionController:
         stream = self.stream
         if stream is not None and state.stream == stream.id:
             stream.on_state(state)
-        self._history.append((arrival, self._device.reporter.positions(state.steps)))
+        positions = self._device.reporter.positions(state.steps)
+        if not self._history or self._history[-1][1] != positions:
+            self._moved = arrival
+        self._history.append((arrival, positions))
         while self._history[0][0] < arrival - HISTORY:
             self._history.popleft()
         if state.mode not in MOVING or (state.mode == DeviceMode.RUN and state.t_us > self._held_us):
@@ -177,6 +184,8 @@ class MotionController:
         stream = self.stream.id if self.stream is not None else 0
         self.transmission.abandon()
         self._holds, self._is_silenced = False, is_silence
+        if not self._awaits_stop or self._stopped_us >= 0:
+            self._unheard_since = moment.monotonic
         self._stop_asked, self._stopped_us, self._awaits_stop = moment.monotonic, -1, True
         timeout = self._device.parameters.command_timeout
         self._device.commands.ask(DeviceCommandKind.STOP, moment, timeout, stream=stream)
@@ -185,6 +194,16 @@ class MotionController:
         """True if the device has answered the latest STOP and has said since that it stands."""
         state = self._device.session.latest
         return state is not None and 0 <= self._stopped_us < state.t_us and state.mode not in MOVING
+
+    def is_unheard(self, moment: Moment) -> bool:
+        """True if nobody answers the latest STOP, and it is needless by now: all that was sent before it has expired,
+        and the device says that it stands."""
+        state = self._device.session.latest
+        if state is None or not self._awaits_stop or self._stopped_us >= 0:
+            return False
+        is_fresh = self._device.session.is_fresh(moment, self._device.parameters.state_timeout)
+        stands = not any(state.velocity) and moment.monotonic - self._moved > STANDING
+        return is_fresh and stands and moment.monotonic - self._unheard_since > EXPIRED
 
     def lost(self) -> None:
         """The device cannot be reached: no answer to a STOP will come, nor will a person's RESUME."""
