@@ -13,7 +13,7 @@ from services.runtime.deployment import load_deployment
 from services.runtime.errors import BusError, Refused
 from services.runtime.node import Node
 from services.runtime.process.logs import LEVELS, line_logger
-from services.runtime.process.shutdown import ShutdownRequest, end_soon, stop_on_signals
+from services.runtime.process.shutdown import ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
 
 Run = Callable[[Node, Deployment], None]
 EXPECTED = (ConfigurationError, BusError, Refused)  # a sentence says all; anything else shows where it happened
@@ -23,6 +23,7 @@ def service(name: str, run: Run, arguments: Sequence[str] | None = None) -> None
     """Opens the node `name`, runs `run(node, deployment)`, and ends the process: 0 when stopped, 1 for an error."""
     options = _parse(name, arguments)
     stop = ShutdownRequest()
+    end_with_any_thread(line_logger(name, options.log_level), lambda: stop.is_set)
     with stop_on_signals(stop):
         code = _run(name, run, options, stop)
     end_soon(code)  # whatever threads a library has left behind

@@ -174,6 +174,28 @@ def test_a_thread_that_a_library_left_behind_does_not_keep_the_process(start: St
     assert process.returncode == 0
 
 
+def test_a_thread_that_dies_ends_the_process_with_its_name_and_where(start: Start) -> None:
+    """As one that reads a wire: what goes on without it looks well and hears nothing."""
+    process = start(
+        """
+        import threading
+
+        def read():
+            [][1]
+
+        def run(node, deployment):
+            threading.Thread(target=read, name="wire", daemon=True).start()
+            node.spin()
+
+        service("reading", run)
+        """
+    )
+    _, errors = process.communicate(timeout=PROMPT)
+    assert process.returncode == 1
+    assert 'reading ERROR the thread "wire" has died, and with it this process' in errors
+    assert "IndexError" in errors
+
+
 def test_an_error_before_the_spin_ends_the_process(start: Start) -> None:
     process = start("service('failing', lambda node, deployment: {}['no such key'])")
     _, errors = process.communicate(timeout=PROMPT)

@@ -31,6 +31,7 @@ from services.mqtt.access import device_access
 from services.runtime.deployment import DeploymentError, load_deployment, project_root
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.readiness import Readiness
+from services.runtime.process.shutdown import ShutdownRequest, end_with_any_thread
 
 NAME = "virtual_esp32"
 BEAT = 1.0  # [s] between two touches of the readiness file
@@ -57,8 +58,11 @@ def run(deployment: Deployment, has_line: bool = False) -> None:
     folder = project_root() / deployment.paths.run
     folder.mkdir(parents=True, exist_ok=True)
     inbox: queue.SimpleQueue[Item] = queue.SimpleQueue()
+    stop = ShutdownRequest()
+    stop.on_set(lambda: inbox.put(ShutdownRequested()))
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: inbox.put(ShutdownRequested()))
+        signal.signal(number, lambda *_: stop.set())
+    end_with_any_thread(log, lambda: stop.is_set)
     if deployment.device is DeviceKind.BOARD:
         return idle(inbox, Readiness(folder, NAME))
     access = device_access(deployment.mqtt, arm.device.name)

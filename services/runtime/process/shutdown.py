@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import _thread
 import faulthandler
+import logging
 import os
 import signal
 import sys
@@ -78,6 +79,24 @@ def stop_on_signals(stop: ShutdownRequest) -> Iterator[None]:
         is_over = True
         for each, handler in before.items():
             signal.signal(each, handler)
+
+
+def end_with_any_thread(log: logging.Logger, is_stopping: Callable[[], bool]) -> None:
+    """From now on an error that ends a thread ends the process, exit code 1, unless `is_stopping()`.
+
+    A service that goes on without the thread which reads its wire looks well and hears nothing; one that has ended is
+    started again.
+    """
+
+    def on_error(died: threading.ExceptHookArgs) -> None:
+        name = died.thread.name if died.thread is not None else "unknown"
+        error = (died.exc_type, died.exc_value or died.exc_type(), died.exc_traceback)
+        log.error('the thread "%s" has died, and with it this process', name, exc_info=error)
+        if not is_stopping():
+            sys.stderr.flush()
+            os._exit(1)
+
+    threading.excepthook = on_error
 
 
 def end_soon(code: int) -> None:
