@@ -45,6 +45,17 @@ def test_a_move_ends_on_the_exact_steps() -> None:
     assert_within_limits(rig)
 
 
+@pytest.mark.parametrize("half", [-34.5, -33.5, 33.5, 34.5])
+def test_a_move_that_ends_on_half_a_step_says_the_steps_that_the_device_makes_of_it(half: float) -> None:
+    rig = VirtualArm().ready()
+    goal = (0.0, half / rm1().joints[1].steps.per_unit, 0.0)
+    assert rig.goal(move(HOME, goal)).accepted
+    status, result = rig.finish()
+    assert status == GoalStatusCode.SUCCEEDED
+    assert result.commanded_steps == result.executed_steps == rig.device.steps
+    assert abs(result.final_error[1]) == 0.5
+
+
 def test_the_log_says_what_moved_where_how_long_and_with_what_error() -> None:
     rig = VirtualArm().ready()
     rig.goal(move(HOME, READY))

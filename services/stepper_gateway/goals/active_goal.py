@@ -203,7 +203,7 @@ class ActiveGoal:
             error_code=ending.code,
             error_string=ending.reason,
             joint_names=tuple(joint.name for joint in self.joints),
-            commanded_steps=tuple(round(steps) for steps in self.commanded),
+            commanded_steps=tuple(math.floor(steps + 0.5) for steps in self.commanded),  # as the device rounds
             executed_steps=state.steps if state is not None else (),
             max_following_error=tuple(self.max_error),
             final_error=tuple(self._final_errors(state)) if state is not None else (),
