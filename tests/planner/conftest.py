@@ -7,6 +7,7 @@ import pytest
 from schemas.joints import JointState
 from services.arm.model.description import Arm
 from services.planner.core import Planner
+from tests.planner.judging import forget_scenes
 
 
 @pytest.fixture(scope="session")
@@ -17,3 +18,9 @@ def planner(rm1: Arm) -> Planner:
 @pytest.fixture
 def home(rm1: Arm) -> JointState:
     return JointState(name=rm1.joint_names, position=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0))
+
+
+@pytest.fixture(autouse=True)
+def scenes_of_other_tests() -> None:
+    """Tests of all files share planners, in any order."""
+    forget_scenes()

@@ -35,11 +35,22 @@ ROUNDING = 1e-9  # [rad] or [m], and a share of a limit
 REACHED = 2e-6  # [m] and [rad] that a pose may be missed by, where it is asked for exactly
 
 
+_shared: list[Planner] = []
+
+
 @cache
 def planner_of(name: str) -> Planner:
+    """One for all tests of this process; `forget_scenes` empties its scene before each of them."""
     planner = Planner(arm_of(name))
     planner.prepare()  # its links' spheres would cost the first plan its time
+    _shared.append(planner)
     return planner
+
+
+def forget_scenes() -> None:
+    for planner in _shared:
+        if planner.checker.newest.scene.objects:
+            show(planner, PlanningScene())
 
 
 @cache
