@@ -26,7 +26,27 @@ from tests.stack import gemelo as command
 
 BIN, RED = (0.1, 0.3), (0.3, -0.12)  # [m] of rm1's sample cell: the place, and where the red block stands
 ASTRAY = 0.04  # [m]
-FAR = '[[place]]\nname = "far"\nkind = "pose"\nposition = [0.9, 0.1, 0.06]\n'
+MORE = """
+[[place]]
+name = "far"
+kind = "pose"
+position = [0.9, 0.1, 0.06]
+
+[[thing]]  # which is nowhere
+name = "ghost"
+kind = "tag"
+id = 7
+size = 0.028
+
+[[thing]]  # whose grasp is beside it
+name = "beside"
+kind = "tag"
+id = 8
+size = 0.028
+box = [0.03, 0.03, 0.04]
+grasp_offset = [0.0, -0.06, -0.012]
+position = [0.24, 0.02, 0.04]
+"""
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +140,7 @@ def astray(tmp_path):
     rm1 = project_root() / "urdf/rm1"
     path = tmp_path / "cell.toml"
     text = (rm1 / "cell.toml").read_text()
-    path.write_text(re.sub(r"\[\[tag\]\].*?(?=\[\[thing)", "", text, flags=re.DOTALL) + FAR)
+    path.write_text(re.sub(r"\[\[tag\]\].*?(?=\[\[thing)", "", text, flags=re.DOTALL) + MORE)
     arm = load_arm(rm1)
     (record,) = load_cell(path, arm).cameras
     info = exact_info(record, arm.base_frame)
@@ -132,8 +152,8 @@ def astray(tmp_path):
         yield running
 
 
-def test_a_thing_that_stays_where_it_was_is_not_said_to_be_picked(astray, monkeypatch):
-    """rm1's jaws measure nothing: what is believed to be between them is all that they could say."""
+def test_what_cannot_be_picked_is_refused_or_aborted_with_its_reason(astray, monkeypatch):
+    """Above all what stays where it was: rm1's jaws measure nothing, and can only say what is believed of them."""
     for name, value in astray.deployment.items():
         monkeypatch.setenv(name, value)
     with gemelo.connect() as arm:
