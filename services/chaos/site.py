@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import deque
 from contextlib import ExitStack, suppress
+from functools import cached_property
 from pathlib import Path
 from random import Random
 from types import TracebackType
@@ -50,10 +51,7 @@ class Site:
     def __init__(self, out: Path, broker: str, seed: int, is_judged: bool = True) -> None:
         out.mkdir(parents=True, exist_ok=True)
         self.slots = SlotFile(out / "slots")
-        try:
-            self.clocks = SteppingClocks(out, [*map(program, PROCESSES), "mosquitto"])  # which takes a broker's place
-        except ClockError as error:
-            raise StackError(str(error)) from error
+        self._out = out
         self._port, self._broker_port = free_ports(2)
         self.stack = Stack(
             broker=broker,
@@ -68,6 +66,14 @@ class Site:
         )
         self._seed = seed
         self._closing = ExitStack()
+
+    @cached_property
+    def clocks(self) -> SteppingClocks:
+        """Of all that may run; made when first asked for, since that takes a compiler. Raises `StackError`."""
+        try:
+            return SteppingClocks(self._out, [*map(program, PROCESSES), "mosquitto"])  # which takes a broker's place
+        except ClockError as error:
+            raise StackError(str(error)) from error
 
     def __enter__(self) -> Site:
         with ExitStack() as closing:

@@ -25,7 +25,7 @@ from services.panel.view.world import World
 from services.runtime.deployment import DeploymentError, exposure, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
-from services.runtime.process.shutdown import ShutdownRequest, end_soon, stop_on_signals
+from services.runtime.process.shutdown import ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
 
 NAME = "panel"
 APART = 0.02  # [s] at least from the beginning of one picture to the next, however much is dragged
@@ -159,6 +159,7 @@ def main() -> None:
     arguments = parser.parse_args()
     warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")  # a browser that has just gone
     log, stop = line_logger(NAME, arguments.log_level), ShutdownRequest()
+    end_with_any_thread(log, lambda: stop.is_set)  # above all with the one that sends a Stop
     try:
         with stop_on_signals(stop):
             code = run(load_deployment(arguments.config), arguments.config, log, stop)
