@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import shutil
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -29,6 +28,7 @@ from services.chaos.report import Report, page_of, text_of
 from services.chaos.site import Site, installed_broker
 from services.runtime.deployment import load_deployment
 from services.runtime.process.ending import ended_by_signals
+from services.stack.results import new_results
 from services.stack.stack import StackError
 
 Order = Iterator[tuple[int, Fault, Random]]  # number, fault and chance of each episode
@@ -86,8 +86,7 @@ def run(
     only: tuple[str, ...],
 ) -> bool:
     """Runs episodes for `seconds` [s] or until there are no more; writes and prints the report; True if all is good."""
-    shutil.rmtree(out, ignore_errors=True)
-    out.mkdir(parents=True)
+    new_results(out)
     begun = time.monotonic()
     episodes: list[Episode] = []
     with Site(out, broker, seed) as site:

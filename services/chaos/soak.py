@@ -7,7 +7,6 @@ by more than 1 MB an hour, nor its number of files, sockets and threads by more 
 from __future__ import annotations
 
 import argparse
-import shutil
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -28,6 +27,7 @@ from services.chaos.person import Person
 from services.chaos.site import Site, installed_broker
 from services.runtime.deployment import load_deployment
 from services.runtime.process.ending import ended_by_signals
+from services.stack.results import new_results
 from services.stack.stack import StackError
 
 EVERY = 5.0  # [s] between two samples
@@ -86,8 +86,7 @@ def main() -> None:
 
 def run(seconds: float, seed: int, broker: str, out: Path) -> bool:
     """Moves for `seconds` [s]; writes and prints the report; True if nothing grew and every move succeeded."""
-    shutil.rmtree(out, ignore_errors=True)
-    out.mkdir(parents=True)
+    new_results(out)
     random, samples, failures, moves = Random(seed), dict[str, list[Sample]](), list[str](), 0
     with Site(out, broker, seed, is_judged=False) as site:
         change_files_often(site.arm, seconds)

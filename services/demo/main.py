@@ -20,6 +20,7 @@ from services.demo.performance import Performance
 from services.demo.report import complaints, report_of, text_of
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.process.ending import ended_by_signals
+from services.stack.results import new_results
 from services.stack.stack import Stack, StackError
 
 MOSQUITTO = (shutil.which("mosquitto"), shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin"))
@@ -48,9 +49,7 @@ def best_broker() -> str:
 
 def demonstrate(out: Path, broker: str, with_picture: bool) -> int:
     """Runs the demonstration on a stack of its own and writes the results into `out`; returns the exit code."""
-    folder, recording = out / "demo", out / "demo.rrd"
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
+    folder, recording = new_results(out / "demo"), out / "demo.rrd"
     for old in (out / "demo.json", recording, out / "demo.png"):
         old.unlink(missing_ok=True)
     robot = load_deployment().robot

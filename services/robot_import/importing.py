@@ -155,6 +155,8 @@ def _require_free(folder: Path, options: ImportOptions) -> None:
         raise DescriptionError(f"{folder} is there already: give --force to replace it, or --name for another")
     if folder.resolve() in (options.source.resolve(), *options.source.resolve().parents):
         raise DescriptionError(f"{options.source} lies in {folder}, which is to be replaced: give --name for another")
+    if not folder.is_dir() or (any(folder.iterdir()) and not (folder / "robot.urdf").is_file()):
+        raise DescriptionError(f"{folder} is no robot's folder, --force does not replace it: give --name for another")
 
 
 def _tool(model: UrdfModel) -> str:

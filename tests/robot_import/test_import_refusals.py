@@ -254,3 +254,14 @@ def test_a_wrist_of_two_turns_each_way_keeps_its_limits_however_they_are_rounded
     ask_limits(mended, Questions({}, takes_defaults=True))
     assert mended.model.joints[0].limit.lower == -6.28319  # type: ignore[union-attr]
     assert not [each for each in mended.findings() if each.subject == 'joint "wrist"']
+
+
+def test_force_replaces_a_robot_and_nothing_else(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    kept = tmp_path / "urdf" / "arm" / "thesis.txt"
+    kept.parent.mkdir(parents=True)
+    kept.write_text("three years")
+    source = str(by_hand(tmp_path / "source").source)
+    words = ["import", source, "--output", str(tmp_path / "urdf"), "--name", "arm", "--yes", "--force"]
+    assert run(words) is ExitCode.FAILED
+    assert "is no robot's folder, --force does not replace it: give --name" in capsys.readouterr().err
+    assert kept.read_text() == "three years"

@@ -1,0 +1,28 @@
+"""The folder into which a run on a stack of its own writes its results."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from services.stack.stack import StackError
+
+MARK = ".gemelo-results"  # in every such folder: what lies beside it may be removed by the next run
+
+
+def new_results(folder: Path) -> Path:
+    """The folder, made and empty: the results of an earlier run are removed, and nothing else ever is.
+
+    Raises `StackError` where it holds anything that no run has left there, or is no folder.
+    """
+    try:
+        if folder.exists() and any(folder.iterdir()):
+            if not (folder / MARK).is_file():
+                raise StackError(f"{folder} holds files that no such run has left there, and results would replace "
+                                 "them: choose a new folder with --out, or empty it")  # fmt: skip
+            shutil.rmtree(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / MARK).write_text("the next run that writes here removes all that lies in this folder\n")
+    except OSError as error:
+        raise StackError(f"no results can be written into {folder}: {error.strerror}") from error
+    return folder
