@@ -8,6 +8,7 @@ import msgspec
 
 from gemelo.errors import BadArgument, Error
 from gemelo.targets import number
+from gemelo.whole_files import write_whole
 from schemas.scene import MeshShape, PlanningScene
 from services.runtime.deployment import project_root
 
@@ -52,10 +53,7 @@ def _require_size(path: Path, content: bytes, scale: float) -> None:
 
 def write_scene(scene: PlanningScene, path: Path) -> None:
     """Writes the scene as JSON; raises `Error` where the file cannot be written."""
-    try:
-        path.write_bytes(msgspec.json.format(msgspec.json.encode(scene)) + b"\n")
-    except OSError as error:
-        raise Error(f"{path} cannot be written: {error.strerror}") from error
+    write_whole(path, msgspec.json.format(msgspec.json.encode(scene)) + b"\n")
 
 
 def read_scene(path: Path) -> PlanningScene:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 import unicodedata
 from pathlib import Path
 
@@ -49,25 +47,6 @@ def read_text(path: Path) -> str:
         raise Error(f"{path} cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise Error(f"{path} is no UTF-8 text: {error}") from error
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """All or nothing: into a file beside it, which then takes its name. Makes the folder; raises `Error`."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, beside = tempfile.mkstemp(prefix=".", suffix=".tmp", dir=path.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            os.chmod(beside, 0o644)
-            os.replace(beside, path)
-        except BaseException:
-            Path(beside).unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise Error(f"{path} cannot be written: {error.strerror}") from error
 
 
 def _name(kind: str, name: str) -> str:
