@@ -18,6 +18,8 @@ PATIENCE = 60_000.0  # [ms] a loaded machine draws a picture in seconds
 OPENING = 300_000.0  # [ms] and compiles its shaders in a minute or more
 SCALE = 0.5  # of a picture's pixels to those of the page: a processor draws a quarter of them
 CONTROLS = 450  # [pixels] of the page
+STILL = 2.5  # [s] the drawing of a loaded machine lags so much
+CHANGED = 30  # of 255: what differs more between two pictures was drawn anew
 BLUE = (45, 140, 255)  # of the gizmo's arrow along z
 
 
@@ -90,12 +92,49 @@ class Person:
 
     def drags_down_arrow(self, color: tuple[int, int, int], right: float, down: float) -> None:
         """Takes the gizmo's arrow of that colour, which points down, by its head and leads it so many pixels."""
-        x, y = self._tip_of(color)
+        self.drags(self._tip_of(color), right, down)
+
+    def drags(self, start: tuple[float, float], right: float, down: float) -> None:
+        """Takes what is drawn at `start` [pixels] of the page and leads it so many pixels."""
+        x, y = start
         self.page.mouse.move(x, y)
         self.page.mouse.down()
         for part in range(1, 9):
             self.page.mouse.move(x + right * part / 8, y + down * part / 8)
         self.page.mouse.up()
+
+    def still_picture(self) -> np.ndarray:
+        """What the person sees once nothing has moved in the drawing for `STILL`."""
+        seen, since = self.picture(), time.monotonic()
+
+        def look() -> bool:
+            nonlocal seen, since
+            before = seen
+            seen = self.picture()
+            if self.differs(before, seen).any():
+                since = time.monotonic()
+            return time.monotonic() > since + STILL
+
+        until(look, bool)
+        return seen
+
+    def drawn_since(self, before: np.ndarray, color: tuple[int, int, int] | None = None) -> np.ndarray:
+        """(n, 2) [pixels] of the page: rightwards and downwards, of what is drawn otherwise than in the picture
+        `before`, once it stands still; of what has this colour alone, where one is given."""
+
+        def found() -> np.ndarray:
+            now = self.still_picture()
+            changed = self.differs(before, now)
+            if color is not None:  # thin lines are blended with what is behind
+                changed &= np.abs(now.astype(int)[:, : self._drawing] - color).max(axis=2) < 60
+            return np.argwhere(changed)
+
+        return until(found, lambda seen: len(seen) > 5)[:, ::-1] / SCALE
+
+    def differs(self, before: np.ndarray, now: np.ndarray | None = None) -> np.ndarray:
+        """(height, width) where the drawing is another one than in `before`: in `now`, or as it is seen."""
+        now = self.picture() if now is None else now
+        return np.abs(now.astype(int) - before)[:, : self._drawing].max(axis=2) > CHANGED
 
     def require_no_errors(self) -> None:
         assert self._errors == []

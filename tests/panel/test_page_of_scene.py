@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
-from math import degrees
+from contextlib import suppress
+from functools import partial
+from math import degrees, radians
 from pathlib import Path
 
+import numpy as np
 import pytest
+from playwright.sync_api import expect
 
 import gemelo
 from services.runtime.deployment import project_root
-from tests.panel.person import Person, until
+from tests.panel.person import BLUE, Person, until
 
 ARM = "brazo_joint"
 WEDGE = Path("tests/gemelo/wedge.stl")
@@ -96,3 +100,98 @@ def test_homing_says_how_far_it_is(person: Person, arm: gemelo.Arm) -> None:
     person.press("Home")
     person.reads("Homing: ")
     until(lambda: all(arm.device.state.referenced) and not any(arm.velocities.values()), bool, 120.0)
+
+
+def test_the_ghost_goes_along_the_plan_until_it_is_executed_and_again_when_asked(
+    person: Person, arm: gemelo.Arm
+) -> None:
+    person.types(f"{ARM} [°]", 60)
+    person.press("Plan")
+    person.reads("Duration")
+    _waits_for_the_ghost(person)
+    person.press("Execute")
+    person.reads("Arrived")
+    person.still_picture()
+    person.ticks("Play")
+    person.ticks("Play")
+    _waits_for_the_ghost(person)
+    person.press("Goal to where the arm is")
+    expect(person.page.get_by_text("Duration").filter(visible=True)).to_have_count(0)
+    person.still_picture()
+
+
+def _waits_for_the_ghost(person: Person) -> None:
+    for before in [person.picture(), person.picture()]:  # it goes on
+        until(partial(_changed, person, before), lambda changed: changed > 10)
+
+
+def _changed(person: Person, before: np.ndarray) -> int:
+    return int(person.differs(before).sum())
+
+
+def test_a_narrow_page_shows_the_arm_however_often_it_is_opened(person: Person, arm: gemelo.Arm) -> None:
+    for _ in range(5):
+        person.open()
+        picture = person.still_picture().astype(int)[100:, :225]  # the drawing, below what viser says of WebGL
+        red, green, blue = picture.transpose(2, 0, 1)
+        rows, columns = np.nonzero((red > 150) & (red - blue > 80) & (green - blue > 20))  # the upper arm's orange
+        assert len(rows) > 100
+        assert 70.0 < columns.mean() < 160.0
+
+
+@pytest.mark.parametrize("way", ["shift", "the switch"])
+def test_a_click_on_an_object_sets_the_goal_just_above_its_surface(person: Person, arm: gemelo.Arm, way: str) -> None:
+    person.press("Goal to where the arm is")
+    before = person.still_picture()
+    arm.scene.add_box("table", size=(0.12, 0.12, 0.04), at=(0.1, -0.3, 0.05))
+    place = person.drawn_since(before).mean(axis=0)
+    was = goal_of(person, arm)
+    if way == "shift":
+        person.page.mouse.click(*place)  # without the key a click sets nothing
+        person.page.keyboard.down("Shift")
+    else:
+        person.ticks("Goal by click")
+    assert goal_of(person, arm) == was
+    until(lambda: _clicked_goal(person, arm, place, was), lambda now: now != was)
+    person.page.keyboard.up("Shift")
+    person.still_picture()
+    x, y, z = goal_of(person, arm)
+    assert 0.04 < x < 0.16
+    assert -0.36 < y < -0.24
+    assert 0.06 <= z <= 0.101
+    assert not any(arm.velocities.values())
+
+
+def test_an_object_is_led_by_its_arrow(person: Person, arm: gemelo.Arm) -> None:
+    arm.scene.add_box("post", size=(0.03, 0.03, 0.06), at=(0.1, -0.3, 0.05))
+    person.tab("Scene")
+    before = person.still_picture()
+    person.chooses("Object", "post")
+    person.reads("post: box, ")
+    arrow = person.drawn_since(before, BLUE)
+    across, down = arrow[arrow[:, 1] == arrow[:, 1].min()].mean(axis=0)  # the head of the arrow that points up
+    person.drags((float(across), float(down) + 5.0), 0, -60)
+    at = until(lambda: arm.scene.objects["post"].pose.translation, lambda now: now != (0.1, -0.3, 0.05))
+    assert at[:2] == pytest.approx((0.1, -0.3), abs=1e-6)
+    assert 0.07 < at[2] < 0.4
+    assert arm.scene.objects["post"].shape.size == (0.03, 0.03, 0.06)
+
+
+def _clicked_goal(
+    person: Person, arm: gemelo.Arm, place: np.ndarray, was: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Soon after a click; the browser learns a moment after the switch that it is to tell of clicks."""
+    person.page.mouse.click(*place)
+    with suppress(AssertionError):
+        until(lambda: goal_of(person, arm), lambda now: now != was, 3.0)
+    return goal_of(person, arm)
+
+
+def goal_of(person: Person, arm: gemelo.Arm) -> tuple[float, float, float]:
+    """[m] where the tool would stand with the joint values of the page."""
+    joints = {}
+    for joint in arm.description.joints:
+        unit = "mm" if joint.unit == "m" else "°"
+        shown = person.value(f"{joint.name} [{unit}]")
+        joints[joint.name] = shown / 1000.0 if unit == "mm" else radians(shown)
+    return arm.fk(joints).position

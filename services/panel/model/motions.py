@@ -44,6 +44,7 @@ class Motions:
         self.plan: gemelo.Plan | None = None
         self.motion: gemelo.Motion | None = None
         self.is_planning = False
+        self.shows_plan = False  # by a ghost that goes along it: until it is executed, and again when a person asks
         self.version = 0  # +1 with every change
 
     @property
@@ -61,6 +62,7 @@ class Motions:
             self.is_planning, self.plan = True, None
             self._changed()
             self.plan = self._arm.plan(**target)
+            self.shows_plan = True
         except Exception as error:
             self._tell(problem_of(error))
         finally:
@@ -103,6 +105,7 @@ class Motions:
         motion: gemelo.Motion | None = None
         try:
             motion = self.motion = self._arm.start(plan)
+            self.shows_plan = False
             self._changed()
             motion.wait()
         except Exception as error:

@@ -119,7 +119,8 @@ class Operator:
         self.forget_problem()
 
     def follow_measured(self) -> None:
-        """The goal is where the arm is."""
+        """The goal is where the arm is, and no plan leads there."""
+        self.motions.forget_plan()
         self.guarded(lambda: self.set_goal(self.arm.joints))
 
     # Motions

@@ -92,6 +92,7 @@ class World:
         """Shows all of the arm in a narrow picture; `aspect` is the ratio of its width to its height."""
         if aspect < ASPECT:
             client.camera.position = self._seen + min(FARTHEST, ASPECT / aspect) * (self._eye - self._seen)
+            client.camera.look_at = self._seen  # which viser has led along with the position
 
     def _set_stage(self, server: viser.ViserServer, reach: float) -> None:
         size = 2.0 * ceil(4.0 * reach) / 2.0
@@ -150,8 +151,8 @@ class World:
             self._path_stamp = path.stamp
             self._draw_line("/planned", np.array(path.points), PLANNED)
         plan = motions.plan
-        self._ghost.is_visible = plan is not None and not motions.is_moving
-        if plan is None or motions.is_moving:
+        self._ghost.is_visible = plan is not None and motions.shows_plan and not motions.is_moving
+        if plan is None or not self._ghost.is_visible:
             return
         now = time.monotonic()
         if now - self._played_at < 1.0 / GHOST_RATE:

@@ -133,6 +133,7 @@ class MoveTab:
         plan = self._operator.motions.plan
         if plan is not None:
             set_if_new(self._play, "value", is_playing)
+            self._operator.motions.shows_plan = True
             self._world.is_playing, self._world.scrubbed = is_playing, self._scrub.value / SCRUB * plan.duration
 
     def _show_problem(self) -> None:
