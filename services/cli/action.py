@@ -9,7 +9,7 @@ from schemas.actions import GoalStatusCode
 from schemas.message import Message
 from schemas.topics import ACTIONS, Action
 from services.cli.errors import CommandError, ExitCode, unknown, usage
-from services.cli.forms import print_value
+from services.cli.forms import json_line, print_value
 from services.cli.messages import dump, fields_of, message_of
 from services.cli.parser import Choices, Options, Parser, json_option
 from services.cli.session import Session, connect, share_control
@@ -46,10 +46,11 @@ def run_info(options: Options) -> ExitCode:
 
 
 def goal_options(parser: Parser) -> None:
-    """Adds action, goal and --feedback."""
+    """Adds action, goal, --feedback and --json."""
     action_option(parser)
     parser.add_argument("goal", metavar="GOAL", help="the goal as JSON, a file that holds it, or - for standard input")
     parser.add_argument("-f", "--feedback", action="store_true", help="show the feedback")
+    parser.add_argument("--json", action="store_true", help="JSON lines: accepted, feedback, status and result")
 
 
 def run_send_goal(options: Options) -> ExitCode:
@@ -58,7 +59,7 @@ def run_send_goal(options: Options) -> ExitCode:
     goal = message_of(action.goal, goal_text(options.goal))
     with connect() as session:
         share_control(session)
-        return send_goal(session, action, goal, options.feedback)
+        return send_goal(session, action, goal, options.feedback, options.json)
 
 
 def choices(robot: Robot | None) -> Choices:
@@ -113,13 +114,20 @@ def goal_text(source: str) -> str:
 
 
 def send_goal(
-    session: Session, action: Action[Message, Message, Message], goal: Message, with_feedback: bool
+    session: Session,
+    action: Action[Message, Message, Message],
+    goal: Message,
+    with_feedback: bool,
+    as_json: bool = False,
 ) -> ExitCode:
     """Sends the goal and waits for its result; Ctrl-C cancels."""
     client = session.node.action(action)
 
+    def say(value: object, text: str) -> None:
+        print(json_line(value) if as_json else text, flush=True)
+
     def on_feedback(feedback: Any) -> None:
-        print(f"feedback:\n{indented(feedback)}---", flush=True)
+        say({"feedback": feedback}, f"feedback:\n{indented(feedback)}---")
 
     with two_stage_interrupt() as interrupt:
 
@@ -127,15 +135,19 @@ def send_goal(
             if interrupt.is_set and not interrupt.is_answered:
                 interrupt.is_answered = True
                 handle.cancel()
-                print(CANCELLING, flush=True)
+                print(CANCELLING, file=sys.stderr if as_json else sys.stdout, flush=True)
 
         try:
             handle = client.send(goal, on_feedback=on_feedback if with_feedback else None)
         except GoalRefused as error:
             raise CommandError(f"refused by {action.server}: {error}") from error
-        print(f"accepted: goal {handle.goal_id}", flush=True)
+        say({"accepted": handle.goal_id}, f"accepted: goal {handle.goal_id}")
         outcome = handle.wait(LONGEST_HOLD, on_tick=cancel_once)
-    print(f"result: {outcome.status.name}\n{indented(outcome.result) if outcome.result else ''}", end="")
+    result = indented(outcome.result) if outcome.result else ""
+    say(
+        {"status": outcome.status.name, "result": outcome.result},
+        f"result: {outcome.status.name}\n{result}".removesuffix("\n"),
+    )
     if outcome.status is GoalStatusCode.SUCCEEDED:
         return ExitCode.OK
     return ExitCode.CANCELLED if interrupt.is_set else ExitCode.FAILED

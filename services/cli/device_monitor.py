@@ -15,8 +15,8 @@ from schemas.topics import DEVICE_CONFIGURATION, DEVICE_EVENTS, DEVICE_STATE, DE
 from services.cli.device_snapshot import DeviceView, snapshot_of
 from services.cli.device_status import text_of
 from services.cli.errors import ExitCode
-from services.cli.forms import count_options
-from services.cli.parser import Options, Parser, json_option
+from services.cli.forms import Form, count_options, form_of, form_options
+from services.cli.parser import Options, Parser
 from services.cli.session import Session, connect
 from services.cli.terminal import LiveBlock
 from services.cli.units import positive_seconds
@@ -28,30 +28,37 @@ REFRESH = 5.0  # [Hz]
 
 
 def add_options(parser: Parser) -> None:
-    """Adds the end of monitoring and --json."""
+    """Adds the end of monitoring, --json and --csv."""
     count_options(parser, "lines")
     parser.add_argument("-d", "--duration", type=positive_seconds, metavar="TIME", help="end after it, as 10 or 10s")
-    json_option(parser)
+    form_options(parser)
 
 
 def run(options: Options) -> ExitCode:
     """Monitors the device."""
     with connect() as session:
-        return monitor(session, options.count, options.duration, options.json)
+        form = form_of(options, timed_line)
+        return monitor(session, options.count, options.duration, form, is_live=form is timed_line)
 
 
 class Change(msgspec.Struct, frozen=True):
-    """One line of --json."""
+    """One line of --json and --csv."""
 
     stamp: int  # [ns] UNIX time of its reception
     text: str
 
 
+def timed_line(change: Change) -> str:
+    """A change for a person, with the time of day."""
+    time = datetime.datetime.fromtimestamp(change.stamp / 1e9).strftime("%H:%M:%S.%f")[:-3]
+    return f"{time} {change.text}"
+
+
 class Monitor:
     """Prints every change once, at most `count` of them."""
 
-    def __init__(self, session: Session, block: LiveBlock, count: int | None, as_json: bool) -> None:
-        self._session, self._block, self._count, self._as_json = session, block, count, as_json
+    def __init__(self, session: Session, block: LiveBlock, count: int | None, form: Form) -> None:
+        self._session, self._block, self._count, self._form = session, block, count, form
         self._status: DeviceStatus | None = None
         self._state: DeviceState | None = None
         self._configuration: DeviceConfiguration | None = None
@@ -80,16 +87,18 @@ class Monitor:
             if self._count is not None and self._said >= self._count:
                 return
             self._said += 1
-            self._block.say(msgspec.json.encode(Change(now, line)).decode() if self._as_json else _timed(now, line))
+            self._block.say(self._form(Change(now, line)))
         if self._count is not None and self._said >= self._count:
             self._session.node.stop()
 
 
-def monitor(session: Session, count: int | None, duration: float | None, as_json: bool) -> ExitCode:
-    """Runs until Ctrl-C, `count` lines or `duration` [s]."""
-    block = LiveBlock(is_live=False) if as_json else LiveBlock()
+def monitor(
+    session: Session, count: int | None, duration: float | None, form: Form = timed_line, is_live: bool = True
+) -> ExitCode:
+    """Runs until Ctrl-C, `count` lines or `duration` [s]; `is_live`: the device's status is shown below the lines."""
+    block = LiveBlock() if is_live else LiveBlock(is_live=False)
     view = DeviceView(session)
-    Monitor(session, block, count, as_json)
+    Monitor(session, block, count, form)
     ends = None if duration is None else session.node.monotonic() + duration
 
     def step(now: int) -> None:
@@ -99,11 +108,6 @@ def monitor(session: Session, count: int | None, duration: float | None, as_json
 
     session.node.spin(step, rate=REFRESH)
     return ExitCode.OK
-
-
-def _timed(now: int, line: str) -> str:
-    time = datetime.datetime.fromtimestamp(now / 1e9).strftime("%H:%M:%S.%f")[:-3]
-    return f"{time} {line}"
 
 
 def status_changes(before: DeviceStatus | None, after: DeviceStatus) -> list[str]:

@@ -6,12 +6,16 @@ import inspect
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+import msgspec.structs
 
 import schemas
 from schemas.message import Message
 from schemas.topics import ACTIONS, REQUESTS, TOPICS
 from services.cli.errors import ExitCode, unknown
+from services.cli.forms import print_value
 from services.cli.parser import Choices, Options, Parser
 
 if TYPE_CHECKING:
@@ -21,14 +25,15 @@ BASE = Message.__module__
 
 
 def name_option(parser: Parser) -> None:
-    """Adds the message."""
+    """Adds the message and --json."""
     parser.add_argument("message", metavar="MESSAGE", help="as JointState, or a topic's key")
+    parser.add_argument("--json", action="store_true", help="its JSON Schema, as JSON carries it on the bus")
 
 
 def run(options: Options) -> ExitCode:
     """Prints one message."""
-    print(text_of(message_named(options.message)))
-    return ExitCode.OK
+    kind = message_named(options.message)
+    return print_value(schema_of(kind) if options.json else None, options.json, lambda: text_of(kind))
 
 
 def choices(robot: Robot | None) -> Choices:
@@ -71,6 +76,27 @@ def text_of(kind: type[Message]) -> str:
                 waiting.append(known[name])
                 parts.append(inspect.getsource(known[name]).rstrip())
     return "\n\n".join([*parts, "\n".join(f"# {line}" for line in _uses(kind)) or "# inside of other messages only"])
+
+
+def schema_of(kind: type[Message]) -> dict[str, Any]:
+    """Its JSON Schema; a field whose value is any JSON is required there, as msgspec writes no default for it."""
+    fields = msgspec.structs.fields(kind)
+    if not any(isinstance(each.default, msgspec.Raw) for each in fields):
+        return msgspec.json.schema(kind)
+    config = kind.__struct_config__
+    shown = msgspec.defstruct(
+        kind.__name__, [_field(each) for each in fields], kw_only=True, tag=config.tag, tag_field=config.tag_field,
+        namespace={"__doc__": kind.__doc__},
+    )  # fmt: skip
+    return msgspec.json.schema(shown)
+
+
+def _field(info: msgspec.structs.FieldInfo) -> tuple[str, Any] | tuple[str, Any, Any]:
+    if isinstance(info.default, msgspec.Raw) or info.required:
+        return info.name, info.type
+    if info.default_factory is not msgspec.NODEFAULT:
+        return info.name, info.type, msgspec.field(default_factory=info.default_factory)
+    return info.name, info.type, info.default
 
 
 def _named_in(kind: type[Message], known: dict[str, type[Message]]) -> list[str]:

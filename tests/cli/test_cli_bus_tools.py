@@ -249,9 +249,17 @@ def test_a_message_is_shown_with_its_units_and_where_it_travels(capsys):
     assert 'did you mean "JointState"' in capsys.readouterr().err
 
 
+def test_a_message_is_shown_as_its_json_schema(capsys):
+    assert run(["interface", "show", "FrameTransforms", "--json"]) is ExitCode.OK
+    schema = json.loads(capsys.readouterr().out)
+    assert schema["$ref"] == "#/$defs/FrameTransforms"
+    assert {"FrameTransforms", "Transform"} <= set(schema["$defs"])
+
+
 def test_every_message_that_travels_is_shown():
     for kind in interface.messages().values():
         assert f"class {kind.__name__}(" in interface.text_of(kind)
+        assert kind.__name__ in interface.schema_of(kind)["$defs"]
 
 
 class Knobs(msgspec.Struct, frozen=True, kw_only=True):

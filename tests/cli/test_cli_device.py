@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 import os
@@ -24,6 +25,7 @@ from schemas.device import (
 from services.cli import device, device_config, device_monitor, device_status
 from services.cli.device_press import PRESSES, press, request_of
 from services.cli.errors import CommandError, ExitCode
+from services.cli.forms import csv_lines, json_line
 from services.cli.home import home
 from services.cli.main import run
 from services.runtime.bus.memory_bus import MemoryBus
@@ -196,7 +198,7 @@ def test_arming_and_disarming_say_what_follows(connected, rm1_device, capsys):
 
 def test_the_monitor_says_every_change_once(session, rm1_device, capsys):
     threading.Timer(0.5, lambda: rm1_device.set(mode=DeviceMode.IDLE, inputs=("estop",), speed=0.25)).start()
-    assert device_monitor.monitor(session, None, 1.0, as_json=False) is ExitCode.OK
+    assert device_monitor.monitor(session, None, 1.0) is ExitCode.OK
     said = [line.split(" ", 1)[1] for line in capsys.readouterr().out.splitlines()]
     assert said[-3:] == ["mode IDLE", "input estop PRESSED", "speed 25%"]
     assert "drivers armed" in said
@@ -206,10 +208,18 @@ def test_the_monitor_says_every_change_once(session, rm1_device, capsys):
 
 
 def test_the_monitor_ends_after_so_many_lines_of_json(session, rm1_device, capsys):
-    assert device_monitor.monitor(session, 3, 5.0, as_json=True) is ExitCode.OK
+    assert device_monitor.monitor(session, 3, 5.0, json_line, is_live=False) is ExitCode.OK
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert len(lines) == 3
     assert all(line["stamp"] > 0 and line["text"] for line in lines)
+
+
+def test_the_monitor_says_changes_as_a_table_under_a_heading(session, rm1_device, capsys):
+    assert device_monitor.monitor(session, 2, 5.0, csv_lines(), is_live=False) is ExitCode.OK
+    heading, *rows = csv.reader(capsys.readouterr().out.splitlines())
+    assert heading == ["stamp", "text"]
+    assert len(rows) == 2
+    assert all(int(stamp) > 0 and text for stamp, text in rows)
 
 
 def test_the_configuration_is_shown_with_its_crc(connected, rm1_device, capsys):

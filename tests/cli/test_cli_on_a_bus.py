@@ -213,3 +213,14 @@ def test_a_goal_can_be_sent_without_a_planner(session, gateway, capsys):
     assert text.startswith("accepted: goal ")
     assert "feedback:\n  stamp: 0" in text
     assert "result: SUCCEEDED\n  error_code: 0  # SUCCESSFUL" in text
+
+
+def test_what_becomes_of_a_goal_is_said_as_json(session, gateway, capsys):
+    row = action.action_of("follow_joint_trajectory")
+    goal = message_of(row.goal, '{"trajectory": {"joint_names": ["brazo_joint"]}}')
+    assert action.send_goal(session, row, goal, with_feedback=True, as_json=True) is ExitCode.OK
+    accepted, *feedback, ended = (json.loads(line) for line in capsys.readouterr().out.splitlines())
+    assert len(accepted["accepted"]) > 8
+    assert {each["feedback"]["stamp"] for each in feedback} == {0}
+    assert ended["status"] == "SUCCEEDED"
+    assert ended["result"]["error_code"] == 0
