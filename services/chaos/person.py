@@ -121,8 +121,10 @@ class Person:
 
     def _next_step(self, reference: bool) -> str:
         device = self.arm.device
-        mode = device.mode
-        if not device.configuration.accepted:
+        mode, configuration = device.mode, device.configuration
+        if not configuration.accepted:
+            if configuration.device_crc32 == configuration.crc32:
+                return configuration.reason or "the device is out of reach"  # it has the configuration
             return self._do("configure", lambda: device.configure())
         if mode in (DeviceMode.FAULT, DeviceMode.ESTOP):
             return self._do("reset", device.reset)
