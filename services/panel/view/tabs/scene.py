@@ -131,9 +131,9 @@ class SceneTab:
         name, scene = self._require_chosen(), self._operator.arm.scene
         item = scene.objects[name]
         shape = _resized(item.shape, self._size.value)
+        at = tuple(value / 1000.0 for value in self._at.value)  # read before the fields are written for the new size
         if shape != item.shape:
             scene.resize(name, shape)
-        at = tuple(value / 1000.0 for value in self._at.value)
         if at != item.pose.translation and not item.attached:
             scene.move(name, at, item.pose.rotation or Transform().rotation)
         self._operator.goal.check_again()
