@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import TypeVar
 
@@ -69,6 +69,18 @@ class Person:
         field = self.field(label)
         field.fill(str(value))
         field.press("Enter")
+
+    def fills(self, label: str, numbers: Sequence[float]) -> None:
+        """The fields of one row, from the left."""
+        for place, number in enumerate(numbers):
+            field = self.row(label).locator("input").filter(visible=True).nth(place)
+            field.fill(str(number))
+            field.press("Enter")
+
+    def values(self, label: str) -> list[float]:
+        """Of the fields of one row, from the left."""
+        fields = self.row(label).locator("input").filter(visible=True)
+        return [float(field.input_value()) for field in fields.all()]
 
     def chooses(self, label: str, option: str) -> None:
         self.row(label).locator("input").first.click()

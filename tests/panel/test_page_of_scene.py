@@ -21,13 +21,6 @@ WEDGE = Path("tests/gemelo/wedge.stl")
 FILE = "test_page_of_scene.json"
 
 
-def fills(person: Person, label: str, numbers: tuple[float, ...]) -> None:
-    for place, number in enumerate(numbers):
-        field = person.row(label).locator("input").filter(visible=True).nth(place)
-        field.fill(str(number))
-        field.press("Enter")
-
-
 @pytest.fixture
 def saved():
     path = project_root() / "scenes" / FILE
@@ -40,14 +33,14 @@ def test_an_object_is_added_moved_resized_carried_saved_and_loaded(
     person: Person, arm: gemelo.Arm, saved: Path
 ) -> None:
     person.tab("Scene")
-    fills(person, "Size [mm]", (40, 30, 60))
-    fills(person, "Middle [mm]", (250, 200, 40))
+    person.fills("Size [mm]", (40, 30, 60))
+    person.fills("Middle [mm]", (250, 200, 40))
     person.press("Add")
     until(lambda: arm.scene.objects, lambda objects: list(objects) == ["box_1"])
     person.chooses("Object", "box_1")
     person.reads("box_1: box, ")
-    fills(person, "Size [mm]", (50, 30, 60))
-    fills(person, "Middle [mm]", (260, 190, 40))
+    person.fills("Size [mm]", (50, 30, 60))
+    person.fills("Middle [mm]", (260, 190, 40))
     person.press("Apply size and place")
     until(lambda: arm.scene.objects["box_1"].shape.size, lambda size: size == pytest.approx((0.05, 0.03, 0.06)))
     until(
@@ -71,6 +64,21 @@ def test_an_object_is_added_moved_resized_carried_saved_and_loaded(
     person.chooses("Object", "wedge")
     person.press("Remove")
     until(lambda: arm.scene.objects, lambda objects: set(objects) == {"box_1"})
+
+
+def test_the_tool_s_numbers_lead_the_goal_and_what_cannot_be_says_so(person: Person, arm: gemelo.Arm) -> None:
+    person.press("Goal to where the arm is")
+    label = "Tool x, y, z [mm]"
+    until(lambda: person.values(label), lambda now: now[0] == pytest.approx(1000.0 * arm.pose().position[0], abs=0.06))
+    person.fills(label, (250, 150, 60))
+    until(lambda: goal_of(person, arm), lambda now: now == pytest.approx((0.25, 0.15, 0.06), abs=2e-4))
+    person.fills(label, (250, 150, 5000))
+    person.reads("Out of reach")
+    assert goal_of(person, arm)[:2] == pytest.approx((0.25, 0.15), abs=2e-4)
+    assert person.values(label)[2] == 5000.0  # what was asked for stays to be seen, and mended
+    person.fills(label, (250, 150, 80))
+    until(lambda: goal_of(person, arm), lambda now: now == pytest.approx((0.25, 0.15, 0.08), abs=2e-4))
+    assert not any(arm.velocities.values())
 
 
 def test_a_move_is_held_and_goes_on(person: Person, arm: gemelo.Arm) -> None:

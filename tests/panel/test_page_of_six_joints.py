@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from math import degrees
+from math import degrees, radians
 
+import numpy as np
 import pytest
 
 import gemelo
@@ -26,3 +27,27 @@ def test_sliders_a_plan_and_execute_bring_six_joints_there(person: Person, arm: 
     assert max(abs(error) for error in arm.step_errors.values()) <= 0.5 + 1e-9
     person.tab("Jog")
     assert person.button("rz +").count() == 1
+
+
+def test_the_tool_s_numbers_lead_the_goal_and_what_is_not_typed_stays(person: Person, arm: gemelo.Arm) -> None:
+    place, turn = "Tool x, y, z [mm]", "Tool roll, pitch, yaw [°]"
+    arm.move(named="ready")
+    person.press("Goal to where the arm is")
+    at, orientation = arm.pose().position, arm.pose().orientation
+    until(lambda: person.values(place), lambda now: now == pytest.approx([1000.0 * each for each in at], abs=0.06))
+    x, y, z = person.values(place)
+    person.fills(place, (x, y, z + 40.0))
+    until(lambda: goal_pose(person, arm).position[2], lambda now: abs(now - at[2] - 0.04) < 1e-3)
+    assert goal_pose(person, arm).position[:2] == pytest.approx(at[:2], abs=1e-3)
+    assert abs(np.dot(goal_pose(person, arm).orientation, orientation)) == pytest.approx(1.0, abs=1e-5)
+    roll, pitch, yaw = person.values(turn)
+    person.fills(turn, (roll, pitch, yaw + 15.0))
+    until(lambda: person.values(turn)[2], lambda now: abs(now - yaw - 15.0) < 0.11)
+    assert goal_pose(person, arm).position == pytest.approx((at[0], at[1], at[2] + 0.04), abs=1e-3)
+    person.press("Plan and execute")
+    until(lambda: arm.pose().position[2], lambda now: abs(now - at[2] - 0.04) < 5e-4)
+
+
+def goal_pose(person: Person, arm: gemelo.Arm) -> gemelo.Pose:
+    """Of the tool [m], with the joint values that the sliders show."""
+    return arm.fk({name: radians(person.value(f"{name} [°]")) for name in arm.joint_names})

@@ -12,6 +12,7 @@ from services.panel.model.motions import PLANNERS, MotionChoice
 from services.panel.model.readings import Readings
 from services.panel.model.units import SHOWN, STEP, meant, slider_range, slider_value, text_of
 from services.panel.view.kit import Kit, Mirror, box, esc, note, set_if_new, table
+from services.panel.view.tabs.tool_fields import ToolFields
 from services.panel.view.world import World
 
 OWN_DRAG = 0.6  # [s] after its own change a browser's slider is not written: the finger may still be on it
@@ -30,6 +31,7 @@ class MoveTab:
         self._problem = kit.line()
         self._nearest = kit.button(words("take_nearest"), self._take_nearest, color="orange")
         self._sliders = {joint.name: self._slider(joint) for joint in self._operator.arm.description.joints}
+        self._tool = ToolFields(kit)
         self._state_names = tuple(self._operator.arm.states)
         if self._state_names:
             named = kit.gui.add_dropdown(words("named_state"), (words("choose"), *self._state_names))
@@ -61,6 +63,7 @@ class MoveTab:
                 self._write_sliders()
         elif goal.source == self._client and time.monotonic() - self._touched > OWN_DRAG:
             self._write_sliders()
+        self._tool.show(goal)
         self._show_problem()
         self._shown_live.show(self._operator.live.is_on)
         if motions.version != self._plan_version or motions.is_moving or motions.is_planning:

@@ -1,0 +1,78 @@
+"""The goal as numbers: where the tool is to be, and how it is to be turned where the arm can turn it at all."""
+
+from __future__ import annotations
+
+import time
+from math import degrees, radians
+
+import viser
+
+import gemelo
+from services.arm.frames.transforms import Point, Quaternion, from_rpy, to_rpy
+from services.panel.model.goal import Goal
+from services.panel.model.tool_turns import ALL_RINGS
+from services.panel.view.kit import Kit, set_if_new
+
+OWN_NUMBERS = 0.6  # [s] after its own change a browser's fields are not written: the next number is typed
+PLACE_STEP, TURN_STEP = 0.1, 0.1  # [mm], [deg] of the fields
+
+
+class ToolFields:
+    """Position in mm and, for an arm that turns its tool about all axes, roll, pitch and yaw in degrees."""
+
+    def __init__(self, kit: Kit) -> None:
+        self._operator, self._client = kit.operator, kit.client.client_id
+        self._version, self._touched = -1, 0.0
+        goal = self._operator.goal
+        self._place = kit.gui.add_vector3(kit.words("tool_mm"), _shown_place(goal.goal), step=PLACE_STEP)
+        self._place.on_update(lambda event: self._lead(event, is_turned=False))
+        self._turn: viser.GuiVector3Handle | None = None
+        if goal.turns.rings == ALL_RINGS:
+            self._turn = kit.gui.add_vector3(kit.words("tool_deg"), _shown_turn(goal.goal), step=TURN_STEP)
+            self._turn.on_update(lambda event: self._lead(event, is_turned=True))
+
+    def show(self, goal: Goal) -> None:
+        """The pose of the goal, or the one that was asked for and cannot be."""
+        if goal.version == self._version or time.monotonic() - self._touched < OWN_NUMBERS:
+            return
+        self._version = goal.version
+        set_if_new(self._place, "value", _shown_place(goal))
+        if self._turn is not None:
+            set_if_new(self._turn, "value", _shown_turn(goal))
+
+    def _lead(self, event: viser.GuiEvent[viser.GuiVector3Handle], is_turned: bool) -> None:
+        if event.client_id is None:
+            return
+        self._touched = time.monotonic()
+        goal = self._operator.goal
+        pose = gemelo.Pose(self._position(goal.goal), self._orientation(goal.goal))
+        goal.set_pose(pose, self._client, is_turned=is_turned)
+
+    def _position(self, goal: Goal) -> Point:
+        """[m] of the fields; exactly the goal's where they show it, since they round."""
+        fields = zip(self._place.value, _shown_place(goal), _pose(goal).position, strict=True)
+        x, y, z = (exact if typed == shown else typed / 1000.0 for typed, shown, exact in fields)
+        return x, y, z
+
+    def _orientation(self, goal: Goal) -> Quaternion:
+        """That of the fields; exactly the goal's where they show it, since they round."""
+        if self._turn is None or tuple(self._turn.value) == _shown_turn(goal):
+            return _pose(goal).orientation
+        roll, pitch, yaw = (radians(value) for value in self._turn.value)
+        return from_rpy(roll, pitch, yaw)
+
+
+def _pose(goal: Goal) -> gemelo.Pose:
+    return goal.wanted or goal.pose
+
+
+def _shown_place(goal: Goal) -> Point:
+    """[mm] as the fields show it."""
+    x, y, z = (round(1000.0 * value, 1) for value in _pose(goal).position)
+    return x, y, z
+
+
+def _shown_turn(goal: Goal) -> Point:
+    """[deg] as the fields show it."""
+    roll, pitch, yaw = (round(degrees(value), 1) for value in to_rpy(_pose(goal).orientation))
+    return roll, pitch, yaw
