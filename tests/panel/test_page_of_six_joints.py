@@ -30,7 +30,7 @@ def test_sliders_a_plan_and_execute_bring_six_joints_there(person: Person, arm: 
 
 
 def test_the_tool_s_numbers_lead_the_goal_and_what_is_not_typed_stays(person: Person, arm: gemelo.Arm) -> None:
-    place, turn = "Tool x, y, z [mm]", "Tool roll, pitch, yaw [°]"
+    place, turn = "Tool x, y, z [mm]", "Roll, pitch, yaw [°]"
     arm.move(named="ready")
     person.press("Goal to where the arm is")
     at, orientation = arm.pose().position, arm.pose().orientation

@@ -40,7 +40,7 @@ ENGLISH: dict[str, str] = {
     "choose": "choose ...",
     "goal_is_measured": "Goal to where the arm is",
     "tool_mm": "Tool x, y, z [mm]",
-    "tool_deg": "Tool roll, pitch, yaw [°]",
+    "tool_deg": "Roll, pitch, yaw [°]",
     "click_goal": "Goal by click",
     "click_hint": "A click on the ground or on an object sets the goal; with Shift it does so at any time.",
     "live": "Live",

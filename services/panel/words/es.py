@@ -40,7 +40,7 @@ SPANISH: dict[str, str] = {
     "choose": "elegir ...",
     "goal_is_measured": "Meta donde está el brazo",
     "tool_mm": "Herramienta x, y, z [mm]",
-    "tool_deg": "Herramienta: alabeo, cabeceo, guiñada [°]",
+    "tool_deg": "Alabeo, cabeceo, guiñada [°]",
     "click_goal": "Meta por clic",
     "click_hint": "Un clic en el suelo o en un objeto pone la meta; con Mayúsculas, en cualquier momento.",
     "live": "En vivo",
