@@ -23,6 +23,7 @@ from services.chaos.slots import SlotFile
 from services.chaos.slow_link import SlowLink
 from services.runtime.actions.keys import feedback_topic, status_topic
 from services.runtime.bus.zenoh_bus import ZenohBus
+from services.runtime.saved_parameters import SavedParameters
 from services.stack.stack import PROCESSES, Stack, StackError, free_ports
 
 KEPT = 200  # frames of the wire that can be said again
@@ -64,6 +65,7 @@ class Site:
                 **({VARIABLE: str(self.slots.path), **self.clocks.environment} if is_judged else {}),
             },
         )
+        SavedParameters(self.stack.run, "logger").keep({"keep_files": 0})  # none is removed: all are judged at the end
         self._seed = seed
         self._closing = ExitStack()
 
