@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 import gemelo
-from gemelo.programs import AnyStep, Program, Repeat, StepPath, Wait
+from gemelo.programs import AnyStep, Program, Repeat, RunStatus, StepPath, Wait
+from schemas.actions import GoalStatusCode
 from schemas.device import DeviceMode, DeviceState
 from services.arm.model.description import Arm as Description
 from services.arm.model.description import load_arm
@@ -68,6 +69,16 @@ def test_every_reason_and_every_mode_has_its_words():
         words = Words(language)
         assert all(words.reason(check(state)) is not None for check in CHECKS.values() for state in states)
         assert all(words(f"mode_{mode.name.lower()}") for mode in DeviceMode)
+
+
+@pytest.mark.parametrize("language", ["en", "es"])
+def test_every_end_of_a_motion_and_of_a_program_has_its_words(language: str):
+    words = Words(language)
+    ends = [words.ended(status) for status in GoalStatusCode]
+    assert all(ends)
+    lost = [end for status, end in zip(GoalStatusCode, ends, strict=True) if not status.is_terminal]
+    assert set(lost) == {words("ended_unknown")}  # its gateway was lost on the way
+    assert all(words(f"run_{status.value}") for status in RunStatus)
 
 
 def test_what_cannot_be_done_now_says_why():

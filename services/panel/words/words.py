@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from schemas.actions import GoalStatusCode
 from services.panel.model.availability import Reason
 from services.panel.model.problems import Problem
 from services.panel.words.en import ENGLISH
@@ -44,6 +45,10 @@ class Words:
     def reason(self, reason: Reason) -> str:
         """Why something cannot be done now; empty where it can."""
         return "" if reason is None else self(f"reason_{reason[0]}", value=self.value("mode", reason[1]))
+
+    def ended(self, status: GoalStatusCode) -> str:
+        """How a motion that is over has ended; nobody knows it of one whose gateway was lost on the way."""
+        return self(f"ended_{status.name.lower()}" if status.is_terminal else "ended_unknown")
 
     def check(self, check: str) -> str:
         """What a check that refuses or limits is called; empty where the table has no name for it."""

@@ -181,7 +181,7 @@ class MoveTab:
 
     def _arrival(self, motion: gemelo.Motion) -> str:
         words = self._kit.words
-        key = f"ended_{motion.status.name.lower()}"
+        ended = esc(words.ended(motion.status))
         where = [
             (esc(joint.name), esc(text_of(joint, motion.stopped_at[joint.name])))
             for joint in self._operator.arm.description.joints
@@ -189,10 +189,10 @@ class MoveTab:
         ]
         try:
             if not motion.result.verified:
-                return note(f"{esc(words(key))}: {esc(words('sent_not_verified'))}")
+                return note(f"{ended}: {esc(words('sent_not_verified'))}")
             worst = max((abs(error) for error in motion.result.final_error), default=0.0)
         except gemelo.Error:
-            return note(esc(words(key)))
-        return note(f"{esc(words(key))}: {esc(words('final_error', steps=f'{worst:.2f}'))}") + (
+            return note(ended)
+        return note(f"{ended}: {esc(words('final_error', steps=f'{worst:.2f}'))}") + (
             "" if motion.status.name == "SUCCEEDED" else table(where)
         )
