@@ -39,6 +39,7 @@ class BareBrowser:
         self._socket, self._on_said = socket, on_said
         self._news = threading.Condition()
         self._labels: dict[str, str] = {}  # of buttons, by their number
+        self._sliders: dict[str, str] = {}  # labels of sliders, by their number
         self._channel, self._answered = "", ""  # the number of the hidden field, and the newest mark that was answered
         self.frames = 0
         socket.send(msgspec.msgpack.encode(CAMERA))  # with its first camera a browser is there
@@ -58,18 +59,28 @@ class BareBrowser:
         """Presses the newest button whose label begins so, once the page has it; raises TimeoutError if it has none."""
         self._set(self._button(label), True)
 
+    def slide(self, label: str, value: float) -> None:
+        """Sets the newest slider whose label begins so, in the unit of its label; raises TimeoutError if there is
+        none."""
+        self._set(self._newest(self._sliders, label, "slider"), value)
+
     def _set(self, number: str, value: object) -> None:
         said = {"type": "GuiUpdateMessage", "uuid": number, "updates": {"value": value}}
         self._socket.send(msgspec.msgpack.encode(said))
 
     def _button(self, label: str) -> str:
-        with self._news:
-            if not self._news.wait_for(lambda: self._found(label), PATIENCE):
-                raise TimeoutError(f'the page has no button "{label}" after {PATIENCE:g} s')
-            return self._found(label)
+        return self._newest(self._labels, label, "button")
 
-    def _found(self, label: str) -> str:
-        return next((number for number, text in reversed(self._labels.items()) if text.startswith(label)), "")
+    def _newest(self, labels: dict[str, str], label: str, kind: str) -> str:
+        """The number of the newest one whose label begins so, once the page has it."""
+
+        def found() -> str:
+            return next((number for number, text in reversed(labels.items()) if text.startswith(label)), "")
+
+        with self._news:
+            if not self._news.wait_for(found, PATIENCE):
+                raise TimeoutError(f'the page has no {kind} "{label}" after {PATIENCE:g} s')
+            return found()
 
     def _hear(self) -> None:
         unpacker = zstandard.ZstdDecompressor()
@@ -85,10 +96,11 @@ class BareBrowser:
                     self._on_said(said, now)
 
     def _note(self, said: Said) -> None:
-        """Remembers the buttons, and answers marks as the page's script does."""
-        if said["type"] == "GuiButtonMessage":
+        """Remembers buttons and sliders, and answers marks as the page's script does."""
+        if said["type"] in ("GuiButtonMessage", "GuiSliderMessage"):
+            labels = self._labels if said["type"] == "GuiButtonMessage" else self._sliders
             with self._news:
-                self._labels[said["uuid"]] = str(said["props"]["label"])
+                labels[said["uuid"]] = str(said["props"]["label"])
                 self._news.notify_all()
         elif said["type"] == "GuiTextMessage" and said["value"].startswith(CHANNEL):
             self._channel = said["uuid"]

@@ -243,23 +243,6 @@ def test_a_planner_that_is_killed_is_named_and_planning_goes_on_when_it_is_back(
     arrives(arm, ARM, 20.0)
 
 
-def test_a_gateway_that_is_killed_in_the_middle_of_a_move_is_named_and_the_page_goes_on(
-    person: Person, arm: gemelo.Arm, twin: Stack
-) -> None:
-    page = twin.pids()["panel"]
-    person.types(f"{ARM} [°]", 150)
-    person.press("Plan and execute")
-    until(lambda: is_moving(arm), bool)
-    twin.kill("stepper_gateway")
-    person.reads("Nobody knows how it ended")
-    twin.wait_ready(30.0)
-    until(lambda: arm.device.mode.name, lambda mode: mode == "IDLE")
-    person.types(f"{ARM} [°]", 20)
-    person.press("Plan and execute")
-    arrives(arm, ARM, 20.0)
-    assert twin.pids()["panel"] == page
-
-
 def test_the_gripper_opens_closes_and_goes_where_its_slider_stands(person: Person, arm: gemelo.Arm) -> None:
     gripper = arm.description.gripper
     assert gripper is not None
