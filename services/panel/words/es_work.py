@@ -247,14 +247,12 @@ _ASKED: dict[str, str] = {
 _SILENT: dict[str, str] = {
     "{server} did not answer {key} within {time} s: is it busy, or gone?": "{server} no respondió en {time} s: está "
     "ocupado, o ya no está.",
-    "{server} dropped {key} unread: it takes {most} of one client, and nothing of one that asks for more; wait for "
-    "each "
-    "answer, and ask again after {pause} (or it has just ended: `gemelo node list`)": "{server} no leyó la petición: "
-    "se "
-    "le pide demasiado a la vez. Pruebe en {pause}.",
-    "{server} has not answered {key}: it answers {most} of that kind of one client, and carries out the others all the "
-    "same; ask again after {pause} (or it has just ended: `gemelo node list`)": "{server} no respondió: se le pide "
-    "demasiado a la vez. Pruebe en {pause}.",
+    "{server} did not answer {key}: it has just ended (`gemelo node list`), or dropped it unread: it takes {most} of "
+    "one client, and nothing of one that asks for more; ask again after {pause}": "{server} no respondió: acaba de "
+    "terminar, o se le pide demasiado a la vez. Pruebe en {pause}.",
+    "{server} did not answer {key}: it has just ended (`gemelo node list`), or was asked too often: it answers {most} "
+    "of that kind of one client, and carries out the others all the same; ask again after {pause}": "{server} no "
+    "respondió: acaba de terminar, o se le pide demasiado a la vez. Pruebe en {pause}.",
     "{key}: the router is away; start it with `make up`": "Falta el router: arranque todo con `make up`.",
     "nobody serves {key}: is {server} running? `gemelo node list` shows who is": "Nadie responde: ¿está en marcha "
     "{server}?",

@@ -85,18 +85,19 @@ def _silent(bus: Bus, request: Request[Q, R], timeout: float) -> str:
 
 
 def _unread(bus: Bus, request: Request[Q, R]) -> str:
-    """The text for a request that was dropped; its server may also have ended before it answered."""
+    """The text for a request that was not read: its server has ended before it answered, or has dropped it."""
     if not bus.is_connected:
         return _away(request)
     most, pause = f"{OF_A_CLIENT.per_second:g} requests a second", f"{DEBT / OF_A_CLIENT.per_second:g} s"
     if request.urgent:
         return (
-            f"{request.server} has not answered {request.key}: it answers {most} of that kind of one client, and "
-            f"carries out the others all the same; ask again after {pause} (or it has just ended: `gemelo node list`)"
+            f"{request.server} did not answer {request.key}: it has just ended (`gemelo node list`), or was asked too "
+            f"often: it answers {most} of that kind of one client, and carries out the others all the same; ask again "
+            f"after {pause}"
         )
     return (
-        f"{request.server} dropped {request.key} unread: it takes {most} of one client, and nothing of one that asks "
-        f"for more; wait for each answer, and ask again after {pause} (or it has just ended: `gemelo node list`)"
+        f"{request.server} did not answer {request.key}: it has just ended (`gemelo node list`), or dropped it unread: "
+        f"it takes {most} of one client, and nothing of one that asks for more; ask again after {pause}"
     )
 
 
