@@ -7,6 +7,7 @@ import select
 import shutil
 import signal
 import socket
+import ssl
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,10 @@ from schemas.deployment import MqttSection
 from services.mqtt import secure_folder
 
 BEAT = 1.0  # [s]
+PATIENCE = 1.5  # [s] for the handshake, and again for the answer: with BEAT less than the watchdog of its unit
+# MQTT 3.1.1, 3.1: protocol, level 4, a session that leaves nothing, 5 s of keep-alive, no name, no user.
+CONNECT = b"\x10\x0c\x00\x04MQTT\x04\x02\x00\x05\x00\x00"
+CONNACK, DISCONNECT = b"\x20", b"\xe0\x00"
 OPEN = "allow_anonymous true"
 
 
@@ -35,7 +40,7 @@ def find() -> str:
 
 
 def serve(section: MqttSection, run: Path, beat: Callable[[], None], on_end: Callable[[], None]) -> int:
-    """Becomes mosquitto; a child process calls `beat` once a second while it accepts, and `on_end` when it has ended.
+    """Becomes mosquitto; a child process calls `beat` once a second while it answers, and `on_end` when it has ended.
 
     Does not return in the process that becomes mosquitto.
     """
@@ -67,15 +72,28 @@ def _watch_broker(section: MqttSection, alive: int, beat: Callable[[], None], on
         signal.signal(number, signal.SIG_IGN)
     interval = 0.02
     while not select.select([alive], [], [], interval)[0]:
-        if interval == BEAT or _accepts(section):
+        if _answers(section):
             interval = BEAT
             beat()
     on_end()
 
 
-def _accepts(section: MqttSection) -> bool:
+def _answers(section: MqttSection) -> bool:
+    """It says yes or no to a client: the kernel accepts connections also for one that stands still."""
     try:
-        socket.create_connection(section.listening, timeout=0.5).close()
+        with socket.create_connection(section.listening, timeout=PATIENCE) as plain, _wrapped(section, plain) as link:
+            link.sendall(CONNECT)
+            answer = link.recv(4)
+            link.sendall(DISCONNECT)
     except OSError:
         return False
-    return True
+    return answer.startswith(CONNACK)
+
+
+def _wrapped(section: MqttSection, link: socket.socket) -> socket.socket:
+    if not section.secure_folder:
+        return link
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    # It is our own broker, at our own address; one whose certificate has ended still answers.
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    return context.wrap_socket(link)
