@@ -5,9 +5,12 @@ from __future__ import annotations
 import contextlib
 import queue
 import signal
+import socket
 import struct
 import time
+from pathlib import Path
 
+import pytest
 from bed_firmware import Bed, wait_for
 from bench_firmware import FIRST, LAST, seal, traj
 
@@ -31,6 +34,22 @@ def test_the_device_answers_moves_and_leaves_in_order(bed: Bed):
     bed.start_device()
     assert bed.status["referenced"] is True
     assert bed.move(0, 0.5, start=200, stream=2)[20] == 0
+
+
+def test_without_a_broker_a_device_is_not_ready_and_feeds_the_watchdog(
+    bed: Bed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind(str(tmp_path / "notify"))
+        systemd.settimeout(4.0)  # [s] less than the watchdog's patience
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        bed.start_device()
+        wait_for((bed.folder / "run/virtual_esp32.ready").exists, "readiness")
+        bed.stop_broker()
+        wait_for(lambda: not (bed.folder / "run/virtual_esp32.ready").exists(), "its readiness to be taken back")
+        while systemd.recv(100) != b"STATUS=not ready":
+            pass
+        assert [systemd.recv(100) for _ in range(3)] == [b"WATCHDOG=1"] * 3
 
 
 def test_a_device_that_is_killed_while_moving_wakes_up_unreferenced(bed: Bed):

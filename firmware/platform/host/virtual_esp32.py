@@ -247,8 +247,12 @@ class VirtualEsp32:
         self._advanced_to = max(self._advanced_to, monotonic)
 
     def _beat(self, now: float) -> None:
-        if now < self._next_beat or not self._wires.is_reachable:
+        is_reachable = self._wires.is_reachable
+        if now < self._next_beat and is_reachable == self._readiness.is_ready:
             return
         self._next_beat = now + BEAT
-        self._readiness.ready()
+        if is_reachable:
+            self._readiness.ready()
+        else:
+            self._readiness.not_ready("no connection to the broker")
         self._readiness.beat()

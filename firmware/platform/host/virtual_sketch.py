@@ -61,10 +61,14 @@ class VirtualSketch:
         return not isinstance(item, ShutdownRequested)
 
     def _beat(self, now: float) -> None:
-        if now < self._next_beat or not self._client.is_connected():
+        is_connected = self._client.is_connected()
+        if now < self._next_beat and is_connected == self._readiness.is_ready:
             return
         self._next_beat = now + BEAT
-        self._readiness.ready()
+        if is_connected:
+            self._readiness.ready()
+        else:
+            self._readiness.not_ready("no connection to the broker")
         self._readiness.beat()
 
     def _on_connect(self, client: paho.Client, _data: object, _flags: object, reason: object, _props: object) -> None:
