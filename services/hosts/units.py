@@ -16,6 +16,8 @@ Description={description}
 Wants=network-online.target
 After=network-online.target
 PartOf={target}
+# Started again for as long as it takes: an address or a port that is not there yet may come.
+StartLimitIntervalSec=0
 
 [Service]
 Type=notify
@@ -63,6 +65,10 @@ WHOLE = """\
 # Written by `gemelo deploy render {site} {host}`: `systemctl start gemelo.target` starts all of this host.
 [Unit]
 Description=gemelo on {host}
+# Reached when all is started, not when all is ready: that may wait for another host, and nobody's boot waits for it.
+DefaultDependencies=no
+Conflicts=shutdown.target
+Before=shutdown.target
 Wants={units}
 
 [Install]

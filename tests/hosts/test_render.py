@@ -208,6 +208,15 @@ def test_the_example_is_rendered_hardened_and_readable(tmp_path):
     assert json.loads(read.get_json("access_control"))["default_permission"] == "deny"
 
 
+def test_a_service_is_started_again_however_often_and_nobody_waits_until_all_are_ready(tmp_path):
+    files = rendered(site(tmp_path), "cell")
+    for name, text in files.items():
+        if name.endswith(".service"):
+            assert ("Unit", "StartLimitIntervalSec", "0") in directives(text)
+    # Else a target comes after all that it wants, and neither a boot nor `systemctl enable --now` ends before it.
+    assert ("Unit", "DefaultDependencies", "no") in directives(files["systemd/gemelo.target"])
+
+
 def test_only_a_gateway_on_a_serial_line_sees_a_device(tmp_path):
     lab = site(tmp_path, "[robots.rm1]", '[robots.rm1]\nwire = "serial"')
     files = rendered(lab, "cell")
