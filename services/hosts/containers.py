@@ -9,19 +9,38 @@ from typing import Any
 from schemas.deployment import Wire
 from schemas.site import Site
 from services.hosts.deployments import HOST, environment
-from services.hosts.layout import Process, processes
+from services.hosts.layout import Process, extras, processes
 
 IN_IMAGE = "/opt/gemelo"  # where the Containerfile puts the project
 CONTAINERFILE = """\
-# Written by `gemelo deploy render`. Build it in the project's folder: podman build -t gemelo -f <this file> .
+# Written by `gemelo deploy render {site} {host}`. Build it in the project's folder, on the host itself, as root:
+# podman build --build-arg UID=$(id -u {user}) -t gemelo -f <this file> .
+FROM docker.io/library/debian:12-slim AS build
+RUN apt-get update \\
+    && apt-get install -y --no-install-recommends ca-certificates curl g++ python3 python3-dev python3-venv xz-utils
+COPY . /opt/gemelo
+# Compiled here, as no process can write there later; without what only building needs.
+RUN cd /opt/gemelo \\
+    && EXTRAS="{extras}" deploy/bootstrap \\
+    && .venv/bin/python -m compileall -q -j 0 .venv/lib gemelo schemas services firmware \\
+    && rm -rf .gemelo \\
+    && chmod -R a+rX .
+
 FROM docker.io/library/debian:12-slim
 RUN apt-get update \\
-    && apt-get install -y --no-install-recommends \\
-       ca-certificates curl g++ git make mosquitto openssl python3 python3-dev python3-venv xz-utils \\
+    && apt-get install -y --no-install-recommends ca-certificates libgomp1 mosquitto openssl python3 \\
     && rm -rf /var/lib/apt/lists/*
-COPY . /opt/gemelo
-RUN cd /opt/gemelo && deploy/bootstrap
+COPY --from=build /opt/gemelo /opt/gemelo
+# Keys and state are this user's alone, and without capabilities root cannot read them either.
+ARG UID
+RUN useradd --no-create-home --home-dir /nonexistent --uid "${{UID:?is missing: --build-arg UID=...}}" {user}
+USER {user}
 """
+
+
+def containerfile(site: Site, host: str) -> str:
+    """An image of the project with what this host runs, for compose.yaml."""
+    return CONTAINERFILE.format(site=site.name, host=host, user=site.user, extras=" ".join(extras(site, host)))
 
 
 def process_compose(site: Site, host: str) -> str:
@@ -70,9 +89,14 @@ def _contained(site: Site, process: Process) -> dict[str, Any]:
         "pids_limit": 256,
         "tmpfs": ["/tmp"],
         "volumes": [_mount(site.config, is_read_only=True), _mount(site.state, is_read_only=False)],
-        **({"devices": [{"source": settings.serial, "target": settings.serial}]} if settings and has_line else {}),
+        **(_line(settings.serial) if settings and has_line else {}),
         "healthcheck": {"test": ["CMD-SHELL", _probe(site, process, IN_IMAGE)], "interval": "5s"},
     }
+
+
+def _line(device: str) -> dict[str, Any]:
+    """A serial line, for a user who is no root."""
+    return {"devices": [{"source": device, "target": device}], "group_add": ["dialout"]}
 
 
 def _mount(path: str, is_read_only: bool) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from schemas.site import Site
 from services.hosts import deployments
-from services.hosts.containers import CONTAINERFILE, compose, process_compose
+from services.hosts.containers import compose, containerfile, process_compose
 from services.hosts.layout import listening, robots
 from services.hosts.units import units
 from services.mqtt.secure_folder import lines, mosquitto_conf
@@ -28,7 +28,7 @@ def rendered(site: Site, host: str) -> dict[str, str]:
     return files | {
         "process-compose.yaml": process_compose(site, host),
         "compose.yaml": compose(site, host),
-        "Containerfile": CONTAINERFILE,
+        "Containerfile": containerfile(site, host),
     }
 
 
