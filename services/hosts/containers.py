@@ -96,7 +96,9 @@ def _contained(site: Site, process: Process) -> dict[str, Any]:
 
 def _line(device: str) -> dict[str, Any]:
     """A serial line, for a user who is no root."""
-    return {"devices": [{"source": device, "target": device}], "group_add": ["dialout"]}
+    # podman-compose knows only the short form, in which ":" cannot be part of a path.
+    mapped = {"source": device, "target": device} if ":" in device else f"{device}:{device}"
+    return {"devices": [mapped], "group_add": ["dialout"]}
 
 
 def _mount(path: str, is_read_only: bool) -> dict[str, Any]:

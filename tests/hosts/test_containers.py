@@ -33,6 +33,7 @@ def test_an_image_has_the_user_of_the_services_and_installs_what_its_host_runs(t
 def test_a_serial_line_is_open_to_a_gateway_that_is_not_root(tmp_path):
     made = services(site(tmp_path, "[robots.rm1]", '[robots.rm1]\nwire = "serial"'), "cell")
     assert made["gemelo-rm1-stepper_gateway"]["group_add"] == ["dialout"]
+    assert made["gemelo-rm1-stepper_gateway"]["devices"] == ["/dev/ttyUSB0:/dev/ttyUSB0"]
     assert [name for name, each in made.items() if "devices" in each] == ["gemelo-rm1-stepper_gateway"]
 
 
