@@ -25,6 +25,7 @@ class SiteBroker(SiteRecord, frozen=True, kw_only=True):
 
 class SiteRobot(SiteRecord, frozen=True, kw_only=True):
     folder: str  # urdf/<robot>, below the project
+    cell: str = ""  # cell.toml below the project: cameras, things and places around the arm; empty: none
     device: DeviceKind = DeviceKind.VIRTUAL
     wire: Wire = Wire.MQTT
     serial: str = "/dev/ttyUSB0"  # with wire = "serial"

@@ -13,7 +13,8 @@ from schemas.deployment import DeviceKind, Wire
 from schemas.errors import ConfigurationError
 from schemas.roles import ROLES
 from schemas.site import Site
-from services.arm.model.description import load_arm
+from services.arm.cell.cell_file import load_cell
+from services.arm.model.description import Arm, load_arm
 from services.hosts.deployments import HOST
 from services.hosts.layout import BROKER, OF_A_ROBOT, ROUTER
 from services.hosts.site_file import Problems, nearest, read_site
@@ -23,6 +24,7 @@ ZONE = re.compile(r"[A-Za-z0-9_.-]{1,15}")  # an interface's name after the % of
 LABEL = re.compile(r"[A-Za-z0-9]([A-Za-z0-9-]{0,61}[A-Za-z0-9])?")  # of a host's name (RFC 1123)
 HAS_MEANING = re.compile(r"[$%\\]")  # to systemd, process-compose and compose, whatever stands around it
 GATEWAY, DEVICE = "stepper_gateway", "virtual_esp32"
+EYES = ("camera", "detector")
 NEEDED = (GATEWAY, "state_publisher")  # without them a robot has no state
 
 
@@ -126,7 +128,7 @@ def _paths(site: Site, problems: Problems) -> None:
             problems.add((key,), f'{key} = "{path}" must be an absolute path without ".."')
         _require_meaningless(path, (key,), problems)
     for robot, settings in site.robots.items():
-        for key in ("folder", "serial"):
+        for key in ("folder", "cell", "serial"):
             _require_meaningless(getattr(settings, key), ("robots", robot, key), problems)
     if not USER.fullmatch(site.user):
         problems.add(("user",), f'"{site.user}" cannot be a user\'s name: lower-case letters, digits, "_" and "-"')
@@ -143,7 +145,7 @@ def _robots(site: Site, problems: Problems, project: Path) -> None:
         place: Where = ("robots", robot, "folder")
         if robot == HOST:
             problems.add(("robots", robot), f'no robot can have the name "{HOST}": {HOST}.toml is of router and broker')
-        if PurePosixPath(settings.folder).is_absolute() or ".." in PurePosixPath(settings.folder).parts:
+        if not _is_below(settings.folder):
             problems.add(place, f'folder = "{settings.folder}" must be below the project, as "urdf/{robot}"')
             continue
         try:
@@ -157,6 +159,29 @@ def _robots(site: Site, problems: Problems, project: Path) -> None:
             other = devices[arm.device.name]
             problems.add(place, f'{robot} and {other} both have the device "{arm.device.name}" at the broker')
         devices[arm.device.name] = robot
+        _cell(site, robot, arm, problems, project)
+
+
+def _cell(site: Site, robot: str, arm: Arm, problems: Problems, project: Path) -> None:
+    """What is around the arm; cameras and detector have nothing to do without it."""
+    cell, place = site.robots[robot].cell, ("robots", robot, "cell")
+    eyes = [(name, each) for name, host in site.hosts.items() for each in EYES if each in host.services.get(robot, ())]
+    for name, each in eyes if not cell else ():
+        problems.add(("hosts", name, "services", robot), f'{each} of {robot} needs a cell: write cell = "urdf/{robot}/'
+                     f'cell.toml" in [robots.{robot}]')  # fmt: skip
+    if not cell:
+        return
+    if not _is_below(cell):
+        return problems.add(place, f'cell = "{cell}" must be below the project, as "urdf/{robot}/cell.toml"')
+    try:
+        load_cell(project / cell, arm)
+    except (ConfigurationError, OSError, tomllib.TOMLDecodeError) as error:
+        problems.add(place, f"{robot}: {error}")
+
+
+def _is_below(path: str) -> bool:
+    """True for a path that stays below the project."""
+    return not PurePosixPath(path).is_absolute() and ".." not in PurePosixPath(path).parts
 
 
 def _require_meaningless(path: str, place: Where, problems: Problems) -> None:

@@ -17,7 +17,12 @@ def deployment_of_robot(site: Site, host: str, robot: str) -> str:
     certificate = certificate_settings(site, at[host].roles[0]) if at[host].roles else {}
     names = {process.service.name for process in processes(site, host) if process.robot == robot}
     tables: dict[str, dict[str, Value]] = {
-        "": {"robot": settings.folder, "device": settings.device, "wire": settings.wire},
+        "": {
+            "robot": settings.folder,
+            **({"cell": settings.cell} if settings.cell else {}),
+            "device": settings.device,
+            "wire": settings.wire,
+        },
         "router": {
             "host": at[site.router.host].address,
             "port": site.router.port,

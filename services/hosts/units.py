@@ -101,9 +101,11 @@ def _unit(site: Site, host: str, process: Process) -> str:
 
 
 def _devices(site: Site, process: Process) -> str:
-    """Only a gateway on a serial line sees devices; of them its user may open serial lines, by the group."""
+    """Only a gateway on a serial line and a camera see devices; of them their user may open what the group may."""
     settings = site.robots.get(process.robot)
-    if settings is None or settings.wire is not Wire.SERIAL or process.service.name != "stepper_gateway":
-        return "PrivateDevices=yes"
-    # The line by its path would be looked up once, at the start: an adapter that is plugged in later would be refused.
-    return "DevicePolicy=closed\nDeviceAllow=char-* rw\nSupplementaryGroups=dialout"
+    if settings is not None and settings.wire is Wire.SERIAL and process.service.name == "stepper_gateway":
+        # The line by its path would be looked up once, at the start: an adapter plugged in later would be refused.
+        return "DevicePolicy=closed\nDeviceAllow=char-* rw\nSupplementaryGroups=dialout"
+    if process.service.name == "camera":
+        return "DevicePolicy=closed\nDeviceAllow=char-* rw\nSupplementaryGroups=video"
+    return "PrivateDevices=yes"

@@ -227,6 +227,19 @@ def test_only_a_gateway_on_a_serial_line_sees_devices_also_those_plugged_in_late
     assert values(directives(files["systemd/gemelo-broker.service"]), "PrivateDevices") == ["yes"]
 
 
+def test_a_camera_runs_on_a_host_of_its_own_and_sees_its_device(tmp_path):
+    eyes = 'rm1 = ["panel", "camera", "detector"]'
+    file = changed(tmp_path, 'rm1 = ["panel"]', eyes)
+    file.write_text(file.read_text().replace("[robots.rm1]", '[robots.rm1]\ncell = "urdf/rm1/cell.toml"'))
+    files = rendered(load_site(file, project_root()), "desk")
+    (tmp_path / "rm1.toml").write_text(files["rm1.toml"])
+    assert load_deployment(tmp_path / "rm1.toml", {}).cell == str(project_root() / "urdf/rm1/cell.toml")
+    camera = directives(files["systemd/gemelo-rm1-camera.service"])
+    assert values(camera, "DeviceAllow") == ["char-* rw"]
+    assert values(camera, "SupplementaryGroups") == ["video"]
+    assert values(directives(files["systemd/gemelo-rm1-detector.service"]), "PrivateDevices") == ["yes"]
+
+
 def test_no_rendered_file_of_a_host_names_the_authoritys_key(tmp_path):
     lab = site(tmp_path)
     for host in lab.hosts:
