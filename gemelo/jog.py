@@ -22,6 +22,8 @@ PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
 ANSWER = 3.0  # [s] of jogging without a word of the planner, after which it counts as lost
 PAUSE = 0.5  # [s] without a command, after which the next one begins a new jog
 SILENT = "the planner does not answer to jogging: is it running? `gemelo node list`"
+GAP = 1.0  # [s] without a word of the planner in the middle of a jog; it says one ten times a second
+INTERRUPTED = "the planner has said nothing for 1 s: the arm has stopped in the middle of the jog; `gemelo node list`"
 REST = 5.0  # [s] that the arm may take to come to rest
 FASTEST = 1.0  # [m/s] of the tool of a desktop arm
 FASTEST_TURN = math.pi  # [rad/s] of its tool
@@ -37,7 +39,7 @@ class Jogging:
         self._heard_at = -math.inf  # [s] monotonic
 
     def say(self, command: JogCommand) -> JogStatus | None:
-        """Moves for 0.1 s; the planner's newest word on this jog. Raises `Refused` or `Lost`."""
+        """Moves for 0.1 s; the planner's newest word on this jog. Raises `Refused`, or `Lost` where it says no more."""
         now = time.monotonic()
         self._session.latest(JOG_STATUS, self._on_status)
         if now - self._said > PAUSE:
@@ -48,6 +50,8 @@ class Jogging:
         heard = self._heard_since(self._began)
         if heard is None and now - self._began > ANSWER:
             raise Lost(SILENT)
+        if heard is not None and now - self._heard_at > GAP:
+            raise Lost(INTERRUPTED)
         if heard is not None and not heard.active and heard.limited_by and now - self._began > PERIOD:
             raise _refused(heard)
         return heard

@@ -137,6 +137,7 @@ class PretendPlanner:
         self.commands: list[JogCommand] = []
         limit = JogLimit(check="joint limit", subject="brazo_joint", message="joint limit of brazo_joint")
         self.answer = JogStatus(active=True, limited_by=limit.message, limits=(limit,))
+        self.ends_after = 1_000_000  # commands: then it is dead
         self._heard = -1.0
         self._node, self._status = node, node.publisher(JOG_STATUS)
         node.subscribe(JOG, self._on_command)
@@ -148,6 +149,9 @@ class PretendPlanner:
 
     def _on_command(self, command: JogCommand) -> None:
         self.commands.append(command)
+        if len(self.commands) > self.ends_after:
+            self._heard = -1.0
+            return
         self._heard = self._node.monotonic()
         self._status.put(self.answer)
 
@@ -183,6 +187,14 @@ def test_without_a_planner_it_ends_with_the_remedy(connected, gateway, seconds):
     with pytest.raises(CommandError, match="the planner does not answer") as silent, reported(load_robot()):
         jog_for(connected, TURN, seconds)
     assert silent.value.code is ExitCode.NO_STACK
+
+
+def test_a_planner_that_dies_in_the_middle_of_a_jog_ends_it_and_is_named(connected, gateway, jogger):
+    jogger.ends_after = 10
+    said = "said nothing for 1 s: the arm has stopped in the middle of the jog"
+    with pytest.raises(CommandError, match=said), reported(load_robot()):
+        jog_for(connected, TURN, 5.0)
+    assert len(jogger.commands) < 150  # 5 s of them would be 250
 
 
 def test_keys_jog_until_they_are_let_go_and_x_leaves(connected, gateway, jogger, terminal, capsys):

@@ -177,6 +177,9 @@ _ASKED: dict[str, str] = {
     "the planner does not answer to jogging: is it running? `gemelo node list`": "El planificador no responde: ¿está "
     "en "
     "marcha?",
+    "the planner has said nothing for {time} s: the arm has stopped in the middle of the jog; `gemelo node list`": (
+        "El planificador no dice nada desde hace {time} s: el brazo se detuvo a medio mover."
+    ),
     "the planner does not say within {time} s that the jog has ended": "El planificador no dijo en {time} s que el "
     "brazo "
     "ya no se mueve a mano.",
