@@ -15,7 +15,7 @@ from gemelo.targets import joint_state, named_joints, vector
 from schemas.device import DeviceEvent
 from schemas.joints import JointTargets
 from schemas.planning import JogCommand, JogStatus
-from schemas.topics import DEVICE_EVENTS, JOG, JOG_STATUS, JOINT_TARGETS
+from schemas.topics import DEVICE_EVENTS, JOG, JOG_STATUS, JOINT_STATES, JOINT_TARGETS
 from services.arm.model.description import Arm as Description
 
 PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
@@ -24,6 +24,7 @@ PAUSE = 0.5  # [s] without a command, after which the next one begins a new jog
 SILENT = "the planner does not answer to jogging: is it running? `gemelo node list`"
 GAP = 1.0  # [s] without a word of the planner in the middle of a jog; it says one ten times a second
 INTERRUPTED = "the planner has said nothing for 1 s: the arm has stopped in the middle of the jog; `gemelo node list`"
+UNHEARD = "nothing heard of joint_states for 1 s: no target is followed; is stepper_gateway running? `gemelo node list`"
 REST = 5.0  # [s] that the arm may take to come to rest
 FASTEST = 1.0  # [m/s] of the tool of a desktop arm
 FASTEST_TURN = math.pi  # [rad/s] of its tool
@@ -107,16 +108,23 @@ class Streaming:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._refused = ""  # why the gateway did not take the last target
-        self._said = -math.inf  # [s] monotonic
+        self._began = self._said = -math.inf  # [s] monotonic, of this stream's first and last target
 
     def say(self, joints: Joints) -> None:
-        """Raises `BadArgument`, or `Refused` where the gateway has refused the target before."""
+        """Raises `BadArgument`, `Refused` where the gateway has refused the target before, or `Lost` where it is
+        silent."""
         arm = self._session.description
         state = joint_state(arm, joints, "stream")
         _require_within(arm, dict(zip(state.name, state.position, strict=True)))
         self._session.latest(DEVICE_EVENTS, self._on_event)
         node = self._session.node
-        self._said = time.monotonic()
+        now = time.monotonic()
+        if now - self._said > PAUSE:
+            self._began = now
+        self._said = now
+        states = self._session.latest(JOINT_STATES)  # heard from the first target on
+        if now - self._began > GAP and states.age() > GAP:
+            raise Lost(UNHEARD)
         reason, self._refused = self._refused, ""
         if reason:
             raise Refused(f"refused: {reason}", check="stream")

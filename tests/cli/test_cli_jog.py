@@ -8,10 +8,12 @@ import pty
 import signal
 import termios
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
 
+import gemelo
 from schemas.planning import JogCommand, JogLimit, JogStatus
 from schemas.topics import JOG, JOG_STATUS
 from services.cli.errors import CommandError, ExitCode
@@ -195,6 +197,19 @@ def test_a_planner_that_dies_in_the_middle_of_a_jog_ends_it_and_is_named(connect
     with pytest.raises(CommandError, match=said), reported(load_robot()):
         jog_for(connected, TURN, 5.0)
     assert len(jogger.commands) < 150  # 5 s of them would be 250
+
+
+def test_a_stream_that_nobody_follows_says_so(connected):
+    began = time.monotonic()
+
+    def stream() -> None:
+        while time.monotonic() < began + 5.0:
+            connected.stream({"brazo_joint": 0.1})
+            time.sleep(0.02)
+
+    with pytest.raises(gemelo.Lost, match="nothing heard of joint_states for 1 s: no target is followed"):
+        stream()
+    assert time.monotonic() - began > 1.0  # which is given to a twin that has just been found
 
 
 def test_keys_jog_until_they_are_let_go_and_x_leaves(connected, gateway, jogger, terminal, capsys):

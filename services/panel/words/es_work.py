@@ -180,6 +180,10 @@ _ASKED: dict[str, str] = {
     "the planner has said nothing for {time} s: the arm has stopped in the middle of the jog; `gemelo node list`": (
         "El planificador no dice nada desde hace {time} s: el brazo se detuvo a medio mover."
     ),
+    "nothing heard of joint_states for {time} s: no target is followed; is stepper_gateway running? `gemelo node "
+    "list`": (
+        "No se oye nada del brazo desde hace {time} s: nadie sigue lo que se le pide. ¿Está en marcha stepper_gateway?"
+    ),
     "the planner does not say within {time} s that the jog has ended": "El planificador no dijo en {time} s que el "
     "brazo "
     "ya no se mueve a mano.",
