@@ -21,14 +21,12 @@ from services.robot_import.parts import MOTORS, USUAL_DRIVER, DriverPart, MotorP
 from services.robot_import.questions import Questions, answers_text, read_answers, yes_or_no
 from services.robot_import.robot_folder import Description, step, write_robot
 from services.robot_import.source import find_source
+from services.robot_import.standing import ask_who_stands
+from services.robot_import.tool_link import tool_link
 from services.robot_import.trial import trial_findings
 
 ANSWERS_FILE = "import.toml"
 NOT_IN_A_NAME = r"[^A-Za-z0-9_-]+"
-TOOL_NAMES = (
-    "tool0", "tcp", "tool", "ee_link", "end_effector", "eef", "gripper_frame_link", "flange", "hand", "gripper_link",
-    "gripper",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -83,8 +81,13 @@ def _described(name: str, mended: Mended, options: ImportOptions, questions: Que
     """With what a URDF cannot say, asked."""
     motor = _part(motor_named, options.motor or MOTORS[0].name)
     driver = _part(driver_named, options.driver or USUAL_DRIVER)
+    tool = questions.ask("tool_frame", "the tool's link", tool_link(mended.model), _link_of(mended.model))
+    said = len(mended.notes)
+    ask_who_stands(mended, tool, questions)
+    _show(mended.notes[said:])
     joints = driven_joints(mended.model)
-    tool = questions.ask("tool_frame", "the tool's link", _tool(mended.model), _link_of(mended.model))
+    if not joints:
+        raise DescriptionError(f"{mended.source.urdf}: it has no joint that moves, so it is no arm: name another file")
     has_motors = questions.ask(
         "motors", "does it have motors to drive (no: to plan and look at only)?",
         "yes" if options.motor or options.driver else "no", yes_or_no,
@@ -157,20 +160,6 @@ def _require_free(folder: Path, options: ImportOptions) -> None:
         raise DescriptionError(f"{options.source} lies in {folder}, which is to be replaced: give --name for another")
     if not folder.is_dir() or (any(folder.iterdir()) and not (folder / "robot.urdf").is_file()):
         raise DescriptionError(f"{folder} is no robot's folder, --force does not replace it: give --name for another")
-
-
-def _tool(model: UrdfModel) -> str:
-    """A link with a tool's name, else the last one behind the longest chain of joints."""
-    depths = {link.name: 0 for link in model.links}
-    for _ in model.joints:
-        for joint in model.joints:
-            if joint.parent in depths and joint.child in depths:
-                depths[joint.child] = depths[joint.parent] + 1
-    for wanted in TOOL_NAMES:
-        found = [link for link in depths if link.lower().rpartition("-")[2].endswith(wanted)]
-        if found:
-            return max(found, key=lambda link: depths[link])
-    return max(depths, key=lambda link: depths[link])
 
 
 def _link_of(model: UrdfModel) -> Callable[[str], str]:

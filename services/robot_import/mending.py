@@ -22,8 +22,11 @@ from services.arm.checks.meshes import (
     link_volume,
 )
 from services.arm.checks.urdf import check_urdf, fault_finding, principal_moments
+from services.arm.errors import DescriptionError
+from services.arm.model.robot_file import read_text
 from services.arm.model.urdf import Geometry, JointKind, UrdfLink, UrdfModel, model_of
 from services.arm.model.xml_reader import XmlReader, parse_xml
+from services.robot_import.joint_mending import fix_free_base, follow_the_motor
 from services.robot_import.source import Source
 
 FOREIGN = ("gazebo", "transmission", "ros2_control", "sensor")
@@ -48,9 +51,9 @@ class Mended:
     def findings(self) -> list[Finding]:
         """Everything: errors, warnings, and what is mended."""
         model, faults = model_of(XmlReader(self.xml.root, self.xml.lines))
-        file = self.source.urdf.name
+        file = self.source.label
         found = [*self.errors, *(fault_finding(fault, file) for fault in faults)]
-        found += [*check_urdf(model, self.source.urdf, has_meshes=False), *check_meshes(model, file, self.facts)]
+        found += [*check_urdf(model, Path(file), has_meshes=False), *check_meshes(model, file, self.facts)]
         return sorted([*found, *self.notes], key=lambda each: list(Severity).index(each.severity))
 
     def facts(self, geometry: Geometry) -> MeshFacts | str | None:
@@ -60,11 +63,11 @@ class Mended:
 
     def say(self, element: ET.Element, subject: str, message: str, remedy: str) -> None:
         """Notes what is mended."""
-        self.notes.append(note(self.source.urdf.name, subject, message, remedy, self.xml.lines.get(element, 0)))
+        self.notes.append(note(self.source.label, subject, message, remedy, self.xml.lines.get(element, 0)))
 
     def warn(self, element: ET.Element, subject: str, message: str, remedy: str) -> None:
         """Warns of what a default stands for that nobody has given."""
-        self.notes.append(warning(self.source.urdf.name, subject, message, remedy, self.xml.lines.get(element, 0)))
+        self.notes.append(warning(self.source.label, subject, message, remedy, self.xml.lines.get(element, 0)))
 
 
 @lru_cache(maxsize=256)
@@ -74,14 +77,20 @@ def _facts(file: Path) -> MeshFacts | str:
 
 def mend(source: Source) -> Mended:
     """The source, mended; raises `DescriptionError` where it is no URDF at all."""
-    xml = parse_xml(source.text)
-    model_of(xml)
+    try:
+        xml = parse_xml(source.text)
+        model_of(xml)
+    except DescriptionError as said:
+        raise DescriptionError(f"{source.urdf}: {said}") from said
+    _require_links(xml, source)
     xml.faults.clear()
     mended = Mended(source, xml, {})
     for step in (
         _foreign,
+        _prefixed,
         _names,
         _references,
+        _free_base,
         _axes,
         _mimics,
         _millimetres,
@@ -93,6 +102,15 @@ def mend(source: Source) -> Mended:
     ):
         step(mended)
     return mended
+
+
+def _require_links(xml: XmlReader, source: Source) -> None:
+    """Raises `DescriptionError` for a robot without any link, as of a xacro file of macros that others call."""
+    if xml.root.find("link") is None:
+        remedy = (
+            "name the file that calls its macros" if "<xacro:macro" in read_text(source.urdf) else "export it again"
+        )
+        raise DescriptionError(f"{source.urdf}: it has no <link>: {remedy}")
 
 
 def safe_name(text: str, known: set[str], allowed: str = r"[^A-Za-z0-9_.-]+") -> str:
@@ -120,6 +138,21 @@ def _foreign(mended: Mended) -> None:
             material.remove(texture)
             mended.say(texture, "<texture>", f'"{texture.get("filename")}" is not drawn', "left out")
     _colours(mended)
+
+
+def _prefixed(mended: Mended) -> None:
+    """Elements and attributes of another program's namespace, over which readers stumble where it is not declared."""
+    found: dict[str, list[ET.Element]] = {}
+    for parent in list(mended.xml.root.iter()):
+        for element in [each for each in parent if ":" in each.tag]:
+            parent.remove(element)
+            found.setdefault(element.tag, []).append(element)
+        for name in [each for each in parent.attrib if ":" in each]:
+            del parent.attrib[name]
+            found.setdefault(name, []).append(parent)
+    for name, elements in found.items():
+        if not name.startswith("xmlns:"):
+            mended.say(elements[0], f'"{name}"', f"{len(elements)} of these say nothing that is used here", "left out")
 
 
 def _colours(mended: Mended) -> None:
@@ -163,13 +196,15 @@ def _names(mended: Mended) -> None:
 def _references(mended: Mended) -> None:
     """The files that meshes mean; a missing one is an error."""
     by_package: dict[str, int] = {}
+    missing: set[tuple[ET.Element, str]] = set()  # most are in <visual> and in <collision>
     for link, _, _, mesh in _meshes(mended):
         reference = mesh.get("filename", "")
         found = mended.source.find(reference) if reference else None
-        if found is None and reference:
+        if found is None and reference and (link, reference) not in missing:
+            missing.add((link, reference))
             message = f'mesh "{reference}" is not there{mended.source.near(reference)}'
             line = mended.xml.lines.get(mesh, 0)
-            file = mended.source.urdf.name
+            file = mended.source.label
             mended.errors.append(error(file, _subject(link), message, f"put it below {mended.source.root}", line))
         elif found is not None:
             mended.files[reference] = found
@@ -178,7 +213,11 @@ def _references(mended: Mended) -> None:
                 by_package[package] = by_package.get(package, 0) + 1
     for package, count in by_package.items():
         message = f"{count} meshes are named by the ROS package path package://{package}"
-        mended.notes.append(note(mended.source.urdf.name, "meshes", message, "relative paths, the files copied"))
+        mended.notes.append(note(mended.source.label, "meshes", message, "relative paths, the files copied"))
+
+
+def _free_base(mended: Mended) -> None:
+    fix_free_base(mended.xml, mended.warn)
 
 
 def _axes(mended: Mended) -> None:
@@ -200,6 +239,7 @@ def _axes(mended: Mended) -> None:
 
 
 def _mimics(mended: Mended) -> None:
+    follow_the_motor(mended.xml, mended.say)
     for joint in mended.xml.root.findall("joint"):
         mimic = joint.find("mimic")
         if mimic is not None and joint.get("type") in MOVES:
@@ -245,7 +285,7 @@ def _tiny(mended: Mended) -> None:
         else:
             line = mended.xml.lines.get(mesh, 0)
             remedy = f'correct scale="{mesh.get("scale")}"'
-            mended.errors.append(error(mended.source.urdf.name, _subject(link), message, remedy, line))
+            mended.errors.append(error(mended.source.label, _subject(link), message, remedy, line))
 
 
 def _frames(mended: Mended) -> None:
@@ -280,11 +320,13 @@ def _unseen(mended: Mended) -> None:
     for link in mended.xml.root.findall("link"):
         if link.find("visual") is not None:
             continue
-        for collision in link.findall("collision"):
+        collisions = link.findall("collision")
+        for collision in collisions:
             visual = ET.fromstring(ET.tostring(collision))
             visual.tag = "visual"
             link.insert(0, visual)
-            mended.say(collision, _subject(link), "has a <collision>, but no <visual>", "drawn with the same shape")
+        if collisions:
+            mended.say(collisions[0], _subject(link), "has a <collision>, but no <visual>", "drawn with the same shape")
 
 
 def _even_density(link: UrdfLink, mass: float, facts: Facts) -> ET.Element | None:

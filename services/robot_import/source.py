@@ -12,8 +12,9 @@ from urllib.parse import unquote
 from services.arm.errors import DescriptionError, suggestion
 from services.arm.model.robot_file import read_text
 
-UP = 3  # folders above the URDF in which its package may be
+UP = 6  # folders above the URDF in which its package may be
 XACRO = ".xacro"
+MOST_NAMED = 3  # files of one name
 NO_XACRO = (
     "it is xacro, and the Python package `xacro` is not installed: run `make setup`, which brings it, "
     "or expand the file where ROS is (`xacro robot.urdf.xacro > robot.urdf`) and import that"
@@ -27,6 +28,12 @@ class Source:
     urdf: Path
     root: Path
     text: str
+    is_expanded: bool = False
+
+    @property
+    def label(self) -> str:
+        """The name to which lines of the text belong."""
+        return f"{self.urdf.name}, expanded" if self.is_expanded else self.urdf.name
 
     def find(self, reference: str) -> Path | None:
         """The file that a mesh's `filename` means, None where there is none or several could be meant."""
@@ -38,8 +45,13 @@ class Source:
         return alike[0] if len(alike) == 1 else None
 
     def near(self, reference: str) -> str:
-        """A hint at the file with the most similar name."""
-        return suggestion(Path(reference).name, [path.name for path in _files(self.root) if _is_mesh(path)])
+        """A hint at the file with the most similar name; or at those of the same one, of which any could be meant."""
+        name, meshes = Path(reference).name, [path for path in _files(self.root) if _is_mesh(path)]
+        same = [str(path.relative_to(self.root)) for path in meshes if path.name.lower() == name.lower()]
+        if same:
+            more = f" and {len(same) - MOST_NAMED} more" if len(same) > MOST_NAMED else ""
+            return f", and {len(same)} have that name: {', '.join(same[:MOST_NAMED])}{more}"
+        return suggestion(name, [path.name for path in meshes])
 
     def _candidates(self, reference: str) -> Iterator[Path]:
         scheme, _, rest = reference.rpartition("://")
@@ -58,11 +70,16 @@ class Source:
 def find_source(given: Path) -> Source:
     """The source at a URDF, a xacro file or an export's folder; raises `DescriptionError`."""
     if given.is_file():
-        return Source(given, given.parent, _text(given))
+        return _source(given, _root_of(given))
     if not given.is_dir():
         raise DescriptionError(f"{given}: there is no such file or folder")
-    urdf = _urdf_in(given)
-    return Source(urdf, given, _text(urdf))
+    return _source(_urdf_in(given), given)
+
+
+def _root_of(urdf: Path) -> Path:
+    """The folder of the export that holds the file: the nearest with a package.xml or meshes, else the file's own."""
+    holds = (folder for folder in _above(urdf) if (folder / "package.xml").is_file() or (folder / "meshes").is_dir())
+    return next(holds, urdf.parent)
 
 
 def _urdf_in(folder: Path) -> Path:
@@ -83,10 +100,11 @@ def _is_robot(path: Path) -> bool:
     return re.search(r"<robot\b[^>]*\bname\s*=", text) is not None and ("<link" in text or "<xacro:" in text)
 
 
-def _text(path: Path) -> str:
-    text = read_text(path)
-    is_xacro = path.suffix.lower() == XACRO or "<xacro:" in text
-    return _expanded(path) if is_xacro else text
+def _source(urdf: Path, root: Path) -> Source:
+    text = read_text(urdf)
+    if urdf.suffix.lower() == XACRO or "<xacro:" in text:
+        return Source(urdf, root, _expanded(urdf), is_expanded=True)
+    return Source(urdf, root, text)
 
 
 def _expanded(path: Path) -> str:
@@ -108,7 +126,7 @@ def _expanded(path: Path) -> str:
 
     substitution_args._eval_find = find  # else it asks ROS where it is
     try:
-        return str(xacro.process_file(str(path)).toxml())
+        return str(xacro.process_file(str(path)).toprettyxml(indent="  "))  # its lines as `xacro` prints them
     except DescriptionError:
         raise
     except Exception as error:  # xacro's own, and those of Python expressions in it

@@ -1,0 +1,83 @@
+"""Joints that no motor of an arm turns: a base that drives or flies stands still, and followers of followers follow the
+joint that has the motor.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+
+from services.arm.model.xml_reader import XmlReader
+
+FREE = {"planar": "drives", "floating": "is free to move"}
+LEFT_BY_FIXING = ("axis", "limit", "dynamics", "mimic", "safety_controller", "calibration")
+
+Say = Callable[[ET.Element, str, str, str], None]  # of `Mended`
+
+
+def fix_free_base(xml: XmlReader, warn: Say) -> None:
+    """Makes a planar or floating joint between the root and everything that moves a fixed one."""
+    joints = xml.root.findall("joint")
+    children = {_link(joint, "child") for joint in joints}
+    still = {link.get("name") for link in xml.root.findall("link")} - children
+    front = list(joints)
+    while front:
+        reached = [
+            joint for joint in front if _link(joint, "parent") in still and joint.get("type") in ("fixed", *FREE)
+        ]
+        if not reached:
+            return
+        for joint in reached:
+            front.remove(joint)
+            still.add(_link(joint, "child"))
+            if joint.get("type") in FREE:
+                message = f"the base {FREE[joint.get('type', '')]}, and no motor of an arm does that"
+                remedy = 'type="fixed": the arm is planned where its base stands'
+                warn(joint, f'joint "{joint.get("name")}"', message, remedy)
+                fix(joint)
+
+
+def fix(joint: ET.Element) -> None:
+    """Makes it a fixed one, at its 0."""
+    joint.set("type", "fixed")
+    for tag in LEFT_BY_FIXING:
+        for element in joint.findall(tag):
+            joint.remove(element)
+
+
+def follow_the_motor(xml: XmlReader, say: Say) -> None:
+    """Followers of a joint that follows another itself follow that other, with the product of the multipliers."""
+    mimics = {joint.get("name"): found for joint in xml.root.findall("joint") for found in joint.findall("mimic")}
+    for name, (between, text) in {name: _composed(name, mimics) for name in mimics}.items():
+        if not between or text["joint"] in mimics:
+            continue  # a follower of a motor's joint, or followers in a ring, which is an error
+        message = f'follows joint "{between[0]}", which follows "{text["joint"]}"'
+        remedy = " ".join(f'{key}="{value}"' for key, value in text.items())
+        say(mimics[name], f'joint "{name}"', message, remedy)
+        mimics[name].attrib.update(text)
+
+
+def _composed(name: str | None, mimics: dict[str | None, ET.Element]) -> tuple[list[str | None], dict[str, str]]:
+    """The followers between joint `name` and the one with the motor, and the attributes that follow that one."""
+    multiplier, offset = _numbers(mimics[name])
+    leader = mimics[name].get("joint")
+    between: list[str | None] = []
+    while leader in mimics and leader not in (name, *between):
+        between.append(leader)
+        factor, addend = _numbers(mimics[leader])
+        multiplier, offset = multiplier * factor, multiplier * addend + offset
+        leader = mimics[leader].get("joint")
+    return between, {"joint": str(leader), "multiplier": f"{multiplier:.9g}", "offset": f"{offset:.9g}"}
+
+
+def _link(joint: ET.Element, role: str) -> str | None:
+    element = joint.find(role)
+    return None if element is None else element.get("link")
+
+
+def _numbers(mimic: ET.Element) -> tuple[float, float]:
+    """Multiplier, and offset [rad] or [m]; those of a plain follower where they are no numbers, which is an error."""
+    try:
+        return float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))
+    except ValueError:
+        return 1.0, 0.0

@@ -1,0 +1,77 @@
+"""Joints that do not carry the tool: wheels and a second arm stand still, a gripper's joints do not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from services.arm.errors import DescriptionError
+from services.arm.model.virtual_drive import driven_joints
+from services.robot_import.mending import Mended, mend
+from services.robot_import.questions import Questions
+from services.robot_import.source import find_source
+from services.robot_import.standing import ask_who_stands
+from tests.robot_import.exports import LIMIT, joint, write
+
+
+def arm(prefix: str, count: int) -> list[str]:
+    """Joints and links of one arm on `base`, with two jaws of which one follows the other."""
+    links = ["base", *(f"{prefix}_{number}" for number in range(1, count + 1))]
+    joints = [joint(f"{prefix}_j{at}", links[at - 1], links[at]) for at in range(1, count + 1)]
+    joints += [joint(f"{prefix}_jaw", links[-1], f"{prefix}_finger")]
+    joints += [joint(f"{prefix}_jaw2", links[-1], f"{prefix}_finger2", rest=f'{LIMIT}<mimic joint="{prefix}_jaw"/>')]
+    return [*(f'<link name="{name}"/>' for name in (*links[1:], f"{prefix}_finger", f"{prefix}_finger2")), *joints]
+
+
+def robot(path: Path, *parts: str) -> Mended:
+    return mend(find_source(write(path / "robot.urdf", "robot", '<link name="base"/>', *parts)))
+
+
+def driven(found: Mended) -> list[str]:
+    return [each.name for each in driven_joints(found.model)]
+
+
+def asked(found: Mended, tool: str, given: dict[str, str] | None = None) -> Questions:
+    questions = Questions(given or {}, takes_defaults=True)
+    ask_who_stands(found, tool, questions)
+    return questions
+
+
+def test_of_two_arms_that_are_too_many_the_one_without_the_tool_stands_still(tmp_path: Path):
+    for tool, moving in (("left_5", "left"), ("right_5", "right")):
+        found = robot(tmp_path, *arm("left", 5), *arm("right", 5))
+        asked(found, tool)
+        assert driven(found) == [*(f"{moving}_j{number}" for number in range(1, 6)), f"{moving}_jaw"]
+        (said,) = (str(each) for each in found.notes if "stand still at 0" in str(each))
+        assert "6 joints do not carry the tool" in said
+        assert not [each for each in found.findings() if str(each).startswith("error")]
+
+
+def test_of_two_small_arms_both_are_driven_unless_a_person_wants_otherwise(tmp_path: Path):
+    both = robot(tmp_path, *arm("left", 2), *arm("right", 2))
+    assert asked(both, "left_2").answers == {"others_stand_still": "no"}
+    assert len(driven(both)) == 6
+    one = robot(tmp_path, *arm("left", 2), *arm("right", 2))
+    asked(one, "left_2", {"others_stand_still": "yes"})
+    assert driven(one) == ["left_j1", "left_j2", "left_jaw"]
+
+
+def test_wheels_stand_still(tmp_path: Path):
+    wheels = [joint(f"w{side}", "base", f"{side}_wheel", kind="continuous") for side in ("left", "right")]
+    found = robot(tmp_path, '<link name="left_wheel"/><link name="right_wheel"/>', *arm("arm", 2), *wheels)
+    asked(found, "arm_2")
+    assert driven(found) == ["arm_j1", "arm_j2", "arm_jaw"]
+
+
+def test_nothing_is_asked_of_an_arm_with_a_gripper(tmp_path: Path):
+    found = robot(tmp_path, *arm("arm", 6))
+    assert asked(found, "arm_6").answers == {}
+    assert len(driven(found)) == 7
+
+
+def test_more_joints_than_a_device_drives_are_refused_before_anything_is_computed(tmp_path: Path):
+    with pytest.raises(DescriptionError, match="10 joints to drive, and a device drives 8: make some of them fixed"):
+        asked(robot(tmp_path, *arm("long", 9)), "long_9")
+    with pytest.raises(DescriptionError, match='say "yes" to others_stand_still'):
+        asked(robot(tmp_path, *arm("left", 5), *arm("right", 5)), "left_5", {"others_stand_still": "no"})
