@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentTypeError
 from pathlib import Path
 
 from services.cli.errors import CommandError, ExitCode
@@ -11,6 +12,7 @@ EXAMPLES = """examples:
   gemelo import ~/Downloads/my_arm_description
   gemelo import my_arm.urdf --name my_arm --yes
   gemelo import my_arm.urdf --motor "NEMA 17" --driver A4988
+  gemelo import my_arm.urdf.xacro --xacro prefix:=left_ --xacro gripper:=true
   gemelo import my_arm.urdf --answers urdf/my_arm/import.toml --force"""
 
 
@@ -25,6 +27,22 @@ def add_options(parser: Parser) -> None:
     parser.add_argument("--output", type=Path, default=Path("urdf"), metavar="FOLDER", help="of robots; else urdf")
     parser.add_argument("--motor", default="", help="of every joint, as NEMA 17, NEMA 23 or 28BYJ-48")
     parser.add_argument("--driver", default="", help="of every motor, as A4988, DRV8825, TMC2209 or DM542")
+    parser.add_argument(
+        "--xacro",
+        type=xacro_argument,
+        action="append",
+        default=[],
+        metavar="NAME:=VALUE",
+        help="for a xacro file; repeat it",
+    )
+
+
+def xacro_argument(text: str) -> tuple[str, str]:
+    """Name and value of NAME:=VALUE; raises ArgumentTypeError."""
+    name, separator, value = text.partition(":=")
+    if not separator or not name:
+        raise ArgumentTypeError(f'"{text}" is not NAME:=VALUE')
+    return name, value
 
 
 def run(options: Options) -> ExitCode:
@@ -34,7 +52,7 @@ def run(options: Options) -> ExitCode:
 
     wanted = ImportOptions(
         options.source, options.output, options.name, options.yes, options.force,
-        options.answers, options.motor, options.driver,
+        options.answers, options.motor, options.driver, dict(options.xacro),
     )  # fmt: skip
     try:
         folder = import_robot(wanted)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from services.arm.checks.check import check
@@ -26,6 +26,7 @@ from services.robot_import.tool_link import tool_link
 from services.robot_import.trial import trial_findings
 
 ANSWERS_FILE = "import.toml"
+XACRO = "xacro."  # before the names of its arguments, in a file of answers
 NOT_IN_A_NAME = r"[^A-Za-z0-9_-]+"
 
 
@@ -41,11 +42,15 @@ class ImportOptions:
     answers: Path | None = None
     motor: str = ""
     driver: str = ""
+    xacro: Mapping[str, str] = field(default_factory=dict)  # arguments by name
 
 
 def import_robot(options: ImportOptions) -> Path:
     """Writes the robot's folder and returns it; raises `DescriptionError`, and leaves what was there as it was."""
-    questions = Questions(read_answers(options.answers) if options.answers else {}, options.yes)
+    answers = read_answers(options.answers) if options.answers else {}
+    questions = Questions(
+        {**answers, **{f"{XACRO}{name}": value for name, value in options.xacro.items()}}, options.yes
+    )
     mended = _mended(options, questions)
     name = safe_name(options.name or mended.xml.root.get("name") or options.source.stem, set(), NOT_IN_A_NAME)
     folder = options.output / name
@@ -67,7 +72,7 @@ def import_robot(options: ImportOptions) -> Path:
 def _mended(options: ImportOptions, questions: Questions) -> Mended:
     """The source, mended and with limits; nothing is asked where it has errors."""
     with step("reading the source and its meshes"):
-        source = find_source(options.source)
+        source = find_source(options.source, questions.given_below(XACRO))
         trial = mend(source)
         ask_limits(trial, Questions({}, takes_defaults=True))
         _require_importable(trial.findings())

@@ -41,6 +41,12 @@ class Questions:
             except DescriptionError as error:
                 print(f"  {error}")
 
+    def given_below(self, prefix: str) -> dict[str, str]:
+        """The given answers whose keys begin with `prefix`, by what follows it; they count as asked for."""
+        below = {key: value for key, value in self._given.items() if key.startswith(prefix)}
+        self.answers |= below
+        return {key.removeprefix(prefix): value for key, value in below.items()}
+
     def was_given(self, key: str) -> bool:
         """True if a person said it: in the file of answers, or on the terminal, where even a default was looked at."""
         return key in self.answers and key not in self._by_default

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
 from services.arm.errors import DescriptionError, suggestion
-from services.arm.model.robot_file import read_text
+from services.robot_import.xacro_files import SUFFIX, expanded, outermost
 
 UP = 6  # folders above the URDF in which its package may be
-XACRO = ".xacro"
 MOST_NAMED = 3  # files of one name
-NO_XACRO = (
-    "it is xacro, and the Python package `xacro` is not installed: run `make setup`, which brings it, "
-    "or expand the file where ROS is (`xacro robot.urdf.xacro > robot.urdf`) and import that"
-)
+ENCODING = re.compile(rb"<\?xml[^>]*?\bencoding\s*=\s*[\"']([A-Za-z0-9._-]+)")
+LONGEST_DECLARATION = 200  # [B]
+UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 @dataclass(frozen=True)
@@ -67,13 +66,13 @@ class Source:
             yield from (folder / reference for folder in above)
 
 
-def find_source(given: Path) -> Source:
-    """The source at a URDF, a xacro file or an export's folder; raises `DescriptionError`."""
+def find_source(given: Path, arguments: Mapping[str, str] | None = None) -> Source:
+    """The source at a URDF, a xacro file with `arguments`, or an export's folder; raises `DescriptionError`."""
     if given.is_file():
-        return _source(given, _root_of(given))
+        return _source(given, _root_of(given), arguments or {})
     if not given.is_dir():
         raise DescriptionError(f"{given}: there is no such file or folder")
-    return _source(_urdf_in(given), given)
+    return _source(_urdf_in(given), given, arguments or {})
 
 
 def _root_of(urdf: Path) -> Path:
@@ -85,7 +84,8 @@ def _root_of(urdf: Path) -> Path:
 def _urdf_in(folder: Path) -> Path:
     """The only URDF; or, where there is none, the only xacro file that is a robot."""
     urdfs = [path for path in _files(folder) if path.suffix.lower() == ".urdf"]
-    found = urdfs or [path for path in _files(folder) if path.suffix.lower() == XACRO and _is_robot(path)]
+    xacros = (path for path in _files(folder) if path.suffix.lower() == SUFFIX and _is_robot(path))
+    found = urdfs or outermost(xacros)
     if not found:
         raise DescriptionError(f"{folder}: there is no .urdf and no .xacro of a robot in it")
     if len(found) > 1:
@@ -100,41 +100,33 @@ def _is_robot(path: Path) -> bool:
     return re.search(r"<robot\b[^>]*\bname\s*=", text) is not None and ("<link" in text or "<xacro:" in text)
 
 
-def _source(urdf: Path, root: Path) -> Source:
-    text = read_text(urdf)
-    if urdf.suffix.lower() == XACRO or "<xacro:" in text:
-        return Source(urdf, root, _expanded(urdf), is_expanded=True)
+def _source(urdf: Path, root: Path, arguments: Mapping[str, str]) -> Source:
+    text = _decoded(urdf)
+    if urdf.suffix.lower() == SUFFIX or "<xacro:" in text:
+        expansion = expanded(urdf, arguments, lambda package: _found_package(package, urdf))
+        return Source(urdf, root, expansion, is_expanded=True)
+    if arguments:
+        raise DescriptionError(f"{urdf}: it is no xacro file, and has no argument {', '.join(arguments)}")
     return Source(urdf, root, text)
 
 
-def _expanded(path: Path) -> str:
-    """By the package `xacro`; raises `DescriptionError` where it is not installed or refuses the file."""
-    try:
-        import xacro
-        from xacro import substitution_args
-    except ImportError:
-        raise DescriptionError(f"{path}: {NO_XACRO}") from None
-    installed = substitution_args._eval_find
-    refused: list[DescriptionError] = []  # xacro wraps what is raised in it, and says it twice
+def _decoded(urdf: Path) -> str:
+    """The text in the encoding that its first line names, else in UTF-8; no blank before that line, as no XML has any.
 
-    def find(package: str) -> str:
-        try:
-            return str(_found_package(package, path))
-        except DescriptionError as error:
-            refused.append(error)
-            raise
-
-    substitution_args._eval_find = find  # else it asks ROS where it is
+    Raises `DescriptionError`.
+    """
     try:
-        return str(xacro.process_file(str(path)).toprettyxml(indent="  "))  # its lines as `xacro` prints them
-    except DescriptionError:
-        raise
-    except Exception as error:  # xacro's own, and those of Python expressions in it
-        if refused:
-            raise refused[0] from error
-        raise DescriptionError(f"{path}: xacro cannot expand it: {type(error).__name__}: {error}") from error
-    finally:
-        substitution_args._eval_find = installed
+        raw = urdf.read_bytes()
+    except OSError as error:
+        raise DescriptionError(f"{urdf}: cannot be read: {error}") from error
+    named = ENCODING.search(raw[:LONGEST_DECLARATION])
+    encoding = "utf-16" if raw.startswith(UTF_16) else named[1].decode() if named else "utf-8-sig"
+    try:
+        text = raw.decode("utf-8-sig" if encoding.lower() == "utf-8" else encoding)
+    except (UnicodeDecodeError, LookupError) as error:
+        raise DescriptionError(f"{urdf}: its letters are not {encoding}: save it as UTF-8 ({error})") from error
+    blanks = re.match(r"(\s+)<\?xml[^>]*\?>", text)
+    return text if blanks is None else blanks[1] + text[blanks.end() :]
 
 
 def _found_package(package: str, path: Path) -> Path:
