@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from services.arm.checks.meshes import scene_of
 from services.arm.errors import DescriptionError
 from services.arm.frames.transforms import from_rpy
 from services.arm.model.urdf import Geometry, UrdfLink
@@ -47,12 +48,10 @@ def _placed(visual: Geometry, link: str, folder: Path) -> TriangleMesh:
 
 def _read(path: Path, where: str) -> TriangleMesh:
     """Vertices that a triangle uses, in the file's unit."""
-    import trimesh  # half a second
-
     if not path.is_file():
         raise DescriptionError(f"{where} is not there")
     try:
-        whole = trimesh.load_scene(path).to_mesh()
+        whole = scene_of(path).to_mesh()
         vertices, faces = np.asarray(whole.vertices, dtype=float), np.asarray(whole.faces, dtype=np.int32)
     except Exception as error:  # whatever its many readers raise for a damaged file
         raise DescriptionError(f"{where} cannot be read: {type(error).__name__}: {error}") from error

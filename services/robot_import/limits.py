@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 
-from services.arm.model.urdf import JointKind, UrdfJoint
+from services.arm.model.urdf import JointKind, Limit, UrdfJoint
 from services.robot_import.mending import Mended
 from services.robot_import.questions import Questions, above_zero, number
 
@@ -15,6 +15,8 @@ MOST_VELOCITY = 50.0  # [rad/s] or [m/s]
 TURN, SLIDE = math.pi, 0.2  # [rad] each way, [m]
 VELOCITY, SLIDE_VELOCITY = 1.0, 0.1  # [rad/s], [m/s]
 EFFORT = 10.0  # [N m] or [N]
+DEGREE, MILLIMETRE = math.pi / 180.0, 0.001  # [rad], [m]
+LEAST_SHARE = 0.1  # of the default: a velocity that would be less is no other unit
 
 
 def ask_limits(mended: Mended, questions: Questions) -> None:
@@ -37,15 +39,34 @@ def _complete(joint: UrdfJoint, element: ET.Element, mended: Mended, questions: 
 
     travel = MOST_TRAVEL.get(joint.kind, math.inf)
     if joint.kind is not JointKind.CONTINUOUS and (limit is None or not 0.0 < limit.upper - limit.lower <= travel):
-        ask("lower", 0.0 if slides else -TURN, positive=False)
-        ask("upper", SLIDE if slides else TURN, positive=False)
+        lower, upper = _likely_travel(limit, slides)
+        ask("lower", lower, positive=False)
+        ask("upper", upper, positive=False)
     if limit is None or not 0.0 < limit.velocity <= MOST_VELOCITY:
-        ask("velocity", SLIDE_VELOCITY if slides else VELOCITY)
+        ask("velocity", _likely_velocity(limit, slides))
     if limit is None or not limit.effort > 0.0:
         ask("effort", EFFORT)
     if wanted:
         is_given = all(questions.was_given(f"{joint.name}.{key}") for key in wanted)
         _write(joint, element, wanted, mended, is_given)
+
+
+def _likely_travel(limit: Limit | None, slides: bool) -> tuple[float, float]:
+    """[rad] or [m] what limits without sense were meant to be: turned about, in degrees, or in millimetres."""
+    unknown = (0.0, SLIDE) if slides else (-TURN, TURN)
+    if limit is None or limit.lower == limit.upper:
+        return unknown
+    low, high = sorted((limit.lower, limit.upper))
+    kind = JointKind.PRISMATIC if slides else JointKind.REVOLUTE
+    scales = (1.0, MILLIMETRE if slides else DEGREE)
+    return next(((low * x, high * x) for x in scales if (high - low) * x <= MOST_TRAVEL[kind]), unknown)
+
+
+def _likely_velocity(limit: Limit | None, slides: bool) -> float:
+    """[rad/s] or [m/s] what a velocity without sense was meant to be, in degrees or millimetres per second."""
+    meant = (limit.velocity if limit is not None else 0.0) * (MILLIMETRE if slides else DEGREE)
+    unknown = SLIDE_VELOCITY if slides else VELOCITY
+    return meant if LEAST_SHARE * unknown < meant <= MOST_VELOCITY else unknown
 
 
 def _write(joint: UrdfJoint, element: ET.Element, wanted: dict[str, float], mended: Mended, is_given: bool) -> None:

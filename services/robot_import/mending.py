@@ -23,7 +23,6 @@ from services.arm.checks.meshes import (
 )
 from services.arm.checks.urdf import check_urdf, fault_finding, principal_moments
 from services.arm.errors import DescriptionError
-from services.arm.model.robot_file import read_text
 from services.arm.model.urdf import Geometry, JointKind, UrdfLink, UrdfModel, model_of
 from services.arm.model.xml_reader import XmlReader, parse_xml
 from services.robot_import.joint_mending import fix_free_base, follow_the_motor
@@ -91,6 +90,7 @@ def mend(source: Source) -> Mended:
         _names,
         _references,
         _free_base,
+        _endless,
         _axes,
         _mimics,
         _millimetres,
@@ -107,9 +107,7 @@ def mend(source: Source) -> Mended:
 def _require_links(xml: XmlReader, source: Source) -> None:
     """Raises `DescriptionError` for a robot without any link, as of a xacro file of macros that others call."""
     if xml.root.find("link") is None:
-        remedy = (
-            "name the file that calls its macros" if "<xacro:macro" in read_text(source.urdf) else "export it again"
-        )
+        remedy = "name the file that calls its macros" if source.is_expanded else "export it again"
         raise DescriptionError(f"{source.urdf}: it has no <link>: {remedy}")
 
 
@@ -218,6 +216,18 @@ def _references(mended: Mended) -> None:
 
 def _free_base(mended: Mended) -> None:
     fix_free_base(mended.xml, mended.warn)
+
+
+def _endless(mended: Mended) -> None:
+    """Limits that are infinite, or no number at all, are none: what a joint lacks is asked for."""
+    for joint in mended.xml.root.findall("joint"):
+        for limit in joint.findall("limit"):
+            named = [key for key, text in limit.items() if any(not math.isfinite(x) for x in _numbers(text) or ())]
+            if named:
+                where, message = f'joint "{joint.get("name")}"', f"its {', '.join(named)} in <limit> is not finite"
+                mended.say(limit, where, message, "left out")
+            for key in named:
+                del limit.attrib[key]
 
 
 def _axes(mended: Mended) -> None:

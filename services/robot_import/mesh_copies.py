@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from services.arm.checks.meshes import scene_of
 from services.arm.errors import DescriptionError
 from services.robot_import.mending import Mended, safe_name
 
@@ -32,10 +33,8 @@ def _copy(file: Path, folder: Path, stem: str) -> str:
     if ending in KEPT:
         shutil.copyfile(file, folder / f"{stem}{ending}")
         return f"{stem}{ending}"
-    import trimesh  # half a second
-
     try:
-        trimesh.load_scene(file).export(folder / f"{stem}.glb")
+        scene_of(file).export(folder / f"{stem}.glb")
     except Exception as error:  # whatever its many readers raise for a damaged file
         raise DescriptionError(f"{file} cannot be read: {type(error).__name__}: {error}") from error
     return f"{stem}.glb"

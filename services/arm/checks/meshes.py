@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from services.arm.checks.findings import Finding, error, warning
 from services.arm.model.urdf import Geometry, UrdfLink, UrdfModel
 
+if TYPE_CHECKING:
+    import trimesh
+
 # Tuning constants: chosen, where a line does not say measured or standard.
 IN_MILLIMETRES = 5.0  # longest side in the file's unit from which on a link's mesh is not in metres
 SMALLEST = 0.002  # [m] of its longest side
 FLAT = 1e-3  # thickness as a share of the longest side below which a mesh bounds no volume
 LIGHTEST, HEAVIEST = 15.0, 20_000.0  # [kg/m^3] light foam, tungsten: no part of an arm is beyond
+COLLADA_UNIT = re.compile(rb"<unit\b[^>]*?\bmeter\s*=\s*[\"']\s*([0-9.eE+-]+)")
 MILLIMETRE_REMEDY = 'write scale="0.001 0.001 0.001"'
 
 
@@ -52,12 +58,26 @@ def mesh_facts(folder: Path) -> Facts:
     return facts
 
 
-def facts_of(file: Path) -> MeshFacts | str:
-    """Of a mesh file, or why it cannot be read."""
+def scene_of(file: Path) -> trimesh.Scene:
+    """What a mesh file holds, in its own units; in metres where it names its unit, as COLLADA does and as ROS reads it.
+
+    Raises what trimesh's many readers raise.
+    """
     import trimesh  # half a second
 
+    scene = trimesh.load_scene(file)
+    if file.suffix.lower() == ".dae":
+        unit = COLLADA_UNIT.search(file.read_bytes())
+        metres = float(unit[1]) if unit else 1.0
+        if metres != 1.0:
+            scene.apply_scale(metres)
+    return scene
+
+
+def facts_of(file: Path) -> MeshFacts | str:
+    """Of a mesh file, or why it cannot be read."""
     try:
-        mesh = trimesh.load_scene(file).to_mesh()
+        mesh = scene_of(file).to_mesh()
     except ImportError as problem:
         return f"there is no reader for {file.suffix}: {problem}"
     except Exception as problem:  # whatever its many readers raise for a damaged file

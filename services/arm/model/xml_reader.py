@@ -95,7 +95,7 @@ class XmlReader:
 
 def parse_xml(text: str) -> XmlReader:
     """Elements, comments left out, with the line that each begins in; raises `DescriptionError` where it is no XML."""
-    parser, builder = expat.ParserCreate(), ET.TreeBuilder()
+    parser, builder = expat.ParserCreate("utf-8"), ET.TreeBuilder()
     lines: dict[ET.Element, int] = {}
 
     def start(tag: str, attributes: dict[str, str]) -> None:
@@ -105,7 +105,7 @@ def parse_xml(text: str) -> XmlReader:
     parser.EndElementHandler = builder.end
     parser.CharacterDataHandler = builder.data
     try:
-        # A UTF-8 text says nothing else of itself once it is decoded.
+        # Whatever encoding the declaration names, the text is decoded, and is UTF-8 here.
         parser.Parse(text.encode("utf-8"), True)
     except expat.ExpatError as error:
         raise DescriptionError(f"not XML: {error}") from error
