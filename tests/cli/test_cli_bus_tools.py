@@ -238,6 +238,19 @@ def test_roll_pitch_and_yaw_are_those_that_were_given(roll: float, pitch: float,
     assert to_rpy(from_rpy(roll, pitch, yaw)) == pytest.approx((roll, pitch, yaw), abs=1e-9)
 
 
+@given(
+    st.floats(-3.1, 3.1),
+    st.sampled_from([math.pi / 2, -math.pi / 2, 1.5708, -1.570796, math.pi / 2 - 1e-9]),
+    st.floats(-3.1, 3.1),
+)
+def test_roll_and_yaw_at_a_right_angle_of_pitch_give_the_same_orientation(roll: float, pitch: float, yaw: float):
+    orientation = from_rpy(roll, pitch, yaw)
+    again = from_rpy(*to_rpy(orientation))
+    assert abs(sum(first * second for first, second in zip(orientation, again, strict=True))) == pytest.approx(
+        1.0, abs=1e-12
+    )
+
+
 def test_a_message_is_shown_with_its_units_and_where_it_travels(capsys):
     assert run(["interface", "show", "FrameTransforms"]) is ExitCode.OK
     said = capsys.readouterr().out

@@ -11,6 +11,7 @@ Quaternion = tuple[float, float, float, float]
 Rigid = tuple[Point, Quaternion]
 
 IDENTITY: Rigid = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+_RIGHT_ANGLE = 1e-8  # cosine of a pitch below which roll and yaw are one to rounding
 _NEARLY_PARALLEL = 1.0 - 1e-9  # cosine above which slerp is linear to rounding
 
 
@@ -86,11 +87,14 @@ def from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def to_rpy(rotation: Quaternion) -> Point:
-    """Roll, pitch and yaw [rad] of a unit quaternion, as of `from_rpy`; where pitch is a right angle, one of many."""
+    """Roll, pitch and yaw [rad] of a unit quaternion, as of `from_rpy`; the roll is 0 where pitch is a right angle."""
     x, y, z, w = rotation
-    pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
-    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    sine, up, ahead = 2.0 * (w * y - z * x), 2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)
+    cosine = math.hypot(up, ahead)
+    pitch = math.atan2(sine, cosine)
+    if cosine < _RIGHT_ANGLE:  # roll and yaw turn about one axis: what is left of `up` and `ahead` is rounding
+        return 0.0, pitch, math.atan2(2.0 * (w * z - x * y), 1.0 - 2.0 * (x * x + z * z))
+    return math.atan2(up, ahead), pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def from_axis_angle(axis: Point, angle: float) -> Quaternion:
