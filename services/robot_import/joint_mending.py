@@ -38,7 +38,7 @@ def fix_free_base(xml: XmlReader, warn: Say) -> None:
 
 
 def fix(joint: ET.Element) -> None:
-    """Makes it a fixed one, at its 0."""
+    """Makes it a fixed one, where its origin is."""
     joint.set("type", "fixed")
     for tag in LEFT_BY_FIXING:
         for element in joint.findall(tag):

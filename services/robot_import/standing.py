@@ -6,19 +6,23 @@ import xml.etree.ElementTree as ET
 
 from services.arm.device.device_config import MAX_COUNTS
 from services.arm.errors import DescriptionError
+from services.arm.frames.transforms import from_axis_angle, from_rpy, multiply, rotate, to_rpy
 from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
 from services.arm.model.virtual_drive import driven_joints
 from services.robot_import.joint_mending import fix
 from services.robot_import.mending import Mended
+from services.robot_import.poses import zero_state
 from services.robot_import.questions import Questions, yes_or_no
 
 MOST = MAX_COUNTS["joint"]  # that one device drives
 FEW = 3  # names that are said
+STANDING = "they stand still at 0 or the nearest limit; `tool_frame` and `others_stand_still` say otherwise"
+DRIVEN = "they are driven apart from it; where they hold it too, as the legs of a delta do, that loop is not followed"
 WHEEL = "wheel"  # in the name of a joint or its link
 
 
 def ask_who_stands(mended: Mended, tool: str, questions: Questions) -> None:
-    """Makes the joints that do not carry `tool` fixed at 0 where a person wants them to stand still; raises
+    """Makes the joints that do not carry `tool` fixed near 0 where a person wants them to stand still; raises
     `DescriptionError` where more are left than a device drives.
     """
     model = mended.model
@@ -26,11 +30,16 @@ def ask_who_stands(mended: Mended, tool: str, questions: Questions) -> None:
     aside = _aside(model, driven, tool)
     if aside:
         names = ", ".join(joint.name for joint in aside)
-        question = f'do these joints, which do not carry "{tool}", stand still at 0: {names}?'
+        question = (
+            f'do these joints, which do not carry "{tool}", stand still at 0 (or the limit nearest to it): {names}?'
+        )
         stand = len(driven) > MOST or any(_is_wheel(joint) for joint in aside)
         if questions.ask("others_stand_still", question, "yes" if stand else "no", yes_or_no):
-            _stand(mended, aside, tool)
+            _stand(mended, aside)
+            _say(mended, aside, tool, STANDING)
             driven = [joint for joint in driven if joint not in aside]
+        else:
+            _say(mended, aside, tool, DRIVEN)
     if len(driven) > MOST:
         others = 'say "yes" to others_stand_still' if len(driven) - len(aside) <= MOST else "make some of them fixed"
         raise DescriptionError(f"it has {len(driven)} joints to drive, and a device drives {MOST}: {others}")
@@ -64,17 +73,40 @@ def _is_wheel(joint: UrdfJoint) -> bool:
     return joint.kind is JointKind.CONTINUOUS and WHEEL in f"{joint.name} {joint.child}".lower()
 
 
-def _stand(mended: Mended, aside: list[UrdfJoint], tool: str) -> None:
-    """Fixes the joints and those that follow them, and says it once."""
+def _stand(mended: Mended, aside: list[UrdfJoint]) -> None:
+    """Fixes the joints at 0 or at the limit nearest to it, and those that follow them where that leads them."""
+    places = zero_state(aside)
+    for element, joint in zip(mended.xml.root.findall("joint"), mended.model.joints, strict=True):
+        mimic = joint.mimic
+        if joint.name in places:
+            place = places[joint.name]
+        elif mimic is not None and mimic.joint in places:
+            place = mimic.multiplier * places[mimic.joint] + mimic.offset
+        else:
+            continue
+        if place:
+            _move(element, joint, place)
+        fix(element)
+
+
+def _move(element: ET.Element, joint: UrdfJoint, place: float) -> None:
+    """Puts the origin of the joint where `place` [rad] or [m] takes its link."""
+    turn, (x, y, z) = from_rpy(*joint.origin.rpy), joint.axis
+    xyz, rpy = joint.origin.xyz, joint.origin.rpy
+    if joint.kind is JointKind.PRISMATIC:
+        along = rotate(turn, (place * x, place * y, place * z))
+        xyz = (xyz[0] + along[0], xyz[1] + along[1], xyz[2] + along[2])
+    else:
+        rpy = to_rpy(multiply(turn, from_axis_angle(joint.axis, place)))
+    for origin in element.findall("origin"):
+        element.remove(origin)
+    texts = {key: " ".join(f"{value:.9g}" for value in triple) for key, triple in (("xyz", xyz), ("rpy", rpy))}
+    ET.SubElement(element, "origin", texts)
+
+
+def _say(mended: Mended, aside: list[UrdfJoint], tool: str, remedy: str) -> None:
     names = [joint.name for joint in aside]
-    elements = {joint.get("name", ""): joint for joint in mended.xml.root.findall("joint")}
-    followers = [joint.name for joint in mended.model.joints if joint.mimic is not None and joint.mimic.joint in names]
-    for name in (*names, *followers):
-        fix(elements[name])
+    element = next(each for each in mended.xml.root.findall("joint") if each.get("name") == names[0])
     few = ", ".join(names[:FEW]) + (f" and {len(names) - FEW} more" if len(names) > FEW else "")
-    _say(mended, elements[names[0]], f'{len(names)} joints do not carry the tool "{tool}" ({few})')
-
-
-def _say(mended: Mended, element: ET.Element, message: str) -> None:
-    remedy = "they stand still at 0; `tool_frame` and `others_stand_still` in the file of answers choose otherwise"
-    mended.warn(element, f'joint "{element.get("name")}"', message, remedy)
+    message = f'{len(names)} joints do not carry the tool "{tool}" ({few})'
+    mended.warn(element, f'joint "{names[0]}"', message, remedy)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
 
 from services.arm.errors import DescriptionError
+from services.arm.model.urdf import JointKind, UrdfJoint
 from services.arm.model.virtual_drive import driven_joints
 from services.robot_import.mending import Mended, mend
+from services.robot_import.poses import zero_state
 from services.robot_import.questions import Questions
 from services.robot_import.source import find_source
 from services.robot_import.standing import ask_who_stands
@@ -52,6 +56,8 @@ def test_of_two_small_arms_both_are_driven_unless_a_person_wants_otherwise(tmp_p
     both = robot(tmp_path, *arm("left", 2), *arm("right", 2))
     assert asked(both, "left_2").answers == {"others_stand_still": "no"}
     assert len(driven(both)) == 6
+    (said,) = (str(each) for each in both.notes if "do not carry the tool" in str(each))
+    assert "that loop is not followed" in said
     one = robot(tmp_path, *arm("left", 2), *arm("right", 2))
     asked(one, "left_2", {"others_stand_still": "yes"})
     assert driven(one) == ["left_j1", "left_j2", "left_jaw"]
@@ -75,3 +81,40 @@ def test_more_joints_than_a_device_drives_are_refused_before_anything_is_compute
         asked(robot(tmp_path, *arm("long", 9)), "long_9")
     with pytest.raises(DescriptionError, match='say "yes" to others_stand_still'):
         asked(robot(tmp_path, *arm("left", 5), *arm("right", 5)), "left_5", {"others_stand_still": "no"})
+
+
+@pytest.mark.parametrize("rpy", ["0.3 0.2 1", "0.3 1.5707963267949 1"])
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_what_cannot_stand_at_0_stands_at_the_limit_nearest_to_it_and_its_follower_too(
+    tmp_path: Path, kind: str, rpy: str
+):
+    limit = '<limit lower="-2" upper="-0.5" effort="1" velocity="1"/>'
+    follows = f'{LIMIT}<mimic joint="held" multiplier="-2" offset="0.1"/>'
+    parts = [
+        joint(
+            "held", "base", "held", axis="1 0 0" if rpy.startswith("0.3 1.5") else "0 0.6 0.8", kind=kind, rest=limit
+        ).replace('rpy="0 0 0"', f'rpy="{rpy}"'),
+        joint("follower", "base", "follower", axis="1 0 0", kind=kind, rest=follows),
+    ]
+    links = '<link name="held"/><link name="follower"/>'
+    found = robot(tmp_path, links, *arm("arm", 2), *parts)
+    before = {name: found.model.joint(name) for name in ("held", "follower")}
+    asked(found, "arm_2", {"others_stand_still": "yes"})
+    place = zero_state([before["held"]])["held"]
+    assert -0.6 < place < -0.5
+    for name, moved in (("held", place), ("follower", -2 * place + 0.1)):
+        joint_now = found.model.joint(name)
+        assert joint_now.kind is JointKind.FIXED
+        np.testing.assert_allclose(placed(joint_now, 0.0), placed(before[name], moved), atol=1e-8)
+
+
+def placed(each: UrdfJoint, value: float) -> np.ndarray:
+    """(4, 4) the child in the parent at `value` [rad] or [m]."""
+    motion = np.eye(4)
+    if each.kind is JointKind.PRISMATIC:
+        motion[:3, 3] = value * np.array(each.axis)
+    elif each.kind is JointKind.REVOLUTE:
+        motion = trimesh.transformations.rotation_matrix(value, each.axis)
+    origin = trimesh.transformations.euler_matrix(*each.origin.rpy)
+    origin[:3, 3] = each.origin.xyz
+    return origin @ motion
