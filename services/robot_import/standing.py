@@ -41,8 +41,10 @@ def ask_who_stands(mended: Mended, tool: str, questions: Questions) -> None:
         else:
             _say(mended, aside, tool, DRIVEN)
     if len(driven) > MOST:
-        others = 'say "yes" to others_stand_still' if len(driven) - len(aside) <= MOST else "make some of them fixed"
-        raise DescriptionError(f"it has {len(driven)} joints to drive, and a device drives {MOST}: {others}")
+        can_stand = 0 < len([joint for joint in driven if joint not in aside]) <= MOST
+        first = _few([joint.name for joint in driven])
+        remedy = 'say "yes" to others_stand_still' if can_stand else f'give some of {first} type="fixed" in the source'
+        raise DescriptionError(f"it has {len(driven)} joints to drive, and a device drives {MOST}: {remedy}")
 
 
 def _aside(model: UrdfModel, driven: list[UrdfJoint], tool: str) -> list[UrdfJoint]:
@@ -107,6 +109,10 @@ def _move(element: ET.Element, joint: UrdfJoint, place: float) -> None:
 def _say(mended: Mended, aside: list[UrdfJoint], tool: str, remedy: str) -> None:
     names = [joint.name for joint in aside]
     element = next(each for each in mended.xml.root.findall("joint") if each.get("name") == names[0])
-    few = ", ".join(names[:FEW]) + (f" and {len(names) - FEW} more" if len(names) > FEW else "")
-    message = f'{len(names)} joints do not carry the tool "{tool}" ({few})'
+    message = f'{len(names)} joints do not carry the tool "{tool}" ({_few(names)})'
     mended.warn(element, f'joint "{names[0]}"', message, remedy)
+
+
+def _few(names: list[str]) -> str:
+    """The first of them."""
+    return ", ".join(names[:FEW]) + (f" and {len(names) - FEW} more" if len(names) > FEW else "")

@@ -77,7 +77,10 @@ def test_nothing_is_asked_of_an_arm_with_a_gripper(tmp_path: Path):
 
 
 def test_more_joints_than_a_device_drives_are_refused_before_anything_is_computed(tmp_path: Path):
-    with pytest.raises(DescriptionError, match="10 joints to drive, and a device drives 8: make some of them fixed"):
+    with pytest.raises(
+        DescriptionError,
+        match="10 joints to drive, and a device drives 8: give some of long_j1, long_j2, long_j3 and 7 more type",
+    ):
         asked(robot(tmp_path, *arm("long", 9)), "long_9")
     with pytest.raises(DescriptionError, match='say "yes" to others_stand_still'):
         asked(robot(tmp_path, *arm("left", 5), *arm("right", 5)), "left_5", {"others_stand_still": "no"})
