@@ -231,6 +231,7 @@ def _endless(mended: Mended) -> None:
 
 
 def _axes(mended: Mended) -> None:
+    harmless: list[tuple[ET.Element, str]] = []
     for joint in mended.xml.root.findall("joint"):
         axis = joint.find("axis")
         numbers = None if axis is None else _numbers(axis.get("xyz", "1 0 0"))
@@ -240,12 +241,15 @@ def _axes(mended: Mended) -> None:
         where = f'joint "{joint.get("name")}"'
         if joint.get("type") not in MOVES:
             if length < 1e-9:
-                mended.say(axis, where, "a fixed joint's axis is zero, which is harmless", "left out")
+                harmless.append((axis, where))
             joint.remove(axis)
         elif length >= 1e-9 and abs(length - 1.0) > 1e-6:
             text = " ".join(f"{value / length:.9g}" for value in numbers)
             mended.say(axis, where, f'its axis "{axis.get("xyz")}" is {length:.4g} long, not 1', f'xyz="{text}"')
             axis.set("xyz", text)
+    for axis, where in harmless[:1]:  # some exporters write it for every frame
+        more = f", and of {len(harmless) - 1} more" if harmless[1:] else ""
+        mended.say(axis, where, f"a fixed joint's axis is zero, which is harmless{more}", "left out")
 
 
 def _mimics(mended: Mended) -> None:

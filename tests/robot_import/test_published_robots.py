@@ -77,6 +77,16 @@ def test_attributes_and_elements_of_other_programs_are_left_out(tmp_path: Path):
     assert "2 of these" in said
 
 
+def test_the_harmless_axes_of_many_frames_are_said_once(tmp_path: Path):
+    frames = [f'<link name="frame_{number}"/>' for number in range(3)]
+    joints = [
+        joint(f"to_{number}", "base", f"frame_{number}", axis="0 0 0", kind="fixed", rest="") for number in range(3)
+    ]
+    found = mended(tmp_path / "robot.urdf", *BASE, *frames, joint("one", "ground", "base"), *joints)
+    (said,) = (str(each) for each in found.findings() if "axis is zero" in str(each))
+    assert "harmless, and of 2 more" in said
+
+
 def test_a_mesh_that_is_seen_and_touched_is_missed_once(tmp_path: Path):
     path = write(tmp_path / "robot.urdf", "robot", link("base", "meshes/base.stl"))
     said = [each for each in errors(mend(find_source(path))) if "base.stl" in each]
