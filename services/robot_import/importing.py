@@ -16,7 +16,8 @@ from services.arm.model.urdf import UrdfModel
 from services.arm.model.virtual_drive import NO_MOTORS, driven_joints
 from services.robot_import.drive import ask_drives, speed_lines
 from services.robot_import.limits import ask_limits
-from services.robot_import.mending import Mended, mend, safe_name
+from services.robot_import.mended import Mended
+from services.robot_import.mending import mend, safe_name
 from services.robot_import.parts import MOTORS, USUAL_DRIVER, DriverPart, MotorPart, driver_named, motor_named
 from services.robot_import.questions import Questions, answers_text, read_answers, yes_or_no
 from services.robot_import.robot_folder import Description, step, write_robot

@@ -6,7 +6,7 @@ import math
 import xml.etree.ElementTree as ET
 
 from services.arm.model.urdf import JointKind, Limit, UrdfJoint
-from services.robot_import.mending import Mended
+from services.robot_import.mended import Mended
 from services.robot_import.questions import Questions, above_zero, number
 
 # Tuning constants: chosen, where a line does not say measured or standard.

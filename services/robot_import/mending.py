@@ -6,72 +6,17 @@ import math
 import re
 import unicodedata
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from functools import lru_cache
-from pathlib import Path
 
-from services.arm.checks.findings import Finding, Severity, error, note, warning
-from services.arm.checks.meshes import (
-    SMALLEST,
-    Facts,
-    MeshFacts,
-    check_meshes,
-    facts_of,
-    is_in_millimetres,
-    link_volume,
-)
-from services.arm.checks.urdf import check_urdf, fault_finding, principal_moments
 from services.arm.errors import DescriptionError
-from services.arm.model.urdf import Geometry, JointKind, UrdfLink, UrdfModel, model_of
+from services.arm.model.urdf import JointKind, model_of
 from services.arm.model.xml_reader import XmlReader, parse_xml
+from services.robot_import import link_mending
 from services.robot_import.joint_mending import fix_free_base, follow_the_motor
+from services.robot_import.mended import Mended, numbers_in
 from services.robot_import.source import Source
 
 FOREIGN = ("gazebo", "transmission", "ros2_control", "sensor")
 MOVES = (JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMATIC)
-
-
-@dataclass
-class Mended:
-    """The elements of a source as they are to be written, and what was said of them."""
-
-    source: Source
-    xml: XmlReader
-    files: dict[str, Path]  # mesh references as written, and the files that they mean
-    notes: list[Finding] = field(default_factory=list)
-    errors: list[Finding] = field(default_factory=list)
-
-    @property
-    def model(self) -> UrdfModel:
-        """As it is now, with what cannot be read left at a default."""
-        return model_of(XmlReader(self.xml.root, self.xml.lines))[0]
-
-    def findings(self) -> list[Finding]:
-        """Everything: errors, warnings, and what is mended."""
-        model, faults = model_of(XmlReader(self.xml.root, self.xml.lines))
-        file = self.source.label
-        found = [*self.errors, *(fault_finding(fault, file) for fault in faults)]
-        found += [*check_urdf(model, Path(file), has_meshes=False), *check_meshes(model, file, self.facts)]
-        return sorted([*found, *self.notes], key=lambda each: list(Severity).index(each.severity))
-
-    def facts(self, geometry: Geometry) -> MeshFacts | str | None:
-        """Of its mesh; None where it is none or its file is not there."""
-        file = self.files.get(geometry.mesh or "")
-        return None if file is None else _facts(file)
-
-    def say(self, element: ET.Element, subject: str, message: str, remedy: str) -> None:
-        """Notes what is mended."""
-        self.notes.append(note(self.source.label, subject, message, remedy, self.xml.lines.get(element, 0)))
-
-    def warn(self, element: ET.Element, subject: str, message: str, remedy: str) -> None:
-        """Warns of what a default stands for that nobody has given."""
-        self.notes.append(warning(self.source.label, subject, message, remedy, self.xml.lines.get(element, 0)))
-
-
-@lru_cache(maxsize=256)
-def _facts(file: Path) -> MeshFacts | str:
-    return facts_of(file)
 
 
 def mend(source: Source) -> Mended:
@@ -88,17 +33,17 @@ def mend(source: Source) -> Mended:
         _foreign,
         _prefixed,
         _names,
-        _references,
+        link_mending.references,
         _free_base,
         _endless,
         _axes,
         _mimics,
-        _millimetres,
-        _flat,
-        _tiny,
-        _frames,
-        _inertias,
-        _unseen,
+        link_mending.millimetres,
+        link_mending.flat,
+        link_mending.tiny,
+        link_mending.frames,
+        link_mending.inertias,
+        link_mending.unseen,
     ):
         step(mended)
     return mended
@@ -158,7 +103,7 @@ def _colours(mended: Mended) -> None:
     root = mended.xml.root
     for material in list(root.iter("material")):
         for color in material.findall("color"):
-            if len(_numbers(color.get("rgba", "")) or ()) != 4:
+            if len(numbers_in(color.get("rgba", "")) or ()) != 4:
                 material.remove(color)
     known = {material.get("name") for material in root.iter("material") if material.find("color") is not None}
     said: set[str | None] = set()
@@ -191,29 +136,6 @@ def _names(mended: Mended) -> None:
                         role.set(tag, new)
 
 
-def _references(mended: Mended) -> None:
-    """The files that meshes mean; a missing one is an error."""
-    by_package: dict[str, int] = {}
-    missing: set[tuple[ET.Element, str]] = set()  # most are in <visual> and in <collision>
-    for link, _, _, mesh in _meshes(mended):
-        reference = mesh.get("filename", "")
-        found = mended.source.find(reference) if reference else None
-        if found is None and reference and (link, reference) not in missing:
-            missing.add((link, reference))
-            message = f'mesh "{reference}" is not there{mended.source.near(reference)}'
-            line = mended.xml.lines.get(mesh, 0)
-            file = mended.source.label
-            mended.errors.append(error(file, _subject(link), message, f"put it below {mended.source.root}", line))
-        elif found is not None:
-            mended.files[reference] = found
-            if reference.startswith("package://"):
-                package = reference.split("/")[2]
-                by_package[package] = by_package.get(package, 0) + 1
-    for package, count in by_package.items():
-        message = f"{count} meshes are named by the ROS package path package://{package}"
-        mended.notes.append(note(mended.source.label, "meshes", message, "relative paths, the files copied"))
-
-
 def _free_base(mended: Mended) -> None:
     fix_free_base(mended.xml, mended.warn)
 
@@ -222,7 +144,7 @@ def _endless(mended: Mended) -> None:
     """Limits that are infinite, or no number at all, are none: what a joint lacks is asked for."""
     for joint in mended.xml.root.findall("joint"):
         for limit in joint.findall("limit"):
-            named = [key for key, text in limit.items() if any(not math.isfinite(x) for x in _numbers(text) or ())]
+            named = [key for key, text in limit.items() if any(not math.isfinite(x) for x in numbers_in(text) or ())]
             if named:
                 where, message = f'joint "{joint.get("name")}"', f"its {', '.join(named)} in <limit> is not finite"
                 mended.say(limit, where, message, "left out")
@@ -234,7 +156,7 @@ def _axes(mended: Mended) -> None:
     harmless: list[tuple[ET.Element, str]] = []
     for joint in mended.xml.root.findall("joint"):
         axis = joint.find("axis")
-        numbers = None if axis is None else _numbers(axis.get("xyz", "1 0 0"))
+        numbers = None if axis is None else numbers_in(axis.get("xyz", "1 0 0"))
         if axis is None or numbers is None:
             continue
         length = math.sqrt(sum(value * value for value in numbers))
@@ -259,131 +181,3 @@ def _mimics(mended: Mended) -> None:
         if mimic is not None and joint.get("type") in MOVES:
             message = f'follows joint "{mimic.get("joint")}"'
             mended.say(mimic, f'joint "{joint.get("name")}"', message, "it gets no motor of its own")
-
-
-def _millimetres(mended: Mended) -> None:
-    said: set[str | None] = set()  # most are in <visual> and in <collision>
-    for link, _, geometry, mesh in _meshes(mended):
-        known = mended.facts(geometry)
-        if isinstance(known, MeshFacts) and is_in_millimetres(geometry, known):
-            scale = " ".join(f"{0.001 * value:.9g}" for value in geometry.scale)
-            length = known.longest * max(map(abs, geometry.scale))
-            message = f'mesh "{geometry.mesh}" is {length:.4g} m long: it is in millimetres'
-            mesh.set("scale", scale)
-            if geometry.mesh not in said:
-                mended.say(mesh, _subject(link), message, f'scale="{scale}"')
-            said.add(geometry.mesh)
-
-
-def _flat(mended: Mended) -> None:
-    """A mesh without volume is drawn nowhere and fitted to nothing."""
-    for link, item, geometry, mesh in _meshes(mended):
-        known = mended.facts(geometry)
-        if isinstance(known, MeshFacts) and known.is_flat:
-            message = f'mesh "{geometry.mesh}" in <{item.tag}> bounds no volume'
-            link.remove(item)
-            mended.say(mesh, _subject(link), message, "left out")
-
-
-def _tiny(mended: Mended) -> None:
-    """A mesh of less than two millimetres is a placeholder; or, where it is scaled, scaled too much."""
-    for link, item, geometry, mesh in _meshes(mended):
-        known = mended.facts(geometry)
-        scale = max(map(abs, geometry.scale))
-        if not isinstance(known, MeshFacts) or not 0.0 < known.longest * scale < SMALLEST:
-            continue
-        message = f'mesh "{geometry.mesh}" is {1000.0 * known.longest * scale:.3g} mm long'
-        if scale == 1.0:
-            link.remove(item)
-            mended.say(mesh, _subject(link), f"{message}: it stands for nothing", "left out")
-        else:
-            line = mended.xml.lines.get(mesh, 0)
-            remedy = f'correct scale="{mesh.get("scale")}"'
-            mended.errors.append(error(mended.source.label, _subject(link), message, remedy, line))
-
-
-def _frames(mended: Mended) -> None:
-    for link, model in _links(mended):
-        inertial = link.find("inertial")
-        if inertial is not None and model.inertial is not None and model.inertial.mass == 0.0:
-            link.remove(inertial)
-            mended.say(inertial, _subject(link), "its mass is 0 kg: it is a mere frame", "<inertial> left out")
-
-
-def _inertias(mended: Mended) -> None:
-    """One that no body has becomes that of the meshes, of even density and of the same mass."""
-    for link, model in _links(mended):
-        inertial, known = link.find("inertial"), model.inertial
-        if inertial is None or known is None or not known.mass > 0.0:
-            continue
-        low, middle, high = principal_moments(known)
-        if low > 0.0 and low + middle >= high * (1.0 - 1e-6):
-            continue
-        message = f"its principal moments {low:.3g}, {middle:.3g}, {high:.3g} kg m^2 are of no body"
-        link.remove(inertial)
-        even = _even_density(model, known.mass, mended.facts)
-        if even is not None:
-            link.insert(0, even)
-            mended.xml.lines[even] = mended.xml.lines.get(inertial, 0)
-        remedy = "left out" if even is None else f"that of its mesh at {known.mass:g} kg of even density"
-        mended.say(inertial, _subject(link), message, remedy)
-
-
-def _unseen(mended: Mended) -> None:
-    """A link with collision meshes alone is drawn with them."""
-    for link in mended.xml.root.findall("link"):
-        if link.find("visual") is not None:
-            continue
-        collisions = link.findall("collision")
-        for collision in collisions:
-            visual = ET.fromstring(ET.tostring(collision))
-            visual.tag = "visual"
-            link.insert(0, visual)
-        if collisions:
-            mended.say(collisions[0], _subject(link), "has a <collision>, but no <visual>", "drawn with the same shape")
-
-
-def _even_density(link: UrdfLink, mass: float, facts: Facts) -> ET.Element | None:
-    """<inertial> of a link with one visual mesh; None for others."""
-    volume = link_volume(link, facts)
-    known = facts(link.visuals[0]) if len(link.visuals) == 1 else None
-    if not volume or not isinstance(known, MeshFacts) or len({abs(value) for value in link.visuals[0].scale}) != 1:
-        return None
-    scale, origin = abs(link.visuals[0].scale[0]), link.visuals[0].origin
-    if any(origin.rpy):
-        return None
-    moments = [mass / known.volume * scale**2 * value for value in known.inertia]
-    center = [place + scale * value for place, value in zip(origin.xyz, known.center, strict=True)]
-    element = ET.Element("inertial")
-    ET.SubElement(element, "origin", xyz=" ".join(f"{value:.6g}" for value in center), rpy="0 0 0")
-    ET.SubElement(element, "mass", value=f"{mass:.6g}")
-    names = {"ixx": 0, "ixy": 1, "ixz": 2, "iyy": 4, "iyz": 5, "izz": 8}
-    ET.SubElement(element, "inertia", {name: f"{moments[place]:.6g}" for name, place in names.items()})
-    return element
-
-
-def _meshes(mended: Mended) -> Iterator[tuple[ET.Element, ET.Element, Geometry, ET.Element]]:
-    """Link, visual or collision, how it was read, and its <mesh>."""
-    for link, model in _links(mended):
-        shapes = zip(
-            (*link.findall("visual"), *link.findall("collision")), (*model.visuals, *model.collisions), strict=True
-        )
-        for item, geometry in list(shapes):
-            mesh = item.find("geometry/mesh")
-            if mesh is not None:
-                yield link, item, geometry, mesh
-
-
-def _links(mended: Mended) -> list[tuple[ET.Element, UrdfLink]]:
-    return list(zip(mended.xml.root.findall("link"), mended.model.links, strict=True))
-
-
-def _subject(link: ET.Element) -> str:
-    return f'link "{link.get("name")}"'
-
-
-def _numbers(text: str) -> list[float] | None:
-    try:
-        return [float(word) for word in text.split()]
-    except ValueError:
-        return None

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from services.arm.checks.meshes import scene_of
 from services.arm.errors import DescriptionError
-from services.robot_import.mending import Mended, safe_name
+from services.robot_import.mended import Mended
+from services.robot_import.mending import safe_name
 
 KEPT = (".stl", ".glb")  # the viewer, the page and the fitting read these; other formats become .glb
 NOT_IN_A_FILE = r"[^a-z0-9_-]+"

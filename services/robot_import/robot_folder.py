@@ -18,7 +18,7 @@ from services.arm.model.description import load_arm
 from services.arm.model.srdf_edit import entries, with_pairs
 from services.arm.model.urdf import UrdfJoint, UrdfLink, UrdfModel
 from services.robot_import.drive import JointDrive, bare_toml, driven_toml
-from services.robot_import.mending import Mended
+from services.robot_import.mended import Mended
 from services.robot_import.mesh_copies import copy_meshes
 from services.robot_import.poses import named_states, srdf_text, zero_state
 

@@ -10,7 +10,7 @@ from services.arm.frames.transforms import from_axis_angle, from_rpy, multiply, 
 from services.arm.model.urdf import JointKind, UrdfJoint, UrdfModel
 from services.arm.model.virtual_drive import driven_joints
 from services.robot_import.joint_mending import fix
-from services.robot_import.mending import Mended
+from services.robot_import.mended import Mended
 from services.robot_import.poses import zero_state
 from services.robot_import.questions import Questions, yes_or_no
 

@@ -11,7 +11,8 @@ from services.arm.errors import DescriptionError
 from services.arm.model.urdf import JointKind
 from services.cli.errors import ExitCode
 from services.cli.main import run
-from services.robot_import.mending import Mended, mend
+from services.robot_import.mended import Mended
+from services.robot_import.mending import mend
 from services.robot_import.source import find_source
 from tests.robot_import.exports import LIMIT, joint, link, mesh, package, write
 

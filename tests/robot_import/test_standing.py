@@ -11,7 +11,8 @@ import trimesh
 from services.arm.errors import DescriptionError
 from services.arm.model.urdf import JointKind, UrdfJoint
 from services.arm.model.virtual_drive import driven_joints
-from services.robot_import.mending import Mended, mend
+from services.robot_import.mended import Mended
+from services.robot_import.mending import mend
 from services.robot_import.poses import zero_state
 from services.robot_import.questions import Questions
 from services.robot_import.source import find_source

@@ -1,0 +1,152 @@
+"""What has one answer in the links of a source: the files that meshes mean, their sizes, inertias, missing drawings."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+
+from services.arm.checks.findings import error, note
+from services.arm.checks.meshes import SMALLEST, Facts, MeshFacts, is_in_millimetres, link_volume
+from services.arm.checks.urdf import principal_moments
+from services.arm.model.urdf import Geometry, UrdfLink
+from services.robot_import.mended import Mended, links_of, subject_of
+
+
+def references(mended: Mended) -> None:
+    """The files that meshes mean; a missing one is an error."""
+    by_package: dict[str, int] = {}
+    missing: set[tuple[ET.Element, str]] = set()  # most are in <visual> and in <collision>
+    for link, _, _, mesh in _meshes(mended):
+        reference = mesh.get("filename", "")
+        found = mended.source.find(reference) if reference else None
+        if found is None and reference and (link, reference) not in missing:
+            missing.add((link, reference))
+            message = f'mesh "{reference}" is not there{mended.source.near(reference)}'
+            line = mended.xml.lines.get(mesh, 0)
+            file = mended.source.label
+            mended.errors.append(error(file, subject_of(link), message, f"put it below {mended.source.root}", line))
+        elif found is not None:
+            mended.files[reference] = found
+            if reference.startswith("package://"):
+                package = reference.split("/")[2]
+                by_package[package] = by_package.get(package, 0) + 1
+    for package, count in by_package.items():
+        message = f"{count} meshes are named by the ROS package path package://{package}"
+        mended.notes.append(note(mended.source.label, "meshes", message, "relative paths, the files copied"))
+
+
+def millimetres(mended: Mended) -> None:
+    """Gives meshes in millimetres a scale."""
+    said: set[str | None] = set()  # most are in <visual> and in <collision>
+    for link, _, geometry, mesh in _meshes(mended):
+        known = mended.facts(geometry)
+        if isinstance(known, MeshFacts) and is_in_millimetres(geometry, known):
+            scale = " ".join(f"{0.001 * value:.9g}" for value in geometry.scale)
+            length = known.longest * max(map(abs, geometry.scale))
+            message = f'mesh "{geometry.mesh}" is {length:.4g} m long: it is in millimetres'
+            mesh.set("scale", scale)
+            if geometry.mesh not in said:
+                mended.say(mesh, subject_of(link), message, f'scale="{scale}"')
+            said.add(geometry.mesh)
+
+
+def flat(mended: Mended) -> None:
+    """A mesh without volume is drawn nowhere and fitted to nothing."""
+    for link, item, geometry, mesh in _meshes(mended):
+        known = mended.facts(geometry)
+        if isinstance(known, MeshFacts) and known.is_flat:
+            message = f'mesh "{geometry.mesh}" in <{item.tag}> bounds no volume'
+            link.remove(item)
+            mended.say(mesh, subject_of(link), message, "left out")
+
+
+def tiny(mended: Mended) -> None:
+    """A mesh of less than two millimetres is a placeholder; or, where it is scaled, scaled too much."""
+    for link, item, geometry, mesh in _meshes(mended):
+        known = mended.facts(geometry)
+        scale = max(map(abs, geometry.scale))
+        if not isinstance(known, MeshFacts) or not 0.0 < known.longest * scale < SMALLEST:
+            continue
+        message = f'mesh "{geometry.mesh}" is {1000.0 * known.longest * scale:.3g} mm long'
+        if scale == 1.0:
+            link.remove(item)
+            mended.say(mesh, subject_of(link), f"{message}: it stands for nothing", "left out")
+        else:
+            line = mended.xml.lines.get(mesh, 0)
+            remedy = f'correct scale="{mesh.get("scale")}"'
+            mended.errors.append(error(mended.source.label, subject_of(link), message, remedy, line))
+
+
+def frames(mended: Mended) -> None:
+    """Leaves out the inertia of a link without mass."""
+    for link, model in links_of(mended):
+        inertial = link.find("inertial")
+        if inertial is not None and model.inertial is not None and model.inertial.mass == 0.0:
+            link.remove(inertial)
+            mended.say(inertial, subject_of(link), "its mass is 0 kg: it is a mere frame", "<inertial> left out")
+
+
+def inertias(mended: Mended) -> None:
+    """One that no body has becomes that of the meshes, of even density and of the same mass."""
+    for link, model in links_of(mended):
+        inertial, known = link.find("inertial"), model.inertial
+        if inertial is None or known is None or not known.mass > 0.0:
+            continue
+        low, middle, high = principal_moments(known)
+        if low > 0.0 and low + middle >= high * (1.0 - 1e-6):
+            continue
+        message = f"its principal moments {low:.3g}, {middle:.3g}, {high:.3g} kg m^2 are of no body"
+        link.remove(inertial)
+        even = _even_density(model, known.mass, mended.facts)
+        if even is not None:
+            link.insert(0, even)
+            mended.xml.lines[even] = mended.xml.lines.get(inertial, 0)
+        remedy = "left out" if even is None else f"that of its mesh at {known.mass:g} kg of even density"
+        mended.say(inertial, subject_of(link), message, remedy)
+
+
+def unseen(mended: Mended) -> None:
+    """A link with collision meshes alone is drawn with them."""
+    for link in mended.xml.root.findall("link"):
+        if link.find("visual") is not None:
+            continue
+        collisions = link.findall("collision")
+        for collision in collisions:
+            visual = ET.fromstring(ET.tostring(collision))
+            visual.tag = "visual"
+            link.insert(0, visual)
+        if collisions:
+            mended.say(
+                collisions[0], subject_of(link), "has a <collision>, but no <visual>", "drawn with the same shape"
+            )
+
+
+def _even_density(link: UrdfLink, mass: float, facts: Facts) -> ET.Element | None:
+    """<inertial> of a link with one visual mesh; None for others."""
+    volume = link_volume(link, facts)
+    known = facts(link.visuals[0]) if len(link.visuals) == 1 else None
+    if not volume or not isinstance(known, MeshFacts) or len({abs(value) for value in link.visuals[0].scale}) != 1:
+        return None
+    scale, origin = abs(link.visuals[0].scale[0]), link.visuals[0].origin
+    if any(origin.rpy):
+        return None
+    moments = [mass / known.volume * scale**2 * value for value in known.inertia]
+    center = [place + scale * value for place, value in zip(origin.xyz, known.center, strict=True)]
+    element = ET.Element("inertial")
+    ET.SubElement(element, "origin", xyz=" ".join(f"{value:.6g}" for value in center), rpy="0 0 0")
+    ET.SubElement(element, "mass", value=f"{mass:.6g}")
+    names = {"ixx": 0, "ixy": 1, "ixz": 2, "iyy": 4, "iyz": 5, "izz": 8}
+    ET.SubElement(element, "inertia", {name: f"{moments[place]:.6g}" for name, place in names.items()})
+    return element
+
+
+def _meshes(mended: Mended) -> Iterator[tuple[ET.Element, ET.Element, Geometry, ET.Element]]:
+    """Link, visual or collision, how it was read, and its <mesh>."""
+    for link, model in links_of(mended):
+        shapes = zip(
+            (*link.findall("visual"), *link.findall("collision")), (*model.visuals, *model.collisions), strict=True
+        )
+        for item, geometry in list(shapes):
+            mesh = item.find("geometry/mesh")
+            if mesh is not None:
+                yield link, item, geometry, mesh
