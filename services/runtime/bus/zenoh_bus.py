@@ -18,6 +18,7 @@ import zenoh.ext as zx
 from zenoh.handlers import Callback
 
 from schemas.deployment import RouterSection
+from schemas.planning import AnswerInputs, PlanInputs
 from schemas.system import Exchange
 from schemas.topics import Delivery
 from services.runtime.bus.dead_links import end_dead_links
@@ -40,7 +41,8 @@ from services.runtime.bus.zenoh_declarations import (
 from services.runtime.errors import BusError
 
 CACHE = 1024  # messages of an EVERY key that survive while the router is away
-CACHE_OF = {Exchange.__name__: 64}  # messages; a plan's answer is some 50 kB
+# Messages; a plan's answer is some 50 kB, and what a plan was made of some 2: an hour of moves fills CACHE with them.
+CACHE_OF = {each.__name__: 64 for each in (Exchange, PlanInputs, AnswerInputs)}
 HEARTBEAT = 0.5  # [s] after which a reader notices that it misses the last message
 CLOSE_TIMEOUT = 1.0  # [s]
 MOST_OF_A_TIMEOUT = 0.9  # what ends without an answer after that has timed out
