@@ -22,9 +22,7 @@ PERIOD = 0.02  # [s] between two jog commands; the planner's dead-man is 0.1 s
 ANSWER = 3.0  # [s] of jogging without a word of the planner, after which it counts as lost
 PAUSE = 0.5  # [s] without a command, after which the next one begins a new jog
 SILENT = "the planner does not answer to jogging: is it running? `gemelo node list`"
-GAP = 1.0  # [s] without a word of the planner in the middle of a jog; it says one ten times a second
-INTERRUPTED = "the planner has said nothing for 1 s: the arm has stopped in the middle of the jog; `gemelo node list`"
-UNHEARD = "nothing heard of joint_states for 1 s: no target is followed; is stepper_gateway running? `gemelo node list`"
+GAP = 1.0  # [s] without a word in the middle: the planner of a jog says ten a second, the gateway of a stream fifty
 REST = 5.0  # [s] that the arm may take to come to rest
 FASTEST = 1.0  # [m/s] of the tool of a desktop arm
 FASTEST_TURN = math.pi  # [rad/s] of its tool
@@ -52,7 +50,10 @@ class Jogging:
         if heard is None and now - self._began > ANSWER:
             raise Lost(SILENT)
         if heard is not None and now - self._heard_at > GAP:
-            raise Lost(INTERRUPTED)
+            raise Lost(
+                f"the planner has said nothing for {GAP:g} s: the arm has stopped in the middle of the jog; "
+                "`gemelo node list`"
+            )
         if heard is not None and not heard.active and heard.limited_by and now - self._began > PERIOD:
             raise _refused(heard)
         return heard
@@ -124,7 +125,10 @@ class Streaming:
         self._said = now
         states = self._session.latest(JOINT_STATES)  # heard from the first target on
         if now - self._began > GAP and states.age() > GAP:
-            raise Lost(UNHEARD)
+            raise Lost(
+                f"nothing heard of joint_states for {GAP:g} s: no target is followed; is stepper_gateway running? "
+                "`gemelo node list`"
+            )
         reason, self._refused = self._refused, ""
         if reason:
             raise Refused(f"refused: {reason}", check="stream")
