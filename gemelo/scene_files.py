@@ -52,7 +52,7 @@ def _require_size(path: Path, content: bytes, scale: float) -> None:
 
 
 def write_scene(scene: PlanningScene, path: Path) -> None:
-    """Writes the scene as JSON; raises `Error` where the file cannot be written."""
+    """Writes the scene as JSON, and makes the file's folder; raises `Error` where the file cannot be written."""
     write_whole(path, msgspec.json.format(msgspec.json.encode(scene)) + b"\n")
 
 

@@ -10,7 +10,11 @@ from gemelo.errors import Error
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """All or nothing: into a file beside it, which then takes its name. Makes the folder; raises `Error`."""
+    """All or nothing: into a file beside it, which then takes its name. Makes the folder; raises `Error`, also where
+    `path` is a folder or a device, whose place no file takes; where it is a link, what it points to is written."""
+    path = path.resolve()
+    if path.exists() and not path.is_file():
+        raise Error(f"{path} cannot be written: it is there already, and is no file")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, beside = tempfile.mkstemp(prefix=".", suffix=".tmp", dir=path.parent)

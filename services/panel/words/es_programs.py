@@ -67,6 +67,8 @@ PROGRAMS: dict[str, str] = {
     "puntos o programa pasa de {most}.",
     "{path} cannot be read: {error}": "{path} no se puede leer ({error}).",
     "{path} is no UTF-8 text: {error}": "{path} no es texto UTF-8 ({error}).",
+    "{path} cannot be written: it is there already, and is no file": "{path} no se puede escribir: ya existe, y no es "
+    "un archivo.",
     "{path} cannot be written: {error}": "{path} no se puede escribir ({error}).",
     'it is for robot "{robot}", and this one is "{present}": correct robot = ...': "Es para el robot «{robot}», y "
     "este es "
