@@ -13,6 +13,7 @@ from urllib.parse import unquote
 from services.arm.errors import DescriptionError, suggestion
 from services.robot_import.xacro_files import SUFFIX, expanded, outermost
 
+BESIDE = 2  # innermost folders, whose meshes are the file's own without a package
 UP = 6  # folders above the URDF in which its package may be
 MOST_NAMED = 3  # files of one name
 ENCODING = re.compile(rb"<\?xml[^>]*?\bencoding\s*=\s*[\"']([A-Za-z0-9._-]+)")
@@ -76,9 +77,12 @@ def find_source(given: Path, arguments: Mapping[str, str] | None = None) -> Sour
 
 
 def _root_of(urdf: Path) -> Path:
-    """The folder of the export that holds the file: the nearest with a package.xml or meshes, else the file's own."""
-    holds = (folder for folder in _above(urdf) if (folder / "package.xml").is_file() or (folder / "meshes").is_dir())
-    return next(holds, urdf.parent)
+    """The folder of the export that holds the file: the nearest that is a package, or has meshes beside or above the
+    file; else the file's own. All of it is looked through, so a person's home with a folder of meshes is none."""
+    above = _above(urdf)
+    packages = (folder for folder in above if (folder / "package.xml").is_file())
+    near = (folder for folder in above[:BESIDE] if (folder / "meshes").is_dir())
+    return next(packages, None) or next(near, urdf.parent)
 
 
 def _urdf_in(folder: Path) -> Path:
