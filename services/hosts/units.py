@@ -102,10 +102,12 @@ def _unit(site: Site, host: str, process: Process) -> str:
 
 def _devices(site: Site, process: Process) -> str:
     """Only a gateway on a serial line and a camera see devices; of them their user may open what the group may."""
-    settings = site.robots.get(process.robot)
-    if settings is not None and settings.wire is Wire.SERIAL and process.service.name == "stepper_gateway":
-        # The line by its path would be looked up once, at the start: an adapter plugged in later would be refused.
-        return "DevicePolicy=closed\nDeviceAllow=char-* rw\nSupplementaryGroups=dialout"
-    if process.service.name == "camera":
-        return "DevicePolicy=closed\nDeviceAllow=char-* rw\nSupplementaryGroups=video"
-    return "PrivateDevices=yes"
+    settings, name = site.robots.get(process.robot), process.service.name
+    if name == "stepper_gateway" and settings is not None and settings.wire is Wire.SERIAL:
+        group = "dialout"
+    elif name == "camera":
+        group = "video"
+    else:
+        return "PrivateDevices=yes"
+    # A device by its path would be looked up once, at the start: what is plugged in later would be refused.
+    return f"DevicePolicy=closed\nDeviceAllow=char-* rw\nSupplementaryGroups={group}"
