@@ -13,6 +13,7 @@ from services.panel.model.operator import Operator
 from services.panel.model.problems import reporting
 from services.panel.words.words import Words
 
+OWN_CHANGE = 0.6  # [s] after its own change a browser's inputs are not written: the next one may be under way
 Color = Literal["red", "blue", "green", "gray", "orange", "yellow", "teal"]
 
 

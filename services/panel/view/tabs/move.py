@@ -11,11 +11,10 @@ from services.arm.model.description import Joint
 from services.panel.model.motions import PLANNERS, MotionChoice
 from services.panel.model.readings import Readings
 from services.panel.model.units import SHOWN, STEP, meant, slider_range, slider_value, text_of
-from services.panel.view.kit import Kit, Mirror, box, esc, note, set_if_new, table
+from services.panel.view.kit import OWN_CHANGE, Kit, Mirror, box, esc, note, set_if_new, table
 from services.panel.view.tabs.tool_fields import ToolFields
 from services.panel.view.world import World
 
-OWN_DRAG = 0.6  # [s] after its own change a browser's slider is not written: the finger may still be on it
 SCRUB = 100.0  # parts of the plan's duration
 
 
@@ -59,9 +58,9 @@ class MoveTab:
         goal, motions = self._operator.goal.goal, self._operator.motions
         if goal.version != self._goal_version:
             self._goal_version = goal.version
-            if goal.source != self._client or time.monotonic() - self._touched > OWN_DRAG:
+            if goal.source != self._client or time.monotonic() - self._touched > OWN_CHANGE:
                 self._write_sliders()
-        elif goal.source == self._client and time.monotonic() - self._touched > OWN_DRAG:
+        elif goal.source == self._client and time.monotonic() - self._touched > OWN_CHANGE:
             self._write_sliders()
         self._tool.show(goal)
         self._show_problem()

@@ -11,9 +11,8 @@ import gemelo
 from services.arm.frames.transforms import Point, Quaternion, from_rpy, to_rpy
 from services.panel.model.goal import Goal
 from services.panel.model.tool_turns import ALL_RINGS
-from services.panel.view.kit import Kit, set_if_new
+from services.panel.view.kit import OWN_CHANGE, Kit, set_if_new
 
-OWN_NUMBERS = 0.6  # [s] after its own change a browser's fields are not written: the next number is typed
 PLACE_STEP, TURN_STEP = 0.1, 0.1  # [mm], [deg] of the fields
 
 
@@ -33,7 +32,7 @@ class ToolFields:
 
     def show(self, goal: Goal) -> None:
         """The pose of the goal, or the one that was asked for and cannot be."""
-        if goal.version == self._version or time.monotonic() - self._touched < OWN_NUMBERS:
+        if goal.version == self._version or time.monotonic() - self._touched < OWN_CHANGE:
             return
         self._version = goal.version
         set_if_new(self._place, "value", _shown_place(goal))
