@@ -1,4 +1,4 @@
-"""From the name of an arm to a connection with it."""
+"""Connection to an arm by its name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a gripper comes to beside a thing: how high the tool is, and how far the jaws turn it. Pure."""
+"""The pose at which a gripper grasps a thing: the height of the tool, and the turn of the jaws. Pure."""
 
 from __future__ import annotations
 

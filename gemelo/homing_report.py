@@ -1,4 +1,4 @@
-"""What a homing says: while it runs, and how it ended."""
+"""The progress of a homing while it runs, and its report at the end."""
 
 from __future__ import annotations
 

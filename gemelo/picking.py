@@ -1,4 +1,4 @@
-"""From a thing that a camera sees to a place: approach, grip, carry, let go. Every motion is planned and verified."""
+"""Picks a thing that a camera sees and places it: approach, grip, carry, release; each motion planned and verified."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the units that a person thinks in to those of the API: radians, metres and seconds."""
+"""Conversion of the units that a person thinks in to those of the API: radians, metres and seconds."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Who speaks: one folder per process."""
+"""The processes of the twin and the libraries that they share: one folder each."""

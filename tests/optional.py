@@ -1,4 +1,4 @@
-"""What a test can do without: it is skipped, and `make test` names it in its closing line; in CI it fails."""
+"""Tools without which a test is skipped, named by `make test` in its closing line; in CI it fails."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-// What the core has read of a configuration's text, said again as JSON field by field: so Python sees that both agree.
+// A parsed configuration as JSON, field by field: so Python can check that both parsers agree.
 #include <string.h>
 
 #include <string>

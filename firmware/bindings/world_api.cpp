@@ -1,4 +1,4 @@
-// What surrounds a virtual device, and a motor alone, as plain C functions for ctypes.
+// The world of a virtual device, and a motor alone, as plain C functions for ctypes.
 #include "../platform/host/virtual_device.h"
 
 using gemelo::HornConfig;

@@ -1,4 +1,4 @@
-// How fast the path may be played so that it can still be stopped at the last knot that is known.
+// The highest speed along the path from which it can still be stopped at the last known knot.
 //
 // With the time scale s (1 plays as planned) and y = s^2, a joint's acceleration is a y + v y' / 2, where v and a
 // are the path's own and y' = dy/d(path time). Bounding it by the limit A, going backwards from y = 0 at the last

@@ -1,4 +1,4 @@
-// What a device is told before it moves: its clock rates, its pins and, per joint, its limits and its driver's demands.
+// A device's configuration: its clock rates, its pins and, per joint, its limits and its driver's demands.
 #pragma once
 
 #include <stdint.h>

@@ -1,4 +1,4 @@
-// What the tick makes of the input pins: which inputs are active, and when that changes.
+// The states of the input pins, tick by tick: which inputs are active, and when that changes.
 //
 // Active is what three equal readings in successive ticks say, and of an e-stop what a single one says.
 #pragma once

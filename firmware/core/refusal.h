@@ -1,4 +1,4 @@
-// Why something that was sent is not taken, in words.
+// The reason for a refusal, in words.
 #pragma once
 
 #include <stddef.h>

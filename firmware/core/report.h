@@ -1,4 +1,4 @@
-// What the device says: every outgoing frame and JSON text as bytes.
+// Outgoing messages of the device: every frame and JSON text as bytes.
 #pragma once
 
 #include <stddef.h>

@@ -1,4 +1,4 @@
-// What keeps people and the machine whole: e-stop, switches, faults, arming, and a gateway that has gone silent.
+// Safety of people and machine: e-stop, switches, faults, arming, and a gateway that has gone silent.
 #include "bytes.h"
 #include "machine.h"
 

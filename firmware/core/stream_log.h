@@ -1,4 +1,4 @@
-// Which stream is played, which chunk it wants next, and which streams are over.
+// The log of streams: the one that is played, the chunk that it wants next, and those that are over.
 #pragma once
 
 #include <stdint.h>

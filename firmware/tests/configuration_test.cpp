@@ -1,4 +1,4 @@
-// How a device takes a configuration.
+// Configurations that a device takes and refuses.
 #include <gtest/gtest.h>
 
 #include <cstring>

@@ -1,4 +1,4 @@
-// Which configurations each chip can serve, and the tables that turn joints into GPIO bits.
+// Configurations that each chip can serve, and the tables that turn joints into GPIO bits.
 #include <gtest/gtest.h>
 
 #include <cstring>

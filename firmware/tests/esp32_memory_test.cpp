@@ -1,4 +1,4 @@
-// What the board remembers over a warm reset, when it tries again, its button and its topics.
+// The board's memory over a warm reset, the times of its attempts, its button and its topics.
 #include <gtest/gtest.h>
 
 #include <cstring>

@@ -1,4 +1,4 @@
-// What the tick makes of the pins: three equal readings for a switch, one for an e-stop.
+// Filtering of the input pins: three equal readings for a switch, one for an e-stop.
 #include <gtest/gtest.h>
 
 #include <random>

@@ -1,4 +1,4 @@
-// What the devices of these tests have in common.
+// A configuration of plain joints, for the devices of several tests.
 #pragma once
 
 #include <cstring>

@@ -1,4 +1,4 @@
-// What a driver sees: pulse widths, DIR set-up, direction.
+// Pulses as a driver sees them: widths, DIR set-up, direction.
 #include <gtest/gtest.h>
 
 #include <map>

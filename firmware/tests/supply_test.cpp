@@ -1,4 +1,4 @@
-// What a gateway steers its lead by: the path that is left to play, and the knots that still fit.
+// The figures that a gateway steers its lead by: path left to play, and knots that still fit.
 #include <gtest/gtest.h>
 
 #include "motion.h"

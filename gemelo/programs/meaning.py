@@ -1,4 +1,4 @@
-"""What is wrong with a program on this robot: names that nobody knows, values beyond limits, calls in a circle."""
+"""Checks of a program against this robot: unknown names, values beyond limits, calls in a circle."""
 
 from __future__ import annotations
 

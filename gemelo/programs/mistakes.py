@@ -1,4 +1,4 @@
-"""What is wrong in a file of points or a program: where exactly, and what would do."""
+"""A mistake in a file of points or a program: its place in the file, a sentence and the remedy."""
 
 from __future__ import annotations
 

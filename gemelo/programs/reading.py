@@ -1,4 +1,4 @@
-"""From the text of a program's file to the program, and to everything that is wrong with its form."""
+"""Reader of a program's text: gives the program, and every mistake in its form."""
 
 from __future__ import annotations
 

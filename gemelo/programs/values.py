@@ -1,4 +1,4 @@
-"""What is wrong with the numbers of a step by themselves: not finite, absurd, in another unit, contradictory."""
+"""Checks of a step's numbers without a robot: finite, plausible, in the right unit, free of contradiction."""
 
 from __future__ import annotations
 

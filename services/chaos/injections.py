@@ -1,4 +1,4 @@
-"""What can be done to a site in the middle of a move, and how it is healed."""
+"""The faults that chaos injects into a site in the middle of a move, and the way each is healed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What must hold whatever happens; pure functions of what was heard."""
+"""The invariants that must hold under every fault; pure functions of the messages that were recorded."""
 
 from __future__ import annotations
 

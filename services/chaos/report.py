@@ -1,4 +1,4 @@
-"""What chaos has shown: a table for the terminal, JSON for programs, and a page with a drawing."""
+"""The report of a chaos run: a table for the terminal, JSON for programs, and a page with a drawing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How what a command watches is printed, and how often: as text for a person, as JSON or CSV for a program."""
+"""Output forms of the commands that watch: text for a person, JSON or CSV for a program; and how often they print."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `ra/juntas` asks of an arm of ours: relative degrees in, absolute positions within the limits out. Pure."""
+"""Intake of `ra/juntas` for an arm of ours: relative degrees in, absolute positions within the limits out. Pure."""
 
 from __future__ import annotations
 

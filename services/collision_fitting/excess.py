@@ -1,4 +1,4 @@
-"""How far fitted shapes reach beyond their mesh: over their outer surface, and at the worst place."""
+"""Excess of fitted shapes over their mesh: over the outer surface, and at the worst place."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When certificates end, read from their own bytes (DER, ITU-T X.690; fields of RFC 5280, 4.1).
+"""Expiry dates of certificates, read from their own bytes (DER, ITU-T X.690; fields of RFC 5280, 4.1).
 
 A process that moves an arm starts no other one to learn this, and a host needs no openssl for it.
 """

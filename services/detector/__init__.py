@@ -1,1 +1,1 @@
-"""What the cameras see, as things with poses."""
+"""The detector: finds things in the images of cameras, and says their poses."""

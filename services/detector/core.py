@@ -1,4 +1,4 @@
-"""What is in one image of a camera: tags, coloured things and boxes of the cell, each with its pose. Pure."""
+"""Detection in one image of a camera: tags, coloured things and boxes of the cell, each with its pose. Pure."""
 
 from __future__ import annotations
 

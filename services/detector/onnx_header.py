@@ -1,4 +1,4 @@
-"""What an ONNX file says of itself: the size of the images that it takes, and the names of its classes.
+"""Reader of an ONNX file's header: the size of the images that the model takes, and the names of its classes.
 
 A file is one message of protobuf; the numbers of the fields are those of onnx.proto. Nothing is copied of the weights.
 """

@@ -1,4 +1,4 @@
-"""How long the certificates of a site are still valid: those made for it, and those that router and broker show."""
+"""Remaining validity of a site's certificates: those made for it, and those that router and broker present."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What would not work of a site, found before anything is written: every problem with its line."""
+"""Checks of a site's file before anything is written: every problem with its line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a host gets its folder: over ssh as root, in commands that can be shown before they are run."""
+"""Installation of a host's folder over ssh as root, as commands that can be shown before they are run."""
 
 from __future__ import annotations
 

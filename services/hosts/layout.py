@@ -1,4 +1,4 @@
-"""What runs where: every process of a site, with its robot, its role and the certificate that it shows."""
+"""The processes of each host of a site, with the robot, the role and the certificate of each."""
 
 from __future__ import annotations
 

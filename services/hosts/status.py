@@ -1,4 +1,4 @@
-"""How a site stands against its file: each service that should run, and what runs besides, by what is on the bus."""
+"""The state of a site against its file: services that should run, and those that run besides, by the bus."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""How gateway and device join an MQTT broker: address, password, TLS, the sentence where they cannot, and its lock."""
+"""Joining an MQTT broker, for gateway and device: address, password, TLS, a sentence for each failure, the lock."""

@@ -1,4 +1,4 @@
-"""What it takes to join a broker, read from the deployment: address, user, password and TLS.
+"""The access to a broker, read from the deployment: address, user, password and TLS.
 
 A password is in the environment or in a file that its owner alone can read; it is never shown.
 """

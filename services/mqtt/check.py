@@ -1,4 +1,4 @@
-"""Whether a broker can be joined, tried once."""
+"""One attempt to join a broker, and its problem as a sentence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why a broker could not be joined: one sentence with the remedy for every failure of network, TLS, password or ACL."""
+"""The sentence with the remedy for every failure to join a broker: network, TLS, password or ACL."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is in a recording, without reading its messages where it has its index."""
+"""The contents of a recording, without reading its messages where it has its index."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What happened, as a black box keeps it: a sentence, what led to it, what followed; and the folder of them."""
+"""Incidents as a black box keeps them: a sentence, the events before and after; and the folder of black boxes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What has one answer in the links of a source: the files that meshes mean, their sizes, inertias, missing drawings."""
+"""Repairs with one answer in the links of a source: mesh files, their sizes, inertias, missing drawings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with a source, all at once; what has one answer is mended in the elements, and said."""
+"""Repair of a source: all problems at once; what has one answer is repaired in the elements, and said."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a URDF cannot say, asked of a person: from a file of answers, by defaults, or on the terminal."""
+"""Questions to a person about what a URDF cannot say: answered by a file, by defaults, or on the terminal."""
 
 from __future__ import annotations
 

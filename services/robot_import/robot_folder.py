@@ -1,4 +1,4 @@
-"""What an import writes: meshes, robot.urdf, robot.toml, and robot.srdf with what sampling finds."""
+"""The folder that an import writes: meshes, robot.urdf, robot.toml, and robot.srdf with the results of sampling."""
 
 from __future__ import annotations
 

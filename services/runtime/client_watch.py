@@ -1,4 +1,4 @@
-"""Which clients are gone, by their liveliness tokens: an attached goal ends when that of its client vanishes.
+"""Watch over clients by their liveliness tokens: an attached goal ends when the token of its client vanishes.
 
 A router that goes away takes all tokens with it, so nothing is concluded while it is away, nor until the clients
 have had the time to come back to it.

@@ -1,4 +1,4 @@
-"""What each role may do with each key, and the router's access control that lets it do no more.
+"""Permissions of each role for each key, and the access control of the router that enforces them.
 
 Zenoh's access control looks at every message between router and session, in both directions: `ingress` is what a
 session sends, `egress` what it is sent. What no rule allows is dropped without a word.

@@ -1,4 +1,4 @@
-"""Why a process of a stack is not ready: what process-compose and the process say of it, and its last lines."""
+"""The reason why a process is not ready: by process-compose, by the process itself, and its last lines."""
 
 from __future__ import annotations
 

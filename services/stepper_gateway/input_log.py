@@ -1,4 +1,4 @@
-"""What the core is given, published twice a second: enough for `gemelo replay` to have it said again, to the byte.
+"""Log of the core's inputs, published twice a second: enough for `gemelo replay` to give the same output, to the byte.
 
 The first messages wait until a recorder that starts together with the gateway listens: without the beginning the rest
 is of no use.

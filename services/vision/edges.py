@@ -1,4 +1,4 @@
-"""Where an edge between two brightnesses lies, to a hundredth of a pixel: sampled across it, fitted along it.
+"""Edges between two brightnesses, located to a hundredth of a pixel: sampled across, fitted along.
 
 A profile across a blurred step holds the same area as a sharp one, so the area says where the step is; unlike the
 steepest point or a corner's saddle, that does not move with the blur.

@@ -1,4 +1,4 @@
-"""Where in an image something may lie: sought at half its size, so that only those windows are looked at in full."""
+"""Windows of an image that may hold something: found at half its size, so that only they are examined in full."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which topic goes to which method of the core, live and from a recording."""
+"""The table of topics and the methods of the core that take them, live and from a recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which pairs of links need no check, and how the SRDF's text takes that up."""
+"""Pairs of links that need no check, and the update of the SRDF's text with them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What robot.toml asks of the device, to the last 1/256 step, and how it says what it cannot ask."""
+"""The device's configuration of robot.toml, to the last 1/256 step, and the refusals of what it cannot hold."""
 
 from __future__ import annotations
 

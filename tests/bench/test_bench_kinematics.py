@@ -1,4 +1,4 @@
-"""What `ik_ms` and `ik_success` count as solved."""
+"""The condition under which `ik_ms` and `ik_success` count a pose as solved."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the planner is held against in the same run: the same arm, the same scene, other planners."""
+"""The references of the planner in the same run: the same arm and scene, other planners."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the person beside the arm does by hand, and what she only waits for."""
+"""The person beside the arm in chaos: the steps by hand, and those that only wait."""
 
 from types import SimpleNamespace
 from typing import Any

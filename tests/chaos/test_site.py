@@ -1,4 +1,4 @@
-"""What chaos asks of its stack before it starts."""
+"""The preconditions of chaos: its stack's state before it starts."""
 
 from pathlib import Path
 

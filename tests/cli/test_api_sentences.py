@@ -1,4 +1,4 @@
-"""What `gemelo` says in a sentence, the command line says with its commands."""
+"""Sentences of `gemelo`, said by the command line with its commands."""
 
 from __future__ import annotations
 

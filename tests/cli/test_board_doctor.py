@@ -1,4 +1,4 @@
-"""What a board says as it starts, and what is then said of it; at a pseudo-terminal where a line is needed."""
+"""A board's output as it starts, and the diagnosis of it; at a pseudo-terminal where a line is needed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What shows the bus: fields of messages, rates, sizes and delays, frames, interfaces, parameters as files."""
+"""Commands that show the bus: fields of messages, rates, sizes and delays, frames, interfaces, parameters as files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What watches the bus, as a program reads it: every command on a real router, as JSON and as CSV, once and n times."""
+"""Commands that watch the bus, as a program reads them: each on a real router, as JSON and as CSV, once and n times."""
 
 from __future__ import annotations
 

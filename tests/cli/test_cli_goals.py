@@ -1,4 +1,4 @@
-"""From words to goals, and from refusals to words."""
+"""Goals from the command line's words, and refusals in words."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a person writes becomes SI, and nothing else does."""
+"""Units on the command line: a value that a person writes becomes SI, and nothing else does."""
 
 import math
 from dataclasses import dataclass

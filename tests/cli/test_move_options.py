@@ -1,4 +1,4 @@
-"""From the words of `gemelo move` to the planner's request."""
+"""The planner's request from the options of `gemelo move`."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a board is told over a serial line: here a pseudo-terminal, and a board of a few lines at its other end."""
+"""Provisioning of a board over a serial line: a pseudo-terminal, and a board of a few lines at its other end."""
 
 from __future__ import annotations
 

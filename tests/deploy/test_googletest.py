@@ -1,4 +1,4 @@
-"""Where the firmware's tests take GoogleTest from on a machine that does not have it."""
+"""The source of GoogleTest on a machine that does not have it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the tests can do without: named in one line, skipped on a person's machine, failing in CI."""
+"""Optional tools of the tests: named in one line, skipped on a person's machine, failing in CI."""
 
 from __future__ import annotations
 

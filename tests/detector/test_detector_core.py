@@ -1,4 +1,4 @@
-"""What is found in images of the virtual camera, against where the things are in truth."""
+"""Detections in images of the virtual camera, against the true poses of the things."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an ONNX file says of itself, whatever is in the file."""
+"""The header of an ONNX file, whatever is in the file."""
 
 from __future__ import annotations
 

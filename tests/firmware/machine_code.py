@@ -1,4 +1,4 @@
-"""What a function of an object file may come to, as read from its relocations."""
+"""The functions that a function of an object file may call, as read from its relocations."""
 
 from __future__ import annotations
 

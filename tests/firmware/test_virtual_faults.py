@@ -1,4 +1,4 @@
-"""What a person does to a virtual ESP32 over the wire: buttons, faults, a configuration."""
+"""A person's actions on a virtual ESP32 over the wire: buttons, faults, a configuration."""
 
 from __future__ import annotations
 

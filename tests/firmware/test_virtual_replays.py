@@ -1,4 +1,4 @@
-"""What a stranger on an open broker has heard and says again, or lets the broker keep, moves nothing."""
+"""Messages that a stranger on an open broker has recorded and sends again, or lets the broker retain, move nothing."""
 
 from __future__ import annotations
 

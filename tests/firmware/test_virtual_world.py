@@ -1,4 +1,4 @@
-"""What surrounds the device: shafts that close switches, motors that lose steps, buttons; all in virtual time."""
+"""The virtual device's world: shafts that close switches, motors that lose steps, buttons; all in virtual time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What cannot be meant is a sentence with the remedy, and nothing is asked of the planner."""
+"""Invalid arguments are refused by a sentence with the remedy, and nothing is asked of the planner."""
 
 from __future__ import annotations
 

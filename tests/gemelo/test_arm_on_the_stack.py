@@ -1,4 +1,4 @@
-"""What a script is told: fresh states, how motions end, what is lost, and where it may be called from; on the stack."""
+"""The API on the whole stack: fresh states, ends of motions, losses, and the threads that may call it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is written about the package is as the package is."""
+"""The package's documents agree with the package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which way the jaws go, which decides what is attached and what is let go; and what an opening may be."""
+"""The direction of the jaws, which decides what is attached and what is released; and the values of an opening."""
 
 from __future__ import annotations
 

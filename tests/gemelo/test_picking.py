@@ -1,4 +1,4 @@
-"""Where the jaws come to beside a thing, and by how much they turn it."""
+"""The place of the jaws beside a thing, and their turn to it."""
 
 from __future__ import annotations
 

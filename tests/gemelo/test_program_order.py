@@ -1,4 +1,4 @@
-"""What a program does in which order and at which speed, and the script that does the same."""
+"""The order and the speed of a program's steps, and the script that does the same."""
 
 from __future__ import annotations
 

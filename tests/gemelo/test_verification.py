@@ -1,4 +1,4 @@
-"""Which joints a trip passes, homes or leaves to a person, and the sentence of a confidence that is too low."""
+"""Joints that a trip passes, homes or leaves to a person, and the sentence of a confidence that is too low."""
 
 from __future__ import annotations
 

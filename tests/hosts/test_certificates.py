@@ -1,4 +1,4 @@
-"""How long certificates last is said of each host: of those made here, and of what the site shows on its links."""
+"""The remaining validity of certificates, for each host: of those made here, and of those that the site presents."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is rendered can be read by what it is for, and nothing that a person writes becomes more than a value in it."""
+"""Rendered files can be read by their programs, and nothing that a person writes becomes more than a value in them."""
 
 from __future__ import annotations
 

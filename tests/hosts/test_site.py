@@ -1,4 +1,4 @@
-"""What is wrong with a site is said before anything is written, with its line."""
+"""Mistakes in a site's file are reported before anything is written, each with its line."""
 
 from __future__ import annotations
 

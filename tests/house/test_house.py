@@ -1,18 +1,20 @@
-"""What the house may not become: circles of imports, and ideas in fragments."""
+"""Limits on the form of the code: no circles of imports, no fragments, units, module docstrings that say what it is."""
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 import pytest
 
-from tests.house.counts import Module, circles, fragments, imports, modules, without_unit
+from tests.house.counts import ROOMS, ROOT, Module, circles, fragments, imports, modules, without_unit
 
 KEPT = {
     "services.planner.parameters": "as the parameters of every service",
     "services.panel.view.pick_box": "a part of the page, as all its boxes",
     "services.stepper_gateway.ledger.reasons": "the sentences, apart from the arithmetic",
 }
+CLAUSES = {"What", "Where", "How", "Whether", "Who", "When", "Which", "Why", "Whatever", "True", "From", "By", "For"}
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +38,18 @@ def test_nothing_of_the_product_imports_a_test(house):
 
 def test_every_public_function_of_numbers_says_its_units_or_shapes(house):
     assert [name for each in house.values() if each.is_product for name in without_unit(each)] == []
+
+
+def test_every_module_docstring_says_what_the_module_is(house):
+    """By a noun or a verb at its beginning; a clause such as "What the gateway says" makes the reader guess."""
+    beginnings = {name: (ast.get_docstring(each.tree) or "").partition(" ")[0] for name, each in house.items()}
+    assert [name for name, word in beginnings.items() if word in CLAUSES] == []
+
+
+def test_every_cpp_file_says_what_it_is():
+    files = [path for room in ROOMS for kind in ("*.h", "*.cpp") for path in (ROOT / room).rglob(kind)]
+    first_words = {path: path.read_text().partition("\n")[0].removeprefix("// ").partition(" ")[0] for path in files}
+    assert [str(path) for path, word in first_words.items() if "build" not in path.parts and word in CLAUSES] == []
 
 
 def module(name: str, *lines: str) -> tuple[str, Module]:

@@ -1,4 +1,4 @@
-"""What a recording has for Foxglove: the fields of its published schemas, and the arm where the frames put it."""
+"""A recording in Foxglove: the fields of its published schemas, and the arm where the frames put it."""
 
 import json
 import struct

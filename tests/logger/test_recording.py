@@ -1,4 +1,4 @@
-"""What is written can be read: by the MCAP reader, by a streaming reader after kill -9, and as CSV."""
+"""Recordings can be read: by the MCAP reader, by a streaming reader after kill -9, and as CSV."""
 
 import csv
 import json

@@ -1,4 +1,4 @@
-"""What a broker is joined with: from the deployment, files of mode 600 and the environment, and never shown."""
+"""The access to a broker: from the deployment, files of mode 600 and the environment, and never shown."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What comes from a broker and is no MQTT ends the connection, and never the thread that reads: it is made anew."""
+"""Bytes from a broker that are no MQTT end the connection, and never the thread that reads: it is made anew."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the page's script arranges buttons, in a real browser: jog buttons in pairs."""
+"""The arrangement of buttons by the page's script, in a real browser: jog buttons in pairs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the page knows without a browser and without a twin."""
+"""The page's model, without a browser and without a twin."""
 
 from __future__ import annotations
 

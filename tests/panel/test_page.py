@@ -1,4 +1,4 @@
-"""What a person does on the page of rm1, in a real browser on the whole stack, and what the arm does then."""
+"""A person's work on the page of rm1, in a real browser on the whole stack, and the arm's motion by it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a person does in the browser beside goals: edits the scene, holds, homes, jogs by steps."""
+"""A person's work in the browser beside goals: edits the scene, holds, homes, jogs by steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever dies in the middle of a move of the page, the page stays, and leads the next move."""
+"""The page survives every process that dies in the middle of its move, and leads the next move."""
 
 from __future__ import annotations
 

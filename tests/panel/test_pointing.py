@@ -1,4 +1,4 @@
-"""Which detected thing a click into an image means."""
+"""The detected thing that a click into an image means."""
 
 from __future__ import annotations
 

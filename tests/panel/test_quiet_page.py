@@ -1,4 +1,4 @@
-"""What the page sends, counted message by message: nothing while nothing changes, and little while the arm moves."""
+"""The page's messages, counted one by one: none while nothing changes, and few while the arm moves."""
 
 from __future__ import annotations
 

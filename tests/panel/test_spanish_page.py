@@ -1,4 +1,4 @@
-"""Whatever a part of the twin can say to a person is Spanish on a Spanish page."""
+"""Every sentence that a part of the twin can say to a person is Spanish on a Spanish page."""
 
 from __future__ import annotations
 

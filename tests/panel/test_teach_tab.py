@@ -1,4 +1,4 @@
-"""What is taught is shown at once, also the first point of all; what was there before is only offered."""
+"""Taught points are shown at once, also the first one of all; those from before are only offered."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with a goal is told once: on the tab while it is set, above the tabs once a plan of it was refused."""
+"""A mistake in a goal is told once: on the tab while it is set, above the tabs once a plan of it was refused."""
 
 from __future__ import annotations
 

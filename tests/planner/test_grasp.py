@@ -1,4 +1,4 @@
-"""What stands between the jaws is found, attached and left; and the jaws themselves are kept clear of everything."""
+"""The object between the jaws is found, attached and left; and the jaws themselves are kept clear of everything."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a jog is given is published while it is wanted, and what is left out shows in the numbers."""
+"""The inputs of a jog are published while they are wanted, and a gap in them shows in the numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What cannot be replayed is refused by one sentence that names it and what would do."""
+"""Recordings that cannot be replayed are refused by one sentence with the cause and the remedy."""
 
 from __future__ import annotations
 

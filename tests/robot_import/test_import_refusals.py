@@ -1,4 +1,4 @@
-"""What an import refuses, all at once; and what a person says to it: motors, answers, --force."""
+"""Refusals of an import, all at once; and a person's answers to it: motors, answers, --force."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where an import lets an arm stand: within its limits, also as the text of robot.srdf and robot.toml."""
+"""Named states of an imported arm: within its limits, also as the text of robot.srdf and robot.toml."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every bus promises, whatever carries it."""
+"""The contract of every bus, whatever carries it."""
 
 from __future__ import annotations
 

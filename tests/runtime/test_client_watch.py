@@ -1,4 +1,4 @@
-"""When a goal counts as having lost its client; time is given."""
+"""The moment at which a goal counts as having lost its client; time is given."""
 
 from __future__ import annotations
 

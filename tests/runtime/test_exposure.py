@@ -1,4 +1,4 @@
-"""What listens beyond this machine without TLS does not start, unless the deployment says `insecure`, and says so."""
+"""Listeners beyond this machine without TLS do not start, unless the deployment says `insecure`, and say so."""
 
 from __future__ import annotations
 

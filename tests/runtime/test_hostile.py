@@ -1,4 +1,4 @@
-"""Whatever comes on whatever key: it is dropped or refused, counted, and nothing dies."""
+"""Hostile messages on any key: each is dropped or refused, counted, and nothing dies."""
 
 from __future__ import annotations
 

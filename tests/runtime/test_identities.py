@@ -1,4 +1,4 @@
-"""Who joins a locked router: nobody without a certificate of its authority that is valid today."""
+"""Admission to a locked router: only with a certificate of its authority that is valid today."""
 
 from __future__ import annotations
 

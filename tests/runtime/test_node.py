@@ -1,4 +1,4 @@
-"""What a node promises to the service that is made of it, on either bus."""
+"""The promises of a node to the service that is made of it, on either bus."""
 
 from __future__ import annotations
 

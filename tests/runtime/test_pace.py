@@ -1,4 +1,4 @@
-"""How much a client asks by itself, that a server takes all of it, and that it takes nothing of a flood."""
+"""The pace of a client's own requests: a server takes all of it, and takes nothing of a flood."""
 
 from __future__ import annotations
 

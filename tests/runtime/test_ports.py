@@ -1,4 +1,4 @@
-"""Whether a port is free, and what is said where it is not."""
+"""The check that a port is free, and the sentence where it is not."""
 
 from __future__ import annotations
 

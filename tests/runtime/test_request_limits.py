@@ -1,4 +1,4 @@
-"""What a node answers of a flood, who is not touched by it, and that a stop is carried out all the same."""
+"""A node under a flood of requests: its answers, the clients beside it, and stops that are carried out all the same."""
 
 from __future__ import annotations
 

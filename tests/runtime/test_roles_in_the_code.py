@@ -1,4 +1,4 @@
-"""What the code of each service speaks of is what its role may do: a key that is missing shows here, not on a site."""
+"""Roles against the code: a service uses only keys that its role may; a missing one shows here, not on a site."""
 
 from __future__ import annotations
 

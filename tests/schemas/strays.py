@@ -1,4 +1,4 @@
-"""What anybody may put on a key: messages with extreme numbers, stamps, sessions and epochs, and no message at all."""
+"""Messages that anybody may put on a key: extreme numbers, stamps, sessions and epochs, and no message at all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who is in command, on a whole stack: two people, one arm, and a holder that is killed in the middle of a move."""
+"""Control of the arm on a whole stack: two people, one arm, and a holder that is killed in the middle of a move."""
 
 from __future__ import annotations
 

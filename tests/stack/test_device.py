@@ -1,4 +1,4 @@
-"""What a person does with the device, by the command line, through the whole stack: homing, faults, outputs, speed."""
+"""A person's work with the device by the command line, on the whole stack: homing, faults, outputs, speed."""
 
 from __future__ import annotations
 

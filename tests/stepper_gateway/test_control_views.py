@@ -1,4 +1,4 @@
-"""Who holds control, as `gemelo state`, the Rerun view and the page show it."""
+"""The holder of control, as `gemelo state`, the Rerun view and the page show it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What fails: links, devices, heartbeats, gateways. The arm stays on its path, nothing resumes by itself."""
+"""Failures of links, devices, heartbeats, gateways: the arm stays on its path, nothing resumes by itself."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a person sees of the ledger and of the stopping distance, of the real gateway's messages."""
+"""Views of the ledger and of the stopping distance, from the real gateway's messages."""
 
 from __future__ import annotations
 

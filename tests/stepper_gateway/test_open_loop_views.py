@@ -1,4 +1,4 @@
-"""What a person sees of a board that does not say what it has executed: in every view that it is sent, not verified."""
+"""Views of a board that does not say what it has executed: each says that it is sent, not verified."""
 
 from __future__ import annotations
 

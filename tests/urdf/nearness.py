@@ -1,4 +1,4 @@
-"""How near the links of an arm come to one another, by pinocchio and coal alone."""
+"""Distances between the links of an arm, by pinocchio and coal alone."""
 
 from __future__ import annotations
 

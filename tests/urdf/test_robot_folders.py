@@ -1,4 +1,4 @@
-"""What is true of every robot's folder that comes with the project."""
+"""Properties of every robot's folder that comes with the project."""
 
 from __future__ import annotations
 

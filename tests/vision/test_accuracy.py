@@ -1,4 +1,4 @@
-"""Where an error of pointing comes from, by its pattern over the table."""
+"""The cause of an error of pointing, by its pattern over the table."""
 
 from __future__ import annotations
 

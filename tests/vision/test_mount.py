@@ -1,4 +1,4 @@
-"""Where a camera stands: against the truth, beside the closed forms, and refused by name where it cannot be known."""
+"""The calibrated pose of a camera: against the truth, beside the closed forms, and refused where it is undetermined."""
 
 from __future__ import annotations
 

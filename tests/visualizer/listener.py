@@ -1,4 +1,4 @@
-"""What a sink tells a viewer, kept to be looked at."""
+"""Messages of a sink to a viewer, kept for inspection."""
 
 from __future__ import annotations
 

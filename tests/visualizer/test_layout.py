@@ -1,4 +1,4 @@
-"""What a person finds at first sight: every view named with its unit, the ghost translucent, the band in the plot."""
+"""The first sight of the viewer: every view named with its unit, the ghost translucent, the band in the plot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is sent can be read back from a recording, and opens as a picture that is not blank."""
+"""Data sent to the viewer can be read back from a recording, and opens as a picture that is not blank."""
 
 import subprocess
 

@@ -1,4 +1,4 @@
-// What a virtual device's pins are wired to: motors with their shafts, switches that the shafts close, and a button.
+// The world at a virtual device's pins: motors with their shafts, switches that the shafts close, and a button.
 #pragma once
 
 #include "config.h"

@@ -1,4 +1,4 @@
-// What a fuzzer's input means: items, each a kind, a length of 16 bits and so many bytes.
+// The meaning of a fuzzer's input: items, each a kind, a length of 16 bits and so many bytes.
 #pragma once
 
 #include <stddef.h>

@@ -1,4 +1,4 @@
-// What must hold whatever is sent.
+// Properties that must hold whatever is sent.
 #pragma once
 
 #include <stdio.h>

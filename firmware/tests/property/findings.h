@@ -1,4 +1,4 @@
-// What was found against the properties: how often, and the first of each in words.
+// Violations of the properties: how often each was found, and the first of each in words.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// What the drivers see on STEP and DIR, tick by tick: counts the pulses and holds their timing against the data sheets.
+// STEP and DIR as the drivers see them, tick by tick: counts pulses and checks their timing against the data sheets.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// How a count is distributed, by one bin per value.
+// The distribution of a count, by one bin per value.
 #pragma once
 
 #include <stdint.h>

@@ -1,4 +1,4 @@
-"""How long a stepper takes for a relative move, driven as AccelStepper drives it: from rest to rest.
+"""The duration of a stepper's relative move from rest to rest, driven as AccelStepper drives it.
 
 Its ramp is that of D. Austin, "Generate stepper-motor speed profiles in real time", Embedded Systems Programming, 2005:
 a constant acceleration, approximated step by step.

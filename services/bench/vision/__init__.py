@@ -1,1 +1,1 @@
-"""What the eyes are measured on: images with exact ground truth, and the figures."""
+"""Bench of the vision: images with exact ground truth, and the figures measured on them."""

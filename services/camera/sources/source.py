@@ -1,4 +1,4 @@
-"""What every source of images does, and how it says what is wrong."""
+"""The interface of every source of images: its frames and its faults."""
 
 from __future__ import annotations
 

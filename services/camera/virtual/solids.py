@@ -1,4 +1,4 @@
-"""What the virtual camera can draw: solids of plane convex faces, with a colour or a texture."""
+"""The solids that the virtual camera draws: plane convex faces with a colour or a texture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the virtual camera looks at: the table, fixed tags, things, the arm with its jaws, and the planning scene. Pure.
+"""The world before the virtual camera: table, fixed tags, things, the arm with its jaws, and the planning scene. Pure.
 
 It has a truth of its own: things stand where cell.toml puts them, move with the jaws that have closed on them, and fall
 onto the table when they open. What a detector believes (objects of the scene with a thing's name) is never drawn.

@@ -1,1 +1,1 @@
-"""What people at the page have set and what is under way; knows the arm by `gemelo` alone, and no browser."""
+"""The page's model: people's settings and the work under way; knows the arm by `gemelo` alone, and no browser."""

@@ -1,4 +1,4 @@
-"""What can be done now, and for what cannot the reason, as a key of the words and the value that goes with it."""
+"""The actions that are available now, and for each other one the reason: a key of the words, and the value in it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When a picture of the arm is due: with the joint state that brings something new, but not more often than is seen."""
+"""The moments at which the arm is drawn: when a joint state brings something new, at most 25 times a second."""
 
 from __future__ import annotations
 

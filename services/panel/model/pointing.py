@@ -1,4 +1,4 @@
-"""Which detected thing a person means who points into a camera's image."""
+"""The detected thing that a person points at in a camera's image."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a person is told of an error: a sentence, the check, what touches, and the nearest goal that can."""
+"""An error as the page shows it: a sentence, the check, what touches, and the nearest goal that is possible."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who holds control of the arm, and the buttons that take it and give it back; the page holds it for all browsers."""
+"""The box of control: the holder, and buttons to take it and to give it back; the page holds it for all browsers."""
 
 from __future__ import annotations
 

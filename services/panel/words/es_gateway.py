@@ -1,4 +1,4 @@
-"""What the gateway says of the device, of commands, the gripper and control, in Spanish.
+"""Spanish of the gateway's sentences about the device, commands, the gripper and control.
 
 A key is the sentence as the gateway says it; `sentences.py` says how it is found.
 """

@@ -1,4 +1,4 @@
-"""Why the gateway refuses a goal or a streamed target, and how a motion ended before its goal, in Spanish.
+"""Spanish of the gateway's refusals of goals and streamed targets, and of motions that ended before their goal.
 
 A key is the sentence as the gateway says it; `sentences.py` says how it is found.
 """

@@ -1,4 +1,4 @@
-"""What is said of taught points and of programs, in Spanish.
+"""Spanish of the sentences about taught points and programs.
 
 A key is the sentence as `gemelo` or the page's model say it; `sentences.py` says how it is found.
 """

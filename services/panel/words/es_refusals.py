@@ -1,4 +1,4 @@
-"""Why something cannot be, in Spanish: by the check that refused, as `sentence_of` looks them up.
+"""Spanish of the refusals, by the check that refused, as `sentence_of` looks them up.
 
 A key's end says which form it is: "_axis" where the subject is x, y or z, "_touch" where two things do, "_own" where
 the subject is the request itself, "_unknown" where there is no value.

@@ -1,4 +1,4 @@
-"""What is said of the scene, things, jogging, what is asked for and who does not answer, in Spanish.
+"""Spanish of the sentences about the scene, things, jogging, requests, and processes that do not answer.
 
 A key is the sentence as `gemelo` or the planner say it; `sentences.py` says how it is found.
 """

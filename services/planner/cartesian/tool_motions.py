@@ -1,4 +1,4 @@
-"""From a request for a line or an arc of the tool to its way: where it ends, what lies between, and how far it goes."""
+"""The tool path of a requested line or arc: its end, its shape between, and how far it goes."""
 
 from __future__ import annotations
 

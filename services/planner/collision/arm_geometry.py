@@ -1,4 +1,4 @@
-"""What a world needs of the arm's own shapes, whatever stands around it: read and computed once for one arm."""
+"""The collision geometry of the arm itself, without a scene: read and computed once for one arm."""
 
 from __future__ import annotations
 

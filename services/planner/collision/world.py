@@ -1,4 +1,4 @@
-"""True if the arm touches itself, what it carries, or what stands around it: coal on the exact shapes.
+"""Collision checks of the arm with itself, its load and its surroundings: coal on the exact shapes.
 
 The reference of every faster check, with the names that `SelfCollisionChecker` has for the arm alone.
 """

@@ -1,4 +1,4 @@
-"""What a jog is given, published twice a second and at its end: enough for `gemelo replay` to jog that way again."""
+"""Log of a jog's inputs, published twice a second and at its end: enough for `gemelo replay` to jog that way again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From what was asked to joint values: named, joint and pose goals, each with the refusals that belong to it."""
+"""Joint values of a requested goal: named, joint and pose goals, each with its own refusals."""
 
 from __future__ import annotations
 

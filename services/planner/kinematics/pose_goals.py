@@ -1,4 +1,4 @@
-"""From a pose goal, in any of its forms, to the tool's target in the base frame; what contradicts itself is refused."""
+"""The tool's target in the base frame of a pose goal in any of its forms; contradictions are refused."""
 
 from __future__ import annotations
 

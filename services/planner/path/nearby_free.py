@@ -1,4 +1,4 @@
-"""From where only the exact shapes let the arm be, a short straight path to where the native planner lets it be too."""
+"""Short straight path from where only the exact shapes are free to where the native planner's spheres are free too."""
 
 from __future__ import annotations
 

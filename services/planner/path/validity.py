@@ -1,4 +1,4 @@
-"""True if configurations, joint lines and curves keep a margin, for the searches."""
+"""Validity of configurations, joint lines and curves for the searches: each keeps a margin."""
 
 from __future__ import annotations
 

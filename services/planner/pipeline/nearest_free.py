@@ -1,4 +1,4 @@
-"""For an arm that touches something by little: the nearest configuration that touches nothing, and how to jog there."""
+"""The nearest configuration free of contact for an arm that touches something slightly, and the jog to it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a path to a trajectory that may be executed: timed, within what the steppers can do, and looked at densely."""
+"""Builds a trajectory that may be executed from a path: timed, within what the steppers can do, densely verified."""
 
 from __future__ import annotations
 

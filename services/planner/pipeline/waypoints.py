@@ -1,5 +1,4 @@
-"""By way of several goals in the space of the joints: lines from configuration to configuration, corners cut within the
-blend."""
+"""Paths through several goals in joint space: lines between configurations, corners cut within the blend."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What answers are made from, published beside them: enough for `gemelo replay` to make the same answers again."""
+"""Log of the inputs of answers, published beside them: enough for `gemelo replay` to make the same answers again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands between the jaws of the gripper, which move along y of the tool frame, beyond it in z."""
+"""The object between the jaws of the gripper, which move along y of the tool frame, beyond it in z."""
 
 from __future__ import annotations
 

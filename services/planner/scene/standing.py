@@ -1,4 +1,4 @@
-"""Where the arm stands by a joint state, and which scene a world is of. Pure."""
+"""The arm's present configuration by a joint state, and the version of a scene. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""True if the steppers can do a trajectory: its exact step stream against rates, pulses, torque and the device's queue.
+"""Feasibility of a trajectory for the steppers: its exact step stream against rates, pulses, torque and the queue.
 
 The stream is the gateway's and the device's own: knots every 20 ms in 1/256 steps, cubic Hermite between them, and
 floor(p + 0.5) steps made by the end of every millisecond (firmware/PROTOCOL.md, "The path").

@@ -1,4 +1,4 @@
-"""What a stop has overtaken: no request that was asked for before a stop is carried out after it.
+"""Requests that a stop has overtaken: none that was asked for before a stop is carried out after it.
 
 That is whatever had arrived by then, and, however long it is under way, what the stop's own client had asked for
 before: each client numbers its requests in the order in which it asks.

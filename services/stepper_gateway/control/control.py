@@ -1,4 +1,4 @@
-"""Who may move the arm: everybody while nobody holds control, else the holder's nodes alone.
+"""Control of the arm: everybody may move it while nobody holds control, else the holder's nodes alone.
 
 Knows neither the arm nor a clock: it is told whether the arm rests, and how long each token has been missing.
 """

@@ -1,4 +1,4 @@
-"""Which states follow from the one before: what anybody else says under the device's name mostly does not."""
+"""Consistency of a device's successive states: those that others send under its name mostly fail it."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What the gateway knows of lost steps: verified counts, confidence, tool error, stopping distance."""
+"""The ledger of lost steps: verified counts, confidence, tool error, stopping distance."""

@@ -1,4 +1,4 @@
-"""What one joint has done between two states of the device: turns of its motor, and the load of it."""
+"""The work of one joint between two states of the device: turns of its motor, and the load of it."""
 
 from __future__ import annotations
 

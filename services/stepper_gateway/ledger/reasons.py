@@ -1,4 +1,4 @@
-"""Why a joint's confidence is what it is, as a sentence with the remedy."""
+"""The reason for a joint's confidence, as a sentence with the remedy."""
 
 from __future__ import annotations
 

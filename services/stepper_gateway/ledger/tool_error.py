@@ -1,4 +1,4 @@
-"""What steps that a joint is off mean at the tool, by the arm's Jacobian."""
+"""The error at the tool for steps that a joint is off, by the arm's Jacobian."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a path is played on, and for how long, if the gateway falls silent: what firmware/core does then, by knots.
+"""The stop of a path where the gateway falls silent, in distance and time: as firmware/core does it, by knots.
 
 With the time scale s and y = s^2 the device plays on as far as its queue's ceilings let it (ceiling.cpp) until it
 misses the heartbeat, and then lowers s as fast as its joints' accelerations allow (time_scale.cpp). Over one segment of

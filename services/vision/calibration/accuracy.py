@@ -1,4 +1,4 @@
-"""Where an error of pointing comes from: lens, place of the camera, or the arm; by its pattern over the table.
+"""The cause of an error of pointing, by its pattern over the table: lens, place of the camera, or the arm.
 
 An arm is sent above tags that a camera has located, and a person says how far beside each it points. A camera that
 stands elsewhere than believed shifts or turns all of them alike, a lens or print of a wrong scale spreads them, a first

@@ -1,4 +1,4 @@
-"""How large a board is beside what is said of it, from views of an arm whose motions are known in metres."""
+"""The true size of a board against its stated one, from views of an arm whose motions are known in metres."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What views of a board can tell of where a camera stands, by the rank of their Jacobian; what they cannot, by name."""
+"""Determinacy of a camera's place by views of a board: the rank of their Jacobian, and what is undetermined by name."""
 
 from __future__ import annotations
 

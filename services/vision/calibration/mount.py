@@ -1,4 +1,4 @@
-"""Where a camera stands, from images of a board in several poses of the arm, by least squares on the reprojection.
+"""The pose of a camera from images of a board in several poses of the arm, by least squares on the reprojection.
 
 Hand-eye methods in closed form (`cv2.calibrateHandEye`) only give a start: they do not know the pixels, and none of
 them works for an arm that cannot tilt its tool.

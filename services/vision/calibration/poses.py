@@ -1,4 +1,4 @@
-"""Which configurations of an arm show where a camera stands: those from which the most is learned, within its sight.
+"""The choice of configurations for a camera's calibration: those within its sight that determine its pose best.
 
 Many poses of the board before the camera are drawn and brought as near as the joints allow; of those in which the
 camera would see it, each next one is that which tells most beside those before it (a D-optimal design, greedily). So

@@ -1,4 +1,4 @@
-"""Where a camera stands, from points of a printed board that the arm's tool has touched: for arms that cannot tilt."""
+"""The pose of a camera from points of a printed board that the arm's tool has touched: for arms that cannot tilt."""
 
 from __future__ import annotations
 

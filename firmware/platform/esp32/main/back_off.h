@@ -1,4 +1,4 @@
-// When to try again: soon at first, then ever more seldom.
+// The time of the next attempt: soon at first, then ever more seldom.
 #pragma once
 
 #include <stdint.h>

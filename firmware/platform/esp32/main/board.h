@@ -1,4 +1,4 @@
-// What the tasks share: rings between them, and a counter. Each ring has one writer and one reader.
+// Data that the tasks share: rings between them, and a counter. Each ring has one writer and one reader.
 #pragma once
 
 #include <stdint.h>

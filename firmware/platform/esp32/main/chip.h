@@ -1,4 +1,4 @@
-// What the pins of each chip can do: the GPIO summary of ESP-IDF 5.x and the chips' datasheets. Bit i is GPIO i.
+// The pins of each chip: the GPIO summary of ESP-IDF 5.x and the chips' datasheets. Bit i is GPIO i.
 #pragma once
 
 #include <stdint.h>

@@ -1,4 +1,4 @@
-// What the machine and the wire hand to the board: outputs to their rings, a configuration to be kept or checked.
+// Output of machine and wire to the board: messages to their rings, a configuration to be kept or checked.
 #include <string.h>
 
 #include "board.h"

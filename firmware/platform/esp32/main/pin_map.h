@@ -1,4 +1,4 @@
-// From the stepper's joints to the bits of the GPIO registers: tables, so that the tick only looks up.
+// Tables from the stepper's joints to the bits of the GPIO registers, so that the tick only looks up.
 #pragma once
 
 #include <stdint.h>

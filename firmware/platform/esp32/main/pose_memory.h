@@ -1,4 +1,4 @@
-// Where the joints are, kept in memory that survives a warm reset: no flash is written for it.
+// The joints' positions in memory that survives a warm reset: no flash is written for them.
 #pragma once
 
 #include <stdint.h>

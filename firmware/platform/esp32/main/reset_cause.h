@@ -1,4 +1,4 @@
-// Why the chip has started.
+// The cause of the chip's last reset.
 #pragma once
 
 namespace gemelo {

@@ -1,4 +1,4 @@
-// Who runs where. Pulses and the slot have one core for themselves where the chip has two; Wi-Fi is on the other.
+// The core of each task: pulses and the slot have one alone where the chip has two; Wi-Fi is on the other.
 #pragma once
 
 #include "esp_err.h"

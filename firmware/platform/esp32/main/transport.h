@@ -1,4 +1,4 @@
-// How the broker is reached: TCP, or TLS that proves whom it speaks to.
+// The transport to the broker: TCP, or TLS that proves whom it speaks to.
 #pragma once
 
 #include "esp_transport.h"

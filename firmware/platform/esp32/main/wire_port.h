@@ -1,4 +1,4 @@
-// What the serial wire's bytes go through: UART0, or with GEMELO_USB_WIRE the chip's own USB (USB-Serial-JTAG).
+// The port of the serial wire: UART0, or with GEMELO_USB_WIRE the chip's own USB (USB-Serial-JTAG).
 #pragma once
 
 #include <stddef.h>

@@ -1,4 +1,4 @@
-// What sdkconfig.defaults asks for, as far as the layer reads it. The compiler is told the chip:
+// The settings of sdkconfig.defaults, as far as the layer reads them. The compiler is told the chip:
 // -DCONFIG_IDF_TARGET_...
 #pragma once
 

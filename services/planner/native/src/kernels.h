@@ -1,4 +1,4 @@
-// Which build of the check this processor can run best.
+// The choice of the check's build that this processor runs best.
 #pragma once
 
 #include <string>

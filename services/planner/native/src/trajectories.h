@@ -1,4 +1,4 @@
-// What the module offers for trajectories: their timing, their samples and their step rates.
+// The module's functions for trajectories: their timing, their samples and their step rates.
 #pragma once
 
 #include <nanobind/nanobind.h>

@@ -1,4 +1,4 @@
-"""What of the commanded steps a sketch has been sent, and when it may be sent more. Pure.
+"""The sender of commanded steps to a sketch: what it has been sent, and the time of the next message. Pure.
 
 AccelStepper's move() counts from where the motor is, so a message that comes before the last one has ended discards
 what is left of that. So one message is under way at a time, and it is over when its time has passed and the sketch was

@@ -1,4 +1,4 @@
-// For a cross compiler that comes without a C library: what the core and the layer use of it.
+// The part of <string.h> that the core and the layer use, for a cross compiler without a C library.
 #pragma once
 
 #include <stddef.h>

@@ -1,4 +1,4 @@
-// What timing reads and writes, in doubles: limits of the joints, rows of joint states, and why there are none.
+// Data of the timing, in doubles: limits of the joints, rows of joint states, and the reasons for none.
 #pragma once
 
 #include <cmath>
