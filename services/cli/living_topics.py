@@ -8,17 +8,16 @@ from contextlib import contextmanager
 from typing import Any
 
 from schemas.errors import ConfigurationError
-from schemas.system import Empty, NodeStatistics, TopicInterface, TopicStatistics
-from schemas.topics import STATISTICS, TOPICS, Topic
+from schemas.system import Empty, TopicInterface
+from schemas.topics import TOPICS, Topic
 from services.cli.errors import unknown
-from services.cli.node import TIMEOUT, information_of, living
+from services.cli.node import TIMEOUT, living
 from services.cli.session import Session, connect
 from services.recordings.table import living_topic
 from services.runtime.deployment import load_deployment
 from services.runtime.endpoints import interfaces_request
 from services.runtime.errors import NoAnswer, Refused
 
-COUNTED_WITHIN = 1.3  # [s] every node tells its counters once a second
 KNOWN = {topic.key: topic for topic in TOPICS}
 
 
@@ -30,7 +29,7 @@ def known_topic(name: str) -> Topic[Any] | None:
 @contextmanager
 def connected(name: str) -> Iterator[tuple[Session, Topic[Any]]]:
     """Yields a session and the topic of that key; raises `CommandError` with the nearest key where there is none."""
-    if known_topic(name) is None and not _router_listens():  # nobody can say more than the table
+    if known_topic(name) is None and not router_listens():  # nobody can say more than the table
         raise unknown("topic", name, list(KNOWN))
     with connect() as session:
         yield session, topic_on(session, name)
@@ -38,13 +37,13 @@ def connected(name: str) -> Iterator[tuple[Session, Topic[Any]]]:
 
 def all_topics() -> list[Topic[Any]]:
     """Those of our table and, where a router is there, those of its living nodes."""
-    if not _router_listens():
+    if not router_listens():
         return list(TOPICS)
     with connect() as session:
         return [*TOPICS, *other_topics(session)]
 
 
-def _router_listens() -> bool:
+def router_listens() -> bool:
     """Loads nothing else, so that a table comes at once."""
     try:
         router = load_deployment().router
@@ -52,27 +51,6 @@ def _router_listens() -> bool:
     except (OSError, ConfigurationError):
         return False
     return True
-
-
-def ends(session: Session, key: str) -> dict[str, dict[str, str]]:
-    """The living nodes that write the topic and those that read it, with what they have heard and lost."""
-    counted: dict[str, NodeStatistics] = {}
-    session.node.subscribe(STATISTICS, lambda message: counted.update({message.node: message}))
-    session.node.wait(COUNTED_WITHIN)
-    writers: dict[str, str] = {}
-    readers: dict[str, str] = {}
-    for name in living(session):
-        info = information_of(session, name)
-        if key in info.publishes:
-            writers[name] = f"process {info.pid} on {info.host}"
-        if key in info.subscribes:
-            topics = counted[name].topics if name in counted else ()
-            readers[name] = next((_counters(each) for each in topics if each.key == key), "not heard yet")
-    return {"written_by": writers, "read_by": readers}
-
-
-def _counters(each: TopicStatistics) -> str:
-    return f"{each.received} received, {each.dropped} dropped, {each.bad} bad"
 
 
 def topic_on(session: Session, name: str) -> Topic[Any]:

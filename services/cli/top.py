@@ -77,6 +77,20 @@ class Figures(NamedTuple):
         return {each.key: (each.received - before.get(each.key, 0)) / self.seconds for each in self.now.topics}
 
 
+def figures_by_node(session: Session) -> dict[str, Figures]:
+    """Fills, as the nodes speak, with those that have spoken twice."""
+    newest: dict[str, NodeStatistics] = {}
+    figures: dict[str, Figures] = {}
+
+    def on_statistics(message: NodeStatistics) -> None:
+        if message.node in newest:
+            figures[message.node] = Figures(newest[message.node], message)
+        newest[message.node] = message
+
+    session.node.subscribe(STATISTICS, on_statistics)
+    return figures
+
+
 def add_options(parser: Parser) -> None:
     """Adds count and form."""
     count_options(parser, "reports")
@@ -99,13 +113,9 @@ def form_of_reports(options: Options) -> Form:
 
 def watch(session: Session, count: int | None, form: Form = str) -> ExitCode:
     """Prints `count` reports."""
-    reports: dict[str, list[NodeStatistics]] = {}
     infos: dict[str, NodeInfo] = {}
     node, printed, last = session.node, 0, session.node.monotonic() + FIRST - EVERY
-
-    def on_statistics(message: NodeStatistics) -> None:
-        kept = reports.setdefault(message.node, [])
-        kept[:] = [*kept[-1:], message]
+    heard = figures_by_node(session)
 
     def step(now: int) -> None:
         nonlocal printed, last
@@ -113,7 +123,7 @@ def watch(session: Session, count: int | None, form: Form = str) -> ExitCode:
             return
         last = node.monotonic()
         alive = {name for name in node.alive() if not name.startswith("cli-")}
-        figures = {name: Figures(*kept) for name, kept in sorted(reports.items()) if len(kept) == 2 and name in alive}
+        figures = {name: each for name, each in sorted(heard.items()) if name in alive}
         for name in figures:
             if name not in infos:
                 infos[name] = information_of(session, name)
@@ -122,7 +132,6 @@ def watch(session: Session, count: int | None, form: Form = str) -> ExitCode:
         if printed == count:
             node.stop()
 
-    node.subscribe(STATISTICS, on_statistics)
     node.spin(step, rate=10.0)
     return ExitCode.OK
 

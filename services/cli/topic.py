@@ -12,11 +12,12 @@ from schemas.topics import TOPICS, Topic
 from services.cli.errors import CommandError, ExitCode, unknown
 from services.cli.field_path import FieldPath
 from services.cli.forms import Form, count_options, form_of, form_options, print_value, yaml_document
-from services.cli.living_topics import all_topics, connected, ends, known_topic
+from services.cli.living_topics import all_topics, connected, known_topic, router_listens
 from services.cli.messages import dump, fields_of, message_of
 from services.cli.parser import Choices, Options, Parser, json_option, positive_integer, positive_number
 from services.cli.session import Session, connect
 from services.cli.text_table import table
+from services.cli.topic_ends import Ends, ends
 from services.recordings.table import LivingTopic
 
 if TYPE_CHECKING:
@@ -44,19 +45,18 @@ def topic_option(parser: Parser) -> None:
 
 
 def info_options(parser: Parser) -> None:
-    """Adds topic, --living and --json."""
+    """Adds topic and --json."""
     topic_option(parser)
     json_option(parser)
-    parser.add_argument("--living", action="store_true", help="also the nodes that write and read it now")
 
 
 def run_info(options: Options) -> ExitCode:
-    """Prints one topic."""
+    """Prints one topic; where a router listens, with the living nodes that write and read it."""
     known = known_topic(options.topic)
-    if known is not None and not options.living:
+    if known is not None and not router_listens():
         return print_value(about(known), options.json, lambda: information(known))
     with connected(options.topic) as (session, topic):
-        told = about(topic) | ends(session, topic.key)
+        told = with_ends(topic, ends(session, topic))
     return print_value(told, options.json, lambda: dump(told))
 
 
@@ -132,6 +132,11 @@ def about(topic: Topic[Message]) -> dict[str, object]:
     """One topic and the fields of its message, by their names."""
     fields = topic.fields if isinstance(topic, LivingTopic) else fields_of(topic.message)
     return {**head_of(topic), "fields": fields}
+
+
+def with_ends(topic: Topic[Message], living: Ends) -> dict[str, object]:
+    """As `about`, with the living nodes that write and read the topic."""
+    return {**about(topic), "written_by": living.written_by, "read_by": living.read_by}
 
 
 def head_of(topic: Topic[Message]) -> dict[str, object]:

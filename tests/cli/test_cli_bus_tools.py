@@ -6,7 +6,9 @@ import csv
 import io
 import json
 import math
+import os
 import re
+import socket
 import threading
 import tomllib
 import xml.etree.ElementTree as ET
@@ -30,7 +32,18 @@ from schemas.message import Message
 from schemas.system import NodeStatistics, TopicStatistics
 from schemas.topics import DEVICE_STOP, FOLLOW_JOINT_TRAJECTORY, FRAMES, JOINT_STATES, STATIC_FRAMES, Delivery, Topic
 from services.arm.frames.transforms import from_rpy, to_rpy
-from services.cli import action_watch, interface, living_topics, node_parameters, request, tf, top, topic, topic_rates
+from services.cli import (
+    action_watch,
+    interface,
+    living_topics,
+    node_parameters,
+    request,
+    tf,
+    top,
+    topic,
+    topic_ends,
+    topic_rates,
+)
 from services.cli.errors import CommandError, ExitCode
 from services.cli.field_path import FieldPath, leaves
 from services.cli.forms import csv_lines, json_line, yaml_document
@@ -121,13 +134,34 @@ def test_a_topic_of_nobody_is_answered_with_the_nearest_of_all(session, diver):
         living_topics.topic_on(session, "sona")
 
 
-def test_who_writes_and_reads_a_topic_is_named_with_what_was_lost(session, stack, deployment, network):
+def test_who_writes_and_reads_a_topic_is_named_with_rates(session, stack, deployment, network):
     with Node("reader", deployment, robot="rm1", bus=MemoryBus(network)) as node:
         node.subscribe(JOINT_STATES, lambda state: None)
         with spinning(node):
-            told = living_topics.ends(session, "joint_states")
-    assert "process" in told["written_by"]["stepper_gateway"]
-    assert re.fullmatch(r"\d+ received, 0 dropped, 0 bad", told["read_by"]["reader"])
+            told = topic_ends.ends(session, JOINT_STATES)
+    (writer,) = told.written_by.items()
+    assert writer[0] == "stepper_gateway"
+    assert writer[1].process == f"{os.getpid()} on {socket.gethostname()}"
+    assert 25.0 < writer[1].rate_hz < 100.0
+    reader = told.read_by["reader"]
+    assert reader.rate_hz is not None
+    assert 25.0 < reader.rate_hz < 100.0
+    assert reader.received is not None
+    assert reader.received > 50
+    assert (reader.lost, reader.bad) == (0, 0)
+
+
+def test_what_a_reader_has_lost_is_said(session, diver, deployment, network):
+    with Node("sleeper", deployment, robot="rm1", bus=MemoryBus(network)) as node:
+        node.subscribe(SONAR, lambda message: threading.Event().wait(0.2))  # four of five are overrun by newer ones
+        with spinning(node):
+            told = topic_ends.ends(session, living_topics.topic_on(session, "sonar"))
+    assert 10.0 < told.written_by["diver"].rate_hz < 40.0
+    reader = told.read_by["sleeper"]
+    assert reader.rate_hz is not None
+    assert 1.0 < reader.rate_hz < 8.0
+    assert reader.lost is not None
+    assert reader.lost > 10
 
 
 @pytest.mark.parametrize(

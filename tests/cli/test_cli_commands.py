@@ -51,7 +51,7 @@ def test_every_topic_is_listed_with_its_unit_of_rate(capsys):
 
 
 @pytest.mark.parametrize("topic", [topic.key for topic in TOPICS])
-def test_topic_info_is_yaml_with_every_field(topic, capsys):
+def test_topic_info_is_yaml_with_every_field(topic, no_stack, capsys):
     assert run(["topic", "info", topic]) is ExitCode.OK
     shown = yaml.safe_load(capsys.readouterr().out)
     assert list(shown["fields"]) == list(topic_of(topic).message.__struct_fields__)

@@ -93,6 +93,13 @@ def test_rates_sizes_and_delays_are_numbers(talking, capsys, word, field, least,
     assert least <= float(rows[1][heading.index(field)]) <= most
 
 
+def test_the_writer_and_the_readers_of_a_topic_are_json(talking, capsys):
+    told = from_json(capsys, "topic", "info", "joint_states")
+    assert told["read_by"] == {}
+    assert 25.0 < told["written_by"]["state_publisher"]["rate_hz"] < 100.0
+    assert "position" in told["fields"]
+
+
 def test_poses_are_json_csv_and_single_fields(talking, capsys):
     pose = from_json(capsys, "tf", "echo", "base", "hand <1>", "--once")
     assert pose["transform"]["translation"] == pytest.approx([0.1, 0.05, 0.2])
