@@ -25,8 +25,9 @@ NotifyAccess=all
 User={user}
 {environment}
 ExecStart={command}
-# Ready when its state is valid, however long that takes: a board may be off. From then on its loop feeds the watchdog.
-TimeoutStartSec=infinity
+# Ready when its state is valid, however long that takes: a board may be off. Until then its loop extends the start
+# (EXTEND_TIMEOUT_USEC), from then on it feeds the watchdog: one that freezes is started again.
+TimeoutStartSec=90
 WatchdogSec=5
 Restart=always
 RestartSec=1

@@ -25,6 +25,7 @@ from services.panel.view.world import World
 from services.runtime.deployment import DeploymentError, exposure, load_deployment
 from services.runtime.process.logs import LEVELS, line_logger
 from services.runtime.process.ports import PortTaken, require_free
+from services.runtime.process.readiness import tell_alive
 from services.runtime.process.shutdown import ShutdownRequest, end_soon, end_with_any_thread, stop_on_signals
 
 NAME = "panel"
@@ -134,6 +135,7 @@ def _connected(config: Path | None, log: logging.Logger, stop: ShutdownRequest) 
     """The arm, as soon as its gateway is there; None if the process is to end before."""
     told = ""
     while not stop.is_set:
+        tell_alive()
         try:
             arm = gemelo.connect(deployment=config, name=NAME, timeout=LOOK_FOR_TWIN)
             arm.control.shares = False  # the page is for whoever opens it, not for whose process it is

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from services.mqtt import secure_folder
+from services.runtime.process.readiness import ALIVE
 from tests.optional import need
 from tests.runtime.support import ROOT, free_port, until
 
@@ -61,7 +62,7 @@ def test_one_that_stands_still_is_silent_and_one_that_goes_on_beats_again(
     broker: subprocess.Popen[str], systemd: socket.socket, tmp_path: Path
 ) -> None:
     ready = tmp_path / "run/broker.ready"
-    while systemd.recv(100) != b"WATCHDOG=1":  # mosquitto itself says READY=1 too
+    while systemd.recv(100) != ALIVE.encode():  # mosquitto itself says READY=1 too
         pass
     broker.send_signal(signal.SIGSTOP)
     heard(systemd, 1.0)  # what was under way
@@ -70,11 +71,11 @@ def test_one_that_stands_still_is_silent_and_one_that_goes_on_beats_again(
     assert ready.stat().st_mtime == before
     broker.send_signal(signal.SIGCONT)
     assert until(lambda: ready.stat().st_mtime > before, 5.0)
-    assert b"WATCHDOG=1" in heard(systemd, 1.5)
+    assert ALIVE.encode() in heard(systemd, 1.5)
 
 
 def test_being_asked_every_second_is_not_logged(broker: subprocess.Popen[str], systemd: socket.socket) -> None:
-    assert heard(systemd, 4.5).count(b"WATCHDOG=1") >= 3
+    assert heard(systemd, 4.5).count(ALIVE.encode()) >= 3
     broker.terminate()
     output = broker.communicate(timeout=10)[0]
     warned = "should not be run as root" in output

@@ -14,6 +14,8 @@ import pytest
 from bed_firmware import Bed, wait_for
 from bench_firmware import FIRST, LAST, seal, traj
 
+from services.runtime.process.readiness import ALIVE
+
 
 def test_the_device_answers_moves_and_leaves_in_order(bed: Bed):
     bed.start_device()
@@ -49,7 +51,7 @@ def test_without_a_broker_a_device_is_not_ready_and_feeds_the_watchdog(
         wait_for(lambda: not (bed.folder / "run/virtual_esp32.ready").exists(), "its readiness to be taken back")
         while systemd.recv(100) != b"STATUS=not ready":
             pass
-        assert [systemd.recv(100) for _ in range(3)] == [b"WATCHDOG=1"] * 3
+        assert [systemd.recv(100) for _ in range(3)] == [ALIVE.encode()] * 3
 
 
 def test_a_device_that_is_killed_while_moving_wakes_up_unreferenced(bed: Bed):

@@ -20,6 +20,7 @@ from services.hosts.layout import processes, robots
 from services.hosts.render import rendered
 from services.hosts.site_file import SiteError
 from services.runtime.deployment import load_deployment, project_root
+from services.runtime.process.readiness import GOES_ON
 from tests.hosts.sites import changed, escaped, site
 
 NASTY = (
@@ -196,7 +197,7 @@ def test_the_example_is_rendered_hardened_and_readable(tmp_path):
     require_readable(lab, tmp_path)
     unit = directives(rendered(lab, "cell")["systemd/gemelo-rm1-stepper_gateway.service"])
     wanted = """NoNewPrivileges=yes User=gemelo ProtectSystem=strict CapabilityBoundingSet= Type=notify WatchdogSec=5
-        Restart=always MemoryMax=512M PrivateDevices=yes"""
+        Restart=always MemoryMax=512M TasksMax=256 LimitNOFILE=4096 LimitCORE=0 UMask=0077 PrivateDevices=yes"""
     for directive in wanted.split():
         assert tuple(directive.split("=", 1)) in [(key, value) for _, key, value in unit]
     files = rendered(lab, "brain")
@@ -215,6 +216,16 @@ def test_a_service_is_started_again_however_often_and_nobody_waits_until_all_are
             assert ("Unit", "StartLimitIntervalSec", "0") in directives(text)
     # Else a target comes after all that it wants, and neither a boot nor `systemctl enable --now` ends before it.
     assert ("Unit", "DefaultDependencies", "no") in directives(files["systemd/gemelo.target"])
+
+
+def test_a_start_may_last_as_long_as_it_is_said_to_go_on_and_no_longer(tmp_path):
+    lab = site(tmp_path)
+    for host in lab.hosts:
+        for name, text in rendered(lab, host).items():
+            if name.endswith(".service"):
+                unit = directives(text)
+                assert int(*values(unit, "TimeoutStartSec")) > 0  # `infinity` would wait for one that is frozen too
+                assert values(unit, "WatchdogSec") == [str(GOES_ON)]
 
 
 def test_only_a_gateway_on_a_serial_line_sees_devices_also_those_plugged_in_later(tmp_path):

@@ -17,6 +17,7 @@ from services.runtime.process.readiness import Readiness, notify
 from tests.runtime.support import ROOT, free_port
 
 BEAT = 1.0  # [s]
+ALIVE = b"WATCHDOG=1\nEXTEND_TIMEOUT_USEC=5000000"
 
 
 @pytest.fixture
@@ -33,14 +34,37 @@ def test_a_router_is_ready_beats_and_falls_silent_when_it_is_frozen(systemd, tmp
     process = subprocess.Popen([sys.executable, "-m", "services.runtime.router"], cwd=ROOT, env=environ)
     try:
         assert systemd.recv(100) == b"READY=1\nSTATUS=ready"
-        assert systemd.recv(100) == b"WATCHDOG=1"
-        process.send_signal(signal.SIGSTOP)
-        systemd.settimeout(2.5 * BEAT)
-        with pytest.raises(TimeoutError):
-            list(iter(partial(systemd.recv, 100), b""))
+        assert systemd.recv(100) == ALIVE
+        require_silence_of_a_frozen(process, systemd)
     finally:
         process.kill()
         process.wait()
+
+
+@pytest.mark.parametrize("module", ["services.state_publisher.main", "services.panel.main"])
+def test_a_process_that_waits_for_the_router_goes_on_with_its_start_and_falls_silent_when_it_is_frozen(
+    systemd, tmp_path, module
+):
+    """What it waits for may never come: only by its word does systemd know that from a start that hangs."""
+    environ = os.environ | {
+        "GEMELO_ROUTER_PORT": str(free_port()), "GEMELO_PATHS_RUN": str(tmp_path / "run"),
+        "GEMELO_PANEL_PORT": str(free_port()),
+    }  # fmt: skip
+    process = subprocess.Popen([sys.executable, "-m", module], cwd=ROOT, env=environ)
+    try:
+        systemd.settimeout(90.0)  # as long as a start may take without a word
+        assert [systemd.recv(100) for _ in range(3)] == [ALIVE] * 3
+        require_silence_of_a_frozen(process, systemd)
+    finally:
+        process.kill()
+        process.wait()
+
+
+def require_silence_of_a_frozen(process: subprocess.Popen[bytes], systemd: socket.socket) -> None:
+    process.send_signal(signal.SIGSTOP)
+    systemd.settimeout(2.5 * BEAT)
+    with pytest.raises(TimeoutError):
+        list(iter(partial(systemd.recv, 100), b""))
 
 
 def test_a_process_that_is_not_ready_any_more_still_feeds_the_watchdog(systemd, tmp_path):
@@ -50,7 +74,7 @@ def test_a_process_that_is_not_ready_any_more_still_feeds_the_watchdog(systemd, 
     readiness.not_ready()
     readiness.beat()
     said = [systemd.recv(100) for _ in range(4)]
-    assert said == [b"WATCHDOG=1", b"READY=1\nSTATUS=ready", b"STATUS=not ready", b"WATCHDOG=1"]
+    assert said == [ALIVE, b"READY=1\nSTATUS=ready", b"STATUS=not ready", ALIVE]
 
 
 def test_without_systemd_or_when_it_is_gone_nothing_is_said_and_nothing_fails(tmp_path, monkeypatch):

@@ -12,6 +12,7 @@ from schemas.deployment import RouterSection
 from services.credentials.private_files import require_private
 from services.runtime.bus.interface import Bus
 from services.runtime.errors import BusError
+from services.runtime.process.readiness import tell_alive
 from services.runtime.process.shutdown import ShutdownRequest
 
 RETRY_PERIOD = 0.1  # [s]
@@ -27,6 +28,7 @@ def connect(router: RouterSection, robot: str, log: logging.Logger, stop: Shutdo
     is_said = False
     started = time.monotonic()
     while not stop.is_set:
+        tell_alive()
         if router_answers(router.host, router.port):
             try:
                 bus = ZenohBus(router, robot)

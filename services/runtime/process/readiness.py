@@ -1,7 +1,8 @@
 """`<run>/<name>.ready`: the file by which a process says that its state is valid; `<name>.problem` says why it is not.
 
 Both are read by deploy/probe. Under systemd it is told too (sd_notify(3)): ready with the first valid state, and alive
-with every beat, so that a process whose loop stands still is started anew, and one whose board is off is not.
+with every beat, so that a process whose loop stands still is started anew, and one whose board is off is not. That
+also holds before the first valid state: a start may take as long as it is said to go on.
 """
 
 from __future__ import annotations
@@ -10,6 +11,9 @@ import contextlib
 import os
 import socket
 from pathlib import Path
+
+GOES_ON = 5  # [s] that the word for being alive counts
+ALIVE = f"WATCHDOG=1\nEXTEND_TIMEOUT_USEC={GOES_ON}000000"
 
 
 class Readiness:
@@ -45,7 +49,7 @@ class Readiness:
 
     def beat(self) -> None:
         """Call once a second, ready or not."""
-        notify("WATCHDOG=1")
+        tell_alive()
         if not self._is_ready:
             return
         try:
@@ -72,6 +76,11 @@ class Readiness:
 def _remove(file: Path) -> None:
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         file.unlink()
+
+
+def tell_alive() -> None:
+    """Tells systemd that this process is at work, and goes on with its start if it was not ready yet."""
+    notify(ALIVE)
 
 
 def notify(state: str) -> None:
