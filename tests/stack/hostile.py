@@ -25,13 +25,14 @@ from services.runtime.permissions import permissions
 
 RATE = 10_000  # [1/s]
 BURST = 0.005  # [s]
+SIZE = 200  # [bytes] of a message, at the least
 OWN, FOREIGN = LOG.key, (JOINT_TARGETS.key, JOINT_STATES.key)
 ASKED = (FK.key, PLAN.key, goal_request(FOLLOW_JOINT_TRAJECTORY).key)  # of which it may ask the first
 NOTHING = zenoh.handlers.Callback(lambda reply: None, lambda: None, indirect=False)
 
 
 def flood(session: zenoh.Session) -> None:
-    payload = b"x" * 200 + str(GOAL.goal_id).encode()
+    payload = b"x" * SIZE + str(GOAL.goal_id).encode()
     puts: list[Callable[[], object]] = [partial(session.put, key, payload) for key in (OWN, *FOREIGN, OWN)]
     asks: list[Callable[[], object]] = [
         partial(session.get, key, NOTHING, payload=payload, timeout=0.5) for key in ASKED

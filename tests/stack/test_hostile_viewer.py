@@ -5,16 +5,20 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from statistics import median
 
 import pytest
 
 from services.runtime.deployment import project_root
 from tests.optional import need, need_root
+from tests.stack.hostile import RATE, SIZE
 from tests.stack.links import Links
 
-STOP_GOAL = 100.0  # [ms] said, not asserted: other things run on the machine
+STOP_GOAL = 100.0  # [ms] of the median
+STOPS = 3
 
 
 @pytest.fixture(scope="module")
@@ -45,21 +49,35 @@ def require_exact_and_stoppable(links: Links, capsys) -> None:
     came, faults = links.watched("move")
     assert (came["status"], came["is_exact"], faults) == ("SUCCEEDED", True, []), came
     assert came["positions_afterwards"] == 1
-    came, faults = links.watched("stop")
-    assert (came["status"], came["stopped"], faults) == ("ABORTED", True, []), came
+    answered = []
+    for _ in range(STOPS):
+        came, faults = links.watched("stop")
+        assert (came["status"], came["stopped"], faults) == ("ABORTED", True, []), came
+        answered.append(came["stop_ms"])
     with capsys.disabled():
-        print(f" stop answered after {came['stop_ms']:.1f} ms (goal {STOP_GOAL:g})", end="")
+        print(f" stop answered after {', '.join(f'{each:.1f}' for each in answered)} ms (goal {STOP_GOAL:g})", end="")
+    assert median(answered) < STOP_GOAL
 
 
 def test_ten_thousand_messages_a_second_of_a_viewer_neither_move_nor_disturb_the_arm(links, capsys):
     with hostile(links, "flood") as process:
+        before, began = sent_by_the_desk(links), time.monotonic()
         require_exact_and_stoppable(links, capsys)
+        left, seconds = sent_by_the_desk(links) - before, time.monotonic() - began
         process.kill()
         sent = [int(line) for line in process.stdout]
-    seconds = len(sent)
-    assert seconds > 5
+    rate, on_the_wire = sent[-1] / (len(sent) + 1), left / seconds / SIZE
     with capsys.disabled():
-        print(f", {sent[-1] / (seconds + 1):.0f} messages a second", end="")
+        print(f", {rate:.0f} messages a second, {on_the_wire:.0f} of them left the host", end="")
+    assert len(sent) > 5
+    assert rate > 0.95 * RATE
+    assert on_the_wire > 0.95 * RATE
+
+
+def sent_by_the_desk(links: Links) -> int:
+    """[bytes] that its network device has sent so far."""
+    file = "/sys/class/net/eth0/statistics/tx_bytes"
+    return int(subprocess.run(links.hosts.command("desk", "cat", file), capture_output=True, check=True).stdout)
 
 
 @pytest.mark.parametrize("frozen", [False, True], ids=["stalled", "frozen"])
