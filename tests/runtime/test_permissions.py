@@ -5,22 +5,28 @@ from __future__ import annotations
 import threading
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from contextlib import closing, suppress
 from functools import partial
 from itertools import product
 
+import msgspec
 import pytest
 import zenoh
 
-from schemas.deployment import RouterSection
+from schemas.deployment import Deployment, PathsSection, RouterSection
 from schemas.message import Message
 from schemas.roles import ROLES, role
-from schemas.topics import DEVICE_EVENTS, DEVICE_STATUS, TOPICS, Delivery, Topic
+from schemas.system import Parameter, SetParameter
+from schemas.topics import DEVICE_EVENTS, DEVICE_STATUS, TOPICS, Delivery, Request, Topic
 from services.runtime.bus.zenoh_bus import ZenohBus
 from services.runtime.bus.zenoh_config import client_config
+from services.runtime.errors import NoAnswer
+from services.runtime.node import Node
 from services.runtime.permissions import ABOUT, SET, Permissions, permissions
+from services.runtime.requests import client as requests
 from services.runtime.robots import robots_on
 from tests.runtime.locks import Lock, LockedRouter, sessions
-from tests.runtime.support import RouterProcess, until
+from tests.runtime.support import RouterProcess, spinning, until
 
 MAY: dict[str, Permissions] = {each.name: permissions(each) for each in ROLES}
 NAMES = tuple(MAY)
@@ -292,13 +298,39 @@ def under(section: RouterSection, identity: str) -> zenoh.Config:
     return config
 
 
-def test_parameters_are_set_by_the_operator_alone_and_read_by_all(locked):
+def test_parameters_are_set_by_everybody_where_the_lock_is_open_and_behind_it_by_the_operator(locked, unlocked):
     keys = tuple(f"@node/planner/{each}" for each in (*ABOUT, SET))
+    assert answered(unlocked, keys) == dict.fromkeys(keys, all_pairs())
     pairs = answered(locked, keys)
     assert {client for server, client in pairs[f"@node/planner/{SET}"]} == {"operator"}
     assert all({server for server, _ in pairs[key]} == {"planner"} for key in keys)
     for each in ABOUT:
         assert {client for _, client in pairs[f"@node/planner/{each}"]} == set(NAMES) - {"planner"}
+
+
+class Planning(msgspec.Struct, frozen=True, kw_only=True):
+    planning_time: float = 5.0
+
+
+def test_a_viewer_changes_a_running_nodes_parameter_only_where_the_lock_is_open(lock, tmp_path):
+    def changed_by(router: RouterProcess, sections: dict[str, RouterSection], who: str) -> bool:
+        deployment = Deployment(paths=PathsSection(run=str(tmp_path), out=str(tmp_path)))
+        set_one = Request(f"@node/planner/{SET}", SetParameter, Parameter, "planner", "")
+        planner = Node("planner", deployment, robot="rm1", bus=ZenohBus(sections["planner"], "rm1"))
+        client = ZenohBus(sections[who], "rm1")
+        parameters = planner.parameters(Planning)
+        with planner, closing(client), spinning(planner), suppress(NoAnswer):
+            requests.call(client, set_one, SetParameter(name="planning_time", value=0.1), timeout=2.0)
+        return parameters.value.planning_time == 0.1
+
+    locked, unlocked = LockedRouter(tmp_path / "locked", lock), RouterProcess(tmp_path / "open")
+    names = ("planner", "viewer", "operator")
+    behind = {name: locked.section(name) for name in names}
+    assert changed_by(unlocked, dict.fromkeys(names, unlocked.deployment.router), "viewer")
+    assert not changed_by(locked, behind, "viewer")
+    assert changed_by(locked, behind, "operator")
+    locked.stop()
+    unlocked.stop()
 
 
 def test_a_late_joiner_gets_what_is_latched_behind_the_lock_and_what_it_missed_of_every_message(lock, tmp_path):
