@@ -21,7 +21,7 @@ Corner = tuple[float, float, float]
 
 
 def tube(radius: float, length: float) -> bytes:
-    """A binary STL of a closed tube along z [mm]."""
+    """A binary STL of a closed tube along z, of `radius` and `length` [mm]."""
     ring = [(radius * math.cos(math.tau * k / SIDES), radius * math.sin(math.tau * k / SIDES)) for k in range(SIDES)]
     triangles: list[tuple[Corner, Corner, Corner]] = []
     for (ax, ay), (bx, by) in zip(ring, [*ring[1:], ring[0]], strict=True):

@@ -257,7 +257,7 @@ class Arm:
         return self._session.newest(STOPPING_DISTANCE)
 
     def require(self, *, confidence: float = 0.95) -> None:
-        """Refuses below this confidence that no step is lost: now, and from now on before every motion of this `Arm`.
+        """Refuses below this confidence (a share) that no step is lost: now and before each later motion of this `Arm`.
 
         Raises `Refused` with the joint in doubt, value, limit and remedy. 0 ends it; `home` and `verify` are exempt.
 
@@ -272,7 +272,7 @@ class Arm:
 
     @property
     def sensors(self) -> dict[str, float]:
-        """The readings of robot.toml's sensors, by name, in their units.
+        """The readings of robot.toml's sensors, by name, each in the unit that robot.toml gives it.
 
         >>> arm.device.inject("sensor", "ultra", 0.25)
         >>> "ultra" in arm.sensors

@@ -125,7 +125,7 @@ def named_joints(arm: Description, joints: Joints, owner: str) -> dict[str, floa
 
 
 def number(owner: str, value: float) -> float:
-    """A finite number, in the unit of its owner; raises `BadArgument`."""
+    """`value` as a finite number, in the unit of its owner; raises `BadArgument`."""
     try:
         found = float(value)
     except (TypeError, ValueError):
@@ -136,7 +136,7 @@ def number(owner: str, value: float) -> float:
 
 
 def vector(owner: str, values: Iterable[float], size: int, what: str) -> tuple[float, ...]:
-    """`size` finite numbers, in the unit of their owner; raises `BadArgument`."""
+    """`values` as `size` finite numbers, in the unit of their owner; raises `BadArgument`."""
     try:
         found = tuple(values)
     except TypeError:

@@ -49,7 +49,7 @@ class Pose(NamedTuple):
         return cls(position, from_rpy(roll, pitch, yaw))
 
     def offset(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
-        """The pose moved by so many metres along the axes of the frame that it is given in; turned as before.
+        """The pose moved by `x`, `y`, `z` [m] along the axes of the frame that it is given in; turned as before.
 
         >>> gemelo.Pose((0.25, 0.0, 0.25)).offset(z=0.5).position
         (0.25, 0.0, 0.75)

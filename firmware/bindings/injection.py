@@ -89,7 +89,7 @@ def _choice(request: InjectRequest, choices: dict[int, bool | None]) -> bool | N
 
 
 def within(request: InjectRequest, most: float, least: float = 0.0) -> float:
-    """The value in [unit] of its kind, if it is within these bounds; raises InjectRefused."""
+    """The value, in the unit of its kind, if it is from `least` to `most`; raises InjectRefused."""
     if not least <= request.value <= most:
         raise InjectRefused(f"{request.kind}: the value {request.value:g} is not {least:g} to {most:g}")
     return request.value

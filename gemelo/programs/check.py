@@ -45,7 +45,7 @@ class CheckedLeg:
 
     @property
     def tightest(self) -> tuple[str, float]:
-        """The joint with the smallest margin, and the margin; ("", 1.0) where nothing moves."""
+        """The joint with the smallest margin, and the margin as a share of its limit; ("", 1.0) where nothing moves."""
         return min(self.margins.items(), key=lambda each: each[1], default=("", 1.0))
 
 

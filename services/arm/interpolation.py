@@ -78,7 +78,8 @@ def cubic(p0: float, v0: float, p1: float, v1: float, dt: float) -> Coefficients
 def quintic(p0: float, v0: float, a0: float, p1: float, v1: float, a1: float, dt: float) -> Coefficients:
     """The quintic polynomial, after subtracting the parabola of the first end (the same section).
 
-    As `cubic`, with accelerations [rad/s^2] or [m/s^2].
+    Positions `p0`, `p1` [rad] or [m], velocities `v0`, `v1` [rad/s] or [m/s], accelerations `a0`, `a1` [rad/s^2] or
+    [m/s^2], `dt` [s]; coefficients as of `cubic`.
     """
     rise = p1 - p0 - (v0 + 0.5 * a0 * dt) * dt
     climb = (v1 - v0 - a0 * dt) * dt

@@ -34,7 +34,7 @@ class Goal(msgspec.Struct, frozen=True, kw_only=True):
     p99: float | None = None
 
     def is_met(self, median: float, p99: float) -> bool:
-        """True if neither bound is exceeded; both values are in the figure's unit."""
+        """True if neither bound is exceeded; `median` and `p99` are in the figure's unit."""
         return median <= _or_infinity(self.median) and p99 <= _or_infinity(self.p99)
 
     def __str__(self) -> str:

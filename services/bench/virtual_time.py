@@ -115,7 +115,7 @@ def hold_reaction_ms() -> Figure:
 
 
 def reaction(silent_at: float, seed: int) -> tuple[float, float]:
-    """Times [ms] from the last heartbeat until the device slows down, and until it stands."""
+    """Times [ms] from the last heartbeat, at `silent_at` [s], until the device slows down, and until it stands."""
     arm = rm1()
     world = VirtualArm(tcp_wire(), seed, arm=arm)
     world.run(1.0)

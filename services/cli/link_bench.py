@@ -70,7 +70,7 @@ def run(options: Options) -> ExitCode:
 def measure(
     session: Session, rate: float, count: int, swing: Callable[[float], None]
 ) -> tuple[list[float | None], float]:
-    """Round trips [s], None for a lost one, and what all of them took [s]; Ctrl-C ends it early."""
+    """Round trips [s] at `rate` [1/s], None for a lost one, and what all of them took [s]; Ctrl-C ends it early."""
     node, trips = session.node, list[float | None]()
     began = node.monotonic()
     try:

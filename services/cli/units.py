@@ -129,7 +129,7 @@ def show(value: float, unit: str, digits: int = 3) -> str:
 
 
 def argument(parse: Callable[[str], float]) -> Callable[[str], float]:
-    """`parse`, from text to a value in SI units, as the type of an argument of argparse, which names the argument
+    """`parse`, from text to a value in its SI unit, as the type of an argument of argparse, which names the argument
     itself."""
 
     def parsed(text: str) -> float:

@@ -75,6 +75,6 @@ def positions_at(arm: Arm, shares: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def tool_at(arm: Arm, positions: tuple[float, ...]) -> tuple[float, ...]:
-    """Position [m] of the tool in the base frame at these joint values."""
+    """Position (3,) [m] of the tool in the base frame at `positions` (n,) [rad] or [m]."""
     links = link_transforms(arm.model, dict(zip(arm.joint_names, positions, strict=True)))
     return tuple(compose(inverse(links[arm.base_frame]), links[arm.tool_frame])[0])

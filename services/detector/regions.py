@@ -95,5 +95,5 @@ def is_known(region: Mask, window: Window, found: Sequence[Detection]) -> bool:
 
 
 def rows_of(points: Array) -> tuple[tuple[float, ...], ...]:
-    """Pixels (n, 2) as a message has them."""
+    """Pixels (n, 2) [px] as a message has them: n rows of two."""
     return tuple(tuple(float(value) for value in row) for row in points)

@@ -118,7 +118,7 @@ def driven_toml(drives: Sequence[JointDrive], device: str, reference: Mapping[st
 
 
 def bare_toml(joints: Sequence[UrdfJoint], reference: Mapping[str, float]) -> str:
-    """[[joint]] of an arm without motors: speeds that a person may change."""
+    """[[joint]] of an arm without motors: speeds that a person may change; `reference` [rad] or [m] by joint."""
     blocks = ["# Without motors: to plan and look at only. docs/my_own_arm.md says what to add for a real arm.\n"]
     for joint in joints:
         speed = ""  # a sliding joint's is its URDF's

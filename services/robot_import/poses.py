@@ -59,7 +59,7 @@ def named_states(arm: Arm) -> dict[str, dict[str, float]]:
 
 
 def states_around(center: Array, lower: Array, upper: Array) -> Iterator[Array]:
-    """(n,) the center, then random ones that lie farther and farther away."""
+    """(n,) [rad] or [m] `center`, then random ones between `lower` and `upper` that lie farther and farther away."""
     random, (least, most) = np.random.default_rng(SEED), _inside(lower, upper)
     for number in range(TRIES):
         reach = number / TRIES * (upper - lower)

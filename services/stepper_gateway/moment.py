@@ -22,5 +22,5 @@ class Moment(NamedTuple):
 
 
 def next_beat(due: float, now: float, period: float) -> float:
-    """The next beat [s] of a steady rhythm, or of a new rhythm after a pause."""
+    """The beat [s] after that of `due` [s] in a steady rhythm of `period` [s], or of a new rhythm after a pause."""
     return due + period if now - due < period else now + period

@@ -178,7 +178,7 @@ def tag_squares(number: int, family: TagFamily, left: float, lower: float, size:
 
 
 def picture(squares: Sequence[Square], size: tuple[float, float], margin: float, dots_per_metre: float) -> GreyImage:
-    """The board as an image with a white margin [m], for a screen or a test."""
+    """The board of `size` as an image with a white `margin`, both [m], for a screen or a test."""
     width, height = (round((edge + 2.0 * margin) * dots_per_metre) for edge in size)
     image = np.full((height, width), 255, np.uint8)
     for left, lower, edge in squares:

@@ -85,7 +85,7 @@ def region_centre(region: Mask, model: CameraModel, camera_from_plane: Array, he
 
 
 def raised(camera_from_plane: Array, height: float) -> Array:
-    """The plane moved by `height` [m] along its normal."""
+    """The plane (4, 4) moved by `height` [m] along its normal."""
     return camera_from_plane @ rigid(np.zeros(3), np.array([0.0, 0.0, height]))
 
 
@@ -194,7 +194,7 @@ def _seed(region: Mask, model: CameraModel, camera_from_plane: Array, size: Sequ
 
 
 def project_box(values: Array, model: CameraModel, camera_from_plane: Array, size: Sequence[float]) -> Array:
-    """The pixels (8, 2) of the box's corners."""
+    """(8, 2) [px] of the corners of a box of edges `size` (3,) [m] that stands on the plane at `values` (3,)."""
     return np.asarray(project_boxes(values[None], model, camera_from_plane, size)[0], dtype=np.float64)
 
 

@@ -86,8 +86,9 @@ def find_steps(image: Brightness, points: Array, normals: Array, reach: Array) -
 
 
 def measure_steps(image: Brightness, points: Array, normals: Array, reach: Array) -> Steps:
-    """The same for points within half a pixel: a blurred step is fitted to the mean profile of each edge, and each
-    profile is shifted by least squares against it (a matched filter): little depends on what lies farther off."""
+    """As `find_steps`, for `points` (edges, m, 2), `normals` and `reach` (edges, 2) [px] within half a pixel of the
+    edge: a blurred step is fitted to the mean profile of each edge, and each profile is shifted against it by least
+    squares (a matched filter): little depends on what lies farther off."""
     along, values = _profiles(image, points, normals, reach)
     fits = _fit_steps(values.mean(axis=1), along)
     near, contrast, shift, spread = (fits[:, index, None] for index in range(4))
@@ -135,7 +136,8 @@ def _fit_steps(means: Array, along: Array) -> Array:
 
 
 def normal_distribution(x: Array) -> tuple[Array, Array]:
-    """The normal distribution function, to 1e-7 (Abramowitz and Stegun 26.2.17), and its density."""
+    """The normal distribution function of `x`, dimensionless, to 1e-7 (Abramowitz and Stegun 26.2.17), and its
+    density."""
     density = np.exp(x * x * -0.5)
     density *= 1.0 / ROOT_TAU
     t = 1.0 / (1.0 + 0.2316419 * np.abs(x))

@@ -42,18 +42,18 @@ def step(vector: Array) -> Array:
 
 
 def inverse(matrix: Array) -> Array:
-    """b_T_a (4, 4) of a_T_b."""
+    """b_T_a (4, 4) of the `matrix` a_T_b (4, 4)."""
     back = matrix[:3, :3].T
     return rigid(back, -back @ matrix[:3, 3])
 
 
 def apply(matrix: Array, points: Array) -> Array:
-    """Points (n, 3) in the outer frame."""
+    """`points` (n, 3) of the inner frame in the outer frame of `matrix` (4, 4)."""
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def angle_between(first: Array, second: Array) -> float:
-    """The angle between two rotations (3, 3) or transforms (4, 4)."""
+    """[rad] between two rotations (3, 3) or transforms (4, 4)."""
     return float(np.linalg.norm(turn_vector(first[:3, :3].T @ second[:3, :3])))
 
 

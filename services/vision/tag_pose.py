@@ -71,7 +71,8 @@ def residuals(points: Array, ideal: Array, model: CameraModel, pose: Array) -> A
 
 
 def jacobian(points: Array, model: CameraModel, pose: Array) -> Array:
-    """(2 n, 6) of `residuals` by a small turn about the thing's origin and a step, both in the camera frame."""
+    """(2 n, 6) of `residuals` by a small turn about the thing's origin and a step, both in the camera frame; at `pose`
+    (4, 4), of `points` (n, 3) [m]."""
     placed = apply(pose, points)
     x, y, z = placed.T
     by_point = np.zeros((len(placed), 2, 3))
@@ -93,7 +94,7 @@ def moved(pose: Array, change: Array) -> Array:
 
 
 def rms(points: Array, ideal: Array, model: CameraModel, pose: Array) -> float:
-    """[px] root of the mean squared distance between the points and where they are seen."""
+    """[px] root of the mean squared distance between `points` at `pose`, projected, and their `ideal` pixels."""
     return float(np.sqrt(np.sum(residuals(points, ideal, model, pose) ** 2) / len(points)))
 
 
@@ -130,7 +131,7 @@ def flat(values: Array) -> Array:
 
 
 def flat_motions(camera_from_plane: Array) -> NDArray[np.float64]:
-    """(6, 3): the turn and step in the camera frame of each of x, y and turn on the plane."""
+    """(6, 3) turn and step in the camera frame for each of x, y and turn on the plane of `camera_from_plane` (4, 4)."""
     axes = camera_from_plane[:3, :3]
     motions = np.zeros((6, 3))
     motions[3:, 0], motions[3:, 1], motions[:3, 2] = axes[:, 0], axes[:, 1], axes[:, 2]
@@ -146,5 +147,5 @@ def on_plane(rays: Array, camera_from_plane: Array) -> Array:
 
 
 def turned_by(pose: Array) -> float:
-    """[rad] by how much a tag is tilted away from facing the camera."""
+    """[rad] by which a tag at `pose` (4, 4) in the camera frame is tilted away from facing the camera."""
     return float(np.arccos(np.clip(-pose[2, 2], -1.0, 1.0)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -13,7 +14,13 @@ ROOT = Path(__file__).parents[2]
 ROOMS = ("docs", "examples", "firmware", "gemelo", "schemas", "services", "tests")
 FRAGMENT = 40  # lines: a shorter file with one importer is a part of it
 NUMBERS = {"float", "Array", "NDArray"}
-UNITLESS = ("dimensionless", "share", "fraction", "ratio", "scale", "unit", "pixel")
+UNIT = re.compile(
+    r"\[(?:%|1/|(?:A|B|bytes|days|deg|Hz|instructions|kg|m|MB|min|mm|ms|N|ns|pixels|ppm|px|rad|rev|s|share|steps?|us|V)\b)"
+    r"[^\[\]\"']*\]|\b(?:dimensionless|per cent|fractions?|quaternions?|ratios?|scales?|shares?|units?)\b"
+)
+SIZE = r"(?:\.\.\.|(?:\d+ )?\w+(?: [-+*] (?:\d+ )?\w+)*)"  # of a shape: n, 3, "2 n - 1", "..."
+SHAPE = re.compile(rf"\({SIZE},(?:\s{SIZE}(?:,\s{SIZE})*)?(?:; [^()]*)?\)")
+NAMES_ITS_UNIT = re.compile(r".*(?:seconds|minutes|_(?:deg|hz|mb|minutes|mm|ms|ns|ppm|s|us)|^per_\w+)")
 
 
 @dataclass(frozen=True)
@@ -111,9 +118,10 @@ def is_named(house: dict[str, Module], name: str) -> bool:
 
 
 def without_unit(module: Module) -> Iterator[str]:
-    """Public functions of numbers whose docstring has neither a unit or shape in brackets nor a word for none.
+    """Public functions of numbers whose docstring has fewer units and shapes than numbers that it does not name.
 
-    A method without a docstring does what the method of its interface says.
+    A number is an argument of floats or of an array, or such a result; one that the docstring names is taken to be
+    explained there. A method without a docstring does what the method of its interface says.
     """
     waiting: list[tuple[str, ast.AST]] = [("", module.tree)]
     while waiting:
@@ -121,19 +129,24 @@ def without_unit(module: Module) -> Iterator[str]:
         for each in ast.iter_child_nodes(node):
             if isinstance(each, ast.ClassDef) and not each.name.startswith("_"):
                 waiting.append((f"{within}{each.name}.", each))
-            elif isinstance(each, ast.FunctionDef) and not each.name.startswith("_") and _is_numeric(each):
+            elif isinstance(each, ast.FunctionDef) and not each.name.startswith("_") and any(_numbers(each)):
                 text = ast.get_docstring(each)
-                if text is None and within:
-                    continue
-                if not any(word in (text or "").lower() for word in ("[", "(", *UNITLESS)):
+                if (text is not None or not within) and not _says_units(each, (text or "").partition(">>>")[0]):
                     yield f"{module.name}.{within}{each.name}"
 
 
-def _is_numeric(function: ast.FunctionDef) -> bool:
+def _says_units(function: ast.FunctionDef, text: str) -> bool:
+    units = len(UNIT.findall(text)) + len(SHAPE.findall(text))
+    unnamed = [name for name in _numbers(function) if not name or not re.search(rf"\b{name}\b", text)]
+    return units >= max(1, sum(not NAMES_ITS_UNIT.match(name) for name in unnamed))
+
+
+def _numbers(function: ast.FunctionDef) -> Iterator[str]:
+    """The arguments that are numbers, by name, and "" for a result that is."""
     arguments = [*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs]
-    notes = [each.annotation for each in arguments] + [function.returns]
-    return any(isinstance(node, ast.Name) and node.id in NUMBERS
-               for note in notes if note for node in ast.walk(note))  # fmt: skip
+    for name, note in [*((each.arg, each.annotation) for each in arguments), ("", function.returns)]:
+        if note and any(isinstance(node, ast.Name) and node.id in NUMBERS for node in ast.walk(note)):
+            yield name
 
 
 def spread(values: list[int]) -> str:

@@ -70,6 +70,34 @@ def test_a_fragment_is_seen_unless_two_import_it_or_a_table_names_it():
     assert fragments(dict([part, whole, module("table", 'COMMANDS = {"go": "part:run"}')])) == {}
 
 
-def test_a_function_of_numbers_without_a_unit_is_seen():
-    _, seen = module("a", "def f(x: float):", '    """Moves."""', "def g(x: float):", '    """Moves by `x` [m]."""')
-    assert list(without_unit(seen)) == ["a.f"]
+@pytest.mark.parametrize(
+    ("arguments", "docstring", "is_enough"),
+    [
+        ("x: float", "Moves.", False),
+        ("x: float", "Moves by `x` [m].", True),
+        ("x: float", "Moves (not far).", False),
+        ("x: float", "Moves, as in Moeller (Moeller and Trumbore, 1997).", False),
+        ("x: float", "Moves ([1] of the references).", False),
+        ("x: float", "Moves a little.\n\n    >>> f([1])", False),
+        ("x: Array", "Moves along rows (m, n).", True),
+        ("x: Array, y: float", "Moves along rows (m, n).", False),
+        ("x: Array, y: float", "Moves along rows (m, n) by `y`.", True),
+        ("x: Array, y: float", "Moves along rows (m, 2 n - 1) [m], a share of it.", True),
+        ("x: Array, delay_us: float", "Moves along rows (m, n) later.", True),
+        ("x: int", "Moves.", True),
+    ],
+)
+def test_a_function_of_numbers_without_a_unit_is_seen(arguments, docstring, is_enough):
+    _, seen = module("a", f"def f({arguments}):", f'    """{docstring}"""')
+    assert list(without_unit(seen)) == ([] if is_enough else ["a.f"])
+
+
+def test_a_result_without_a_unit_is_seen_too():
+    lines = (
+        "def f(x: float) -> float:",
+        '    """Moves by `x` [m]."""',
+        "def g(x: float) -> float:",
+        '    """[s] for `x`."""',
+    )
+    assert list(without_unit(module("a", *lines)[1])) == []
+    assert list(without_unit(module("a", "def f(x: float) -> float:", '    """Moves by x."""')[1])) == ["a.f"]

@@ -106,7 +106,7 @@ class Sketch:
         return any(motor.due is not None for motor in self.motors)
 
     def block(self, seconds: float) -> None:
-        """A reconnection, or anything else that holds loop() up: no step is made meanwhile."""
+        """A reconnection, or anything else that holds loop() up for `seconds` [s]: no step is made meanwhile."""
         self._free = max(self._now, self._free) + seconds
 
     def receive(self, payload: bytes) -> None:

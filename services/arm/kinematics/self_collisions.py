@@ -44,14 +44,14 @@ class SelfCollisionChecker:
         return tuple(dict.fromkeys(self._pairs))
 
     def distance(self, positions: Sequence[float] | Array) -> float:
-        """[m] between the nearest pair that is checked; negative inside; infinite where nothing is checked."""
+        """[m] between the nearest pair at `positions` (n,) [rad] or [m]; negative inside, infinite without pairs."""
         if not self._pairs:
             return math.inf
         self._update(positions)
         return float(min(result.min_distance for result in self._geometry_data.distanceResults))
 
     def distances(self, positions: Sequence[float] | Array) -> dict[LinkPair, float]:
-        """[m] between the links of every pair that is checked."""
+        """[m] between the links of every pair that is checked, at `positions` (n,) [rad] or [m]."""
         if not self._pairs:
             return {}
         self._update(positions)

@@ -84,7 +84,7 @@ def pulse_of(gripper: ServoGripper, opening: float) -> float:
 
 
 def opening_of(gripper: ServoGripper, pulse_us: float) -> float:
-    """[m] between the jaws under that pulse."""
+    """[m] between the jaws under a pulse of `pulse_us` [us]."""
     share = (pulse_us - gripper.closed_us) / (gripper.open_us - gripper.closed_us)
     return gripper.closed + share * (gripper.open - gripper.closed)
 

@@ -56,7 +56,7 @@ class XmlReader:
         return value or ""
 
     def number(self, element: ET.Element, name: str, where: str, default: float | None = None) -> float:
-        """An attribute [as declared] that is a finite number; needed where there is no `default`."""
+        """An attribute that is a finite number, in the unit of the file; needed where there is no `default`."""
         text = element.get(name)
         if text is None:
             if default is None:

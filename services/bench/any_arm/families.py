@@ -157,7 +157,7 @@ def board(name: str, edges: Vector, place: Vector) -> SceneObject:
 
 
 def cylinder(name: str, radius: float, length: float, place: Vector) -> SceneObject:
-    """Upright around `place`; all in [m]."""
+    """A cylinder of `radius` and `length`, upright around `place`; all in [m]."""
     return SceneObject(name=name, shape=CylinderShape(radius=radius, length=length), pose=Transform(translation=place))
 
 

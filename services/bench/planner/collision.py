@@ -71,7 +71,7 @@ def batch_us(arm: Arm) -> float:
 
 
 def single_us(core: NativePlanner, rows: Array) -> float:
-    """Median time [us] of one configuration, the call from Python included."""
+    """Median time [us] of one configuration of `rows` (m, n) [rad] or [m], the call from Python included."""
     each = [row[None, :] for row in rows[:ONE_BY_ONE]]
     tens = [each[first : first + TEN] for first in range(0, ONE_BY_ONE, TEN)]
     return median_us(lambda some: [core.free(row) for row in some], tens) / TEN

@@ -65,7 +65,7 @@ class JointGrid:
 
 
 def islands(free: NDArray[np.bool_], joined: list[NDArray[np.bool_]]) -> Indices:
-    """A number for every configuration of the grid, equal for those joined to one another; NOWHERE for those not free.
+    """A number for every configuration of the grid (n, n, ...), equal for those joined; NOWHERE for those not free.
 
     `free` and the result have the grid's shape; each of `joined` is one shorter along its own axis.
     """

@@ -229,6 +229,6 @@ def mount_images(setup: Setup) -> tuple[list[float], list[float]]:
 
 
 def mount_error(trial: Trial, carrier: Carrier, height: float | None = None) -> float:
-    """[mm] of our own solution."""
+    """Error [mm] of our own solution; `height` [m] as of `fit_mount`."""
     fit = fit_mount(trial.views, MODEL, carrier, height)
     return tool_error(fit.parent_from_camera, trial.parent_from_camera, carrier)

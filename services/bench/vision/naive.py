@@ -25,6 +25,6 @@ def opencv_corners(image: NDArray[np.uint8], method: str) -> Array | None:
 
 
 def opencv_pose(corners: Array, model: CameraModel, size: float) -> Array:
-    """camera_from_tag (4, 4) of IPPE_SQUARE, its solution of least error."""
+    """camera_from_tag (4, 4) of IPPE_SQUARE, its solution of least error, of `corners` (4, 2) [px] and `size` [m]."""
     solved = cv2.solvePnPGeneric(square(size), corners, model.matrix, model.distortion, flags=cv2.SOLVEPNP_IPPE_SQUARE)
     return from_opencv(solved[1][0], solved[2][0])

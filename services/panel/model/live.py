@@ -74,7 +74,7 @@ class LiveSliders:
                 self._target = {}
 
     def speeds(self, measured: Mapping[str, float], target: Mapping[str, float]) -> dict[str, float]:
-        """[rad/s] or [m/s] by joint; all 0 where everything is near enough."""
+        """[rad/s] or [m/s] by joint from `measured` to `target` [rad] or [m]; all 0 where everything is near enough."""
         speeds: dict[str, float] = {}
         for joint in self._joints:
             missing = joint.clamp(target.get(joint.name, measured[joint.name])) - measured[joint.name]

@@ -49,7 +49,8 @@ class Obstacles:
         self._show_contacts(tuple(contacts))
 
     def under_the_cursor(self, origin: Array, direction: Array) -> Array | None:
-        """(3,) [m] where a ray first meets an object or the ground z = 0; None if it meets nothing."""
+        """(3,) [m] where a ray from `origin` (3,) [m] along `direction` (3,) first meets an object or the ground z = 0;
+        None if it meets nothing."""
         hits = [_ground(origin, direction)]
         for name, (item, handle) in self._drawn.items():
             if name in self._meshes and not item.attached:
@@ -138,7 +139,8 @@ def _ground(origin: Array, direction: Array) -> float:
 
 
 def nearest_hit(origin: Array, direction: Array, corners: Array) -> float:
-    """[m] along the ray to the nearest of the triangles (t, 3, 3), inf for none (Moeller and Trumbore, 1997)."""
+    """[m] along the ray from `origin` (3,) in `direction` (3,) to the nearest of the triangles `corners` (t, 3, 3), inf
+    for none (Moeller and Trumbore, 1997)."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     across = np.cross(direction, second)
     determinant = np.einsum("ij,ij->i", first, across)

@@ -52,7 +52,8 @@ class ToolSolver:
         return float(np.linalg.svd(held, compute_uv=False)[-1])
 
     def error(self, pose: Pose, configuration: Array) -> float:
-        """[m] that the tool is off; turns counted as the path counts them, where they are held."""
+        """[m] that the tool at `configuration` (n,) [rad] or [m] is off `pose`; where turns are held, each counts as on
+        the path."""
         now = self._kinematics.tool(configuration)
         missing = _length(pose.position - now.position)
         if not self._holds_turn:

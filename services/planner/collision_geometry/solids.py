@@ -25,7 +25,7 @@ class Solid(Hashable, Protocol):
         """(3,) half sizes [m] of the box around it."""
 
     def depth(self, points: Array) -> Array:
-        """(...) [m] to the surface from inside; below 0 outside."""
+        """(...) [m] from `points` (..., 3) inside to the surface; below 0 outside."""
 
     def nearest(self, points: Array) -> Array:
         """(..., 3) [m] the points themselves, or the nearest ones of the solid to those outside."""

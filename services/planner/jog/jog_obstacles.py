@@ -36,7 +36,8 @@ class Obstacles:
         self._nearness.move_to(positions)
 
     def most_out_of_contact(self, wanted: Array) -> tuple[float, JogLimit | None]:
-        """The share of a velocity at which nothing that is too near already moves too fast."""
+        """The share of the velocity `wanted` (n,) [rad/s] or [m/s] at which no pair nearer than the clearance comes
+        nearer, or leaves too fast."""
         pairs = self._nearness.pairs_within(self._clearance)
         if not pairs.size:
             return 1.0, None
@@ -109,6 +110,6 @@ class Obstacles:
 
 
 def comes_away(before: Array | float, after: Array | float) -> NDArray[np.bool_]:
-    """True if two that were so near [m] are farther apart; from inside, a path along the surface leads out too."""
+    """True if the distance `after` is above that `before`, both [m]; inside, motion along the surface counts too."""
     slack = np.where(np.less(before, 0.0), LEVEL, 0.0)
     return np.greater(after, np.subtract(before, slack))

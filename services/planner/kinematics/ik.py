@@ -75,7 +75,7 @@ class InverseKinematics:
         return [attempt.positions for attempt in sorted(attempts, key=lambda attempt: attempt.error)]
 
     def travel(self, first: Array, second: Array) -> float:
-        """[s] that the slowest joint takes between two configurations at full speed: the distance that counts."""
+        """[s] that the slowest joint takes from `first` to `second` (n,) at full speed: the distance that counts."""
         return float(np.max(np.abs(first - second) / self._speed))
 
     def descend(self, target: Target, start: Array) -> Attempt:

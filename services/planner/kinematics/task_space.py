@@ -129,7 +129,7 @@ def task_space(arm: Arm, kinematics: Kinematics) -> TaskSpace:
 
 
 def angle_between(first: Array, second: Array) -> float:
-    """[rad] between two unit vectors, exact for small ones too."""
+    """[rad] between two unit vectors (3,), exact for small angles too: `first` to `second`."""
     return math.atan2(float(np.linalg.norm(np.cross(first, second))), float(first @ second))
 
 

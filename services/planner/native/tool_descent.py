@@ -57,7 +57,8 @@ class NativeDescent:
         rotation_tolerance: float,
     ) -> Array | None:
         """`solution` (n,) [rad] or [m], which meets the target, moved by self-motion towards `middle` (n,), where a
-        joint's distance counts by `weight` (n,); None where it has no self-motion. The target is as of `descend`."""
+        joint's distance counts by `weight` (n,); None where it has no self-motion. As of `descend` are the target's
+        `position` and `rotation`, `metres_per_radian`, `position_tolerance` [m] and `rotation_tolerance` [rad]."""
         moved = motion.centre(
             self._arm,
             np.ascontiguousarray(solution, dtype=np.float64),

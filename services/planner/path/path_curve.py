@@ -133,8 +133,8 @@ def _end_slope(knots: Array, values: Array) -> Array:
 
 
 def cut(before: float, after: float, blend: float) -> float:
-    """Length from a corner at which the path may leave its two legs, of lengths `before` and `after`; all are in the
-    same unit. 0 where the path has to stop at the corner."""
+    """Length from a corner at which the path may leave its two legs, of lengths `before` and `after`: at most `blend`;
+    all are in the same unit. 0 where the path has to stop at the corner."""
     radius = min(blend, 0.5 * before, 0.5 * after)
     return radius if radius > NO_LENGTH else 0.0
 

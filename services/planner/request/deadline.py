@@ -66,7 +66,7 @@ class Deadline:
         return replace(self, allowed=(1.0 + part) * self.allowed)
 
     def share(self, part: float) -> Deadline:
-        """A deadline within this one: only `part`, in (0, 1], of the time that is left."""
+        """A deadline within this one: only `part`, a share in (0, 1], of the time that is left."""
         now = self.clock()
         return replace(self, allowed=part * (self.allowed - (now - self.began)), began=now)
 

@@ -84,7 +84,7 @@ class Demand:
         return np.searchsorted(self.along, np.column_stack((edges[:-1] + inside, edges[1:] - inside)))
 
     def least_duration(self, edges: Array) -> float:
-        """[s] at the speeds that the stretches allow."""
+        """[s] at the highest speeds that the stretches between `edges` (j + 1,) allow."""
         return float(np.sum(np.diff(edges) / _least_in(self.speeds, self.rows(edges))))
 
 

@@ -45,7 +45,8 @@ class TimeLaw:
         return times
 
     def times(self, lengths: Array, spacing: float) -> Array:
-        """Times [s] from 0 to the end: where the jerk changes, where the path is so long, and evenly between them."""
+        """Times [s] from 0 to the end: where the jerk changes, where the path has each of `lengths`, and between them
+        evenly, at most `spacing` [s] apart."""
         marks = np.sort(np.concatenate((self._stamps, self.reached(lengths), [self.duration])))
         marks = marks[np.concatenate(([True], np.diff(marks) > FEWEST))]
         marks[-1] = self.duration

@@ -72,7 +72,7 @@ class BlurredLaw:
         return length, speed, bend
 
     def times(self, lengths: Array, spacing: float) -> Array:
-        """Even ones [s] from 0 to the end, so near as what is blurred asks for, wherever the path is so long."""
+        """Even times [s] from 0 to the end, at most `spacing` [s] and the blur's own apart; `lengths` set none."""
         spacing = min(spacing, self._blur * SPACING / BLUR)
         count = int(np.clip(round(self.duration / spacing), FEWEST, MOST))
         return np.linspace(0.0, self.duration, count + 1)

@@ -72,7 +72,7 @@ def tolerances(
 
 
 def time_tolerance(goal: FollowJointTrajectoryGoal, default: float) -> float | None:
-    """[s] the goal may end late, None for no bound; raises `GoalRejected`."""
+    """[s] that the goal may end late, `default` where it says 0, None for no bound; raises `GoalRejected`."""
     asked = goal.goal_time_tolerance
     if asked == -1.0:
         return None

@@ -42,7 +42,7 @@ class Jaws(ABC):
 
     @abstractmethod
     def travel_time(self, position: float) -> float:
-        """[s] to there from where it is, or from anywhere where that is not known."""
+        """[s] to `position` [m] from where it is, or from anywhere where that is not known."""
 
     @abstractmethod
     def on_state(self, state: State, now: float) -> None:

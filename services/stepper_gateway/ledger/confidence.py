@@ -63,7 +63,8 @@ def survival(load: float) -> float:
 
 
 def strong_enough(evidence: Evidence) -> float:
-    """P(no step lost for want of torque), by the load since the verification and what is proven and refuted."""
+    """The probability (a share, 0 to 1) that no step was lost for want of torque, by the load since the verification
+    and what is proven and refuted."""
     load, proven = evidence.load, PROOF * evidence.proven
     if load <= proven:
         return 1.0

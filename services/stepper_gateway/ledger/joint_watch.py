@@ -60,7 +60,7 @@ class JointWatch:
         return self._after(evidence, steps, self.hardest) if steps else evidence
 
     def in_time(self, seconds: float) -> float:
-        """[steps] that the joint makes in that time at most."""
+        """[steps] that the joint makes in `seconds` at most."""
         return self._top_rate * seconds
 
     def _after(self, evidence: Evidence, steps: float, load: float) -> Evidence:

@@ -14,7 +14,7 @@ CERTAIN = 1.0  # [steps] that a verified joint may be off: half for rounding, ha
 def bounds(
     joints: Sequence[Joint], confidences: Sequence[float], travelled: Sequence[float], level: float
 ) -> tuple[float, ...]:
-    """[steps] by which each joint may be off so that all hold with probability `level`.
+    """[steps] by which each joint may be off so that all hold with probability `level`; `confidences` are shares.
 
     The joints with the least confidence are given up until the product of the others reaches `level`. Those that are
     given up may be off by the steps that they have `travelled` since they were verified, or by their whole range if

@@ -112,7 +112,7 @@ class Stream:
         )
 
     def on_ack(self, ack: Ack, arrival: float) -> tuple[float, list[SentChunk]]:
-        """Round trip [s] of the chunk, 0 if it is not known any more, and the chunks to send again now.
+        """Round trip [s] until `arrival` of the chunk, 0 if it is not known any more; and the chunks to send again now.
 
         Raises `BadFrame` for the answer to a chunk that was never sent.
         """

@@ -102,8 +102,8 @@ def _board_in_camera(problem: Problem, index: int) -> Array:
 
 
 def closed_form(boards: Sequence[Array], motions: Sequence[Array], method: int) -> Array | None:
-    """X (4, 4) by one of OpenCV's hand-eye methods from camera_from_board and G of each view; None where what it gives
-    is no rigid transform."""
+    """X (4, 4) by one of OpenCV's hand-eye methods from camera_from_board and G of each view, `boards` and `motions`
+    (4, 4); None where what it gives is no rigid transform."""
     back = [inverse(motion) for motion in motions]
     try:
         turned, place = cv2.calibrateHandEye(

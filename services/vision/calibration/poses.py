@@ -51,7 +51,7 @@ class Belief:
     height: float | None = None  # [m] as of `fit_mount`
 
     def camera_from_board(self, base_from_link: Array) -> Array:
-        """(4, 4) where the camera has the board before it."""
+        """camera_from_board (4, 4) for a carrier at `base_from_link` (4, 4)."""
         motion = base_from_link if self.carrier is Carrier.BOARD else inverse(base_from_link)
         return inverse(self.camera) @ motion @ self.board
 

@@ -99,7 +99,8 @@ def reprojected(problem: Problem, state: State, index: int) -> tuple[Array, Arra
 
 
 def residuals(problem: Problem, state: State) -> Array:
-    """All that is off, each in its own standard deviations: pixels, the arm's errors, the board's place."""
+    """(2 n views + 6 views + 3 or 4,) all that is off, each in its own standard deviations, so dimensionless: pixels,
+    the arm's errors, the board's place."""
     parts = []
     for index, view in enumerate(problem.views):
         seen = reprojected(problem, state, index)[0]
@@ -119,7 +120,7 @@ def _small(pose: Array) -> Array:
 
 
 def cost_of(problem: Problem, state: State) -> float:
-    """Half the sum of squares, large ones counted less (Huber)."""
+    """Half the sum of the squared `residuals`, dimensionless, large ones counted less (Huber)."""
     off = np.abs(residuals(problem, state))
     cost = float(np.sum(np.where(off < TOGETHER, off**2 / 2.0, TOGETHER * (off - TOGETHER / 2.0))))
     in_front = all(placed(problem, state, index)[:, 2].min() > 0.0 for index in range(len(problem.views)))
@@ -154,7 +155,7 @@ def view_slopes(problem: Problem, state: State, index: int) -> tuple[Array, Arra
 
 
 def jacobian(problem: Problem, state: State) -> Array:
-    """Of `residuals` by (12 + 6 views): the unknowns of `view_slopes`, the arm's errors view by view."""
+    """(residuals, 12 + 6 views) of `residuals` by the unknowns of `view_slopes`, the arm's errors view by view."""
     count = len(problem.views)
     rows = []
     for index in range(count):
@@ -170,7 +171,7 @@ def jacobian(problem: Problem, state: State) -> Array:
 
 
 def prior_slopes(problem: Problem) -> Array:
-    """(3 or 4, 12) of what is known of the board's place without any image, by the unknowns."""
+    """(k, 12), k = 3 or 4, of what is known of the board's place without any image, by the unknowns."""
     rows = np.zeros((3 if problem.height is None else 4, KNOWN))
     rows[:3, 9:12] = np.eye(3) / FAR
     if problem.height is not None:
@@ -218,7 +219,8 @@ def _stepped(state: State, change: Array) -> State:
 
 
 def errors_of(problem: Problem, camera: Array, board: Array) -> Array:
-    """[m] at the board, of each view as the arm's joints say: the median of its points across the line of sight."""
+    """(views,) [m] at the board, each view as the arm's joints say: the median of its points across the line of sight;
+    `camera` and `board` (4, 4)."""
     exact = exact_arm(camera, board, len(problem.views))
     found = []
     for index in range(len(problem.views)):

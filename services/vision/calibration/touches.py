@@ -62,7 +62,8 @@ def refuse_touches(board: Array) -> None:
 
 
 def flat_registration(board: Array, touched: Array) -> Array:
-    """base_from_board (4, 4) of a board that lies flat: x, y, height and the turn about the vertical, least squares."""
+    """base_from_board (4, 4) of a board that lies flat: x, y, height and the turn about the vertical, by least squares
+    from its points `board` (n, 3) [m] to where the tool `touched` them, (n, 3) [m]."""
     middle, centre = board.mean(axis=0), touched.mean(axis=0)
     a, b = board[:, :2] - middle[:2], touched[:, :2] - centre[:2]
     angle = np.arctan2(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]), np.sum(a * b))

@@ -19,7 +19,7 @@ def quaternion(roll: float, pitch: float, yaw: float) -> Array:
 
 
 def multiply(left: Array, right: Array) -> Array:
-    """Product of quaternions (..., 4)."""
+    """Product (..., 4) of the quaternions `left` and `right` (..., 4)."""
     x1, y1, z1, w1 = np.moveaxis(left, -1, 0)
     x2, y2, z2, w2 = np.moveaxis(right, -1, 0)
     return np.stack(
