@@ -21,7 +21,7 @@ from services.runtime.deployment import project_root
 from services.runtime.node import Node
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-RATE = 10.0  # [Hz] at which it says how plans stand
+RATE = 10.0  # [Hz] at which it says how plans stand; chosen: smooth for a person's eye
 STARTING = "the process that plans is starting"
 NOT_READY = "no fresh joint_states: is the stepper_gateway running?"
 

@@ -40,7 +40,7 @@ from services.stepper_gateway.outputs import Answer, Output
 from services.stepper_gateway.parameters import GatewayParameters
 
 REGULAR = {Heartbeat: Kind.HB, Sync: Kind.SYNC, Command: Kind.CMD}  # what the session sends by itself
-BAD_FRAME_REPORT = 1.0  # [s] between two
+BAD_FRAME_REPORT = 1.0  # [s] between two; chosen: a flood of bad frames must not flood the log
 PAUSES = (  # commands that leave goals and targets as they are
     DeviceCommandKind.HOLD,
     DeviceCommandKind.RESUME,

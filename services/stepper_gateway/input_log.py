@@ -17,9 +17,9 @@ from services.stepper_gateway.inputs import Began, Given, Input, Reply, digest_o
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Output
 
-PERIOD = 0.5  # [s] between two messages: what a kill -9 can cost
+PERIOD = 0.5  # [s] between two messages; chosen: what a kill -9 can cost
 HELD_BACK = 10.0  # [s] after the beginning until the first ones are published; chosen: a stack is up by then
-LARGE = 256 * 1024  # [B] after which a message does not wait for its time
+LARGE = 256 * 1024  # [B] after which a message does not wait for its time; chosen: small beside what a router takes
 
 
 class InputLog:

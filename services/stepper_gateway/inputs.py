@@ -26,7 +26,7 @@ from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Output, Publish
 from services.stepper_gateway.parameters import GatewayParameters
 
-LARGEST = 64 * 1024 * 1024  # [B] of one message's inputs, unpacked
+LARGEST = 64 * 1024 * 1024  # [B] of one message's inputs, unpacked; chosen: far beyond half a second of them
 
 
 class _Input(msgspec.Struct, frozen=True, tag=True, array_like=True):

@@ -21,10 +21,10 @@ from services.stepper_gateway.links.link import Link
 from services.stepper_gateway.parameters import GatewayParameters
 from services.stepper_gateway.shell import Shell
 
-RATE = 50.0  # [Hz]
+RATE = 50.0  # [Hz] standard: that of the device's states
 # Between the threads of bus, wire and loop: at Python's own 5 ms a stop waits for several of them in a flood.
 SWITCH_INTERVAL = 0.0005  # [s] chosen
-USUAL_BAUD = 921_600
+USUAL_BAUD = 921_600  # standard: the device's own, firmware/PROTOCOL.md
 VIRTUAL_LINE = "virtual_esp32.tty"
 
 

@@ -12,6 +12,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("docs", "examples", "firmware", "gemelo", "schemas", "services", "tests")
+TUNED = ("services/planner/", "services/stepper_gateway/")  # whose constants say where their values come from
+ORIGIN = re.compile(r"\b(?:[Cc]hosen|[Mm]easured|[Ss]tandard|rounding|rounded)\b")
+REASON = 3  # words of a comment, besides units, that can say why
 FRAGMENT = 40  # lines: a shorter file with one importer is a part of it
 NUMBERS = {"float", "Array", "NDArray"}
 UNIT = re.compile(
@@ -147,6 +150,38 @@ def _numbers(function: ast.FunctionDef) -> Iterator[str]:
     for name, note in [*((each.arg, each.annotation) for each in arguments), ("", function.returns)]:
         if note and any(isinstance(node, ast.Name) and node.id in NUMBERS for node in ast.walk(note)):
             yield name
+
+
+def without_origin(module: Module) -> Iterator[str]:
+    """Numbers that are constants of the module without a comment that says what they are and where they come from:
+    chosen, measured or standard, there or in the heading of their block."""
+    heading, lines = "", module.text.splitlines()
+    for node in module.tree.body:
+        above, first = [], node.lineno - 2
+        while first >= 0 and lines[first].startswith("#"):
+            above.insert(0, lines[first])
+            first -= 1
+        if above and above[0].startswith("# Tuning constants:"):
+            heading = above.pop(0)
+        elif first >= 0 and not lines[first]:
+            heading = ""
+        if (
+            isinstance(node, ast.Assign)
+            and ast.unparse(node.targets[0]).strip("(_").isupper()
+            and _is_number(node.value)
+        ):
+            said = " ".join([*above, *(line.partition("  # ")[2] for line in lines[node.lineno - 1 : node.end_lineno])])
+            words = re.findall(r"[A-Za-z]{2,}", re.sub(r"\[[^\]]*\]", "", said))
+            if len(words) < REASON or not ORIGIN.search(said + heading):
+                yield f"{module.name}: {ast.unparse(node)}"
+
+
+def _is_number(value: ast.expr) -> bool:
+    """True for a number or a tuple of numbers, also where they are computed of numbers alone."""
+    leaves = [node for node in ast.walk(value) if not isinstance(node, ast.operator | ast.unaryop | ast.expr_context)]
+    are_plain = all(isinstance(node, ast.Constant | ast.BinOp | ast.UnaryOp | ast.Tuple) for node in leaves)
+    numbers = [node for node in leaves if isinstance(node, ast.Constant)]
+    return are_plain and bool(numbers) and all(type(node.value) in (int, float) for node in numbers)
 
 
 def spread(values: list[int]) -> str:

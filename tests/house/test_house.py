@@ -7,7 +7,18 @@ from pathlib import Path
 
 import pytest
 
-from tests.house.counts import ROOMS, ROOT, Module, circles, fragments, imports, modules, without_unit
+from tests.house.counts import (
+    ROOMS,
+    ROOT,
+    TUNED,
+    Module,
+    circles,
+    fragments,
+    imports,
+    modules,
+    without_origin,
+    without_unit,
+)
 
 KEPT = {
     "services.planner.parameters": "as the parameters of every service",
@@ -50,6 +61,12 @@ def test_every_cpp_file_says_what_it_is():
     files = [path for room in ROOMS for kind in ("*.h", "*.cpp") for path in (ROOT / room).rglob(kind)]
     first_words = {path: path.read_text().partition("\n")[0].removeprefix("// ").partition(" ")[0] for path in files}
     assert [str(path) for path, word in first_words.items() if "build" not in path.parts and word in CLAUSES] == []
+
+
+def test_every_tuning_constant_says_where_its_value_comes_from(house):
+    """Measured (by what), standard, or chosen (with the reason)."""
+    tuned = [each for each in house.values() if str(each.path).startswith(TUNED)]
+    assert [found for each in tuned for found in without_origin(each)] == []
 
 
 def module(name: str, *lines: str) -> tuple[str, Module]:
@@ -101,3 +118,21 @@ def test_a_result_without_a_unit_is_seen_too():
     )
     assert list(without_unit(module("a", *lines)[1])) == []
     assert list(without_unit(module("a", "def f(x: float) -> float:", '    """Moves by x."""')[1])) == ["a.f"]
+
+
+@pytest.mark.parametrize(
+    ("lines", "is_enough"),
+    [
+        (["A = 5"], False),
+        (["A = 5  # [m]"], False),
+        (["A = 5  # [m] by which it may be off"], False),
+        (["A = 5  # [m] by which it may be off; chosen: half a step"], True),
+        (["# Standard: the protocol's own.", "A, B = 5, -2.0 * 3"], True),
+        (["# Tuning constants: chosen.", "A = 5  # [m] by which it may be off", "B = 5"], False),
+        (["# Tuning constants: chosen.", "A = 5  # [m] by which it may be off"], True),
+        (["# Tuning constants: chosen.", "A = 5  # it may be off", "", "B = 5  # so many are tried"], False),
+        (["a = 5", "A = True", "B = 'text'", "C = A"], True),
+    ],
+)
+def test_a_constant_without_an_origin_is_seen(lines, is_enough):
+    assert (list(without_origin(module("a", *lines)[1])) == []) is is_enough

@@ -16,10 +16,10 @@ from services.planner.request.refusals import PlanRefused
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-SAME_POINT = 1e-6  # [m]
+SAME_POINT = 1e-6  # [m] chosen: far below a motor step, far above a float's rounding
 SAME_RADIUS = 1e-4  # [m] by which a centre may be nearer to one end: it is then moved to the middle
 STRAIGHT = 1e-4  # sine of an angle below which three points are on a line
-FARTHEST = 1e6  # [m]
+FARTHEST = 1e6  # [m] chosen: beyond any cell, and a float still tells a micrometre there
 
 
 def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:

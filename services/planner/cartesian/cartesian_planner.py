@@ -38,9 +38,9 @@ Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
 DEEPER = 1.06  # share of the margin that the path keeps, so that samples taken elsewhere keep the margin itself
 LEAST_LOOK = 0.1  # share of the margin by which the arm moves on at least from one look to the next
-SHORTEST_PATH = 1e-4  # of length: less is no way
+SHORTEST_PATH = 1e-4  # of length: less is no path; chosen: below it a joint moves less than a step
 SHORTEST_TOLD = 1e-6  # [m] of a path, of which a place is told in metres
-MOST_ROWS = 4000
+MOST_ROWS = 4000  # chosen: bounds the time of the limits' check on long paths
 MOMENT = 0.05  # share of the time between two points, by which the tool is looked at before and after a moment
 
 

@@ -20,18 +20,18 @@ Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 SPACING = 0.02  # of length between configurations; halved until the spline between them is exact enough
-LEAST_CONFIGURATIONS = 12
+LEAST_CONFIGURATIONS = 12  # chosen: a spline through fewer says little about how exact it is
 FINEST = 2e-5  # of length: nearer configurations are not tried, and a place is not told more exactly
-MOST_CONFIGURATIONS = 5000
+MOST_CONFIGURATIONS = 5000  # chosen: a second or so of solving; more is a mistake in max_step
 JUMP = 0.3  # [rad] or [m] a joint may move between two configurations, before shorter steps are tried
 CLOSE = 1e-5  # [m] by which the spline between configurations may be off the path
 NEARLY = 0.98  # of the path to a limit, as it seems from before it
 LEAST = 0.05  # of a step is tried, where it seems to be none of it
 ROUNDING = 1e-9  # [rad] or [m] beyond a limit that is put back onto it
 SAME = 1e-6  # [rad] or [m] by which configurations differ that are meant to be one
-ROUNDS = 8
-LOOKS = 8  # at the joints' limits between two configurations
-ORDER = 4  # configurations by which the next one is guessed
+ROUNDS = 8  # chosen: each halves the spacing where needed, so 1/256 of it at last
+LOOKS = 8  # at the joints' limits between two configurations; chosen: a spline bends little between them
+ORDER = 4  # configurations by which the next one is guessed; chosen: more extrapolate noise
 TOO_FINE = f"max_step is so fine that the path would have more than {MOST_CONFIGURATIONS} configurations"
 
 

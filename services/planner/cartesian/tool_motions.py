@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 
 INVALID = PlanCode.INVALID_GOAL_CONSTRAINTS
 # Tuning constants: chosen, where a line does not say measured or standard.
-FARTHEST = 1e3  # [m] a blend beyond it is a mistake
+FARTHEST = 1e3  # [m] chosen: a blend beyond it is a mistake, most often in millimetres
 
 
 class ToolMotions:

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-ENDLESS = 1e6  # [m]
+ENDLESS = 1e6  # [m] chosen: a half space as a box, beyond every arm, and finite for coal
 
 
 class PlacedObject(NamedTuple):

@@ -28,16 +28,16 @@ Array = NDArray[np.float64]
 # Tuning constants: chosen, where a line does not say measured or standard.
 PERIOD = 0.02  # [s] between two steps, however late they come: a late step makes the arm slower, never faster
 DEAD_MAN = 0.1  # [s] without a command until the arm brakes; standard: MoveIt Servo's command time-out
-STATUS_PERIOD = 0.1  # [s]
+STATUS_PERIOD = 0.1  # [s] chosen: ten words a second are smooth for a person's eye
 SILENCE = 0.6  # [s] without a command after which an interrupted jog may begin again; the gateway wants 0.5
 FOLLOW = 0.6  # [s] that the arm may be behind its targets, with the gateway's lead and the states' way back
-GRACE = 0.2  # [s] that it may be elsewhere
-STEPS_ASTRAY = 3.0  # [steps] that are no straying
-FADING = 1.0  # [s] in which a tool brakes on its line
+GRACE = 0.2  # [s] that it may be elsewhere; chosen: ten states of the device
+STEPS_ASTRAY = 3.0  # [steps] that are no straying; chosen: rounding at both ends, and one more
+FADING = 1.0  # [s] in which a tool brakes on its line; chosen: beyond any arm's braking time at jogging speed
 LAST = 0.02  # of the twist, that is given up off the line
 MOST_SAID = 100  # different complaints about commands; more is a client gone mad
 ARRIVAL = 1.5  # [s] that the target is repeated at most until the arm has come to rest there
-NEVER = -1.0e9  # [s]
+NEVER = -1.0e9  # [s] chosen: before every monotonic clock's beginning
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from schemas.joints import JointState, JointTargets
 from schemas.message import encode
 from schemas.planning import JogCommand, JogInputs, JogStatus, JogTaken, JogTick, SceneVersion
 
-MOST = 25  # inputs of one message: half a second of periods
-DIGEST = 8  # [B]
+MOST = 25  # inputs of one message; chosen: half a second of periods
+DIGEST = 8  # [B] chosen: two periods of one jog differ by chance once in 2^64
 
 
 class JogLog:

@@ -18,12 +18,12 @@ Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 SAMPLES = 64  # configurations that tell what is much for this arm
-RANK = 1e-6  # [m/s] below which a direction is none
+RANK = 1e-6  # [m/s] below which a direction is none; chosen: far above rounding of the Jacobian
 NEAR = 0.1  # share of the largest manipulability below which a singularity is near
 DAMPING = 0.2  # at a singularity: share of the smallest singular value that the arm usually has
 STRAIGHT, CROOKED = 0.99, 0.90  # cosines to the commanded twist: full speed, and none
-LOOK_AHEAD = 0.02  # [s]
-NOISE = 1e-6  # of the near manipulability, which is no approach
+LOOK_AHEAD = 0.02  # [s] chosen: one period of the jog
+NOISE = 1e-6  # of the near manipulability, which is no approach; chosen: above rounding of the singular values
 LEAST = 0.1  # of the near manipulability, at which the tool stops on its way to a singularity
 PLACES = np.linspace(0.25, 1.0, 4)[:, None]  # of a path to rest that are looked at
 

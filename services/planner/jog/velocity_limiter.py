@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 LIMIT_SHARES, LIMIT_ROUNDS = 25, 3  # that are tried at once, and how often more finely
-SINGULARITY_HALVINGS = 6
+SINGULARITY_HALVINGS = 6  # chosen: finds the share to 1/64, finer than a person feels
 FACTORS = (1.2, 0.9, 0.5)  # of the share of the tick before, where something is in the way
-LEAST_SHARE = 0.01
+LEAST_SHARE = 0.01  # chosen: from a stop the search begins here, as 0 has no larger multiple
 
 # What is too near on a path (n,) [rad] or [m] from where the arm is; None where it may be gone.
 Singular = Callable[[Array], JogLimit | None]

@@ -13,8 +13,8 @@ from services.planner.kinematics.targets import Target
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-STEPS = 6
-LARGEST_STEP = 0.5  # [rad] or [m]
+STEPS = 6  # chosen: each is a step of Gauss and Newton, which the later ones hardly move on
+LARGEST_STEP = 0.5  # [rad] or [m] chosen: the null space turns with the arm, so it is followed in short steps
 LEAST_GAIN = 1e-3  # share of the eccentricity by which a step must improve
 RANK = 1e-6  # share of the largest singular value below which a direction of the tool is none
 

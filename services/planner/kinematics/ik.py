@@ -21,7 +21,7 @@ from services.planner.request.deadline import Deadline
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-STARTS = 24  # beside the present configuration
+STARTS = 24  # beside the present configuration; chosen: `ik_success` of the bench holds it
 FULL_POSE_JOINTS, MORE_STARTS = 6, 64  # that many where a full pose has to be searched for
 BATCH = 4  # starts that are tried together before their solutions are handed out
 FEW = 4  # starts where the closed form finds nothing, which it has never missed
@@ -31,7 +31,7 @@ FINE_TURNS, MOST_AT_LIMITS = (
 )  # the same, where none of those has a configuration, and configurations that are tried then
 TURNS = 16  # rotations about the axis of a tool that only has to point somewhere
 SAME = 1e-4  # [s] at full speed: solutions nearer than that are one
-SAME_REDUNDANT = 0.1  # [s] the same, where solutions lie in a continuum
+SAME_REDUNDANT = 0.1  # [s] the same, where solutions lie in a continuum; chosen: neighbours there are no other choice
 
 
 class InverseKinematics:

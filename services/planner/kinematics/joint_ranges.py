@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 NEVER = 1e9  # [m] after which a slide would be where it was
-MOST_TURNS = 64  # combinations of full turns of one branch
+MOST_TURNS = 64  # combinations of full turns of one branch; chosen: bounds the time where several joints turn often
 ROUNDING = 1e-9  # [rad] or [m] by which a solution may be beyond a limit before it is put onto it
 
 
@@ -64,7 +64,7 @@ def _combinations(turns: tuple[int, ...]) -> NDArray[np.int64]:
     return np.array(list(product(*(range(most + 1) for most in turns))))
 
 
-_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)
+_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19)  # standard: the bases of a Halton sequence
 
 
 def spread(arm: Arm, count: int) -> list[Array]:

@@ -31,8 +31,8 @@ from services.planner.request.refusals import PlanRefused, beyond_limit, in_coll
 from services.planner.request.start_state import require_parallel, resolve_start
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-MOST_SOLUTIONS = 64
-LOOKED_THROUGH = 256  # configurations, of which all may touch something
+MOST_SOLUTIONS = 64  # chosen: more than any arm has that is not redundant, and small as a message
+LOOKED_THROUGH = 256  # configurations, of which all may touch something; chosen: bounds the time of the answer
 
 
 class KinematicRequests:

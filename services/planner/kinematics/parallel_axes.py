@@ -20,10 +20,10 @@ from services.planner.kinematics.targets import any_normal
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-JOINTS = 3
+JOINTS = 3  # of the arms that are solved here
 SAMPLES = 8  # configurations at which the answers are held against the kinematics
-AGREEMENT = 1e-9  # [m]
-LEAST = 1e-6  # [m] a link that is shorter is none
+AGREEMENT = 1e-9  # [m] chosen: rounding of three joints, a hundred times over
+LEAST = 1e-6  # [m] a link that is shorter is none; chosen: far above rounding, far below a link
 STRETCHED = 1e-9  # how far a cosine may be beyond 1 by rounding
 
 

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 INVALID = PlanCode.INVALID_GOAL_CONSTRAINTS
 # Tuning constants: chosen, where a line does not say measured or standard.
 UNIT = 1e-3  # that a quaternion's length may be off by
-LEAST_AXIS = 1e-9  # length below which an axis has no direction
+LEAST_AXIS = 1e-9  # length below which an axis has no direction; chosen: its square is far from underflow
 FARTHEST = 1e6  # [m] beyond which a position is a mistake, and squares lose their digits
 
 

@@ -18,7 +18,7 @@ from services.planner.kinematics.targets import ROTATION_TOLERANCE, Target
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-SAMPLES = 32
+SAMPLES = 32  # chosen: a direction that none of so many configurations can move, the arm does not have
 RANK = 1e-6  # singular value [m] or [rad] per joint below which a direction is none
 UPRIGHT = 1.0 - 1e-6  # cosine to the vertical from which a turn is called yaw
 

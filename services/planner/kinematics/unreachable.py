@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 PRINTED = 1e-4  # [m] to which the nearest point is rounded that a person is told
-NEAREST_TRIED = 6  # configurations
-LIGHT = 0.002  # [m/rad] a turn that must not cost position
+NEAREST_TRIED = 6  # configurations; chosen: the nearest ones are alike beyond these
+LIGHT = 0.002  # [m/rad] a turn that must not cost position; chosen: a hundredth of the usual weight
 FORGIVABLE = math.radians(2.0)  # below which a tolerance is what a person may have wanted
 
 

@@ -30,7 +30,7 @@ ATTACHED_SHARE = 1.0 / 40.0  # of an attached thing's longest side may be bulge:
 MOST_KNOWN = 2048  # obstacles that are kept: those of a scene before a change and after it
 WIDE = 25.0  # parts of a link's longest side: spheres that reach farther beyond its shapes are said
 OBSTACLES = 64  # the first obstacle's number in a contact: kMaxParts
-HAIR = 1e-4  # [m] a sphere's least radius
+HAIR = 1e-4  # [m] a sphere's least radius; chosen: a smaller one adds a check and no safety
 ROUNDING = 2e-5  # [m] for every metre of reach: a float has 24 bits; measured: native/README.md
 
 

@@ -33,8 +33,8 @@ log = logging.getLogger(__name__)
 
 FOLDER = "GEMELO_CACHE"  # environment variable: another folder than the platform's
 # Tuning constants: chosen, where a line does not say measured or standard.
-MOST_FILES = 1000  # the oldest are removed
-DIGEST = 32  # bytes of a SHA-256
+MOST_FILES = 1000  # the oldest are removed; chosen: some tens of megabytes on the disk
+DIGEST = 32  # bytes of a SHA-256: standard
 
 
 def cached_rows(content: bytes, make: Callable[[], Array]) -> Array:

@@ -22,11 +22,11 @@ from services.planner.request.deadline import CancelFlag
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-MARGIN = 0.001  # [m]
+MARGIN = 0.001  # [m] chosen: the clearance of a world that is told none
 FINEST = 0.0002  # [m] how much nearer than the margin a way may seem before it is refused
 COARSE = 0.001  # [m] the same where the true shapes have the last word
-FREE, TOUCHING = 0, 1  # motion_validator.h
-FOUND = 0  # plan.h
+FREE, TOUCHING = 0, 1  # standard: as in motion_validator.h
+FOUND = 0  # standard: as in plan.h
 
 
 class ContactPair(NamedTuple):

@@ -28,7 +28,7 @@ PLANNERS = ("RRTConnect", "RRTstar", "BITstar", "PRM")
 BETTERING = {"RRTstar": 600, "BITstar": 3000}  # questions "are we done?" after the first way
 RANGE = 0.4  # [s] at full speed that a tree grows by at most
 BATCH = 60  # "are we done?" while the roadmap grows, until it is looked at
-SEEDS = 2**32 - 2
+SEEDS = 2**32 - 2  # standard: OMPL takes 32 bits, and 0 means any
 AROUND = math.pi  # [rad] about start and goals that a joint without limits is searched in
 
 

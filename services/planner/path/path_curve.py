@@ -13,7 +13,7 @@ from services.planner.path.curve import Derivatives
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-NO_LENGTH = 1e-7  # [m] a leg that is shorter is none
+NO_LENGTH = 1e-7  # [m] a leg that is shorter is none; chosen: far below a motor step
 
 
 class PathCurve(Protocol):

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 Neighbours = dict[int, list[tuple[int, float]]]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-TRIED = 10  # nearest places to which an end is joined
+TRIED = 10  # nearest places to which an end is joined; chosen: each costs the check of a line
 
 
 def shortest_path(

@@ -14,10 +14,10 @@ from services.planner.request.deadline import Deadline
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-CUTS = 60  # tried; each costs the check of a line
-FRUITLESS = 15  # of them in a row are enough
+CUTS = 60  # tried; each costs the check of a line; chosen: later ones hardly shorten
+FRUITLESS = 15  # of them in a row are enough; chosen: a quarter of all
 WIDEST = 0.5  # share of an edge that its corner may be rounded over
-LEAST = 1.0 / 64.0
+LEAST = 1.0 / 64.0  # chosen: a corner that does not fit after six halvings stays a stop
 SHARED = 2  # control points from one corner to the next, where these share the one between them
 
 

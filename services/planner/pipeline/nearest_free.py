@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 SPARE = 0.001  # [m] beyond the clearance that is clear of everything there, so that a plan can begin
 NEAREST, FARTHEST, GROWTH = 0.003, 0.15, 1.25  # [m] that any point of the arm moves at most on the ways that are tried
 DIRECTIONS = 24  # of all joints together, at each distance, besides those of one joint
-LEAST_REACH = 0.02  # [m/rad] of a joint that moves hardly anything
-LOOKS = 8  # at what touches, along a path
+LEAST_REACH = 0.02  # [m/rad] of a joint that moves hardly anything; chosen: so it turns no more than some radians
+LOOKS = 8  # at what touches, along a path; chosen: each is a check on the exact shapes
 LEAST_SECONDS, SHARE = 0.5, 0.7  # and of a joint's velocity limit at most
 DECIMALS, TINY = 4, 1e-4  # of [rad] or [m], in which a configuration is told; what moves less does not move
 

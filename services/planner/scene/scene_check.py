@@ -13,8 +13,8 @@ from services.arm.model.gripper import JAWS
 from services.planner.collision.scene_shapes import ANY, Folders, SceneError, shape_of
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-LONGEST_NAME = 64
-MOST_OBJECTS = 1000
+LONGEST_NAME = 64  # chosen: fits into a line of a table and of a refusal
+MOST_OBJECTS = 1000  # chosen: more than a cell has; a plan stays fast among so many
 
 
 def require_scene(arm: Arm, scene: PlanningScene, folders: Folders) -> None:

@@ -39,12 +39,12 @@ NEAR = 1e-4  # share of the length: marks that are nearer to one another are one
 ASIDE = 1e-6  # share of the length from a mark at which the path is that of one side
 ROWS = 128  # of length at which limits are looked at, besides the knots and the marks
 COUNTS = (1, 4, 16)  # of even stretches that are tried; they divide ROWS
-PARTS = 4  # of a stretch of one kind
+PARTS = 4  # of a stretch of one kind; chosen: bounds differ little within a quarter
 SHARES = (1.0, 0.7, 0.45)  # of the speed that the path allows: slower leaves more for acceleration
-CENTRIPETAL = 0.8  # share of the acceleration that curvature may take
+CENTRIPETAL = 0.8  # share of the acceleration that curvature may take; chosen: the rest is for speeding up in a bend
 JERK_OF_SPEED, JERK_OF_BOTH = 0.5, 0.25  # shares of the jerk: of q_sss s'^3, and of 3 q_ss s' s''
 MARGIN = 0.98  # share of the limits that is used: the quintics between points swing a little
-FASTEST = 1e3  # [lengths of the path per second], where nothing else limits
+FASTEST = 1e3  # [lengths of the path per second], where nothing else limits; chosen: beyond any arm
 
 
 class Law(Protocol):

@@ -24,13 +24,13 @@ Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
 SPACING = 0.05  # [s] between points, where the profile does not change its jerk; measured: README.md
-MOST_POINTS = 400
+MOST_POINTS = 400  # chosen: small as a message; verification looks between them
 SHORTEST = 1e-4  # [s] two points nearer than that are one: below it the quintic's coefficients lose their digits
 MARGIN = 0.997  # share of the limits that is used, for what SHORTEST leaves out
 LONGEST = 86_400.0  # [s] a plan may take: beyond a day the scaling is a mistake
 STANDSTILL = 1e-9  # [s] at full speed: a path so short is no way
 NEGLIGIBLE = 1e-12  # share of its full speed below which a joint limits nothing
-NO_TIME = 1e-12  # [s] a phase that is shorter is none
+NO_TIME = 1e-12  # [s] a phase that is shorter is none; chosen: rounding of times
 HOLD = 0.1  # [s] that a plan to where the arm already is takes
 
 

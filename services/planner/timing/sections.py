@@ -28,9 +28,9 @@ TWISTING = 0.6  # share of the jerk's limit that the bend's own change may use
 CROSSING = 0.2  # share of the jerk's limit for accelerating in a bend
 CUTS = 2  # sections of a piece, before the ones that are alike become one
 SHARES = np.linspace(1e-6, 1.0 - 1e-6, 5)  # of a section, at which its bounds are taken
-ALIKE = 1.08  # sections whose speeds differ by less are one
+ALIKE = 1.08  # sections whose speeds differ by less are one; chosen: a change of speed would cost more than it wins
 STRAIGHT = 1e-9  # 1/s of bend below which a piece is straight
-TINY = 1e-12
+TINY = 1e-12  # chosen: added to derivatives, so that nothing is divided by 0
 NEARLY = 1.0 - 1e-9  # of a change of speed, lest rounding leaves no profile for it
 
 

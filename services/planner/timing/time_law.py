@@ -11,8 +11,8 @@ Array = NDArray[np.float64]
 Stretch = tuple[float, float, float, float, float]  # [s] duration, then length, speed, acceleration, jerk at its begin
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-NEWTON = 8  # steps to where a length is reached
-FEWEST = 1e-3  # [s] times nearer than that are one
+NEWTON = 8  # steps to where a length is reached; chosen: each doubles the digits, the last ones change nothing
+FEWEST = 1e-3  # [s] times nearer than that are one; chosen: a slot of the device
 
 
 class TimeLaw:

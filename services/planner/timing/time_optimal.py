@@ -17,11 +17,11 @@ from services.planner.timing.toppra_speeds import optimal_speeds
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-GRID = 500  # grid points at least
-BLUR = 0.03  # [s] in which an acceleration comes and goes
-SPACING = 0.01  # [s] between points
-FEWEST = 40  # points of a run
-MOST = 4000
+GRID = 500  # grid points at least; chosen: much finer than the curvature of a rounded path
+BLUR = 0.03  # [s] in which an acceleration comes and goes; chosen: one and a half knots of the gateway
+SPACING = 0.01  # [s] between points; chosen: a third of the blur
+FEWEST = 40  # points of a run; chosen: the blur of a short run still has shape
+MOST = 4000  # points of a run; chosen: small enough as a message
 
 
 def time_optimal_path(control: Array, limits: JointLimits) -> States:

@@ -20,8 +20,8 @@ from services.planner.timing.profile import JointLimits, NoProfile, require_shor
 Array = NDArray[np.float64]
 
 # Tuning constants: chosen, where a line does not say measured or standard.
-DERATED = 0.95  # share of the limits that toppra may use
-SHORTEST = 0.03  # [s] that a unit of time has at least
+DERATED = 0.95  # share of the limits that toppra may use; chosen: the blur afterwards swings over them a little
+SHORTEST = 0.03  # [s] that a unit of time has at least; chosen: as long as the blur
 MUCH = 1e4  # of a normalised limit: beyond it nothing is limited
 SIDES = 16  # of the polygon in half a circle: what the tool's acceleration along and across its way may be
 

@@ -30,11 +30,11 @@ Counts = NDArray[np.int64]
 KNOT = 0.02  # [s] between knots; standard: firmware/PROTOCOL.md
 SLOT = 0.001  # [s] in which the device spreads its steps evenly; standard: firmware/PROTOCOL.md
 LEAD = 0.30  # [s] of path that the gateway keeps in the queue, besides half of what braking takes
-Q8 = 256
+Q8 = 256  # standard: 1/256 step, firmware/PROTOCOL.md
 FULL = 1.0 + 1e-3  # knots are rounded to 1/256 step, so a profile that touches its limit may look so much beyond
-MOST_KNOTS = 30_000  # that are looked at at once
+MOST_KNOTS = 30_000  # that are looked at at once; chosen: some tens of megabytes of slots
 SLOWEST = 0.01  # time scale below which slowing down is no remedy
-HALVINGS = 24
+HALVINGS = 24  # chosen: the time scale to 1 in 2^24, finer than the duration is told
 PLACES = np.arange(1, round(KNOT / SLOT) + 1, dtype=np.float64) * SLOT / KNOT  # of slots between two knots, 0 to 1
 SHARES: Array = PLACES[None, :, None]
 

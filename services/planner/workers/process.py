@@ -30,9 +30,9 @@ from services.planner.workers.jobs import (
 )
 from services.planner.workers.pending_plan import Cancelled, PendingPlan
 
-START = 60.0  # [s] in which a worker must have started, have a scene, or have imported toppra for the first time
-STOPS_WITHIN = 0.2  # [s] from a cancel to the answer of a process that lives on
-TICK = 0.05  # [s] between two looks whether the plan is still wanted
+START = 60.0  # [s] in which a worker must start, have a scene, or import toppra; chosen: cold small computers are slow
+STOPS_WITHIN = 0.2  # [s] from a cancel to the answer of a process that lives on; chosen: else it is ended
+TICK = 0.05  # [s] between two looks whether the plan is still wanted; chosen: short beside STOPS_WITHIN
 CHILD = "services.planner.workers.worker"
 
 R = TypeVar("R", Ready, Shown, Planned)

@@ -29,19 +29,22 @@ from services.planner.workers.jobs import Job
 from services.planner.workers.pending_plan import Answer, Cancelled, OnInputs, PendingPlan
 from services.planner.workers.process import Late, Process, WorkerDied, nothing
 
-MOST = 2  # processes: as many as small computers have cores for it
-LATEST = 0.08  # of the allowed time, beyond it: then the plan is answered, whatever its process does
-LEAST_LATE = 0.008  # [s] of that at least: shorter plans than 0.1 s may be later
-WAY, MOST_WAY = 0.01, 0.1  # [s] to the process and back, which it has less than is allowed; of short times that share
-GRACE = 1.0  # [s] after that answer in which a process ends its plan by itself
-PATIENCE = 5.0  # [s] for a thread to see that its process is gone
-AGAIN = 3  # plans of one request, where the scene changes or the process dies meanwhile
-MOST_DEATHS = 1  # after which a plan is made again: one that ends two processes may end every one
+MOST = 2  # processes; chosen: as many as small computers have cores for it
+LATEST = 0.08  # of the allowed time, beyond it, when the plan is answered whatever its process does; chosen: little
+LEAST_LATE = 0.008  # [s] of that at least; chosen: shorter plans than 0.1 s may be later
+WAY, MOST_WAY = (
+    0.01,
+    0.1,
+)  # [s] to the process and back; of short times that share; chosen: a busy small computer
+GRACE = 1.0  # [s] after that answer in which a process ends its plan by itself; chosen: a new process costs more
+PATIENCE = 5.0  # [s] for a thread to see that its process is gone; chosen: only a broken machine needs more
+AGAIN = 3  # plans of one request, where the scene changes or the process dies meanwhile; chosen: then a person is told
+MOST_DEATHS = 1  # after which a plan is made again; chosen: one that ends two processes may end every one
 DIED_REMEDY = "plan again: new ones are started; the system's log may say what has ended them (out of memory?)"
-LOOK = 0.2  # [s] between two looks whether the scene has changed
-SHORT = 0.1  # [s] until which nothing is said of a plan
-LONGEST_ID = 100  # characters
-MOST_PLANS = 64  # that wait or are being made
+LOOK = 0.2  # [s] between two looks whether the scene has changed; chosen: an idle thread that costs nothing
+SHORT = 0.1  # [s] until which nothing is said of a plan; chosen: a person does not see less
+LONGEST_ID = 100  # characters; chosen: ours have 32, and nobody's fills the memory
+MOST_PLANS = 64  # that wait or are being made; chosen: more than people ask for, little memory
 
 Present = Callable[[], tuple[JointState | None, float]]
 Scene = Callable[[], PlanningScene]

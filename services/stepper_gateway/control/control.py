@@ -17,10 +17,10 @@ from services.stepper_gateway.control.clients import Caller, Client, client_of
 from services.stepper_gateway.goals.rejections import invalid
 from services.stepper_gateway.moment import Moment
 
-MOST_NAME = 40  # characters of a holder's name
-SECRET = (32, 128)  # characters of a secret, at least and at most
+MOST_NAME = 40  # characters of a holder's name; chosen: fits beside a button of the page
+SECRET = (32, 128)  # characters of a secret, at least and at most; chosen: 128 bits in hexadecimal digits, and room
 MOST_MEMBERS = 32  # nodes that share one hold; chosen: a person's terminals and scripts
-GONE = 0.2  # [s] without its token until a holder counts as gone; a router that ends takes longer to be missed
+GONE = 0.2  # [s] without its token until a holder counts as gone; chosen: a router that ends takes longer to be missed
 
 Note = tuple[LogLevel, str]
 

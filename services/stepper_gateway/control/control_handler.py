@@ -23,8 +23,8 @@ from services.stepper_gateway.motion.motion_controller import MotionController
 from services.stepper_gateway.motion.target_follower import TargetFollower
 from services.stepper_gateway.outputs import Answer
 
-STOP_AGAIN = 0.5  # [s] between two stops for an arm that does not come to rest
-COMPLAINT = 1.0  # [s] between two words on streamed targets that are refused
+STOP_AGAIN = 0.5  # [s] between two stops for an arm that does not come to rest; chosen: as the motion controller's
+COMPLAINT = 1.0  # [s] between two words on streamed targets that are refused; chosen: the log stays readable
 IN_MOTION = (DeviceMode.RUN, DeviceMode.HOLD, DeviceMode.HOMING)
 STARTING = (DeviceCommandKind.HOME, DeviceCommandKind.RESUME)  # what they start begins with the device's answer
 NOBODY = Caller()

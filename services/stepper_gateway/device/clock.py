@@ -12,12 +12,12 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
-WINDOW = 64  # exchanges, 32 s at 2 Hz
-ENOUGH = 3  # exchanges until the offset is trusted
-QUICK = 200.0  # [us] beyond the shortest round trip, at which an exchange weighs a quarter
-SPAN = 5e6  # [us] that the exchanges must cover until they tell of a drift
-MOST_DRIFT = 2e-4  # twice what a crystal's data sheet allows
-STEADY = 1000.0  # [us] that two clocks may part beyond any drift
+WINDOW = 64  # exchanges, 32 s at 2 Hz; chosen: long enough for a drift to show, short enough to follow it
+ENOUGH = 3  # exchanges until the offset is trusted; chosen: one may be delayed, and one be a stranger's
+QUICK = 200.0  # [us] beyond the shortest round trip: such an exchange weighs a quarter; chosen: a network's jitter
+SPAN = 5e6  # [us] that the exchanges must cover until they tell of a drift; chosen: less drowns in the jitter
+MOST_DRIFT = 2e-4  # of a clock; chosen: twice what a crystal's data sheet allows
+STEADY = 1000.0  # [us] that two clocks may part beyond any drift; chosen: a slot of the device, which stamps by slots
 
 
 class Exchange(NamedTuple):

@@ -16,9 +16,9 @@ from services.stepper_gateway.links.reports import ConfigAckReport
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Answer, Outbox
 
-AGAIN = 1.0  # [s] until a configuration that was not answered is sent once more
-REFUSED_AGAIN = 10.0  # [s] the same for one that it has refused: somebody else may have said so
-PATIENCE = 5.0  # [s] for an answer: a board writes it to its flash first
+AGAIN = 1.0  # [s] until a configuration that was not answered is sent once more; chosen: a slow network answers by then
+REFUSED_AGAIN = 10.0  # [s] the same for one that it has refused; chosen: somebody else may have said so
+PATIENCE = 5.0  # [s] for an answer; chosen: a board writes it to its flash first
 DISARMED = (DeviceMode.UNREFERENCED, DeviceMode.FAULT, DeviceMode.ESTOP)
 
 

@@ -12,8 +12,8 @@ from services.stepper_gateway.links.link import Kind
 from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Answer
 
-TIMEOUT = 1.0  # [s] after which an answer counts as lost
-MOST = 32  # that may wait; it is one more than any bench has under way
+TIMEOUT = 1.0  # [s] after which an answer counts as lost; chosen: twice the silence that stops the arm
+MOST = 32  # that may wait; chosen: it is one more than any bench has under way
 NO_ANSWERS = "a sketch on ra/juntas answers nothing, so nothing can be measured: see how often ra/estados comes"
 NOT_YET = "the first line to this board would move it: say where its joints stand first, with `gemelo reference`"
 

@@ -17,7 +17,7 @@ from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.outputs import Outbox
 from services.stepper_gateway.parameters import GatewayParameters
 
-SETTLING = 2.5  # messages: the one under way, the last one, and the word after it
+SETTLING = 2.5  # messages; chosen: the one under way, the last one, and the word after it
 
 
 class GatewayDevice:

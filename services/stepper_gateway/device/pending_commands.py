@@ -10,14 +10,14 @@ from services.stepper_gateway.device.clock import ClockSync
 from services.stepper_gateway.links.frames import ANY_BOOT, NEVER_EXPIRES, Command, CommandReply, State
 from services.stepper_gateway.moment import Moment
 
-RETRY = 0.1  # [s]
+RETRY = 0.1  # [s] chosen: five states, as an answer may just be late
 REPEAT = (
     0.01  # [s] after which a stop that is asked for again is sent again at once; chosen: a flood costs 100 frames/s
 )
 REPEATS_AT_ONCE = 3  # which a stop is sent again without that pause; chosen: people, not floods
-TIME_TO_LIVE = 500_000  # [us]
+TIME_TO_LIVE = 500_000  # [us] chosen: a command that is later than a lost heartbeat's 0.5 s must not act
 SHOWN_WITHIN = 0.2  # [s] that an answer waits for the state that shows it; chosen: ten states
-INTERNAL = 0  # ticket of the gateway's own commands
+INTERNAL = 0  # ticket of the gateway's own commands that nobody waits for; chosen: no client has it
 EXCLUSIVE = (  # what a person has asked for would hit whatever is started before the answer
     DeviceCommandKind.STOP,
     DeviceCommandKind.RESET,
@@ -40,7 +40,7 @@ class Arguments:
 NO_ARGUMENTS = Arguments()
 STOPPING = (DeviceCommandKind.STOP, DeviceCommandKind.HOLD, DeviceCommandKind.DISARM)
 MOST_UNDER_WAY = 16  # commands that the device has not answered, but for stops; chosen: a person has one or two
-MOST_TICKETS = 256  # of one command: who asks for the same again is answered with the others
+MOST_TICKETS = 256  # of one command; chosen: who asks for the same again is answered with the others
 
 
 @dataclass

@@ -14,7 +14,7 @@ from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.commanded_path import PathPoint
 from services.stepper_gateway.motion.stream import SentChunk
 
-HALF_STEP = 0.5 + 1.0 / 256.0  # [steps] by which whole steps may lie beside the path, which has 1/256 itself
+HALF_STEP = 0.5 + 1.0 / 256.0  # [steps] of whole steps beside the path: their rounding, and the path's own to 1/256
 
 
 class Reporter:

@@ -25,17 +25,17 @@ from services.stepper_gateway.links.frames import (
 from services.stepper_gateway.links.reports import StatusReport
 from services.stepper_gateway.moment import Moment, next_beat
 
-HEARTBEAT = 0.1  # [s] a cut of 0.4 s does not stop the arm yet
-SYNC = 0.5  # [s]
-SYNC_AT_FIRST = 0.03  # [s] until the clock is known
-STEADY_BEATS = 0.7  # [s] of heartbeats without a pause, after which a device cannot miss them for want of any
-ASK_STATUS = 1.0  # [s] between two requests for a status that is missing
+HEARTBEAT = 0.1  # [s] chosen: a cut of 0.4 s does not stop the arm yet
+SYNC = 0.5  # [s] chosen: a crystal's drift in that time is 50 us at most
+SYNC_AT_FIRST = 0.03  # [s] until the clock is known; chosen: the three that are needed take 0.1 s
+STEADY_BEATS = 0.7  # [s] of heartbeats without a pause, after which a device has heard one; chosen: above its 0.5 s
+ASK_STATUS = 1.0  # [s] between two requests for a status that is missing; chosen: a slow network answers by then
 # Chosen: true states are not taken until they are newer than one from so far ahead, which must not look like silence.
 FARTHEST_AHEAD = 0.2  # [s] that a frame's time may be ahead of the device's clock as it is known
-QUESTIONS = 32  # that may be under way
+QUESTIONS = 32  # that may be under way; chosen: 1 s of them at first, beyond which answers are late
 NOT_HEARD = "is it switched on, does it use the same broker, and does the broker's ACL let it write?"
 NO_CLOCK = "try again in a second; if it stays so, the device does not hear us (the broker's ACL, or the wire)"
-OLD_BOOTS = 16  # remembered, so that a late frame of one does not look like a reboot
+OLD_BOOTS = 16  # remembered, so that a late frame of one is no reboot; chosen: more than a broker keeps frames of
 
 
 class DeviceSession:

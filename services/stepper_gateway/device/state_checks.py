@@ -5,8 +5,8 @@ from __future__ import annotations
 from schemas.device import DeviceMode
 from services.stepper_gateway.links.frames import BadFrame, State
 
-MOST_HASTE = 2000  # [us] by which more of the path may be played than time has passed; a slot, and as much again
-STRANGERS = 3  # states in a row that tell of another boot while the present one is not silent
+MOST_HASTE = 2000  # [us] by which more of the path may be played than time has passed; chosen: a slot, and again
+STRANGERS = 3  # states in a row of another boot while the present one is not silent; chosen: no single frame does it
 MOVING = (DeviceMode.RUN, DeviceMode.HOLD)
 
 

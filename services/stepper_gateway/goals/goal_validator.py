@@ -18,8 +18,8 @@ from services.stepper_gateway.motion.path_joining import join_path
 from services.stepper_gateway.motion.paths import Path, RoundedPath, SampledPath, profile
 from services.stepper_gateway.parameters import GatewayParameters
 
-SAME_VELOCITY = 1e-9  # [rad/s] or [m/s]
-MAX_DELAY = 60.0  # [s] that a trajectory's stamp may lie in the future
+SAME_VELOCITY = 1e-9  # [rad/s] or [m/s] chosen: rounding of a velocity that was computed
+MAX_DELAY = 60.0  # [s] that a trajectory's stamp may lie in the future; chosen: more is a wrong clock
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from services.arm.errors import suggestion
 from services.arm.model.description import Joint
 from services.stepper_gateway.goals.rejections import invalid, invalid_joints
 
-REST = 1e-6  # [rad/s] or [m/s] that a final velocity may be off zero
-MAX_POINTS = 100_000
-MAX_DURATION = 3600.0  # [s]
+REST = 1e-6  # [rad/s] or [m/s] that a final velocity may be off zero; chosen: far below a step a second
+MAX_POINTS = 100_000  # chosen: half an hour at the gateway's own knots; more is no trajectory
+MAX_DURATION = 3600.0  # [s] chosen: an hour; longer work is several goals
 
 
 def ordered_trajectory(trajectory: JointTrajectory, joints: tuple[Joint, ...]) -> JointTrajectory:

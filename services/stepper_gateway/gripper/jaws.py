@@ -12,7 +12,7 @@ from services.stepper_gateway.device.pending_commands import Arguments
 from services.stepper_gateway.goals.rejections import invalid
 from services.stepper_gateway.links.frames import State
 
-SLACK = 1e-6  # [m] by which an end may be missed
+SLACK = 1e-6  # [m] by which an end may be missed; chosen: rounding of a conversion
 
 Sending = tuple[DeviceCommandKind, Arguments]
 

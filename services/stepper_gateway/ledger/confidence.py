@@ -23,12 +23,12 @@ from msgspec import Struct
 
 from schemas.ledger import VerifiedBy
 
-HALF = 0.35  # load at which half of all motors would lose steps: less than stated, and the rotor's swing takes its part
+HALF = 0.35  # load at which half of all motors would lose steps; chosen: below the stated torque, as rotors swing
 STEEPNESS = 3.0  # chosen: one motor in 6 fails at 0.2 of its stated torque, one in 44 at 0.1
-PROOF = 0.9  # of a load that a verification has proven: near pull-out a motor loses steps in one motion, not in all
-CLEAN = 3  # verifications without a loss, after one with a loss, until that is forgotten: losses can cancel out
-TURNS = 100_000.0  # [rev] of the motor shaft after which 1/e is left
-AGE = 30.0 * 86_400.0  # [s] after which 1/e is left
+PROOF = 0.9  # of a load that a verification has proven; chosen: near pull-out steps are lost in one motion, not in all
+CLEAN = 3  # verifications without a loss, after one with a loss, until that is forgotten; chosen: losses can cancel out
+TURNS = 100_000.0  # [rev] of the motor shaft after which 1/e is left; chosen: a day of steady work at a turn a second
+AGE = 30.0 * 86_400.0  # [s] after which 1/e is left; chosen: a month, in which people bump into an arm
 BASE = {  # confidence at the moment of the verification
     VerifiedBy.NOTHING: 0.0,
     VerifiedBy.HOMING: 1.0,
@@ -36,9 +36,9 @@ BASE = {  # confidence at the moment of the verification
     VerifiedBy.REFERENCE: 0.995,  # chosen: a person's eye
 }
 MEASURED = (VerifiedBy.HOMING, VerifiedBy.SWITCH)
-REST_FAULT = 0.02  # incident: a fault while the arm stood, which may have been hit
-REBOOT = 0.05  # incident: a restart at rest: the motors had no current
-LATE = 0.5  # incident: pulses that stopped without a ramp
+REST_FAULT = 0.02  # incident: a fault while the arm stood; chosen: it may have been hit
+REBOOT = 0.05  # incident: a restart at rest; chosen: the motors had no current
+LATE = 0.5  # incident: pulses that stopped without a ramp; chosen: at speed a rotor mostly slips then
 
 
 class Evidence(Struct, frozen=True, kw_only=True):

@@ -10,9 +10,9 @@ from services.arm.model.description import Joint
 from services.arm.motors.torque import NO_CURVE, torque_share
 from services.stepper_gateway.ledger.confidence import Evidence
 
-WATCHED = 0.1  # [s] between two states, beyond which a motion between them is taken for the hardest there is
-USUAL_FULL_STEPS = 200  # [steps/rev] of a motor without a pull-out curve
-STILL = 1.0  # [steps/s]
+WATCHED = 0.1  # [s] between two states, beyond which the hardest motion is assumed; chosen: five states
+USUAL_FULL_STEPS = 200  # [steps/rev] of a motor without a pull-out curve; standard: motors of 1.8 deg
+STILL = 1.0  # [steps/s] chosen: slower pulses are no load
 
 
 class Sample(NamedTuple):

@@ -14,7 +14,7 @@ import msgspec
 
 from services.stepper_gateway.ledger.record import LedgerRecord
 
-LAST_WRITE = 2.0  # [s] that the end of the process waits for the disk
+LAST_WRITE = 2.0  # [s] that the end of the process waits for the disk; chosen: process-compose waits longer
 UNKEPT = "the step ledger cannot be kept ({}): after a restart no joint counts as verified; make room on the disk"
 
 

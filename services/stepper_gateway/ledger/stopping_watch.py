@@ -20,10 +20,10 @@ from services.stepper_gateway.motion.stopping import MARGIN, Segment, Stop, segm
 from services.stepper_gateway.motion.stream import Stream
 
 PERIOD = 1.0 / (STOPPING_DISTANCE.rate or 10.0)  # [s]
-SLOTS = 0.004  # [s] that the device prepares ahead, and a slot for each of its decisions
+SLOTS = 0.004  # [s] that the device prepares ahead, and a slot for each decision: standard, firmware/core
 JITTER = 1.5  # chosen: times the longest round trip of late, that the device's last heartbeat may have taken one way
-STILL = 1.0  # [steps/s]
-MOST_PLACES = 512  # places of the tool that are remembered: the device's queue is shorter
+STILL = 1.0  # [steps/s] chosen: slower joints stop within a step
+MOST_PLACES = 512  # places of the tool that are remembered; chosen: the device's queue is shorter
 
 NOT_OURS = "the device plays a path that this gateway has not sent"
 OPEN_LOOP = "this board does not say what it does, nor does it watch a heartbeat"

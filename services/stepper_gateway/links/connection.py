@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 from services.stepper_gateway.links.link import Received
 
-CAPACITY = 4096  # [messages] 80 s of state
-BACK_OFF = (0.1, 0.2, 0.5, 1.0)  # [s] between attempts
+CAPACITY = 4096  # [messages] 80 s of state; chosen: beyond any pause of the loop that the arm would bear
+BACK_OFF = (0.1, 0.2, 0.5, 1.0)  # [s] between attempts; chosen: quick after a short cut, no flood after a long one
 
 
 class ReceiveQueue:

@@ -15,11 +15,11 @@ import msgspec
 from schemas.message import Vector
 from services.runtime.serial_frames import MAGIC, VERSION, build_frame
 
-UNITY = 32768.0  # of a time scale, Q1.15
-Q8 = 256.0  # of a velocity, Q24.8
-ANY_BOOT = 0  # as the boot id of a command that stops
-NEVER_EXPIRES = 2**64 - 1  # [us]
-NO_JOINT = 255
+UNITY = 32768.0  # of a time scale; standard: Q1.15 of firmware/PROTOCOL.md
+Q8 = 256.0  # of a velocity; standard: Q24.8 of firmware/PROTOCOL.md
+ANY_BOOT = 0  # as the boot id of a command that stops; standard: firmware/PROTOCOL.md
+NEVER_EXPIRES = 2**64 - 1  # [us] standard: firmware/PROTOCOL.md
+NO_JOINT = 255  # standard: firmware/PROTOCOL.md
 
 Row = tuple[int, ...]
 

@@ -23,11 +23,11 @@ from services.stepper_gateway.links.link import FROM_DEVICE, Kind, Received
 
 UNACKNOWLEDGED = (Kind.HB, Kind.SYNC, Kind.SYNC_R, Kind.TRAJ_ACK, Kind.STATE, Kind.SENSORS, Kind.SHAFT)  # QoS 0
 DISPENSABLE = (Kind.INJECT, Kind.CONFIG)  # whoever asks for these hears that the device did not answer
-MAX_PAYLOAD = 65_536  # [bytes] no frame of the device comes near
-KEEP_ALIVE = 5  # [s]
+MAX_PAYLOAD = 65_536  # [bytes] chosen: no frame of the device comes near
+KEEP_ALIVE = 5  # [s] chosen: a dead broker is noticed in 7.5 s where no heartbeat tells it before
 # Between attempts after a refusal, which only a person can mend.
-REFUSED = (1.0, 2.0, 4.0, 8.0, 16.0)  # [s]
-MOST_UNANSWERED = 1024  # [messages] whose topic is remembered for the broker's answer
+REFUSED = (1.0, 2.0, 4.0, 8.0, 16.0)  # [s] chosen: no flood, and no long wait for a person who has mended it
+MOST_UNANSWERED = 1024  # [messages] whose topic is remembered for the broker's answer; chosen: some seconds of ours
 
 
 class MqttLink:

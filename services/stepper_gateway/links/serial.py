@@ -33,7 +33,7 @@ TEXTS = {
     JsonFrame.SHAFT: Kind.SHAFT,
 }
 FRAMES = {kind: frame for frame, kind in TEXTS.items()}  # of the kinds that are JSON
-BACKLOG = 16_384  # [bytes] that may wait: 0.2 s at 921,600 baud
+BACKLOG = 16_384  # [bytes] that may wait; chosen: 0.2 s at 921,600 baud
 
 
 class SerialLink:

@@ -10,8 +10,8 @@ from typing import Protocol
 import serial
 from serial.tools import list_ports
 
-READ_TIMEOUT = 0.1  # [s] after which the reader looks whether it is to end
-WRITE_TIMEOUT = 0.5  # [s] after which a line that takes nothing is given up
+READ_TIMEOUT = 0.1  # [s] after which the reader looks whether it is to end; chosen: a stop of the process is not felt
+WRITE_TIMEOUT = 0.5  # [s] after which a line that takes nothing is given up; chosen: as a heartbeat's silence
 
 
 class Line(Protocol):

@@ -10,7 +10,7 @@ from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.paths import Path
 from services.stepper_gateway.motion.target_tracker import TargetTracker
 
-KNOT_TIME = 0.02  # [s] between knots
+KNOT_TIME = 0.02  # [s] between knots; chosen: one for each state of the device
 
 
 class KnotSource(Protocol):

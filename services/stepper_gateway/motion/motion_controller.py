@@ -19,9 +19,9 @@ from services.stepper_gateway.motion.stream import SentChunk, Stream
 from services.stepper_gateway.motion.transmission import Transmission
 
 HISTORY = 1.0  # [s] of measured positions: a trajectory may have been planned from any of them
-EXPIRED = 1.5  # [s] after which the device takes nothing any more that was sent before: its time to live, and a half
-STANDING = 0.5  # [s] without a step, after which an arm stands and does not only turn back
-STOP_AGAIN = 0.5  # [s] between STOPs for a device that does not obey
+EXPIRED = 1.5  # [s] after which the device takes nothing that was sent before; chosen: its time to live, and half
+STANDING = 0.5  # [s] without a step, after which an arm stands and does not only turn back; chosen: 25 states
+STOP_AGAIN = 0.5  # [s] between STOPs for a device that does not obey; chosen: braking may take as long
 MOVING = (DeviceMode.RUN, DeviceMode.HOLD)
 
 

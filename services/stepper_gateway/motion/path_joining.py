@@ -8,9 +8,9 @@ from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits
 from services.stepper_gateway.motion.paths import Path, ProfilePath, profile
 
-GRID = 0.02  # [s] between the times at which the path may be met
-GRID_POINTS = 150  # at most so many are tried, coarser on long paths
-SAMPLE = 0.01  # [s] between the instants at which a join is checked
+GRID = 0.02  # [s] between the times at which the path may be met; chosen: one for each knot
+GRID_POINTS = 150  # at most so many are tried, coarser on long paths; chosen: bounds the time of a step of the loop
+SAMPLE = 0.01  # [s] between the instants at which a join is checked; chosen: two for each knot
 
 Within = Callable[[Knot], bool]
 

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
-MARGIN = 1.02 * 17.0 / 16.0  # of an acceleration limit: what the device is told of it, and what it adds for slowing
-SLOWEST = 1e-6  # of y: below it the path stands
+MARGIN = 1.02 * 17.0 / 16.0  # of an acceleration limit: what the device is told, and adds; standard: firmware/core
+SLOWEST = 1e-6  # of y: below it the path stands; chosen: 1/1000 of its speed
 CARE, LEAST = 1.015, 0.0001  # chosen: factor and [m] for what straight pieces of y and chords of the way leave out
 
 

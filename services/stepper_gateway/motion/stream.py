@@ -13,9 +13,9 @@ from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.commanded_path import CommandedPath, PathPoint
 from services.stepper_gateway.motion.knots import Knot, StepEncoder, StepKnot
 
-TIME_TO_LIVE = 1_000_000  # [us] after which the device is to refuse a chunk
-RETRY_MIN, RETRY_MAX = 0.06, 0.3  # [s] until an unacknowledged chunk is sent again
-GAP_RETRY = 0.02  # [s] until a gap that the device still reports is filled once more
+TIME_TO_LIVE = 1_000_000  # [us] after which the device is to refuse a chunk; chosen: beyond any lead
+RETRY_MIN, RETRY_MAX = 0.06, 0.3  # [s] until a chunk is sent again; chosen: three knots, and about the lead
+GAP_RETRY = 0.02  # [s] until a gap that the device still reports is filled once more; chosen: until its next state
 TRANSIENT = (Code.GAP, Code.NO_SPACE, Code.EXPIRED, Code.NOT_ARMED)  # NOT_ARMED: the drivers are only just on
 
 UNITS: dict[int, str] = {  # of a refusal's value and limit, where they are no positions

@@ -12,7 +12,7 @@ from services.stepper_gateway.moment import Moment
 from services.stepper_gateway.motion.motion_controller import MotionController
 from services.stepper_gateway.motion.target_stream import TargetStream
 
-COMPLAINT = 1.0  # [s] between two of them
+COMPLAINT = 1.0  # [s] between two of them; chosen: the log stays readable
 
 
 class TargetFollower:

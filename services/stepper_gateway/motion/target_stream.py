@@ -13,7 +13,7 @@ from services.stepper_gateway.motion.knots import Knot
 from services.stepper_gateway.motion.limits import Limits
 from services.stepper_gateway.motion.target_tracker import TargetTracker
 
-NEVER = -1.0e9  # [s]
+NEVER = -1.0e9  # [s] chosen: before every monotonic clock's beginning
 
 
 class TargetStream:

@@ -10,8 +10,8 @@ from services.stepper_gateway.motion.knot_sources import KnotSource
 from services.stepper_gateway.motion.knots import Knot, StepEncoder, stop_time
 from services.stepper_gateway.motion.stream import SentChunk, Stream
 
-LARGEST_CHUNK = 20  # [knots]
-SMALLEST_CHUNK = 2  # [knots] 25 chunks a second at 20 ms
+LARGEST_CHUNK = 20  # [knots] chosen: 0.4 s of path, in one frame also with eight joints
+SMALLEST_CHUNK = 2  # [knots] 25 chunks a second at 20 ms; chosen: half as many frames as knots
 
 
 class Transmission:

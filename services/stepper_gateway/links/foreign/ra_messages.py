@@ -12,10 +12,10 @@ from services.arm.motors.relative_moves import Ramp
 
 JOINTS, STATES, SENSORS = "ra/juntas", "ra/estados", "ra/sensores"
 OUTPUT = "avanzar"
-LARGEST = 256  # [bytes] PubSubClient's buffer, and nothing that the sketch says is longer
-DECIMALS = 9  # of a degree: far below the margin
-LEAST_MARGIN = 2.0**-10  # [steps]
-# A sketch on an ESP32 computes with floats of 24 bits: three roundings of one part in 2^24 stay below one in 2^20.
+LARGEST = 256  # [bytes] standard: PubSubClient's buffer, and nothing that the sketch says is longer
+DECIMALS = 9  # of a degree: far below the margin; chosen for short messages
+LEAST_MARGIN = 2.0**-10  # [steps] chosen: above every rounding near 0, below what a step shows
+# Standard: a sketch on an ESP32 has floats of 24 bits. Three roundings of one part in 2^24 stay below one in 2^20.
 FLOAT_MARGIN = 2.0**-20
 
 _decoder = msgspec.json.Decoder(dict[str, int | float | bool | None])

@@ -28,8 +28,8 @@ from services.stepper_gateway.links.frames import (
 )
 from services.stepper_gateway.links.link import Kind
 
-STALL = 0.1  # [s] a caller that is later was stopped by the operating system: nothing is caught up
-LAST_SLOTS = 2000  # [us] that run after a stall
+STALL = 0.1  # [s] a later caller was stopped by the operating system, and catches nothing up; chosen: five knots
+LAST_SLOTS = 2000  # [us] that run after a stall; chosen: two slots show that the device stood still
 OF_THE_BOARD = (Kind.SENSORS, Kind.SHAFT)  # the core has neither; where the board has sensors, it says so itself
 
 Report = tuple[Kind, bytes]

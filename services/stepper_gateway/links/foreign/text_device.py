@@ -15,8 +15,8 @@ from services.stepper_gateway.links.frames import BadFrame, Sync, decode
 from services.stepper_gateway.links.link import Kind
 
 NAME = "a board that speaks <SEQ,J1,...>"
-SILENCE = 2.0  # [s] without an answer to any line, after which the board is not there
-TELLING = 10.0  # [s] between two summaries of the line
+SILENCE = 2.0  # [s] without an answer to any line, after which the board is not there; chosen: all RETRIES have failed
+TELLING = 10.0  # [s] between two summaries of the line; chosen: the log stays readable
 
 
 class TextDevice:

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 from services.stepper_gateway.links.foreign.text_messages import HALF, SEQ_MODULUS, Answer
 
-REMEMBERED = 256  # lines whose answers are told apart
-TRIPS = 2048  # latest round trips
-PATIENCE = 0.08  # [s] for an answer at first: both take 10 ms at 115,200 baud, and 16 more in a USB adapter
-MOST_PATIENCE = 0.5  # [s]
-RETRIES = 5  # of one line
+REMEMBERED = 256  # lines whose answers are told apart; chosen: more than a line is repeated in its patience
+TRIPS = 2048  # latest round trips; chosen: enough for a 99th percentile
+PATIENCE = 0.08  # [s] for an answer at first; chosen: both take 10 ms at 115,200 baud, and 16 more in a USB adapter
+MOST_PATIENCE = 0.5  # [s] chosen: the arm stands by then, as after a lost heartbeat
+RETRIES = 5  # of one line; chosen: noise spoils one, a board that is gone all
 
 
 @dataclass

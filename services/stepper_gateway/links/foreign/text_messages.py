@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-LONGEST = 64  # [bytes] of an answer
-SEQ_MODULUS = 1 << 32
+LONGEST = 64  # [bytes] of an answer; chosen: half as much again as the longest one
+SEQ_MODULUS = 1 << 32  # standard: numbers of 32 bits in the dialect
 HALF = SEQ_MODULUS // 2
 
 _ANSWER = re.compile(rb"<(ACK|NAK),(\d{1,10}),([A-Za-z0-9_ ]{1,24})>")
