@@ -17,6 +17,7 @@ from services.logger.incident_watch import IncidentWatch, Trigger
 from services.recordings.channels import Entry
 from services.recordings.incidents import BLACK_BOX, Incident, IncidentKind, incident_metadata
 from services.recordings.mcap_file import McapFile
+from services.recordings.view_layout import layout_metadata, layout_of
 
 SECOND = 1_000_000_000  # [ns]
 AFTERWARDS = 3 * SECOND  # [ns] that are waited for what follows an incident
@@ -83,9 +84,15 @@ class BlackBox:
 class BlackBoxWriter:
     """Writes black boxes beside the logger's own work; `tell` says where one is, or why it is not."""
 
-    def __init__(self, robot: str, metadata: dict[str, dict[str, str]], tell: Callable[[str], None]) -> None:
-        """`metadata` by the name of its record."""
-        self._robot, self._metadata, self._tell = robot, metadata, tell
+    def __init__(
+        self,
+        robot: str,
+        metadata: dict[str, dict[str, str]],
+        tell: Callable[[str], None],
+        cameras: tuple[str, ...] = (),
+    ) -> None:
+        """`metadata` by the name of its record; `cameras` have a view each."""
+        self._robot, self._metadata, self._tell, self._cameras = robot, metadata, tell, cameras
         self._thread: threading.Thread | None = None
 
     def save(self, incident: Incident, entries: tuple[Entry, ...], folder: Path, keep: int) -> None:
@@ -102,8 +109,9 @@ class BlackBoxWriter:
             self._thread.join()
 
     def _save(self, incident: Incident, entries: tuple[Entry, ...], folder: Path, keep: int) -> None:
+        metadata = {**self._metadata, **layout_metadata(layout_of(entries, self._cameras))}
         try:
-            path = write_black_box(folder, self._robot, self._metadata, incident, entries)
+            path = write_black_box(folder, self._robot, metadata, incident, entries)
             prune(folder, self._robot, keep)
         except OSError as error:
             self._tell(f"{BLACK_BOX}{incident.sentence}; it cannot be written to {folder}: {error.strerror or error}")

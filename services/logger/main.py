@@ -30,8 +30,9 @@ def run(node: Node, deployment: Deployment) -> None:
     parameters = node.parameters(LoggerParameters)
     logger = Logger()
     metadata = metadata_of(node.robot, deployment, project_root())
+    cameras = deployed_cell(deployment).camera_names
     disk = RecordingWriter(node.robot, metadata, node.log.warning)
-    black_box, saver = BlackBox(), BlackBoxWriter(node.robot, metadata, node.log.warning)
+    black_box, saver = BlackBox(), BlackBoxWriter(node.robot, metadata, node.log.warning, cameras)
 
     def on_message(topic: Topic[Any], message: Message) -> None:
         now = node.now()
@@ -39,7 +40,7 @@ def run(node: Node, deployment: Deployment) -> None:
         black_box.on_message(topic, message, now)
 
     Subscriptions(node, on_message)
-    record_cameras(node, deployed_cell(deployment).camera_names, lambda: parameters.value.image_rate, on_message)
+    record_cameras(node, cameras, lambda: parameters.value.image_rate, on_message)
     said = ""
 
     def write(now: int, batch: Batch) -> None:

@@ -29,6 +29,7 @@ from services.recordings.foxglove import CAMERA, IMAGE
 from services.recordings.incidents import Incident, incident_in
 from services.recordings.reader import BadRecording, RecordingReader, Row
 from services.recordings.shadow import recorded_robot, shadow_folder, write_shadow
+from services.recordings.view_layout import ViewLayout, layout_in
 from services.runtime.deployment import DeploymentError, load_deployment, project_root
 from services.visualizer.core import Visualizer
 from services.visualizer.feeds import feeds
@@ -42,7 +43,6 @@ from services.visualizer.render.sink import APPLICATION, Sink
 from services.visualizer.viewer import address, resolved
 
 BATCH = 100_000_000  # [ns] of the recording that are drawn together, as live
-WINDOW = 10.0  # [s] of the plots, and of the tool's way
 PERIOD = 0.5  # [s] between two looks at the viewer
 
 
@@ -56,7 +56,8 @@ def write_view(file: Path, rrd: Path, shadow: Path) -> Incident | None:
     write_shadow(reader, shadow, robot, project_root() / "urdf" / robot)
     incident = incident_in(reader)
     description = _description_in(reader)
-    cameras = _cameras_in(reader)
+    chosen = layout_in(reader) or ViewLayout()
+    cameras = tuple(sorted({*chosen.cameras, *_cameras_in(reader)}))
     folders = (shadow, project_root())
     try:
         core = _core(description, folders)
@@ -67,7 +68,7 @@ def write_view(file: Path, rrd: Path, shadow: Path) -> Incident | None:
     rrd.parent.mkdir(parents=True, exist_ok=True)
     stream.save(rrd)
     moment = None if incident is None else Moment(incident.stamp, story_text(incident))
-    layout = blueprint(ArmLayout(core.model, WINDOW, WINDOW, cameras), moment)
+    layout = blueprint(ArmLayout(core.model, chosen.window, chosen.trail, cameras), moment)
     sink = Sink(stream, core.model, shadow, layout, story="" if moment is None else moment.story)
     drawn = 0
     for row in reader.rows(taken.__contains__):

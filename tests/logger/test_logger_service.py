@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from contextlib import contextmanager
+from importlib.metadata import version
 
 import msgspec
 import pytest
@@ -47,6 +48,7 @@ from services.runtime.bus.memory_bus import MemoryBus, MemoryNetwork
 from services.runtime.deployment import load_deployment
 from services.runtime.errors import Refused
 from services.runtime.node import Node
+from services.visualizer.render.outputs import VisualizerParameters
 
 
 @pytest.fixture
@@ -208,6 +210,33 @@ def test_goals_requests_parameters_and_a_users_topic_are_recorded_as_what_they_a
     assert schemas["gripper/torque"]["properties"]["value"]["type"] == "number"
     assert json.loads(kept["deployment"]["json"])["router"]["port"] == deployment.router.port
     assert kept["gemelo"]["ruckig"]
+
+
+def test_a_black_box_holds_configuration_versions_parameters_logs_and_the_layout_of_the_view(deployment, tmp_path):
+    network = MemoryNetwork()
+    with (
+        running(deployment, network) as logger,
+        Node("visualizer", deployment, bus=MemoryBus(network), overrides={"window": "7.5"}) as visualizer,
+        Node("stepper_gateway", deployment, bus=MemoryBus(network)) as gateway,
+    ):
+        visualizer.parameters(VisualizerParameters)
+        visualizer.publisher(TORQUE)  # which the logger subscribes to when it has asked this node about itself
+        with spinning(visualizer), spinning(gateway):
+            wait_for(lambda: TORQUE.key in logger.info().subscribes)
+            gateway.log.warning("the belt is slack")
+            wait_for(lambda: heard(logger, "log"))
+            gateway.publisher(DEVICE_EVENTS).put(DeviceEvent(device="rm1", event="rebooted", detail="watchdog"))
+            wait_for(lambda: list((tmp_path / "out" / "blackbox").glob("*.mcap")))
+    (box,) = (tmp_path / "out" / "blackbox").glob("*.mcap")
+    with box.open("rb") as file:
+        kept = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+    assert kept["gemelo"]["gemelo"] == version("gemelo")
+    assert json.loads(kept["deployment"]["json"])["router"]["port"] == deployment.router.port
+    assert json.loads(kept["layout"]["json"]) == {"window": 7.5, "trail": 20.0, "cameras": []}
+    said = messages(box)
+    assert "the belt is slack" in [message["text"] for topic, message in said if topic == "log"]
+    parameters = {message["node"]: message["parameters"] for topic, message in said if topic == "nodes"}
+    assert {each["name"] for each in parameters["visualizer"]} >= {"window", "trail"}
 
 
 def test_logging_is_switched_off_and_on_while_it_runs(deployment, tmp_path):

@@ -6,6 +6,8 @@ import json
 import subprocess
 import time
 
+from mcap.reader import make_reader
+
 from services.visualizer.program.rerun_program import rerun_binary
 from tests.stack.gemelo import gemelo
 
@@ -51,6 +53,15 @@ def test_a_killed_planner_and_an_emergency_stop_are_told_afterwards(stack, opera
         assert any(part in text for text in story), (part, story)
     assert len(stop["margins"]) == 5
     assert "emergency stop" in gemelo(stack, "blackbox", "show", "1")
+
+    newest = max((stack.out / "blackbox").glob("*.mcap"))
+    with newest.open("rb") as file:
+        kept = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+    with newest.open("rb") as file:
+        topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
+    assert {"gemelo", "deployment", "robot", "layout"} <= set(kept)
+    assert json.loads(kept["layout"]["json"])["window"] > 0.0
+    assert {"log", "nodes"} <= topics  # parameters and interfaces are in the latter
 
     view = tmp_path / "view.rrd"
     gemelo(stack, "blackbox", "open", "1", "--save", str(view))

@@ -17,6 +17,7 @@ from services.recordings.channels import Entry
 from services.recordings.incidents import Happening, Incident, IncidentKind, incident_metadata
 from services.recordings.mcap_file import ROBOT, McapFile
 from services.recordings.reader import BadRecording
+from services.recordings.view_layout import ViewLayout, layout_metadata
 from services.state_publisher.main import describe
 from services.visualizer.content import entities
 from services.visualizer.program.rerun_program import rerun_binary
@@ -59,10 +60,26 @@ def moving(robot: str) -> list[Entry]:
     return found
 
 
-def printed(rrd: Path) -> str:
+def printed(rrd: Path, detail: str = "-vv") -> str:
     return subprocess.run(
-        [rerun_binary(), "rrd", "print", "-vv", rrd], capture_output=True, text=True, check=True
+        [rerun_binary(), "rrd", "print", detail, rrd], capture_output=True, text=True, check=True
     ).stdout
+
+
+def test_the_layout_that_the_file_keeps_is_the_one_that_is_shown(tmp_path):
+    path = tmp_path / "box.mcap"
+    layout = ViewLayout(window=7.5, trail=3.25, cameras=("overhead",))
+    file = McapFile(path, {**incident_metadata(INCIDENT), **layout_metadata(layout)})
+    file.write(moving("rm1"))
+    file.close()
+    write_view(path, tmp_path / "view.rrd", tmp_path / "shadow")
+    text = printed(tmp_path / "view.rrd", "-vvv")
+    for shown in ("-7500000000", "-3250000000", entities.camera_picture("overhead")):
+        assert shown in text
+    write_view(recording(tmp_path / "bag.mcap", *moving("rm1")), tmp_path / "usual.rrd", tmp_path / "shadow")
+    text = printed(tmp_path / "usual.rrd", "-vvv")
+    assert "-7500000000" not in text
+    assert "-20000000000" in text
 
 
 @pytest.mark.parametrize("robot", ["rm1", "parol6"])

@@ -11,6 +11,7 @@ import rerun as rr
 from msgspec import Meta
 
 from schemas.deployment import ViewerMode, ViewerSection
+from services.recordings.view_layout import SECONDS
 from services.visualizer.core import Visualizer
 from services.visualizer.program.viewer_connection import ViewerConnection
 from services.visualizer.render.arms_layout import SharedView, arms_blueprint
@@ -24,8 +25,8 @@ class VisualizerParameters(msgspec.Struct, frozen=True, kw_only=True):
     """Read at the start; the viewer itself is chosen by the deployment."""
 
     recording_path: Annotated[str, Meta(description="also write a Rerun recording (.rrd) there; empty: none")] = ""
-    window: Annotated[float, Meta(description="[s] of the past that the plots show", gt=0)] = 20.0
-    trail: Annotated[float, Meta(description="[s] of the tool's way that stays visible", gt=0)] = 20.0
+    window: Annotated[float, Meta(description="[s] of the past that the plots show", gt=0)] = SECONDS
+    trail: Annotated[float, Meta(description="[s] of the tool's way that stays visible", gt=0)] = SECONDS
 
 
 class Outputs:
