@@ -63,9 +63,10 @@ def read_site(file: Path) -> tuple[Site, Problems]:
 def _site(raw: dict[str, Any], name: str, problems: Problems) -> Site | None:
     if "name" in raw:
         problems.add(("name",), f'a site has the name of its file, "{name}": take the key "name" away')
-    if not NAME.fullmatch(name):
-        problems.add((), f'"{name}" cannot be the name of a site: 1 to 31 lower-case letters, digits, "_" or "-"')
-    values = {**raw, "name": name}
+    is_plain = NAME.fullmatch(name) is not None
+    if not is_plain:
+        problems.add((), f'{name!r} cannot be the name of a site: 1 to 31 lower-case letters, digits, "_" or "-"')
+    values = {**raw, "name": name if is_plain else ""}
     for key, kind in TABLES.items():
         if isinstance(raw.get(key), dict):
             values[key] = _record(kind, raw[key], (key,), problems)

@@ -16,12 +16,13 @@ from hypothesis import strategies as st
 from schemas.site import Site
 from services.hosts import install
 from services.hosts.checks import load_site
-from services.hosts.layout import processes, robots
+from services.hosts.containers import IN_IMAGE
+from services.hosts.layout import Process, processes, robots
 from services.hosts.render import rendered
 from services.hosts.site_file import SiteError
 from services.runtime.deployment import load_deployment, project_root
 from services.runtime.process.readiness import GOES_ON
-from tests.hosts.sites import changed, escaped, site
+from tests.hosts.sites import EXAMPLE, changed, escaped, site
 
 NASTY = (
     'a"b', "a'b", "a b", "ñandú/机器人", "a;reboot", "a && b", "`id`", "a#b", "{x}", "a: b", "- a", "a\\", "$(id)",
@@ -78,18 +79,41 @@ def require_nothing_injected(lab: Site, plain: Site) -> None:
             assert words(values(unit, "ReadWritePaths")[0]) == [lab.state]
             assert words(values(unit, "Environment")[0])[0].startswith(f"GEMELO_CONFIG={lab.config}/")
             assert values(unit, "User") == [lab.user]
+        whole, of_plain = (directives(each["systemd/gemelo.target"]) for each in (files, ordinary))
+        assert whole == of_plain
+        assert values(whole, "Wants")[0].split() == [f"{process.unit}.service" for process in processes(lab, host)]
         supervised = yaml.safe_load(files["process-compose.yaml"])["processes"]
+        contained = yaml.safe_load(files["compose.yaml"])["services"]
         for process in processes(lab, host):
             made = supervised[process.unit]
             assert shlex.split(made["command"]) == ["exec", f"{lab.project}/.venv/bin/{process.program}", "2>&1"]
-            assert shlex.split(made["readiness_probe"]["exec"]["command"]) == [
-                f"GEMELO_PATHS_RUN={lab.state}/{process.robot or 'host'}/run",
-                f"{lab.project}/deploy/probe", process.service.name,
-            ]  # fmt: skip
+            probe = made["readiness_probe"]["exec"]["command"]
+            assert shlex.split(probe) == probe_words(lab, process, lab.project)
+            made = contained[process.unit]
+            assert made["command"] == [f"{IN_IMAGE}/.venv/bin/{process.program}"]
+            assert made["healthcheck"]["test"][0] == "CMD-SHELL"
+            assert shlex.split(made["healthcheck"]["test"][1]) == probe_words(lab, process, IN_IMAGE)
+            mounts = [(each["source"], each["target"]) for each in made["volumes"]]
+            assert mounts == [(lab.config, lab.config), (lab.state, lab.state)]
+            assert made["environment"]["GEMELO_CONFIG"].startswith(f"{lab.config}/")
+        require_same_image(files["Containerfile"], ordinary["Containerfile"], lab.user)
         assert "$" not in files["process-compose.yaml"] + files["compose.yaml"]
         if "mosquitto.conf" in files:
             of_lab, of_plain = (text.splitlines() for text in (files["mosquitto.conf"], ordinary["mosquitto.conf"]))
             assert [line.split(" ")[0] for line in of_lab] == [line.split(" ")[0] for line in of_plain]
+
+
+def probe_words(lab: Site, process: Process, project: str) -> list[str]:
+    run = f"GEMELO_PATHS_RUN={lab.state}/{process.robot or 'host'}/run"
+    return [run, f"{project}/deploy/probe", process.service.name]
+
+
+def require_same_image(text: str, plain: str, user: str) -> None:
+    """All lines are those of `plain`, but for the user's name, which is a word of its own wherever it stands."""
+    for line, ordinary in zip(text.split("\n"), plain.split("\n"), strict=True):
+        assert line.startswith("#") == ordinary.startswith("#")
+        words_of_plain = [user if word == "gemelo" else word for word in ordinary.split(" ")]
+        assert line.startswith("#") or line.split(" ") == words_of_plain
 
 
 def require_readable(lab: Site, folder: Path) -> None:
@@ -189,6 +213,29 @@ def test_a_name_of_a_host_or_robot_that_is_not_plain_is_refused(tmp_path, name):
     for old, new in (("[hosts.desk]", "[hosts.{}]"), ("[robots.rm1]", "[robots.{}]")):
         with pytest.raises((SiteError, UnicodeEncodeError)):
             site(tmp_path, old, new.format(escaped(name)))
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(texts.filter(lambda text: "/" not in text and "\0" not in text and 0 < len(text.encode(errors="replace")) < 250))
+@example("lab-2")
+@example("lab\n")
+@example("ñandú")
+@example("lab x")
+@example("")
+def test_a_name_of_a_site_is_plain_or_refused(tmp_path, name):
+    file = tmp_path / f"{name}.toml"
+    try:
+        file.write_text(EXAMPLE.read_text(encoding="utf-8"), encoding="utf-8")
+    except UnicodeEncodeError:  # half a character of UTF-16: no file can have that name
+        return
+    try:
+        lab = load_site(file, project_root())
+    except SiteError as error:
+        said = str(error).removeprefix(str(file))
+        assert said == f", line 1: {file.stem!r} cannot be the name of a site: {said.partition('site: ')[2]}"
+        return
+    assert re.fullmatch("[a-z0-9][a-z0-9_-]{0,30}", lab.name)
+    require_nothing_injected(lab, site(tmp_path))
 
 
 def test_the_example_is_rendered_hardened_and_readable(tmp_path):
