@@ -29,7 +29,7 @@ inline void rotate(size_t size, double (*a)[kMaxDof], double (*v)[kMaxDof], size
 
 // The eigenvalues of the symmetric matrix `a` on its diagonal, its eigenvectors in the columns of `v`.
 inline void diagonalise(size_t size, double (*a)[kMaxDof], double (*v)[kMaxDof]) {
-    constexpr double kSettled = 1e-15;  // share of the largest element that may be left beside the diagonal
+    constexpr double kSettled = 1e-15;  // of the largest element, left beside the diagonal; chosen: a few roundings
     for (size_t i = 0; i < size; ++i) {
         for (size_t j = 0; j < size; ++j) v[i][j] = i == j ? 1.0 : 0.0;
     }
@@ -67,6 +67,7 @@ class Centring {
     }
 
   private:
+    // Chosen as in centring.py.
     static constexpr int kSteps = 6;
     static constexpr double kLargestStep = 0.5;  // [rad] or [m]
     static constexpr double kLeastGain = 1e-3;   // share of the eccentricity by which a step must improve

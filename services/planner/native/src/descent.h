@@ -76,10 +76,11 @@ class DescentRun {
     }
 
   private:
+    // Chosen as in descent.py.
     static constexpr int kIterations = 40;
     static constexpr double kStall = 1e-5;       // share of the squared error by which a step must improve
     static constexpr double kLargestStep = 0.8;  // [rad] or [m] a joint may move in one step
-    static constexpr double kFlat = 1e-10;       // of the error's slope: there is nothing to go down
+    static constexpr double kFlat = 1e-10;       // of the error's slope, below which it is a minimum; chosen: rounding
     using Matrix = std::array<double, 12>;       // a rotation by rows, then a translation
 
     struct Residual {

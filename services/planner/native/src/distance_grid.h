@@ -92,7 +92,7 @@ class DistanceGrid {
     }
 
   private:
-    static constexpr int kMostSolids = 64;
+    static constexpr int kMostSolids = 64;  // that are asked, each of all triangles; chosen: in more all are solid
 
     size_t side(size_t axis) const { return static_cast<size_t>(size[axis]); }
     size_t step(size_t axis) const { return axis == 0 ? 1 : axis == 1 ? side(0) : side(0) * side(1); }

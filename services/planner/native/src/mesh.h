@@ -43,7 +43,7 @@ class TriangleMesh {
     double radius() const { return radius_; }  // around the mesh's own origin
 
   private:
-    static constexpr size_t kLeaf = 4;
+    static constexpr size_t kLeaf = 4;  // triangles; chosen: a box costs about as much as that many
 
     void add(std::vector<size_t>& order, size_t begin, size_t end) {
         const size_t self = boxes_.size();

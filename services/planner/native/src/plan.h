@@ -25,13 +25,13 @@ struct PlanQuery {
     int patience = 15;    // of the shortener
 };
 
-constexpr double kCloseEnough = 1.05;    // of the least length that any path can have: no other search is begun
-constexpr uint64_t kNextSeed = 1000003;  // from search to search: the next request's is another one
+constexpr double kCloseEnough = 1.05;    // of the least possible length: no other search begins; chosen
+constexpr uint64_t kNextSeed = 1000003;  // from search to search; chosen: a prime, far from the seeds of other requests
 
-// How finely lines are told apart [m]: a line that comes so near to something is no loss where there is room. What is
-// shortened keeps clear by more than what is searched for: it is then smoothed and verified in fewer checks.
+// Chosen: how finely lines are told apart [m]: a line that comes so near to something is no loss where there is room.
+// What is shortened keeps clear by more than what is searched for: it is then smoothed and verified in fewer checks.
 constexpr double kFinestSearched = 1e-3, kFinestShortened = 6e-3;
-constexpr double kRoom = 1.2;  // times that, beyond the margin, which the start and the goals need
+constexpr double kRoom = 1.2;  // times that, beyond the margin, which start and goals need; chosen
 
 // `otherwise`, or with lines told apart to `finest` [m] where the start and all goals have room for it.
 inline Tolerances told_to(double finest, const World& world, const Kernel& kernel, const PlanQuery& query,

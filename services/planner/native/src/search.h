@@ -156,7 +156,7 @@ class Search {
         return true;
     }
 
-    static constexpr int kMostDraws = 200;
+    static constexpr int kMostDraws = 200;  // chosen: bounds the time where hardly anything is free
 
     // One step of at most `range_` from a node towards `target`; true when it got there.
     bool extend(SearchTree& tree, size_t from, const double* target) {

@@ -41,6 +41,7 @@ class Smoother {
     const std::vector<double>& shares() const { return shares_; }
 
   private:
+    // Chosen as in smoothing.py.
     static constexpr double kLeast = 1.0 / 64.0;
     static constexpr size_t kShared = 2;  // control points between two corners that share the one between them
 

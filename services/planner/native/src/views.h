@@ -7,12 +7,12 @@
 
 namespace gemelo {
 
-constexpr int kLanes = 8;
+constexpr int kLanes = 8;  // standard: floats in a register of AVX2
 constexpr uint32_t kAllLanes = (1u << kLanes) - 1;
-constexpr int kMaxDof = 16;
-constexpr int kMaxFrames = 32;       // the base and one for each moving joint, followers included
-constexpr int kMaxParts = 64;        // links and attached objects: bits of ObstacleView::touching
-constexpr float kMostTurn = 100.0f;  // [rad] joint values beyond that lose their precision in a float
+constexpr int kMaxDof = 16;          // chosen: joints of an arm, with room
+constexpr int kMaxFrames = 32;       // chosen: the base and one for each moving joint, followers included
+constexpr int kMaxParts = 64;        // standard: links and attached objects are bits of ObstacleView::touching
+constexpr float kMostTurn = 100.0f;  // [rad] chosen: joint values beyond it lose precision in a float
 
 // A frame that a joint moves: its z is the joint's axis. Frame 0 is the base.
 struct FrameView {

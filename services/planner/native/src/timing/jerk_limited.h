@@ -25,6 +25,7 @@ struct Phase {
     double acceleration_at(double t) const { return acceleration + t * jerk; }
 };
 
+// Chosen: what rounding leaves.
 constexpr double kTiny = 1e-12;
 constexpr double kNoTime = 1e-12;  // [s] a phase that is shorter is none
 
@@ -140,7 +141,7 @@ class JerkLimited {
         return 0.5 * ramp.duration() + 0.5 * (low + high) / rate;
     }
 
-    static constexpr int kSteps = 100;  // of Newton, halving where it leaves the bracket
+    static constexpr int kSteps = 100;  // of Newton, and halvings; chosen: more than a double has bits
 };
 
 }  // namespace gemelo

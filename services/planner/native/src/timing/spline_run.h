@@ -14,7 +14,7 @@
 
 namespace gemelo {
 
-// Tuning constants, as in curve.py.
+// Tuning constants, chosen as in curve.py.
 constexpr size_t kPieceParts = 8;    // of a piece, within which its length is integrated and looked up
 constexpr int kLengthNewton = 3;     // steps from the look-up to the parameter
 constexpr double kSmallest = 1e-12;  // of a path's whole length: a piece that is shorter is none

@@ -42,7 +42,7 @@ struct States {
     }
 };
 
-// Tuning constants, as in services/planner/timing (profile.py), which computes the same where this is not built.
+// Tuning constants, chosen as in services/planner/timing (profile.py), which computes the same where this is not built.
 constexpr double kSpacing = 0.05;  // [s] between points, where the profile does not change its jerk
 constexpr double kMostPoints = 400.0;
 constexpr double kShortest = 1e-4;     // [s] two points of a line nearer than that are one

@@ -13,7 +13,7 @@
 
 namespace gemelo {
 
-// Tuning constants, as in sections.py and time_law.py.
+// Tuning constants, chosen as in sections.py and time_law.py.
 constexpr double kBending = 0.8;   // share of the acceleration's limit that bending may use
 constexpr double kTwisting = 0.6;  // share of the jerk's limit that the bend's own change may use
 constexpr double kCrossing = 0.2;  // share of the jerk's limit for accelerating in a bend
