@@ -1,4 +1,4 @@
-"""The arrangement of buttons by the page's script, in a real browser: jog buttons in pairs."""
+"""The arrangement of buttons by the page's script, in a real browser: jog buttons in pairs, each with its key."""
 
 from __future__ import annotations
 
@@ -14,21 +14,32 @@ from tests.panel.person import OPENING, until
 LABELS = ("Home", "x +  ▲", "x -  ▼", "z +  PgUp", "z -  PgDn", "a long_joint -", "a long_joint +", "Go + stop")
 
 
+class Jogged:
+    """What was pressed and what was held of jog buttons."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self.server, self.pressed, self.held = server, list[str](), list[str]()
+        server.gui.add_html(script_html())
+        server.gui.add_text(CHANNEL, CHANNEL)
+        for label in LABELS:
+            button = server.gui.add_button(label)
+            button.on_click(lambda event, label=label: self.pressed.append(label))
+            button.on_hold(lambda event, label=label: self.held.append(label), callback_hz=20.0)
+
+
 @pytest.fixture
-def server() -> Iterator[viser.ViserServer]:
-    started = viser.ViserServer("127.0.0.1", 0, verbose=False)
-    started.gui.add_html(script_html())
-    started.gui.add_text(CHANNEL, CHANNEL)
-    for label in LABELS:
-        started.gui.add_button(label)
-    yield started
-    started.stop()
+def jogged() -> Iterator[Jogged]:
+    server = viser.ViserServer("127.0.0.1", 0, verbose=False)
+    yield Jogged(server)
+    server.stop()
 
 
-def test_the_two_jog_buttons_of_an_axis_share_a_row(server: viser.ViserServer, chromium: Browser) -> None:
+def test_the_two_jog_buttons_of_an_axis_share_a_row_and_each_key_holds_and_presses_its_own(
+    jogged: Jogged, chromium: Browser
+) -> None:
     context = chromium.new_context(viewport={"width": 900, "height": 700}, device_scale_factor=0.5)
     page = context.new_page()
-    page.goto(f"http://127.0.0.1:{server.get_port()}")
+    page.goto(f"http://127.0.0.1:{jogged.server.get_port()}")
     try:
         page.get_by_role("button", name="Home").wait_for(timeout=OPENING)
 
@@ -41,5 +52,13 @@ def test_the_two_jog_buttons_of_an_axis_share_a_row(server: viser.ViserServer, c
         home, *pairs, stop = until(rows, lambda seen: seen[1] == seen[2])
         assert pairs[0::2] == pairs[1::2]
         assert len({home, *pairs, stop}) == 5
+        page.keyboard.down("ArrowUp")
+        until(lambda: jogged.held, lambda held: len(held) > 2)
+        assert jogged.pressed == []
+        page.keyboard.up("ArrowUp")
+        until(lambda: jogged.pressed, lambda pressed: pressed == ["x +  ▲"])  # a step, where a press makes one
+        page.keyboard.press("PageDown")
+        until(lambda: jogged.pressed, lambda pressed: pressed == ["x +  ▲", "z -  PgDn"])
+        assert set(jogged.held) <= {"x +  ▲", "z -  PgDn"}
     finally:
         context.close()

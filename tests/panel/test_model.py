@@ -29,6 +29,7 @@ from services.panel.model.tool_turns import ALL_RINGS, NO_RINGS, ToolTurns, tool
 from services.panel.view.browser import CHANNEL, Browser, read_browser, script_html
 from services.panel.view.obstacles import nearest_hit
 from services.panel.words.en import ENGLISH
+from services.panel.words.en_refusals import REFUSALS as ENGLISH_REFUSALS
 from services.panel.words.es import SPANISH
 from services.panel.words.es_refusals import REFUSALS
 from services.panel.words.refusals import key_of
@@ -166,7 +167,8 @@ def test_every_refusal_of_the_planner_is_said_in_spanish():
         ("reach", "tool position", 0.1234, 0.0, "Ese punto queda 123.4 mm fuera del alcance"),
         ("reach", "z", 0.4, 0.2, "llega en z hasta 200.0 mm, no hasta 400.0 mm"),
         ("collision", "efector_link / post", 0.0012, 0.004, "y post quedarían a 1.2 mm; deben quedar 4.0 mm"),
-        ("self-collision", "a / b", -0.03, 0.004, "a y b, del mismo brazo, se tocarían."),
+        ("self-collision", "a / b", 0.0, 0.004, "a y b, del mismo brazo, se tocarían."),
+        ("self-collision", "a / b", -0.03, 0.004, "a y b, del mismo brazo, se tocarían: 30.0 mm uno dentro del otro."),
         ("self-collision", "a / b", None, 0.004, "a y b, del mismo brazo, quedarían demasiado cerca."),
         ("orientation", "orientation", math.radians(12.0), 0.0, "faltan 12.0°"),
         ("allowed time", "allowed_time", None, None, "No se encontró un camino"),
@@ -182,13 +184,36 @@ def test_every_refusal_of_the_planner_is_said_in_spanish():
 def test_refusals_are_said_in_spanish_with_their_values(check, subject, value, limit, said):
     problem = problem_of(gemelo.Refused("in English", check=check, subject=subject, value=value, limit=limit))
     assert said in Words("es", JOINTS).problem(problem)[1]
-    assert Words("en", JOINTS).problem(problem)[1] == "in English"
+
+
+@pytest.mark.parametrize(
+    ("check", "subject", "value", "limit", "said"),
+    [
+        ("joint limit", "brazo_joint", math.pi, math.radians(169.0), "brazo_joint: 180.00 ° is beyond its limit of "
+         "169.00 °."),
+        ("reach", "tool position", 0.1234, 0.0, "That point is 123.4 mm out of reach of the tool."),
+        ("collision", "link / post", -0.0343, 0.004, "link and post would touch: 34.3 mm of one inside the other."),
+        ("collision", "link / post", 0.0012, 0.004, "link and post would be 1.2 mm apart; 4.0 mm must stay free."),
+        ("allowed time", "allowed_time", 5.04, 5.0, "blocked by post: go around"),  # no sentence of the page's own
+    ],
+)  # fmt: skip
+def test_refusals_are_said_in_english_in_degrees_and_millimetres(check, subject, value, limit, said):
+    text = "refused (allowed time): blocked by post; go around" if check == "allowed time" else "joints={'a': 0.4208}"
+    refused = gemelo.Refused(
+        text, check=check, subject=subject, value=value, limit=limit, reason="blocked by post", remedy="go around"
+    )
+    assert Words("en", JOINTS).problem(problem_of(refused))[1] == said
+
+
+def test_a_refusal_that_both_languages_tell_takes_the_same_values():
+    for key, text in ENGLISH_REFUSALS.items():
+        assert fields(text) == fields(REFUSALS[key]), key
 
 
 def test_every_refusal_in_spanish_is_one_that_is_given():
     given = {key_of(check) for check, _ in checks("services/planner") | checks("gemelo") | LIMITED_BY}
     for key in REFUSALS:
-        assert re.sub("_(axis|unknown|touch|own)$", "", key) in given, key
+        assert re.sub("_(axis|unknown|touch|inside|own)$", "", key) in given, key
 
 
 def wrist(folder: Path, axis: str) -> Description:

@@ -20,6 +20,7 @@ from services.panel.main import TEXTS
 from services.panel.model.pace import EARLY, PERIOD, Pace
 from services.panel.view.arms import DrawnArm, load_model
 from services.panel.view.browser import CHANNEL, STOP_SIGN
+from services.panel.view.page import LATE, LATE_AGAIN
 from services.panel.view.world import ASPECT, FARTHEST
 from services.panel.words.en import ENGLISH
 from tests.panel.memory_page import ROOT, MemoryPage, memory_page
@@ -72,6 +73,17 @@ def test_a_browser_that_tells_its_frame_rate_later_has_the_lag_that_it_had(page:
     lag, sent = shown.lag, shown.browser.sent
     shown._hear(f'{CHANNEL} {{"sent": {sent}, "language": "en", "rate": 5.0}}')
     assert (shown.lag, shown.browser.rate) == (lag, 5.0)
+
+
+def test_a_long_lag_is_measured_again_though_nothing_else_changes(page: MemoryPage):
+    [shown] = page.panel._present()
+    shown.lag, shown._marked = 0.7, page.now  # a browser that compiles its shaders has just said so, of this mark
+    page.browser._answered = f"{1000 * (page.now - shown._began):.0f}"
+    page.draw(round(LATE_AGAIN * TEXTS) + 2)
+    assert until(lambda: shown.lag < LATE)
+    settle(page)
+    page.draw(round(2.0 * LATE_AGAIN * TEXTS))
+    assert page.sent() == {}
 
 
 def test_the_lag_of_a_page_that_was_loading_is_not_shown_for_ever(page: MemoryPage, monkeypatch: pytest.MonkeyPatch):

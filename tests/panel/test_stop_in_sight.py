@@ -54,6 +54,10 @@ def test_a_stop_that_is_scrolled_away_is_still_there_to_be_pressed(stopped: Stop
     page.get_by_role("button", name="line 59").scroll_into_view_if_needed(timeout=PATIENCE)
     expect(second).to_be_visible(timeout=PATIENCE)
     expect(second).to_have_text(f"{STOP_SIGN} Stop")
+    controls, stop = page.get_by_role("button", name="line 59").bounding_box(), second.bounding_box()
+    assert controls is not None
+    assert stop is not None
+    assert stop["x"] + stop["width"] < controls["x"]  # it covers none of the buttons
     second.click()
     until(lambda: stopped.presses, lambda presses: presses == 1)
     page.get_by_role("button", name="line 0").scroll_into_view_if_needed(timeout=PATIENCE)

@@ -11,8 +11,10 @@ from tests.panel.memory_page import memory_page
 
 
 def test_a_refusal_that_the_page_tells_is_not_told_by_the_tab_again(tmp_path: Path):
-    refused = gemelo.Refused(
-        "a and b would touch", check="collision", nearest=gemelo.Target(joints={"brazo_joint": 0.5})
+    nearest = gemelo.Target(joints={"brazo_joint": 0.5})
+    refused, planned, farther = (
+        gemelo.Refused(text, check="collision", subject="a / b", value=value, limit=0.004, nearest=nearest)
+        for text, value in (("there, a with b", -0.0343), ("at the goal, a with b", -0.03432), ("farther", -0.04))
     )
     with memory_page("rm1", tmp_path) as page:
         page.draw(5)
@@ -22,7 +24,10 @@ def test_a_refusal_that_the_page_tells_is_not_told_by_the_tab_again(tmp_path: Pa
         page.draw(2)
         assert "would touch" in shown._move._problem.content
         assert shown._move._nearest.visible
-        operator.tell(problem)
+        operator.tell(problem_of(farther))
+        page.draw(2)
+        assert "34.3 mm" in shown._move._problem.content
+        operator.tell(problem_of(planned))
         page.draw(2)
         assert "would touch" in shown._problem.content
         assert shown._nearest.visible

@@ -1,4 +1,4 @@
-"""Opening or beginning another program never loses steps that are not saved without a word."""
+"""Opening or beginning another program never loses steps without a word, and what cannot be opened says why."""
 
 from __future__ import annotations
 
@@ -65,3 +65,33 @@ def test_a_new_one_asks_too_and_where_all_is_saved_nothing_is_asked(page: Memory
     assert set(teaching.programs) == {"fresh", "old"}
     chooses_old(page)
     assert teaching.program.name == "old"
+
+
+def test_a_program_that_is_written_beside_the_page_is_offered_and_a_broken_one_says_its_line(page: MemoryPage):
+    teaching = page.panel.operator.teaching
+    teaching.save("fresh")
+    file = teaching.programs.file("broken")
+    file.write_text('version = 1\nsteps = [\n  {do = "wait", time = -2.0},\n  {do = "fly"},\n]\n')
+    page.draw(2)
+    assert "broken" in tab(page)._file.options
+    tab(page)._file.value = "broken"
+    tab(page)._open()
+    assert tab(page)._file.value == teaching.program.name == "fresh"
+    [shown] = page.panel._present()
+    page.draw(2)
+    lines = shown._problem.content.partition("<br>")[2].splitlines()
+    assert [line.partition("broken.toml, ")[2][:7] for line in lines] == ["line 3:", "line 4:"]
+    file.unlink()
+    page.draw(2)
+    assert "broken" not in tab(page)._file.options
+
+
+def test_a_refusal_is_gone_once_the_next_press_has_done_its_work(page: MemoryPage):
+    operator = page.panel.operator
+    page.browser.press(ENGLISH["delete_step"])  # none is chosen
+    assert until(lambda: operator.newest_problem is not None)
+    page.browser.press(ENGLISH["delete_step"])
+    assert until(lambda: operator.newest_problem.number == 2)
+    page.browser.press(ENGLISH["add_step"])
+    assert until(lambda: operator.newest_problem is None)
+    assert len(operator.teaching.program.steps) == 2

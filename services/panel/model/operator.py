@@ -76,6 +76,11 @@ class Operator:
         self._told = ToldProblem(problem, time.monotonic(), number)
         self.wake()
 
+    def mended(self, told: ToldProblem | None) -> None:
+        """Something was done after `told`: a refusal of a press that went before is over, and nothing newer is."""
+        if told is not None and told is self._told and told.problem.is_refusal:
+            self.forget_problem()
+
     def _jog_refused(self, problem: Problem) -> None:
         """Something else leads the arm, or nothing may: the live sliders let go."""
         self.live.switch(False)

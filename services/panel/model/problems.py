@@ -11,6 +11,7 @@ import gemelo
 from schemas.scene import Contact
 
 P = ParamSpec("P")
+NEAR = 1e-3  # of two values of the same thing, in the unit of the check, that are told as one
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,13 @@ class Problem:
     @property
     def has_nearest(self) -> bool:
         return bool(self.nearest)
+
+    def is_same(self, other: Problem) -> bool:
+        """True if both tell a person the same: a goal is checked while it is set, and again when it is planned."""
+        if self.text == other.text:
+            return True
+        near = abs((self.value or 0.0) - (other.value or 0.0)) < NEAR
+        return near and bool(self.subject) and (self.check, self.subject) == (other.check, other.subject)
 
 
 def problem_of(error: Exception) -> Problem:

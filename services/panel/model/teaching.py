@@ -33,7 +33,12 @@ class Teaching:
     def __init__(self, arm: gemelo.Arm, on_change: Callable[[], object]) -> None:
         self._arm, self._on_change = arm, on_change
         folder = programs_folder(arm)
-        self.points, self.programs = Points.load(folder, arm.description), Programs(folder)
+        self.points, self.programs = Points(folder, arm.description), Programs(folder)
+        self.points_error: gemelo.Error | None = None  # why the file of points could not be read, if it could not
+        try:
+            self.points.reload()
+        except gemelo.Error as error:  # the page is there all the same; nothing is written over that file
+            self.points_error = error
         self._lock = threading.RLock()
         self.program = Program(NEW, ())
         self.is_saved = True
@@ -58,16 +63,20 @@ class Teaching:
     def remember(self, name: str, picture: bytes | None, *, overwrite: bool = False) -> None:
         """Where the arm is now, under `name`."""
         self.points.remember(name, self._arm.joints, picture, overwrite=overwrite)
-        self._changed()
+        self._points_changed()
 
     def rename_point(self, old: str, new: str) -> None:
         """Programs that name it are not changed; their check says so."""
         self.points.rename(old, new)
-        self._changed()
+        self._points_changed()
 
     def remove_point(self, name: str) -> None:
         """Forgets it."""
         self.points.remove(name)
+        self._points_changed()
+
+    def _points_changed(self) -> None:
+        self.points_error = None  # each change reads the file first
         self._changed()
 
     # The program that is open

@@ -1,14 +1,14 @@
 """The few lines of JavaScript that viser's page lacks, and what they tell of the browser.
 
 Space is Stop wherever the focus is but in a text field: a focused button would else be pressed by it, and a number
-field would swallow it. The arrow keys hold the jog buttons that name them. The browser's language, its wish for dark
-colours, its frame rate and the newest header that it has drawn come back through a hidden text field: with each header
-that bears a new mark, and when the rate has changed; a page on which nothing changes says nothing. A click into the
-image of a camera comes at once: a press and its release are taken for it, since the image may have been replaced by the
-next one between the two.
-Where the Stop button is scrolled out of sight or covered, a second one stands in the lower right corner. While the
-controls are built anew there is no such button, or one that the page no longer knows: every Stop is counted, and told
-through the hidden field as well.
+field would swallow it. The arrow keys hold the jog buttons that name them, and press them when they are let go. The
+browser's language, its wish for dark colours, its frame rate and the newest header that it has drawn come back through
+a hidden text field: with each header that bears a new mark, and when the rate has changed; a page on which nothing
+changes says nothing. A click into the image of a camera comes at once: a press and its release are taken for it, since
+the image may have been replaced by the next one between the two.
+Where the Stop button is scrolled out of sight or covered, a second one stands at the bottom, beside the controls where
+there is room, else upon them. While the controls are built anew there is no such button, or one that the page no longer
+knows: every Stop is counted, and told through the hidden field as well.
 The tabs stand closer, so that all of them have room in one row, and the two jog buttons of an axis share a row. A file
 that is too large is not sent at all.
 """
@@ -52,6 +52,7 @@ SCRIPT = """
     const stop = findStop(), box = stop && stop.getBoundingClientRect();
     const seen = box && box.width && document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
     second.style.display = stop && !(seen && (stop.contains(seen) || second.contains(seen))) ? 'block' : 'none';
+    second.style.right = (box && box.x > 260 ? innerWidth - box.x + 24 : 16) + 'px';
     second.textContent = stop ? stop.textContent : '';
   };
   ['scroll', 'resize', 'click'].forEach((kind) => window.addEventListener(kind, keepStop, true));
@@ -75,10 +76,12 @@ SCRIPT = """
       if (!e.repeat && !held[e.code]) { held[e.code] = button; point(button, 'pointerdown'); }
     }
   }, true);
-  const release = (code) => { if (held[code]) { point(held[code], 'pointerup'); delete held[code]; } };
+  const release = (code) => { const button = held[code]; if (button) point(button, 'pointerup'); delete held[code];
+    return button; };
   window.addEventListener('keyup', (e) => {
     if (e.code === 'Space' && !isText(e.target)) take(e);
-    release(e.code);
+    const button = release(e.code);
+    if (button) button.click();
   }, true);
   window.addEventListener('blur', () => Object.keys(held).forEach(release));
   let pressed = null, clicked = null, clicks = 0;

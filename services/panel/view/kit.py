@@ -28,10 +28,15 @@ class Kit:
     def button(
         self, label: str, action: Callable[[], object], *, color: Color | None = None, needs: str = ""
     ) -> viser.GuiButtonHandle:
-        """`action` runs in a thread of its own."""
+        """`action` runs in a thread of its own; once it is done, the refusal of the press before is shown no more."""
         handle = self.gui.add_button(label, color=color)
-        act = reporting(self.operator.tell, action)
-        handle.on_click(without_event(act))
+
+        def act() -> None:
+            told = self.operator.newest_problem
+            action()
+            self.operator.mended(told)
+
+        handle.on_click(without_event(reporting(self.operator.tell, act)))
         if needs:
             self._gated.append((handle, needs))
         return handle
@@ -135,10 +140,10 @@ def note(content: str) -> str:
 
 
 def box(content: str, color: str) -> str:
-    """A coloured box that stands out, on light and on dark."""
+    """A coloured box that stands out, on light and on dark; a line of the content is a line of the box."""
     return (
         f'<div style="margin:0 0.8em 0.5em;padding:0.45em 0.7em;border-left:4px solid {color};border-radius:4px;'
-        f'background:{color}22;font-size:0.85em;line-height:1.35">{content}</div>'
+        f'background:{color}22;font-size:0.85em;line-height:1.35;white-space:pre-line">{content}</div>'
     )
 
 

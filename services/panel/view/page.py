@@ -30,6 +30,7 @@ from services.panel.view.world import World
 from services.panel.words.words import NAMES, Words, language_of
 
 MARK = 1.0  # [s] between two marks by which a browser's lag is measured
+LATE, LATE_AGAIN = 0.2, 5.0  # [s] chosen: a longer lag is measured again after so long
 BRAND = (28, 126, 214)
 SLOW = 12.0  # [Hz] a browser that draws slower has no graphics card, and gets no shadows
 WIDTH = 440.0  # [pixels] of the controls: room for all tabs in one row
@@ -63,7 +64,7 @@ class Page:
         self._told = 0
         self._stops = Stops()
         self._said = ""  # by the header
-        self._shown_lag = Steady(share=0.5, least=0.05)  # [s] a page that has just loaded is late, and not for long
+        self._shown_lag = Steady(share=0.5, least=0.05)  # [s]
 
     def refresh(self, readings: Readings, now: float) -> None:
         """Shows what has changed, at `now` [s] monotonic. All is built in here, by one thread: callbacks only say what
@@ -211,13 +212,14 @@ class Page:
             self._operator.stop()
 
     def _show_header(self, readings: Readings, now: float) -> None:
-        """Sent where it says something new, with a new mark; that of its lag is new only where it has much changed."""
+        """Sent where it says something new, with a new mark; that of its lag is new only where it has much changed, and
+        a lag that is long is measured again: a page that has just loaded is late, and not for long."""
         lag = f" · {1000 * self._shown_lag.of(self.lag):.0f} ms" if isfinite(self.lag) and readings.is_live else ""
         text, color = self._header_text(readings, lag)
-        said = text
-        if said == self._said:
+        is_measured_again = self.lag > LATE and now - self._marked > LATE_AGAIN
+        if text == self._said and not is_measured_again:
             return
-        self._said = said
+        self._said = text
         if now - self._marked > MARK:
             self._marked = now
         mark = f'<span data-gemelo-sent="{1000 * (self._marked - self._began):.0f}"></span>'

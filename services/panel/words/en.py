@@ -281,7 +281,7 @@ ENGLISH: dict[str, str] = {
     "check_busy": "One thing at a time",
     "check_no_plan": "There is no plan",
     "check_lost": "Nobody answers",
-    "check_argument": "This cannot be meant",
+    "check_argument": "This cannot be done",
     "check_canceled": "Cancelled",
     "check_preempted": "Another motion took over",
     "check_scaling": "The speed cannot be so",

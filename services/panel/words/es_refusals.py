@@ -1,7 +1,7 @@
 """Spanish of the refusals, by the check that refused, as `sentence_of` looks them up.
 
-A key's end says which form it is: "_axis" where the subject is x, y or z, "_touch" where two things do, "_own" where
-the subject is the request itself, "_unknown" where there is no value.
+A key's end says which form it is: "_axis" where the subject is x, y or z, "_touch" where two things do, "_inside" where
+it is known how deep, "_own" where the subject is the request itself, "_unknown" where there is no value.
 """
 
 from __future__ import annotations
@@ -22,9 +22,11 @@ REFUSALS: dict[str, str] = {
     "orientation_unknown": "La herramienta no puede girarse así.",
     # what would touch
     "collision": "{first} y {second} quedarían a {value}; deben quedar {limit} libres.",
+    "collision_inside": "{first} y {second} se tocarían: {value} uno dentro del otro.",
     "collision_touch": "{first} y {second} se tocarían.",
     "collision_unknown": "{first} y {second} quedarían demasiado cerca.",
     "self_collision": "{first} y {second}, del mismo brazo, quedarían a {value}; deben quedar {limit} libres.",
+    "self_collision_inside": "{first} y {second}, del mismo brazo, se tocarían: {value} uno dentro del otro.",
     "self_collision_touch": "{first} y {second}, del mismo brazo, se tocarían.",
     "self_collision_unknown": "{first} y {second}, del mismo brazo, quedarían demasiado cerca.",
     "clearance": "{first} y {second} quedan a {value}, demasiado cerca para el planificador nativo: elija el "

@@ -1,4 +1,4 @@
-"""A planner's refusal in another language: made from its check, subject, value and limit, not from its sentence."""
+"""A planner's refusal in the language and units of the page: from its check, subject, value and limit, not its text."""
 
 from __future__ import annotations
 
@@ -40,15 +40,17 @@ def key_of(check: str) -> str:
 
 
 def _variant(problem: Problem) -> str:
-    """Of the check's template: "axis" where the subject is one of the tool's, "touch" where two things do,
-    "own" where the subject is what was asked for, "unknown" without a value."""
+    """Of the check's template: "axis" where the subject is one of the tool's, "touch" where two things do, "inside"
+    where it is known how deep, "own" where the subject is what was asked for, "unknown" without a value."""
     if problem.subject in ("x", "y", "z"):
         return "axis"
     if problem.value is None:
         return "unknown"
     if problem.subject == problem.check:
         return "" if problem.check not in PAIRS else "own"
-    return "touch" if problem.check in PAIRS and problem.value <= 0.0 else ""
+    if problem.check not in PAIRS or problem.value > 0.0:
+        return ""
+    return "inside" if problem.value < 0.0 and problem.check != "clearance" else "touch"
 
 
 def _of_joint(problem: Problem, joints: Joints, value: float) -> str:
@@ -62,6 +64,11 @@ def _of_speed(problem: Problem, joints: Joints, value: float) -> str:
 
 def _millimetres(problem: Problem, joints: Joints, value: float) -> str:
     return f"{1000.0 * value:.1f} mm"
+
+
+def _between(problem: Problem, joints: Joints, value: float) -> str:
+    """How far apart two things are, or how deep one is inside the other."""
+    return _millimetres(problem, joints, abs(value))
 
 
 def _degrees(problem: Problem, joints: Joints, value: float) -> str:
@@ -87,8 +94,8 @@ SHOWN: dict[str, Show] = {
     "start state": _of_joint,
     "moving start": _of_speed,
     "reach": _millimetres,
-    "collision": _millimetres,
-    "self-collision": _millimetres,
+    "collision": _between,
+    "self-collision": _between,
     "clearance": _millimetres,
     "orientation": _degrees,
     "joint state": _seconds,

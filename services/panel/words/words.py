@@ -8,6 +8,7 @@ from schemas.actions import GoalStatusCode
 from services.panel.model.availability import Reason
 from services.panel.model.problems import Problem
 from services.panel.words.en import ENGLISH
+from services.panel.words.en_refusals import REFUSALS as ENGLISH_REFUSALS
 from services.panel.words.es import SPANISH
 from services.panel.words.es_device import FAULTS, GOAL_CODES, VALUES
 from services.panel.words.es_gateway import GATEWAY
@@ -19,7 +20,7 @@ from services.panel.words.refusals import Joints, key_of, sentence_of
 from services.panel.words.sentences import Sentences
 
 TABLES = {"en": ENGLISH, "es": SPANISH}
-REFUSED: dict[str, Mapping[str, str]] = {"en": {}, "es": REFUSALS}  # in English each part's own sentences are shown
+REFUSED: dict[str, Mapping[str, str]] = {"en": ENGLISH_REFUSALS, "es": REFUSALS}
 SENTENCES = {"en": Sentences({}, {}), "es": Sentences(GATEWAY | GOALS | FAULTS | PROGRAMS | WORK, VALUES)}
 CODES: dict[str, Mapping[int, str]] = {"en": {}, "es": GOAL_CODES}
 BUTTONS = {  # of the command line: what a person at the page presses instead
@@ -82,7 +83,15 @@ class Words:
         of = SENTENCES[self.language].of
         known = of(problem.text) or of(problem.reason)
         about = CODES[self.language].get(problem.code)
-        return known or (f"{about} («{problem.text}»)" if about else self.said(problem.text))
+        return known or (f"{about} («{problem.text}»)" if about else self.said(_without_heading(problem)))
+
+
+def _without_heading(problem: Problem) -> str:
+    """The sentence of the part that refused, without its check, which is the heading, and without the arguments of the
+    nearest that can, which a button takes."""
+    if not problem.text.startswith(f"refused ({problem.check})"):
+        return problem.text
+    return ": ".join(filter(None, (problem.reason, "" if problem.has_nearest else problem.remedy)))
 
 
 def language_of(browser: str) -> str:

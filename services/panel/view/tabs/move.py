@@ -142,7 +142,7 @@ class MoveTab:
         """What is wrong with the goal, unless the same is told above the tabs already."""
         goal, words, told = self._operator.goal.goal, self._kit.words, self._operator.newest_problem
         content = ""
-        is_told = told is not None and goal.problem is not None and told.problem.text == goal.problem.text
+        is_told = told is not None and goal.problem is not None and told.problem.is_same(goal.problem)
         if goal.problem is not None and not is_told:
             heading, text = words.problem(goal.problem)
             content = box(f"<b>{esc(heading)}</b><br>{esc(text)}", "#d9480f")

@@ -33,6 +33,7 @@ class ProgramsTab:
         self._kit, self._operator, self._teaching = kit, kit.operator, kit.operator.teaching
         words, gui = kit.words, kit.gui
         self._version = -1
+        self._files: tuple[str, ...] = ()
         self._paths: dict[str, StepPath] = {}
         self._file = gui.add_dropdown(words("program"), (words("none"),))
         self._file.on_update(lambda event: self._open() if event.client_id is not None else None)
@@ -68,14 +69,13 @@ class ProgramsTab:
         state = teaching.state
         set_if_new(self._pause, "visible", state is not None and state.status is RunStatus.RUNNING)
         set_if_new(self._resume, "visible", state is not None and state.status is RunStatus.PAUSED)
-        if teaching.version == self._version:
+        files = tuple(teaching.programs)  # also those that an editor or the command line has written
+        if (teaching.version, files) == (self._version, self._files):
             return
-        self._version = teaching.version
-        names = (words("none"), *teaching.programs)
-        if tuple(self._file.options) != names:
-            self._file.options = names
-        opened = teaching.program.name if teaching.program.name in names else words("none")
-        set_if_new(self._file, "value", opened)
+        self._version, self._files = teaching.version, files
+        if tuple(self._file.options) != (words("none"), *files):
+            self._file.options = (words("none"), *files)
+        self._show_open()
         self._show_steps()
         set_if_new(self._state, "content", self._state_text(state))
         set_if_new(self._list, "content", self._list_text(state))
@@ -160,7 +160,13 @@ class ProgramsTab:
         chosen = str(self._file.value)
         if chosen in self._teaching.programs and chosen != self._teaching.program.name:
             self._leave(lambda: self._teaching.open(chosen))
+        self._show_open()
         set_if_new(self._name, "value", self._teaching.program.name)
+
+    def _show_open(self) -> None:
+        """Chooses the program that is open: one that could not be opened is not."""
+        name = self._teaching.program.name
+        set_if_new(self._file, "value", name if name in self._teaching.programs else self._kit.words("none"))
 
     def _new(self) -> None:
         name = str(self._name.value)
@@ -192,7 +198,6 @@ class ProgramsTab:
             self._kit.button(words("save_first"), save, color="blue")
             self._kit.button(words("discard"), discard, color="orange")
             self._kit.button(words("cancel"), modal.close, color="gray")
-        set_if_new(self._file, "value", name if name in teaching.programs else words("none"))
         return None
 
     def _chosen(self) -> StepPath:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import io
+from itertools import count
 
 import imageio.v3 as imageio
 import numpy as np
 
 import gemelo
+from services.panel.model.problems import problem_of
 from services.panel.model.readings import Readings
 from services.panel.model.units import text_of
-from services.panel.view.kit import Kit, esc, note, set_if_new, table
+from services.panel.view.kit import Kit, box, esc, note, set_if_new, table
 
 PICTURE = (180, 240)  # [pixels] height, width
 TO_DRAW = 5.0  # [s] that a browser may take for a picture
@@ -26,7 +28,7 @@ class TeachTab:
         self._version = -1
         self._names: tuple[str, ...] = ()
         self._shown = ""
-        self._name = gui.add_text(words("name"), words("point_name", number=1))
+        self._name = gui.add_text(words("name"), self._free_name())
         kit.button(words("remember"), self._remember, color="green")
         self._chosen = gui.add_dropdown(words("point"), (words("none"),))
         self._chosen.on_update(lambda event: self._show())
@@ -58,8 +60,12 @@ class TeachTab:
 
     def _remember(self) -> None:
         self._take()
-        number = len(self._teaching.points) + 1
-        set_if_new(self._name, "value", self._kit.words("point_name", number=number))
+        set_if_new(self._name, "value", self._free_name())
+
+    def _free_name(self) -> str:
+        """The first that no point has."""
+        names = (self._kit.words("point_name", number=number) for number in count(1))
+        return next(name for name in names if name not in self._teaching.points)
 
     def _take(self, overwrite: str = "") -> None:
         self._teaching.remember(overwrite or self._name.value, self._drawn(), overwrite=bool(overwrite))
@@ -101,4 +107,7 @@ class TeachTab:
         joints = self._operator.arm.description.joints
         rows = [(esc(joint.name), esc(text_of(joint, point.joints[joint.name]))) for joint in joints] if point else []
         about = table(rows) if rows else note(esc(self._kit.words("no_points"))) if not self._names else ""
+        error = self._teaching.points_error
+        if error is not None:
+            about = box(esc(self._kit.words.problem(problem_of(error))[1]), "#e03131")
         set_if_new(self._facts, "content", about)
