@@ -15,6 +15,7 @@ from schemas.roles import ROLES
 from schemas.site import Site
 from services.arm.cell.cell_file import load_cell
 from services.arm.model.description import Arm, load_arm
+from services.hosts.certificates import AUTHORITY_FOLDER
 from services.hosts.deployments import HOST
 from services.hosts.layout import BROKER, OF_A_ROBOT, ROUTER
 from services.hosts.site_file import Problems, nearest, read_site
@@ -41,6 +42,8 @@ def load_site(file: Path, project: Path) -> Site:
 def _addresses(site: Site, problems: Problems) -> None:
     seen: dict[str, str] = {}
     for name, host in site.hosts.items():
+        if name == AUTHORITY_FOLDER:  # its folder would go to a host with the key in it
+            problems.add(("hosts", name), f'no host can have the name "{name}": {name}/ holds the key of the authority')
         for key, address in (("address", host.address), ("listen", host.listen)):
             if (address or key == "address") and not _is_address(address):
                 problems.add(("hosts", name, key), f"{address!r} is neither a host name nor an IP address")

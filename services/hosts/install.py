@@ -12,13 +12,16 @@ from services.hosts.site_file import SiteError
 from services.hosts.units import TARGET
 
 Command = tuple[str, ...]
-# Keys of roles that have left a host go from it; all else that stands there stays.
-KEPT = tuple(f"--filter=protect {each}" for each in ("/*", "/systemd/***", "/broker/***"))
+# Keys of roles and units of services that have left a host go from it; all else that stands there stays.
+KEPT = ("--filter=risk /systemd/gemelo-*.service",
+        *(f"--filter=protect {each}" for each in ("/*", "/systemd/***", "/broker/***")))  # fmt: skip
 MADE_BY = {"systemd": "gemelo deploy render", "keys": "gemelo deploy keys"}  # folders of a host
 
 
 def commands(site: Site, host: str, folder: Path) -> tuple[Command, ...]:
     """What is run on this machine; services that run already are not restarted, as an arm may move.
+
+    Those that the site does not have on this host any more are stopped: another host may run them now.
 
     `folder` is the host's own; raises `SiteError` where something of it was not made yet.
     """
@@ -32,6 +35,9 @@ def commands(site: Site, host: str, folder: Path) -> tuple[Command, ...]:
         f"install -d -m 700 -o {user} {config} {state}"
     )
     start = (
+        f'cd /etc/systemd/system && for unit in gemelo-*.service; do [ -e {config}/systemd/"$unit" ] || '
+        f"! grep -qs '^# Written by .gemelo deploy render {site.name} ' \"$unit\" || "
+        f'{{ systemctl stop "$unit" && rm "$unit"; }} || exit 1; done; '
         f"install -m 644 {config}/systemd/* /etc/systemd/system/ && systemctl daemon-reload "
         f"&& systemctl enable --now {TARGET}"
     )

@@ -33,9 +33,12 @@ def rendered(site: Site, host: str) -> dict[str, str]:
 
 
 def write(site: Site, host: str, folder: Path) -> tuple[Path, ...]:
-    """Writes the files of a host into `folder`, and returns them."""
-    written = []
-    for name, text in rendered(site, host).items():
+    """Writes the files of a host into `folder`, and returns them; units of services that have left it go."""
+    files, written = rendered(site, host), []
+    for unit in (folder / "systemd").glob("*"):
+        if f"systemd/{unit.name}" not in files:
+            unit.unlink()
+    for name, text in files.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")

@@ -70,6 +70,13 @@ def test_each_mistake_is_named_with_its_line(tmp_path, old, new, said):
     assert any(f"lab.toml, line {at}: " in line for line in text.splitlines() if said in line), text
 
 
+def test_no_host_is_called_like_the_folder_of_the_authoritys_key_which_would_go_to_it(tmp_path):
+    file = changed(tmp_path)
+    file.write_text(file.read_text().replace("[hosts.desk", "[hosts.authority"))
+    with pytest.raises(SiteError, match='no host can have the name "authority"'):
+        load_site(file, project_root())
+
+
 def test_a_robot_without_what_makes_its_state_is_refused(tmp_path):
     assert "rm1 has no stepper_gateway on any host" in problem(tmp_path, SERVICES, 'rm1 = ["virtual_esp32"]')
     assert "rm1 has no virtual_esp32 on any host" in problem(

@@ -75,7 +75,8 @@ def again(operator: Operator) -> dict[str, object]:
     operator.wait_for(lambda: operator.seen, 5.0)
     stands = operator.seen[-1].position if operator.seen else ()
     outcome, done = operator.move_again()
-    return {"stands": stands, "again": outcome.status.name, "hands": [str(each) for each in done]}
+    why = outcome.result.error_string
+    return {"stands": stands, "again": outcome.status.name, "why": why, "hands": [str(each) for each in done]}
 
 
 def elapsed(handle) -> float:

@@ -76,7 +76,8 @@ def told_within(case: Case, status: str, rested: float) -> float:
 
     The arm came to rest at `rested` [s]. A link that is only slow may break at any moment until then.
     """
-    if status in ("SUCCEEDED", "CANCELED"):
-        return max(rested, case.lasts) + TOLD
-    is_own = case.host in ("desk", "brain")
-    return (0.0 if case.lasts else rested) + (ROUTER_LOST if is_own and status == "ServerLost" else TOLD)
+    is_own = case.host in ("desk", "brain")  # what is said meanwhile comes when the link is back
+    since = 0.0 if case.lasts else rested
+    if status == "ServerLost":
+        return since + (ROUTER_LOST if is_own else TOLD)
+    return (since if status == "ABORTED" and not is_own else max(rested, case.lasts)) + TOLD

@@ -149,7 +149,7 @@ class Links:
         if heard["told_after"] > within:
             faults.append(f"the client heard it after {heard['told_after']:.1f} s, allowed {within:.1f} s")
         if after["again"] != "SUCCEEDED" or (after["hands"] and came[0] == FINISHED):
-            faults.append("it is not ready again by itself")
+            faults.append(f"it is not ready again by itself: {after['why']}")
         return Row(
             case=case, heard=heard["status"], why=heard["why"], told_after=heard["told_after"],
             told_within=within, arm=came[0], ready_after=ready, again=after["again"], hands=tuple(after["hands"]),

@@ -152,6 +152,30 @@ def test_the_key_of_a_role_that_has_left_goes_from_the_host_and_what_others_put_
     installed.host.run(f"cd /etc/gemelo && rm -r own {' '.join(own[:3])}")
 
 
+def test_a_service_that_has_left_the_host_is_stopped_there_and_its_unit_goes_but_no_other(installed: Lab) -> None:
+    """Else two gateways would lead one arm until the next boot."""
+    text, units = installed.file.read_text(), "/etc/systemd/system"
+    left = "gemelo-rm1-logger.service"
+    try:
+        installed.file.write_text(text.replace('"planner"]', '"planner", "logger"]'))
+        for _ in range(2):
+            for command in (("render",), ("keys",), ("install", "one")):
+                done = installed.deploy(*command)
+                assert done.returncode == 0, done.stderr
+            if installed.file.read_text() != text:
+                assert installed.host.run(f"ls {units}/{left} /etc/gemelo/systemd/{left}").returncode == 0
+                installed.host.run(f"echo '[Unit]' >{units}/gemelo-of-others.service")
+            installed.file.write_text(text)
+    finally:
+        installed.file.write_text(text)
+    calls = installed.host.calls.read_text().splitlines()
+    assert calls[-3:] == [f"stop {left}", "daemon-reload", "enable --now gemelo.target"]
+    assert [call for call in calls if call.startswith("stop")] == [f"stop {left}"]
+    for folder in (units, "/etc/gemelo/systemd"):
+        assert installed.host.run(f"ls {folder}/{left}").returncode != 0
+    assert installed.host.run(f"rm {units}/gemelo-of-others.service").returncode == 0
+
+
 def test_its_files_start_the_stack_as_that_user_and_who_works_there_moves_it(installed: Lab, tmp_path: Path) -> None:
     need("mosquitto")
     gemelo = f"{installed.site.project}/.venv/bin/gemelo"
