@@ -10,7 +10,7 @@ from gemelo.errors import Error, Lost
 from gemelo.robot_files import Robot, load_robot, require_router
 from gemelo.session import Session, open_node
 from schemas.deployment import Deployment
-from services.runtime.deployment import load_deployment
+from services.runtime.deployment import is_loopback, load_deployment
 from services.runtime.robots import robots_on
 
 GATEWAY = "stepper_gateway"
@@ -80,6 +80,7 @@ def _await_gateway(session: Session, end: float) -> None:
         if time.monotonic() > end:
             others = robots(session.deployment)
             hint = f'; there is {", ".join(others)}: gemelo.connect("{others[0]}")' if others else ""
-            hint = hint or f": start the twin with `GEMELO_ROBOT=urdf/{robot} make up`"
+            here = f": start the twin with `GEMELO_ROBOT=urdf/{robot} make up`"
+            hint = hint or (here if is_loopback(router.host) else ": `gemelo deploy status` says where it should run")
             raise Lost(f"no {GATEWAY} of {robot} at the router {router.host}:{router.port}{hint}", others)
         time.sleep(LOOK_EVERY)

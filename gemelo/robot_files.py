@@ -13,7 +13,7 @@ from schemas.deployment import Deployment
 from services.arm.errors import suggestion
 from services.arm.model import description as descriptions
 from services.arm.model.description import Arm as Description
-from services.runtime.deployment import deployment_of_arm, is_loopback, load_deployment, project_root
+from services.runtime.deployment import deployment_of_arm, load_deployment, project_root, when_silent
 
 LOOK_TIMEOUT = 1.0  # [s] of one look for the router
 
@@ -58,10 +58,7 @@ def require_router(deployment: Deployment) -> None:
     try:
         socket.create_connection(address, timeout=LOOK_TIMEOUT).close()
     except OSError:
-        here = "start the twin with `make up`"
-        away = f"is that host on, does it answer `ping {address[0]}` from here, and does its router run?"
-        remedy = here if is_loopback(address[0]) else away
-        raise Lost(f"no router at {address[0]}:{address[1]}: {remedy}") from None
+        raise Lost(f"no router at {address[0]}:{address[1]}: {when_silent(address[0])}") from None
 
 
 def _folder(robot: str) -> Path:

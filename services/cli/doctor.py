@@ -28,9 +28,8 @@ from services.cli.version import version_text
 from services.credentials.private_files import AccessError
 from services.mqtt.access import gateway_access
 from services.runtime.clock_offset import ClockOffset
-from services.runtime.deployment import load_deployment, project_root
+from services.runtime.deployment import load_deployment, project_root, when_silent
 
-UP = "start the twin with `make up`"
 BROKER_PAGE = "docs/my_broker.md has every such sentence with what to do"
 # Tuning constants: chosen.
 LEAST_DISK = 1e9  # [bytes] free: an hour of recordings
@@ -148,7 +147,7 @@ def _listener(name: str, host: str, port: int) -> Diagnosis:
         socket.create_connection((host, port), timeout=1.0).close()
     except OSError as error:
         found = f"nobody listens at {host}:{port} ({error.strerror or error})"
-        return Diagnosis(Verdict.ERROR, name, found, "start the twin with `make up`")
+        return Diagnosis(Verdict.ERROR, name, found, when_silent(host))
     return Diagnosis(Verdict.OK, name, f"listens at {host}:{port}")
 
 
@@ -183,9 +182,9 @@ def twin(session: Session) -> Iterator[Diagnosis]:
     node.subscribe(DEVICE_STATUS, statuses.append)
     node.subscribe(DEVICE_STATE, states.append)
     node.wait(LISTENING)
-    nodes = living(session)
-    yield Diagnosis(Verdict.OK if nodes else Verdict.ERROR, "nodes", ", ".join(nodes) or "none", "" if nodes else UP)
-    yield device(statuses[-1] if statuses else None, states[-1] if states else None)
+    nodes, up = living(session), when_silent(session.deployment.router.host)
+    yield Diagnosis(Verdict.OK if nodes else Verdict.ERROR, "nodes", ", ".join(nodes) or "none", "" if nodes else up)
+    yield device(statuses[-1] if statuses else None, states[-1] if states else None, up)
     yield clocks(_offsets(session, nodes))
 
 
@@ -202,10 +201,10 @@ def _offsets(session: Session, nodes: Iterable[str]) -> dict[str, ClockOffset]:
     return found
 
 
-def device(status: DeviceStatus | None, state: DeviceState | None) -> Diagnosis:
-    """Whether it is online, and in no fault."""
+def device(status: DeviceStatus | None, state: DeviceState | None, up: str) -> Diagnosis:
+    """Whether it is online, and in no fault; `up` is the remedy where no gateway speaks of it."""
     if status is None:
-        return Diagnosis(Verdict.ERROR, "device", "stepper_gateway says nothing of it", UP)
+        return Diagnosis(Verdict.ERROR, "device", "stepper_gateway says nothing of it", up)
     if not status.online:
         remedy = "see that it has power and reaches its broker; `gemelo device status` says more"
         return Diagnosis(Verdict.ERROR, "device", f"offline: {status.reason or 'nothing heard of it'}", remedy)

@@ -121,6 +121,13 @@ def is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
+def when_silent(host: str) -> str:
+    """The remedy where nobody answers at `host`: what is here is started, another host is looked at."""
+    if is_loopback(host):
+        return "start the twin with `make up`"
+    return f"is that host on, does it answer `ping {host}` from here, and does its service run?"
+
+
 def _read(file: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(file.read_text(encoding="utf-8"))

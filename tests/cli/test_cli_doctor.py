@@ -45,9 +45,9 @@ def test_the_doctor_without_a_twin_says_what_would_do(monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("diagnosis", "verdict", "words"),
     [
-        (doctor.device(None, None), "error", "make up"),
-        (doctor.device(DeviceStatus(reason="no state for 0.5 s"), None), "error", "offline: no state for 0.5 s"),
-        (doctor.device(DeviceStatus(online=True, device="rm1"), DeviceState(fault=3)), "warning", "gemelo reset"),
+        (doctor.device(None, None, "make up"), "error", "make up"),
+        (doctor.device(DeviceStatus(reason="no state for 0.5 s"), None, ""), "error", "offline: no state for 0.5 s"),
+        (doctor.device(DeviceStatus(online=True, device="rm1"), DeviceState(fault=3), ""), "warning", "gemelo reset"),
         (doctor.clocks({"planner": ClockOffset(5.2, 0.01)}), "warning", "timedatectl"),
         (doctor.clocks({"a": ClockOffset(-3.0, 0.002), "b": OK}), "warning", "a -3000.0 ±2.0 ms let"),
         (doctor.clocks({"a": ClockOffset(0.0003, 0.001), "b": OK}), "ok", "farthest from this host's is a, +0.3 ±1.0"),

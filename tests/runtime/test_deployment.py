@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from schemas.deployment import Broker, MqttSection
-from services.runtime.deployment import DeploymentError, load_deployment, project_root, robot_name
+from services.runtime.deployment import DeploymentError, load_deployment, project_root, robot_name, when_silent
 
 
 @pytest.fixture
@@ -85,3 +85,9 @@ def test_a_mistake_is_named(file: Path, text: str, environ: dict[str, str], reas
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(DeploymentError, match=r"nowhere\.toml: there is no such file"):
         load_deployment(tmp_path / "nowhere.toml", {})
+
+
+def test_only_what_is_on_this_machine_is_to_be_started_where_it_does_not_answer() -> None:
+    for host in ("127.0.0.1", "localhost", "::1"):
+        assert when_silent(host) == "start the twin with `make up`"
+    assert when_silent("10.0.0.12").startswith("is that host on, does it answer `ping 10.0.0.12` from here")

@@ -100,7 +100,7 @@ def test_a_service_that_waits_for_the_router_says_so_and_can_be_stopped(start: S
     process = start(SPINNER, GEMELO_ROUTER_PORT=str(own.port))
     assert process.stderr is not None
     line = process.stderr.readline()
-    assert f"spinner WARNING waiting for the router at 127.0.0.1:{own.port}" in line
+    assert f"spinner WARNING waiting for the router at 127.0.0.1:{own.port}: start the twin with `make up`" in line
     code, errors = end(process)
     assert (code, errors) == (0, "")
 

@@ -11,6 +11,7 @@ import time
 from schemas.deployment import RouterSection
 from services.credentials.private_files import require_private
 from services.runtime.bus.interface import Bus
+from services.runtime.deployment import when_silent
 from services.runtime.errors import BusError
 from services.runtime.process.readiness import tell_alive
 from services.runtime.process.shutdown import ShutdownRequest
@@ -42,7 +43,8 @@ def connect(router: RouterSection, robot: str, log: logging.Logger, stop: Shutdo
             reason = ""
         if not is_said and time.monotonic() - started > SILENT_WAIT:
             is_said = True
-            log.warning("waiting for the router at %s:%d%s; `make up` starts it", router.host, router.port, reason)
+            known = reason or f": {when_silent(router.host)}"
+            log.warning("waiting for the router at %s:%d%s", router.host, router.port, known)
         stop.wait(RETRY_PERIOD)
     raise SystemExit(0)
 
