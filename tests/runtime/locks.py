@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import zenoh
 
@@ -36,11 +37,14 @@ class Lock:
     def files(self, name: str) -> tuple[Path, Path]:
         return self.folder / f"{name}.pem", self.folder / f"{name}.key"
 
-    def write_router(self, port: int, robots: Iterable[str] = ("rm1",)) -> Path:
+    def write_router(self, port: int, robots: Iterable[str] = ("rm1",), asks: bool = True) -> Path:
+        """The configuration of a router; one that does not ask has TLS as any web server, and takes everybody."""
         certificate, key = map(str, self.files("router"))
         ca = str(self.folder / "ca.pem")
         file = self.folder / "router.json5"
-        file.write_text(json.dumps(locked_router(HOST, port, ca, certificate, key, access_control(robots))))
+        settings: dict[str, Any] = locked_router(HOST, port, ca, certificate, key, access_control(robots))
+        settings["transport"]["link"]["tls"]["enable_mtls"] = asks
+        file.write_text(json.dumps(settings | ({} if asks else {"access_control": {"enabled": False}})))
         return file
 
     def section(self, name: str, port: int) -> RouterSection:
@@ -52,12 +56,12 @@ class Lock:
 class LockedRouter(RouterProcess):
     """`gemelo-router` with the configuration of a `Lock`."""
 
-    def __init__(self, folder: Path, lock: Lock) -> None:
-        self.lock = lock
+    def __init__(self, folder: Path, lock: Lock, asks: bool = True) -> None:
+        self.lock, self._asks = lock, asks
         super().__init__(folder)
 
     def start(self) -> None:
-        self.environ["GEMELO_ROUTER_CONFIGURATION"] = str(self.lock.write_router(self.port))
+        self.environ["GEMELO_ROUTER_CONFIGURATION"] = str(self.lock.write_router(self.port, asks=self._asks))
         super().start()
 
     def section(self, name: str) -> RouterSection:
