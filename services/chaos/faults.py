@@ -51,23 +51,28 @@ class Fault:
     trips: bool = False  # it ends in Fault or EStop, which a person leaves
     slips: bool = False  # the shafts may have moved without their counters
     mutes: bool = False  # records may be lost while it lasts: the logger or the router is away
+    of: str = ""  # the process that it is done to; empty: to none or to several
 
 
 SHORT, LONG = (0.05, 0.6), (0.8, 3.0)  # [s] within what motion and clients bear, and beyond it
-BYSTANDERS = ("state_publisher", "planner", "visualizer")
+BYSTANDERS = ("state_publisher", "planner", "visualizer", "viewer", "panel", "camera", "detector")
+CLOSED_BY_ITS_USER = "viewer"  # and not started anew, where it is asked to end
 FAULTS: tuple[Fault, ...] = (
-    *(Fault(f"kill {name}", "kill -9", killed(name)) for name in (*BYSTANDERS, "stepper_gateway", "broker")),
+    *(Fault(f"kill {name}", "kill -9", killed(name), of=name) for name in (*BYSTANDERS, "stepper_gateway", "broker")),
     Fault("kill router", "kill -9", killed("router"), mutes=True),
     Fault("kill logger", "kill -9", killed("logger"), mutes=True),
     Fault("kill virtual_esp32", "kill -9 of the device", killed("virtual_esp32"), boots=True),
     Fault("kill planner worker", "kill -9 of a worker process", worker_killed),
-    *(Fault(f"restart {name}", "SIGTERM", restarted(name)) for name in (*BYSTANDERS, "stepper_gateway", "broker")),
+    *(
+        Fault(f"restart {name}", "SIGTERM", restarted(name), of=name)
+        for name in (*BYSTANDERS, "stepper_gateway", "broker") if name != CLOSED_BY_ITS_USER
+    ),
     Fault("restart router", "SIGTERM", restarted("router"), mutes=True),
     Fault("restart logger", "SIGTERM", restarted("logger"), mutes=True),
     Fault("restart virtual_esp32", "SIGTERM to the device", restarted("virtual_esp32"), boots=True),
     *(
         Fault(f"freeze {name} {length}", "SIGSTOP, then SIGCONT", frozen(name), lasts, thawed(name),
-              mutes=name in ("router", "logger"))
+              mutes=name in ("router", "logger"), of=name)
         for name in ("stepper_gateway", "broker", "router", "virtual_esp32", "logger", *BYSTANDERS)
         for length, lasts in (("shortly", SHORT), ("long", LONG))
     ),

@@ -25,7 +25,7 @@ from services.chaos.faults import FAULTS, Fault
 from services.chaos.invariants import missing_records
 from services.chaos.options import add_chaos_options
 from services.chaos.report import Report, page_of, text_of
-from services.chaos.site import Site, installed_broker
+from services.chaos.site import Site, installed_broker, processes_of
 from services.runtime.deployment import load_deployment
 from services.runtime.process.ending import ended_by_signals
 from services.stack.results import new_results
@@ -43,7 +43,7 @@ def main() -> None:
     if options.list:
         print("\n".join(f"{fault.name:<28} {fault.about}" for fault in FAULTS))
         return
-    faults = chosen_faults(options.only)
+    faults = possible_faults(chosen_faults(options.only), processes_of(load_deployment()))
     if reason := unfit(options.minutes, faults, options.only):
         sys.exit(f"chaos: {reason}")
     seed = randrange(1_000_000) if options.seed is None else options.seed
@@ -64,6 +64,11 @@ def main() -> None:
 def chosen_faults(words: Sequence[str]) -> tuple[Fault, ...]:
     """The faults whose names contain one of `words`; all where there are none."""
     return tuple(fault for fault in FAULTS if not words or any(word in fault.name for word in words))
+
+
+def possible_faults(faults: Sequence[Fault], processes: Sequence[str]) -> tuple[Fault, ...]:
+    """Those of `faults` that are done to none of the processes that do not run."""
+    return tuple(fault for fault in faults if not fault.of or fault.of in processes)
 
 
 def unfit(minutes: float, faults: Sequence[Fault], words: Sequence[str]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
+from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from functools import cached_property
 from pathlib import Path
@@ -15,17 +16,20 @@ from paho.mqtt.enums import CallbackAPIVersion
 
 import gemelo
 from firmware.platform.host.slot_record import VARIABLE
-from schemas.deployment import RouterSection
-from schemas.topics import ACTIONS, TOPICS, Delivery
+from schemas.deployment import Deployment, RouterSection
+from schemas.topics import ACTIONS, CAMERA_TOPICS, TOPICS, Delivery
+from services.arm.cell.cell_file import deployed_cell
 from services.broker import mosquitto
 from services.chaos.clocks import ClockError, SteppingClocks
 from services.chaos.slots import SlotFile
 from services.chaos.slow_link import SlowLink
 from services.runtime.actions.keys import feedback_topic, status_topic
 from services.runtime.bus.zenoh_bus import ZenohBus
+from services.runtime.deployment import load_deployment, project_root
 from services.runtime.saved_parameters import SavedParameters
 from services.stack.stack import PROCESSES, Stack, StackError, free_ports
 
+EYES = ("camera", "detector")
 KEPT = 200  # frames of the wire that can be said again
 TO_CONNECT = 30.0  # [s] for the arm to be there
 
@@ -43,10 +47,22 @@ def installed_broker() -> str:
     return "amqtt"
 
 
+def cell_of(deployment: Deployment) -> str:
+    """The file of the cell around the arm: the deployment's, else the robot's own; empty where there is none."""
+    own = f"{deployment.robot}/cell.toml"
+    return deployment.cell or (own if (project_root() / own).is_file() else "")
+
+
+def processes_of(deployment: Deployment) -> tuple[str, ...]:
+    """What runs in chaos: everything, but for those that have nothing to do without a cell."""
+    return tuple(name for name in PROCESSES if name not in EYES or cell_of(deployment))
+
+
 class Site:
     """Starts on entering, stops on leaving; `out` gets recordings and logs.
 
-    `is_judged`: clocks can step, and `out` gets the slots of the device. Raises `StackError` where it cannot.
+    `is_judged`: `processes_of` the deployment run, clocks can step, and `out` gets the slots of the device; else only
+    what a move needs, and what records and draws it. Raises `StackError` where it cannot.
     """
 
     def __init__(self, out: Path, broker: str, seed: int, is_judged: bool = True) -> None:
@@ -56,18 +72,24 @@ class Site:
         self._port, self._broker_port = free_ports(2)
         self.stack = Stack(
             broker=broker,
+            viewer="web" if is_judged else "none",
+            panel=is_judged,
             out=out,
             environment={
                 "GEMELO_MQTT_PORT": str(self._port),
                 "GEMELO_MQTT_LISTEN_PORT": str(self._broker_port),
                 "GEMELO_DEVICE": "virtual",
                 "GEMELO_WIRE": "mqtt",
-                **({VARIABLE: str(self.slots.path), **self.clocks.environment} if is_judged else {}),
+                **(self._judged() if is_judged else {}),
             },
         )
         SavedParameters(self.stack.run, "logger").keep({"keep_files": 0})  # none is removed: all are judged at the end
         self._seed = seed
         self._closing = ExitStack()
+
+    def _judged(self) -> dict[str, str]:
+        cell = cell_of(load_deployment())
+        return {VARIABLE: str(self.slots.path), **self.clocks.environment, **({"GEMELO_CELL": cell} if cell else {})}
 
     @cached_property
     def clocks(self) -> SteppingClocks:
@@ -86,7 +108,8 @@ class Site:
             self.arm = closing.enter_context(self._connect())
             self.wire = WireStranger(self._broker_port)
             closing.callback(self.wire.close)
-            self.bus = BusStranger(int(self.stack.deployment["GEMELO_ROUTER_PORT"]), self.arm.name)
+            cameras = deployed_cell(load_deployment()).camera_names
+            self.bus = BusStranger(int(self.stack.deployment["GEMELO_ROUTER_PORT"]), self.arm.name, cameras)
             closing.callback(self.bus.close)
             self._closing = closing.pop_all()
         return self
@@ -148,11 +171,12 @@ class WireStranger:
 class BusStranger:
     """A participant of the bus that puts what nobody can read on every key."""
 
-    def __init__(self, router_port: int, robot: str) -> None:
+    def __init__(self, router_port: int, robot: str, cameras: Sequence[str]) -> None:
         self._bus = ZenohBus(RouterSection(port=router_port), robot)
+        seen = [make(camera) for camera in cameras for make in CAMERA_TOPICS]
         actions = [make(action) for action in ACTIONS for make in (feedback_topic, status_topic)]
         self._keys: list[tuple[str, str, Delivery]] = [
-            (topic.key, topic.message.__name__, topic.delivery) for topic in (*TOPICS, *actions)
+            (topic.key, topic.message.__name__, topic.delivery) for topic in (*TOPICS, *seen, *actions)
         ]
 
     def close(self) -> None:

@@ -9,11 +9,13 @@ from argparse import ArgumentParser
 
 import msgspec
 
+from schemas.deployment import Deployment
 from services.chaos.campaign import Episode, order, unexpected_hands, words_of
 from services.chaos.faults import FAULTS, Fault
-from services.chaos.main import chosen_faults, unfit
+from services.chaos.main import chosen_faults, possible_faults, unfit
 from services.chaos.options import add_chaos_options
 from services.chaos.report import Report, page_of, rows_of, summary, text_of
+from services.chaos.site import processes_of
 from services.stack.not_ready import NotReady
 from services.stack.stack import PROCESSES, StackError
 
@@ -121,7 +123,18 @@ def test_what_cannot_be_run_is_said(monkeypatch) -> None:
 
 
 def test_every_process_is_killed_restarted_and_frozen():
-    """All that a stack runs, the panel apart, which is a client like any other."""
     names = {each.name for each in FAULTS}
-    for process in set(PROCESSES) - {"viewer", "panel", "camera", "detector"}:
-        assert {f"kill {process}", f"restart {process}", f"freeze {process} shortly", f"freeze {process} long"} <= names
+    for process in PROCESSES:
+        wanted = {f"kill {process}", f"restart {process}", f"freeze {process} shortly", f"freeze {process} long"}
+        assert wanted - {"restart viewer"} <= names  # one that is asked to end was closed by its user, and stays closed
+
+
+def test_what_is_done_to_a_process_that_does_not_run_is_left_out():
+    here = processes_of(Deployment(robot="urdf/rm1"))
+    assert set(here) == set(PROCESSES)  # rm1 has a cell of its own
+    assert possible_faults(FAULTS, here) == FAULTS
+    blind = processes_of(Deployment(robot="tests/urdf"))
+    assert set(PROCESSES) - set(blind) == {"camera", "detector"}
+    left_out = {each.name for each in FAULTS} - {each.name for each in possible_faults(FAULTS, blind)}
+    assert left_out == {each.name for each in FAULTS if "camera" in each.name or "detector" in each.name}
+    assert len(left_out) == 8
