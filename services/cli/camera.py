@@ -129,7 +129,7 @@ def drawn(image: CameraImage, found: Detections | None) -> bytes:
     """The JPEG with the outlines and names of what was found in it."""
     if found is None or not found.items:
         return image.data
-    import cv2
+    import cv2  # slow to load: OpenCV
     import numpy as np
 
     picture: Any = cv2.imdecode(np.frombuffer(image.data, np.uint8), cv2.IMREAD_COLOR)
@@ -145,7 +145,7 @@ def drawn(image: CameraImage, found: Detections | None) -> bytes:
 
 def on_terminal(jpeg: bytes, columns: int, rows: int) -> str:
     """The picture in half blocks, which have two square points each, of at most so many `columns` and `rows`."""
-    import cv2
+    import cv2  # slow to load: OpenCV
     import numpy as np
 
     picture: Any = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)

@@ -58,7 +58,7 @@ def install_options(parser: Parser) -> None:
 
 def run_check(options: Options) -> ExitCode:
     """Says what runs where and how long certificates last, or everything that is wrong, with lines."""
-    from services.hosts.certificates import authority_told, days_by_host, endings, renewal
+    from services.hosts.certificates import authority_told, days_by_host, endings, renewal  # slow to load
     from services.hosts.layout import extras, processes
 
     site = site_named(options.site)
@@ -80,7 +80,7 @@ def run_check(options: Options) -> ExitCode:
 
 def run_render(options: Options) -> ExitCode:
     """Writes the files of some hosts below out/."""
-    from services.hosts.render import write
+    from services.hosts.render import write  # slow to load
 
     site = site_named(options.site)
     for host in options.hosts:
@@ -98,7 +98,7 @@ def run_render(options: Options) -> ExitCode:
 
 def run_keys(options: Options) -> ExitCode:
     """Makes and renews certificates and passwords below out/."""
-    from services.hosts.certificates import authority_told
+    from services.hosts.certificates import authority_told  # slow to load: cryptography comes with it
     from services.hosts.keys import authority_in, make_keys
 
     site = site_named(options.site)
@@ -122,7 +122,7 @@ def run_keys(options: Options) -> ExitCode:
 
 def run_install(options: Options) -> ExitCode:
     """Gives a host its folder over ssh, and starts what does not run there yet."""
-    from services.hosts import install
+    from services.hosts import install  # slow to load, as is all of services.hosts
 
     site = site_named(options.site)
     if options.host not in site.hosts:
@@ -141,7 +141,7 @@ def run_install(options: Options) -> ExitCode:
 
 def site_named(name: str) -> Site:
     """The site of that name or file, checked; raises `CommandError`."""
-    from services.hosts.checks import load_site
+    from services.hosts.checks import load_site  # slow to load: it reads robots
 
     root = project_root()
     file = Path(name) if name.endswith(".toml") else root / FOLDER / f"{name}.toml"
@@ -153,7 +153,7 @@ def site_named(name: str) -> Site:
 
 def made_here(site: Site) -> tuple[Certificate, ...]:
     """The certificates of the site made here, if they may be read; raises `CommandError` for a file that is none."""
-    from services.hosts.certificates import made
+    from services.hosts.certificates import made  # slow to load
 
     try:
         return made(site, site_folder(site))

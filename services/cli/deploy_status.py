@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -19,12 +18,14 @@ from services.cli.parser import Options, Parser, json_option
 from services.cli.session import own_name, require_router
 from services.cli.text_table import table
 from services.credentials.expiry import expiry
+from services.hosts.certificates import Certificate, days_by_host, endings, in_days, older, renewal, shown_at
+from services.hosts.layout import BROKER, ROLE_OF, ROUTER
+from services.hosts.status import SeenNode, SeenRobot, ServiceStatus, Standing, is_well, site_status
 from services.runtime.clock_offset import ClockOffset
 from services.runtime.deployment import load_deployment
-
-if TYPE_CHECKING:
-    from services.hosts.status import SeenNode, SeenRobot, ServiceStatus
-    from services.runtime.node import Node
+from services.runtime.errors import BusError, NoAnswer, Refused
+from services.runtime.node import Node
+from services.runtime.node_clock import ask_about
 
 HEADINGS = ("host", "robot", "service", "is", "machine", "version", "clock", "certificate", "why")
 TO_ANSWER = 2.0  # [s] of one node
@@ -39,8 +40,6 @@ def status_options(parser: Parser) -> None:
 
 def run(options: Options) -> ExitCode:
     """Prints every service; FAILED if one of them is not ready, or should not be there."""
-    from services.hosts.status import is_well, site_status
-
     site = site_named(options.site)
     deployment = _deployment(site)
     require_router(deployment)
@@ -59,8 +58,6 @@ def run(options: Options) -> ExitCode:
 
 def summary(found: Iterable[ServiceStatus]) -> str:
     """One sentence about all, and one where hosts have different versions."""
-    from services.hosts.status import Standing
-
     rows = tuple(found)
     wrong = [f"{each.service} of {each.robot or 'the site'} is {each.standing}" for each in rows
              if each.standing is not Standing.READY]  # fmt: skip
@@ -74,9 +71,6 @@ def summary(found: Iterable[ServiceStatus]) -> str:
 
 def shown_certificates(site: Site, deployment: Deployment) -> dict[str, float | None]:
     """[s] UNIX time at which the certificates end that router and broker show now."""
-    from services.hosts.certificates import shown_at
-    from services.hosts.layout import BROKER, ROUTER
-
     own = deployment.router
     if not own.tls:
         return {}
@@ -88,10 +82,6 @@ def shown_certificates(site: Site, deployment: Deployment) -> dict[str, float | 
 
 def certificates_told(site: Site, found: Iterable[ServiceStatus], deployment: Deployment) -> Iterator[str]:
     """How many days each host's certificates still have; those that end within a month, have ended, or are old."""
-    from services.hosts.certificates import Certificate, days_by_host, endings, in_days, older, renewal
-    from services.hosts.layout import ROLE_OF
-    from services.hosts.status import Standing
-
     if not deployment.router.tls:
         return
     rows = [each for each in found if each.host]
@@ -113,10 +103,6 @@ def certificates_told(site: Site, found: Iterable[ServiceStatus], deployment: De
 
 def seen_robot(deployment: Deployment, robot: str) -> SeenRobot:
     """Who is alive of a robot, what each says of itself, and what its gateway says of the device."""
-    from services.hosts.status import SeenRobot
-    from services.runtime.errors import BusError
-    from services.runtime.node import Node
-
     try:
         with Node(own_name(), deployment, robot=robot, log_level="error") as node:
             device = node.latest(DEVICE_STATUS)
@@ -132,10 +118,6 @@ def seen_robot(deployment: Deployment, robot: str) -> SeenRobot:
 
 def seen_nodes(node: Node) -> dict[str, SeenNode]:
     """Every living node but commands', each asked about itself and its clock."""
-    from services.hosts.status import SeenNode
-    from services.runtime.errors import NoAnswer, Refused
-    from services.runtime.node_clock import ask_about
-
     found = {}
     for name in sorted(each for each in node.alive() if not each.startswith("cli-")):
         try:
@@ -162,8 +144,6 @@ def _deployment(site: Site) -> Deployment:
 
 
 def _row(each: ServiceStatus) -> tuple[str, ...]:
-    from services.hosts.certificates import in_days
-
     clock = "-" if each.clock_offset is None else str(ClockOffset(each.clock_offset, each.clock_bound))
     certificate = "-" if each.certificate_ends is None else in_days(each.certificate_ends)
     return (

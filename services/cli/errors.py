@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
@@ -37,8 +38,6 @@ def usage(message: str) -> CommandError:
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name that is most similar to `name`; None if none is similar."""
-    from difflib import get_close_matches
-
     known = list(known)
     close = get_close_matches(name, known, n=1, cutoff=0.5)
     if close:

@@ -47,7 +47,7 @@ def xacro_argument(text: str) -> tuple[str, str]:
 
 def run(options: Options) -> ExitCode:
     """Imports, and ends with the line that starts the twin."""
-    from services.arm.errors import DescriptionError
+    from services.arm.errors import DescriptionError  # slow to load, with all below
     from services.robot_import.importing import ImportOptions, import_robot
 
     wanted = ImportOptions(

@@ -40,7 +40,7 @@ def choose_robot(name: str) -> None:
 
     Raises `CommandError` where there is no such robot.
     """
-    from services.runtime.deployment import deployment_of_arm, overriding
+    from services.runtime.deployment import deployment_of_arm, overriding  # slow to load, for --robot alone
 
     file = deployment_of_arm(name)
     if file is None:
@@ -53,7 +53,7 @@ def choose_robot(name: str) -> None:
 
 def robot_folder(name: str) -> str:
     """The folder of an arm, or of a shadow that `gemelo bag play` has made; raises `CommandError` for neither."""
-    from services.runtime.deployment import load_deployment, project_root
+    from services.runtime.deployment import load_deployment, project_root  # slow to load, for --robot alone
 
     root, out = project_root(), Path(load_deployment().paths.out)
     for folder in (root / "urdf" / name, out / "shadows" / name, Path(name)):

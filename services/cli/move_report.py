@@ -108,7 +108,7 @@ def tool_error(arm: Description, trajectory: JointTrajectory, errors: Mapping[st
 
     Forward kinematics of both: the goal, and the goal minus the error.
     """
-    from services.arm.kinematics.chain import link_transforms
+    from services.arm.kinematics.chain import link_transforms  # slow to load: numpy
 
     goals = dict(zip(trajectory.joint_names, trajectory.points[-1].positions, strict=True))
     reached = {

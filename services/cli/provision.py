@@ -183,7 +183,7 @@ def open_line(port: str, baud: int) -> Iterator[Line]:
 
     Its control lines stay low: many boards reset by them.
     """
-    import serial
+    import serial  # slow to load, for a line alone
 
     try:
         line = serial.Serial(None, baud, timeout=0.05, write_timeout=2.0, exclusive=True)

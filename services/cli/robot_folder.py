@@ -43,7 +43,7 @@ def run_check(options: Options) -> ExitCode:
 
 def print_findings(folder: Path) -> ExitCode:
     """Prints every finding; FAILED if one of them is an error."""
-    from services.arm.checks.check import Severity
+    from services.arm.checks.check import Severity  # slow to load: numpy and trimesh
 
     findings = _findings(folder)
     for finding in findings:
@@ -55,7 +55,7 @@ def print_findings(folder: Path) -> ExitCode:
 
 def _findings(folder: Path) -> list[Finding]:
     """Of a robot's folder; of a source for `gemelo import` where there is no robot.toml."""
-    from services.arm.checks.check import Severity
+    from services.arm.checks.check import Severity  # slow to load: numpy and trimesh
     from services.arm.checks.check import check as findings_in
     from services.arm.model.description import ROBOT_FILE
 
@@ -143,7 +143,7 @@ def _fitted(folder: Path, *options: str) -> ExitCode:
 
 def print_matrix(folder: Path, write: bool, always_within: float | None) -> ExitCode:
     """Prints the pairs that sampling finds and the changes of the SRDF; changes it if `write`. `always_within` [m]."""
-    from services.arm.kinematics.collision_matrix import collision_matrix
+    from services.arm.kinematics.collision_matrix import collision_matrix  # slow to load: coal
     from services.arm.model.description import load_arm
     from services.arm.model.srdf_edit import with_pairs
 
@@ -170,7 +170,7 @@ def _say(progress: str) -> None:
 
 def plan_of(text: str, verdicts: list[LinkPairData]) -> tuple[dict[tuple[str, str], str], list[str]]:
     """The pairs that the SRDF is to have with their reasons, and each change as a line; a person's reasons stay."""
-    from services.arm.kinematics.collision_matrix import DisabledReason
+    from services.arm.kinematics.collision_matrix import DisabledReason  # slow to load: coal
     from services.arm.model.srdf_edit import entries
 
     present = {entry.pair: entry.reason for entry in entries(text)}

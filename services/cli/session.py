@@ -70,7 +70,7 @@ def connect(robot: Robot | None = None) -> Iterator[Session]:
     """
     deployment, arm = robot or load_robot()
     require_router(deployment)
-    from services.runtime.errors import BusError, NoAnswer, Refused, ServerLost
+    from services.runtime.errors import BusError, NoAnswer, Refused, ServerLost  # slow to load: the bus
     from services.runtime.node import Node
 
     try:
@@ -86,14 +86,14 @@ def connect(robot: Robot | None = None) -> Iterator[Session]:
 
 def share_control(session: Session) -> None:
     """Shares the hold of control that another process of this user has on this host, if there is one."""
-    from gemelo.control import join_shared
+    from gemelo.control import join_shared  # slow to load: the bus
 
     join_shared(session.node, session.arm.name, session.deployment)
 
 
 def require_router(deployment: Deployment) -> None:
     """Raises `CommandError` where no router listens, before anything slow is loaded."""
-    from gemelo import robot_files
+    from gemelo import robot_files  # slow to load
 
     try:
         robot_files.require_router(deployment)

@@ -78,7 +78,7 @@ def motion_progress(duration: float, quiet: bool = False) -> Iterator[ShowProgre
 
 @contextmanager
 def _bar(duration: float) -> Iterator[ShowProgress]:
-    from rich.progress import BarColumn, Progress, TextColumn
+    from rich.progress import BarColumn, Progress, TextColumn  # slow to load, for a terminal alone
 
     columns = (TextColumn("moving"), BarColumn(40), TextColumn("{task.completed:.1f} of {task.total:.1f} s"))
     with Progress(*columns, transient=True) as bar:

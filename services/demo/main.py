@@ -101,7 +101,7 @@ def missing_files(folder: Path, recording: Path) -> list[str]:
 
 def take_picture(recording: Path, png: Path) -> list[str]:
     """Takes a picture of the viewer; returns what went wrong, empty if nothing did."""
-    from services.visualizer.program.screenshot import save_screenshot
+    from services.visualizer.program.screenshot import save_screenshot  # slow to load: rerun
 
     try:
         save_screenshot(recording, png)

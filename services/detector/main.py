@@ -51,7 +51,7 @@ def run(node: Node, deployment: Deployment) -> None:
     if not cell.cameras:
         node.log.info("there is no camera in the cell: this process stands aside")
     if cell.cameras:
-        import cv2
+        import cv2  # slow to load: OpenCV, which only a cell with cameras is worth
 
         from services.detector.core import Detector  # OpenCV: 60 MB that only a cell with cameras is worth
 
@@ -73,7 +73,7 @@ def run(node: Node, deployment: Deployment) -> None:
 
 def read_models(cell: Cell, warn: Callable[[str], object]) -> dict[Path, UserModel]:
     """The models of the cell's things, each once; what cannot be read is said to `warn`, and not looked for."""
-    from services.detector.user_models import BadModel, UserModel
+    from services.detector.user_models import BadModel, UserModel  # slow to load: OpenCV
 
     found: dict[Path, UserModel] = {}
     for thing in cell.things:
@@ -110,7 +110,7 @@ class Places:
 
         `stamp` is None where the camera's clock is not known: then only for a camera that the arm does not carry.
         """
-        from services.vision.rigid import from_transform
+        from services.vision.rigid import from_transform  # slow to load: OpenCV
 
         if not info.is_mounted:
             return None
@@ -148,7 +148,7 @@ class Watch:
         self._info = info
 
     def _on_image(self, image: CameraImage) -> None:
-        import cv2
+        import cv2  # slow to load: OpenCV, which only a cell with cameras is worth
 
         from services.detector.images import NoPicture, decoded
 

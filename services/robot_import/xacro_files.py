@@ -37,7 +37,7 @@ def expanded(path: Path, arguments: Mapping[str, str], find: Callable[[str], Pat
     as this does for a file that is refused, for an argument that it does not have, and without the package `xacro`.
     """
     try:
-        import xacro
+        import xacro  # slow to load, for xacro files alone
         from xacro import substitution_args
     except ImportError:
         raise DescriptionError(f"{path}: {NO_XACRO}") from None

@@ -13,7 +13,7 @@ def robots_on(router: RouterSection, node: str = "*") -> tuple[str, ...]:
 
     A session for one robot has its name as Zenoh's namespace and cannot see another's tokens, so this one has none.
     """
-    import zenoh
+    import zenoh  # slow to load
 
     from services.runtime.bus.zenoh_config import client_config
 

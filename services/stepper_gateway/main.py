@@ -54,7 +54,7 @@ def open_device(deployment: Deployment, arm: Arm, wake: Callable[[], None]) -> L
         case Dialect.GEMELO:
             return open_link(deployment, arm.device.name, wake, baud_of(deployment, arm))
         case Dialect.RA:
-            from services.mqtt.access import gateway_access
+            from services.mqtt.access import gateway_access  # slow to load: only the wire's own library
             from services.stepper_gateway.links.foreign.ra_link import RaLink
 
             return RaLink(gateway_access(deployment.mqtt), arm, wake)
@@ -68,7 +68,7 @@ def open_link(deployment: Deployment, device: str, wake: Callable[[], None], bau
     """The other wire's library is not even imported."""
     match deployment.wire:
         case Wire.MQTT:
-            from services.mqtt.access import gateway_access
+            from services.mqtt.access import gateway_access  # slow to load: only the wire's own library
             from services.stepper_gateway.links.mqtt import MqttLink
 
             return MqttLink(gateway_access(deployment.mqtt), device, wake)

@@ -152,6 +152,17 @@ def _numbers(function: ast.FunctionDef) -> Iterator[str]:
             yield name
 
 
+def without_excuse(module: Module) -> Iterator[str]:
+    """Functions that import, and have no comment beside or above one of these imports that says why not at the top."""
+    lines = module.text.splitlines()
+    for function in ast.walk(module.tree):
+        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
+            late = [node for node in ast.walk(function) if isinstance(node, ast.Import | ast.ImportFrom)]
+            near = [line for node in late for line in lines[node.lineno - 2 : node.end_lineno]]
+            if late and not any("# " in line for line in near):
+                yield f"{module.name}.{function.name}"
+
+
 def without_origin(module: Module) -> Iterator[str]:
     """Numbers that are constants of the module without a comment that says what they are and where they come from:
     chosen, measured or standard, there or in the heading of their block."""

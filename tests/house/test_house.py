@@ -16,6 +16,7 @@ from tests.house.counts import (
     fragments,
     imports,
     modules,
+    without_excuse,
     without_origin,
     without_unit,
 )
@@ -61,6 +62,18 @@ def test_every_cpp_file_says_what_it_is():
     files = [path for room in ROOMS for kind in ("*.h", "*.cpp") for path in (ROOT / room).rglob(kind)]
     first_words = {path: path.read_text().partition("\n")[0].removeprefix("// ").partition(" ")[0] for path in files}
     assert [str(path) for path, word in first_words.items() if "build" not in path.parts and word in CLAUSES] == []
+
+
+def test_an_import_within_a_function_says_why(house):
+    """Mostly as the library is slow to load, and not needed by all who import the module."""
+    assert [found for each in house.values() if each.is_product for found in without_excuse(each)] == []
+
+
+def test_an_import_within_a_function_without_a_reason_is_seen():
+    late = ["def f():", "    import b", "    return b"]
+    assert list(without_excuse(module("a", *late)[1])) == ["a.f"]
+    assert list(without_excuse(module("a", late[0], "    import b  # slow to load", late[2])[1])) == []
+    assert list(without_excuse(module("a", "import b", late[0], late[2])[1])) == []
 
 
 def test_every_tuning_constant_says_where_its_value_comes_from(house):

@@ -16,7 +16,7 @@ def check_with_yourdfpy(arm: Arm) -> list[Finding]:
     """Findings of yourdfpy on the arm's URDF; a warning where it is not installed."""
     file = arm.urdf_path.name
     try:
-        import yourdfpy
+        import yourdfpy  # slow to load: trimesh comes with it
     except ModuleNotFoundError:
         remedy = "install the extra `view` to have the meshes opened"
         return [warning(file, "meshes", "not opened, because yourdfpy is not installed", remedy)]

@@ -95,7 +95,7 @@ class PlainOmpl:
     """OMPL's RRTConnect and PathSimplifier with default parameters and `CoalChecker` as its state validity checker."""
 
     def __init__(self, arm: Arm, scene: PlanningScene) -> None:
-        from ompl import base, geometric, util
+        from ompl import base, geometric, util  # slow to load
 
         util.noOutputHandler()
         self._base, self._geometric, self._util = base, geometric, util
@@ -143,7 +143,7 @@ class Roboplan:
 
     def __init__(self, arm: Arm, scene: PlanningScene) -> None:
         try:
-            from roboplan import core, rrt
+            from roboplan import core, rrt  # not there on every machine
         except ImportError as error:
             raise NotMeasured(f"{error}: it is among the packages of requirements.lock, run `make setup`") from error
         self._core = core

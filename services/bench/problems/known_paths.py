@@ -17,6 +17,7 @@ from services.arm.model.description import Arm
 from services.bench.problems.problem_sets import path_length
 from services.planner.collision.checker import CollisionChecker
 from services.planner.collision.clearance import CLEARANCE
+from services.planner.native.paths import NoPath
 from services.planner.path.ompl_search import ompl_corners
 from services.planner.path.path import PathNotFound
 from services.planner.path.smoothing import shorten
@@ -90,8 +91,6 @@ def tightened(rows: Array, speeds: Array, seed: int, validity: ValidityChecker, 
 
 
 def _by_core(core: NativePlanner, start: Array, goals: Array) -> list[tuple[Array, str]]:
-    from services.planner.native.paths import NoPath
-
     paths = []
     for seed in range(SEEDS):
         path = core.plan(start, goals, seed=seed, time_limit=PATIENCE)

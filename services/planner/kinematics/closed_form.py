@@ -68,7 +68,7 @@ def closed_form(arm: Arm, kinematics: Kinematics) -> ClosedForm | None:
     if len(arm.joints) != JOINTS or any(joint.unit != "rad" for joint in arm.joints):
         return None
     try:
-        from eaik.pybindings.EAIK import Robot
+        from eaik.pybindings.EAIK import Robot  # slow to load
     except ImportError as error:
         log.warning(f"no inverse kinematics in closed form, it is searched for instead: {error}")
         return None

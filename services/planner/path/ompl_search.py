@@ -56,7 +56,7 @@ class _Problem:
     """One question in OMPL's terms; states are joint values divided by the speed limits."""
 
     def __init__(self, arm: Arm, validity: ValidityChecker, ends: Array) -> None:
-        from ompl import base
+        from ompl import base  # slow to load
 
         self._scale = np.array([joint.velocity for joint in arm.joints])
         self._validity = validity
@@ -75,7 +75,7 @@ class _Problem:
 
     def set_ends(self, start: Array, goals: Array, seed: int) -> None:
         """Sets `start` (n,) and `goals` (k, n) [rad] or [m]; from here on OMPL's random numbers begin anew."""
-        from ompl import util
+        from ompl import util  # slow to load
 
         util.noOutputHandler()
         util.RNG.setSeed(seed % SEEDS + 1)
@@ -90,7 +90,7 @@ class _Problem:
 
     def tree(self, planner_id: str, deadline: Deadline) -> Array:
         """Corners (m, n) [rad] or [m] of the path of a planner that grows trees or batches; raises `PathNotFound`."""
-        from ompl import geometric
+        from ompl import geometric  # slow to load
 
         planner = getattr(geometric, planner_id)(self.information)
         if hasattr(planner, "setRange"):
@@ -109,7 +109,7 @@ class _Problem:
     def roadmap(self, deadline: Deadline) -> Array:
         """Corners (m, n) [rad] or [m] of the path on a roadmap; raises `PathNotFound`. OMPL grows the roadmap only: its
         `solve` waits for a thread that waits for Python, for ever."""
-        from ompl import geometric
+        from ompl import geometric  # slow to load
 
         planner = geometric.PRM(self.information)
         planner.setProblemDefinition(self._definition)
@@ -177,7 +177,7 @@ def _motions(information: Any, validity: ValidityChecker, scale: Array) -> Any:
 
 @cache
 def _motions_class() -> type[Any]:
-    from ompl import base
+    from ompl import base  # slow to load
 
     class Motions(base.MotionValidator):  # type: ignore[misc]
         is_line_free: Callable[[Any, Any], bool]

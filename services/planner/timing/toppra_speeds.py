@@ -92,7 +92,7 @@ def load_toppra() -> Any:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            import toppra
+            import toppra  # slow to load
             import toppra.algorithm
             import toppra.constraint
     except ImportError as error:
@@ -115,7 +115,7 @@ class _Classes:
 
 @cache
 def _classes() -> _Classes:
-    from toppra.constraint import DiscretizationType, LinearConstraint
+    from toppra.constraint import DiscretizationType, LinearConstraint  # slow to load
     from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
     from toppra.interpolator import AbstractGeometricPath
 

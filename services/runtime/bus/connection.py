@@ -23,7 +23,7 @@ SILENT_WAIT = 1.0  # [s] of waiting that are not worth a word: all processes sta
 
 def connect(router: RouterSection, robot: str, log: logging.Logger, stop: ShutdownRequest) -> Bus:
     """A session of the router; ends the process cleanly where it is asked to stop while waiting."""
-    from services.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus, router_answers
+    from services.runtime.bus.zenoh_bus import BusNotOpen, ZenohBus, router_answers  # slow to load: zenoh
 
     require_certificate(router)
     is_said = False
