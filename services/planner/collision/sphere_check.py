@@ -1,4 +1,4 @@
-"""The choice between the native planner and the exact shapes alone, made here and nowhere else.
+"""Fast checks of collisions: by the native planner, or none where that is not built.
 
 Both stand behind `SphereCheck`: what it says is certain, and what it leaves unresolved is for coal on the exact shapes.
 """
@@ -18,15 +18,9 @@ from services.arm.kinematics.self_collisions import LinkPair
 from services.arm.model.description import Arm
 from services.planner.collision.native_scene import native_scene
 from services.planner.collision.world import Positions, World
+from services.planner.native import compiled
+from services.planner.native.compiled import where_built
 from services.planner.request.deadline import CancelFlag
-
-try:
-    from services.planner.native import native_planner as native
-    from services.planner.native.binding import CancelFlag as NativeCancelFlag
-except ImportError:  # not built for this interpreter, or hidden
-    IS_BUILT = False
-else:
-    IS_BUILT = True
 
 if TYPE_CHECKING:
     from services.planner.native.native_planner import NativePlanner
@@ -115,7 +109,7 @@ class NativeCheck:
     @cached_property
     def _planner(self) -> NativePlanner:
         """Takes a second the first time, in which spheres are fitted to the links."""
-        return native.NativePlanner(self._arm)
+        return compiled.NativePlanner(self._arm)
 
 
 class ExactShapesOnly:
@@ -142,14 +136,16 @@ class ExactShapesOnly:
         return Resolution(unresolved=(Stretch(rows),))
 
 
+@where_built(lambda _: ExactShapesOnly())
 def sphere_check(arm: Arm) -> SphereCheck:
     """The native planner's check where it is built, else the one that resolves nothing."""
-    return NativeCheck(arm) if IS_BUILT else ExactShapesOnly()
+    return NativeCheck(arm)
 
 
+@where_built(threading.Event)
 def cancel_flag() -> CancelFlag:
     """A flag that ends the native planner's search too, where that is built."""
-    return NativeCancelFlag() if IS_BUILT else threading.Event()
+    return compiled.CancelFlag()
 
 
 def show_scene(planner: NativePlanner, world: World) -> None:

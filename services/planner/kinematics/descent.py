@@ -17,13 +17,8 @@ from numpy.typing import NDArray
 from services.arm.kinematics.kinematics import Kinematics
 from services.arm.model.description import Arm
 from services.planner.kinematics.targets import POSITION_TOLERANCE, ROTATION_TOLERANCE, Target
-
-try:
-    from services.planner.native.tool_descent import NativeDescent
-except ImportError:  # not built for this interpreter, or hidden
-    IS_BUILT = False
-else:
-    IS_BUILT = True
+from services.planner.native import compiled
+from services.planner.native.compiled import where_built
 
 Array = NDArray[np.float64]
 Residual = Callable[[Array], tuple[Array, Array]]  # what is missing at a configuration, and how the joints change that
@@ -45,6 +40,11 @@ class Attempt:
     is_solution: bool
 
 
+@where_built(lambda _: None)
+def _native_descent(arm: Arm) -> compiled.NativeDescent | None:
+    return compiled.NativeDescent(arm)
+
+
 class Descent:
     """Descends for one arm."""
 
@@ -53,7 +53,7 @@ class Descent:
         self._lower = np.array([joint.lower for joint in arm.joints])
         self._upper = np.array([joint.upper for joint in arm.joints])
         self._identity = np.eye(len(arm.joints))
-        self._native = NativeDescent(arm) if IS_BUILT else None
+        self._native = _native_descent(arm)
 
     def clip(self, positions: Array) -> Array:
         """The nearest joint values (n,) [rad] or [m] within the limits."""

@@ -18,7 +18,7 @@ from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from services.arm.model.description import Arm
-from services.planner.native.compiled import IS_BUILT, motion
+from services.planner.native.compiled import motion, where_built
 
 Array = NDArray[np.float64]
 
@@ -91,11 +91,19 @@ def straight_line(
     return trajectory_of(names, stop_and_go(np.array((start, goal)), limits))
 
 
+def stop_and_go_in_python(corners: Array, limits: JointLimits) -> States:
+    """`stop_and_go` through `corners` (m, n) [rad] or [m] where the core is not built; raises `NoProfile`."""
+    legs, began = [_rest(corners[0], 0.0)], 0.0
+    for start, goal in pairwise(corners):
+        legs += _leg(start, goal, limits, began)
+        began = float(legs[-1].times[-1])
+    return States(*(np.concatenate(columns) for columns in zip(*legs, strict=True)))
+
+
+@where_built(stop_and_go_in_python)
 def stop_and_go(corners: Array, limits: JointLimits) -> States:
     """From corner to corner of the polyline (m, n) [rad] or [m], each leg as `straight_line`, at rest at all of them;
     raises `NoProfile`."""
-    if not IS_BUILT:
-        return stop_and_go_in_python(corners, limits)
     return compiled_states(lambda: motion.timed_lines(np.ascontiguousarray(corners), *limits.rows))
 
 
@@ -105,15 +113,6 @@ def compiled_states(timed: Callable[[], tuple[Array, Array, Array, Array]]) -> S
         return States(*timed())
     except motion.NoProfile as error:
         raise NoProfile(str(error)) from error
-
-
-def stop_and_go_in_python(corners: Array, limits: JointLimits) -> States:
-    """`stop_and_go` through `corners` (m, n) [rad] or [m] where the core is not built; raises `NoProfile`."""
-    legs, began = [_rest(corners[0], 0.0)], 0.0
-    for start, goal in pairwise(corners):
-        legs += _leg(start, goal, limits, began)
-        began = float(legs[-1].times[-1])
-    return States(*(np.concatenate(columns) for columns in zip(*legs, strict=True)))
 
 
 def _leg(start: Array, goal: Array, limits: JointLimits, began: float) -> list[States]:

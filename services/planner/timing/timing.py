@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from ruckig import InputParameter, Trajectory
 
-from services.planner.native.compiled import IS_BUILT, motion
+from services.planner.native.compiled import motion, where_built
 from services.planner.path.curve import Curve, TurnsOnTheSpot, smooth_runs
 from services.planner.timing.peaks import peak_shares
 from services.planner.timing.profile import (
@@ -44,24 +44,23 @@ def states_along(run: Curve, limits: JointLimits, times: Array, lengths: Array, 
     return States(times, derivatives.value * scale, velocities * scale, accelerations * scale)
 
 
+def timed_path_in_python(control: Array, limits: JointLimits) -> States:
+    """`timed_path` along `control` (k, n) [rad] or [m] where the core is not built; raises `NoProfile` and
+    `TurnsOnTheSpot`."""
+    return along_runs(control, limits, _run_states)
+
+
+@where_built(timed_path_in_python)
 def timed_path(control: Array, limits: JointLimits) -> States:
     """From rest to rest along the uniform cubic B-spline of `control` (k, n) [rad] or [m], both ends exact; raises
     `NoProfile`.
 
     At corners it stops. Raises `TurnsOnTheSpot` where the curve does so without a corner.
     """
-    if not IS_BUILT:
-        return timed_path_in_python(control, limits)
     try:
         return compiled_states(lambda: motion.timed_curve(np.ascontiguousarray(control), *limits.rows))
     except motion.TurnsOnTheSpot as error:
         raise TurnsOnTheSpot(str(error)) from error
-
-
-def timed_path_in_python(control: Array, limits: JointLimits) -> States:
-    """`timed_path` along `control` (k, n) [rad] or [m] where the core is not built; raises `NoProfile` and
-    `TurnsOnTheSpot`."""
-    return along_runs(control, limits, _run_states)
 
 
 def along_runs(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from schemas.motion import JointTrajectory, TrajectoryPoint
 from schemas.planning import PlanCode, Refusal, StepMargin
 from services.arm.model.description import Arm, Joint
-from services.planner.native.compiled import IS_BUILT, motion
+from services.planner.native.compiled import motion, where_built
 from services.planner.request.deadline import NEVER, Deadline
 from services.planner.request.refusals import PlanRefused
 from services.planner.timing.profile import LONGEST, States
@@ -69,16 +69,25 @@ class StepStream:
     @cached_property
     def peaks(self) -> Array:
         """(n,) [steps/s] the largest rate of each joint, forwards or backwards."""
-        if not IS_BUILT:
-            return np.asarray(np.maximum(self.rates.max(axis=0), -self.rates.min(axis=0)))
-        start, square, cube = (np.ascontiguousarray(part[:, 0]) for part in (self.start, self.square, self.cube))
-        return motion.peak_rates(start, square, cube, PLACES, KNOT * Q8)
+        return peak_rates(self)
 
     @cached_property
     def accelerations(self) -> Array:
         """(m, n) [steps/s^2]."""
         bend = (2 * self.square + SHARES * 6 * self.cube) / KNOT**2
         return np.asarray(bend.reshape(-1, bend.shape[2]) / Q8)
+
+
+def peak_rates_in_python(stream: StepStream) -> Array:
+    """`peak_rates`, (n,) [steps/s], where the core is not built."""
+    return np.asarray(np.maximum(stream.rates.max(axis=0), -stream.rates.min(axis=0)))
+
+
+@where_built(peak_rates_in_python)
+def peak_rates(stream: StepStream) -> Array:
+    """(n,) [steps/s] the largest rate of each joint, forwards or backwards."""
+    start, square, cube = (np.ascontiguousarray(part[:, 0]) for part in (stream.start, stream.square, stream.cube))
+    return motion.peak_rates(start, square, cube, PLACES, KNOT * Q8)
 
 
 def step_stream(arm: Arm, trajectory: JointTrajectory, part: tuple[int, int] | None = None) -> StepStream:

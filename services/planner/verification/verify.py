@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from schemas.motion import JointTrajectory
 from services.arm.model.description import Arm
-from services.planner.native.compiled import IS_BUILT, motion
+from services.planner.native.compiled import motion, where_built
 from services.planner.timing.profile import JointLimits, States
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ def sample(trajectory: JointTrajectory, density: int = DENSITY) -> Samples:
 def sample_between(stamps: Array, p: Array, v: Array, a: Array, density: int = DENSITY) -> Samples:
     """As `sample`, through positions, velocities and accelerations (m, n) at `stamps` (m,) [s]."""
     times = (stamps[:-1, None] + _shares(density) * (stamps[1:] - stamps[:-1])[:, None]).reshape(-1)
-    return _evaluate(States(stamps, p, v, a), times, np.arange(len(times)) // (density + 1))
+    return evaluated(States(stamps, p, v, a), times, np.arange(len(times)) // (density + 1))
 
 
 @cache
@@ -64,7 +64,7 @@ def at_times(trajectory: JointTrajectory, times: Array) -> Samples:
 def states_at(states: States, times: Array) -> Samples:
     """As `at_times`, through `states` at `times` (m,) [s]."""
     index = np.clip(np.searchsorted(states.times, times, side="right") - 1, 0, len(states.times) - 2)
-    return _evaluate(states, times, index)
+    return evaluated(states, times, index)
 
 
 def states_of(trajectory: JointTrajectory) -> States:
@@ -82,15 +82,8 @@ def _rows(count: int, rows: Iterable[tuple[float, ...]]) -> Array:
     return np.fromiter(chain.from_iterable(rows), dtype=np.float64).reshape(count, -1)
 
 
-def _evaluate(states: States, times: Array, index: NDArray[np.int64]) -> Samples:
-    """At `times` (m,) [s], each in the segment `index` (m,) (Biagiotti and Melchiorri 2008, section 2.1)."""
-    if not IS_BUILT:
-        return _evaluate_in_python(states, times, index)
-    times, (stamps, p, v, a) = np.ascontiguousarray(times), states
-    return Samples(times, *motion.quintics(stamps, p, v, a, times, np.ascontiguousarray(index, dtype=np.int64)))
-
-
-def _evaluate_in_python(states: States, times: Array, index: NDArray[np.int64]) -> Samples:
+def evaluated_in_python(states: States, times: Array, index: NDArray[np.int64]) -> Samples:
+    """`evaluated` at `times` (m,) [s], segments `index` (m,), where the core is not built."""
     stamps, p, v, a = states
     dt = np.diff(stamps)[index][:, None]
     u = (times - stamps[index])[:, None] / dt
@@ -105,6 +98,13 @@ def _evaluate_in_python(states: States, times: Array, index: NDArray[np.int64]) 
     accelerations = (a0 + u * (6 * third + u * (12 * fourth + u * 20 * fifth))) / dt**2
     jerks = (6 * third + u * (24 * fourth + u * 60 * fifth)) / dt**3
     return Samples(times, positions, velocities, accelerations, jerks)
+
+
+@where_built(evaluated_in_python)
+def evaluated(states: States, times: Array, index: NDArray[np.int64]) -> Samples:
+    """At `times` (m,) [s], each in the segment `index` (m,) (Biagiotti and Melchiorri 2008, section 2.1)."""
+    times, (stamps, p, v, a) = np.ascontiguousarray(times), states
+    return Samples(times, *motion.quintics(stamps, p, v, a, times, np.ascontiguousarray(index, dtype=np.int64)))
 
 
 def limit_shares(samples: Samples, limits: JointLimits) -> tuple[float, float, float]:

@@ -24,6 +24,19 @@ except ImportError as error:
     print(type(error).__name__, error)
 """
 
+CHOSEN = """
+import sys
+sys.modules["services.planner.native.binding"] = None
+from services.planner.collision.sphere_check import cancel_flag, sphere_check
+from services.planner.timing.profile import stop_and_go
+from services.planner.timing.timing import timed_path
+from services.planner.verification.feasibility import peak_rates
+from services.planner.verification.verify import evaluated
+print(type(cancel_flag()).__name__, type(sphere_check(None)).__name__)
+print(stop_and_go.__name__, timed_path.__name__, peak_rates.__name__, evaluated.__name__)
+"""
+PLANNER = Path(motion.__file__).parents[1]
+
 
 def test_the_module_has_all_that_its_stub_promises_and_nothing_else():
     promised = {
@@ -37,6 +50,20 @@ def test_without_the_compiled_module_the_remedy_is_said():
     assert said.stdout.startswith("NativeMissing the native planner cannot be loaded")
     assert "make setup" in said.stdout
     assert "sudo apt-get install python3-dev" in said.stdout
+
+
+def test_without_the_compiled_module_python_takes_its_place_everywhere():
+    said = subprocess.run([sys.executable, "-c", CHOSEN], capture_output=True, text=True, timeout=60, check=True)
+    kinds, functions = said.stdout.splitlines()
+    assert kinds.split() == ["Event", "ExactShapesOnly"]
+    assert all(name.endswith("_in_python") for name in functions.split())
+
+
+def test_one_module_alone_chooses_between_the_compiled_core_and_python():
+    asking = [path.name for path in PLANNER.rglob("*.py") if "native.binding" in path.read_text()]
+    choosing = [path.name for path in PLANNER.rglob("*.py") if "IN_PYTHON" in path.read_text()]
+    assert choosing == ["compiled.py"]
+    assert set(asking) <= {path.name for path in (PLANNER / "native").glob("*.py")}
 
 
 def test_two_hundred_obstacles_are_no_more_than_the_same_asked_one_by_one():

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from services.arm.model.description import load_arm
-from services.planner.native.compiled import IS_BUILT
+from services.planner.native.compiled import IN_PYTHON
 from services.planner.path.curve import TurnsOnTheSpot
 from services.planner.path.smoothing import smooth, stopping
 from services.planner.request.deadline import NEVER
@@ -36,7 +36,7 @@ SCALINGS = st.floats(0.01, 1.0)
 @pytest.fixture(scope="module", autouse=True)
 def built() -> None:
     """Without Python's headers the core is not built; with them it is."""
-    if not IS_BUILT:
+    if IN_PYTHON:
         need("headers")
 
 
