@@ -1,4 +1,8 @@
-"""A smooth path in sections, in each of which the movement along it has bounds under which no joint exceeds its own."""
+"""A smooth path in sections, in each of which the movement along it has bounds under which no joint exceeds its own.
+
+The compiled core has the same (`native/src/timing/time_law.h`): the timing of one path is shorter than the calls that
+would ask Python for its bounds, and without a compiler this one remains. `test_native_timing` holds both together.
+"""
 
 from __future__ import annotations
 

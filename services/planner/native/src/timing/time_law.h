@@ -1,7 +1,9 @@
 // The movement along a smooth run: sections with bounds under which no joint exceeds its own, the steady speeds between
 // them, and the phases of steady jerk one after the other.
 //
-// The operations stand in the order of services/planner/timing (bounds.py, sections.py, time_law.py).
+// The operations stand in the order of services/planner/timing (bounds.py, sections.py, time_law.py), which do the same
+// where this is not built: the timing of one path is shorter than the calls that would ask Python for its bounds.
+// tests/planner/native/test_native_timing.py holds both together.
 #pragma once
 
 #include <algorithm>
