@@ -59,6 +59,12 @@ class BareBrowser:
         """Presses the newest button whose label begins so, once the page has it; raises TimeoutError if it has none."""
         self._set(self._button(label), True)
 
+    def press_first(self, label: str) -> None:
+        """Presses the oldest button of exactly that label; raises StopIteration if the page has none."""
+        with self._news:
+            number = next(number for number, text in self._labels.items() if text == label)
+        self._set(number, True)
+
     def slide(self, label: str, value: float) -> None:
         """Sets the newest slider whose label begins so, in the unit of its label; raises TimeoutError if there is
         none."""
