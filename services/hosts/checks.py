@@ -15,13 +15,16 @@ from schemas.roles import ROLES
 from schemas.site import Site
 from services.arm.cell.cell_file import load_cell
 from services.arm.model.description import Arm, load_arm
+from services.credentials.authority import DAYS
 from services.hosts.certificates import AUTHORITY_FOLDER
 from services.hosts.deployments import HOST
 from services.hosts.layout import BROKER, OF_A_ROBOT, ROUTER
 from services.hosts.site_file import Problems, nearest, read_site
+from services.runtime.deployment import is_loopback
 
 USER = re.compile(r"[a-z_][a-z0-9_-]{0,31}")  # as useradd takes it
 ZONE = re.compile(r"[A-Za-z0-9_.-]{1,15}")  # an interface's name after the % of an IPv6 address (RFC 4007)
+NUMBERS = re.compile(r"[0-9.]+")  # of an address with a number too many or too large; no host's name ends in one
 LABEL = re.compile(r"[A-Za-z0-9]([A-Za-z0-9-]{0,61}[A-Za-z0-9])?")  # of a host's name (RFC 1123)
 HAS_MEANING = re.compile(r"[$%\\]")  # to systemd, process-compose and compose, whatever stands around it
 GATEWAY, DEVICE = "stepper_gateway", "virtual_esp32"
@@ -32,7 +35,7 @@ NEEDED = (GATEWAY, "state_publisher")  # without them a robot has no state
 def load_site(file: Path, project: Path) -> Site:
     """The site of `file`, checked against the robots below `project`; raises `SiteError` with all that is wrong."""
     site, problems = read_site(file)
-    for check in (_addresses, _places, _services, _roles, _listeners, _paths):
+    for check in (_addresses, _places, _services, _lines, _roles, _listeners, _paths):
         check(site, problems)
     _robots(site, problems, project)
     problems.raise_any()
@@ -47,11 +50,26 @@ def _addresses(site: Site, problems: Problems) -> None:
         for key, address in (("address", host.address), ("listen", host.listen)):
             if (address or key == "address") and not _is_address(address):
                 problems.add(("hosts", name, key), f"{address!r} is neither a host name nor an IP address")
-        if host.address in seen:
-            problems.add(("hosts", name, "address"), f"{host.address} is the address of {seen[host.address]} too")
-        seen.setdefault(host.address, name)
+        if host.address.lower() in seen:
+            other = seen[host.address.lower()]
+            problems.add(("hosts", name, "address"), f"{host.address} is the address of {other} too")
+        seen.setdefault(host.address.lower(), name)
+        if len(site.hosts) > 1:
+            _require_reachable(site, name, problems)
         if _is_unspecified(host.address):
             problems.add(("hosts", name, "address"), f"nobody can connect to {host.address}: that is for `listen`")
+
+
+def _require_reachable(site: Site, name: str, problems: Problems) -> None:
+    """Where there are several hosts, each reaches the others."""
+    host, serves = site.hosts[name], name in (site.router.host, site.broker.host)
+    if is_loopback(host.address):
+        problems.add(("hosts", name, "address"), f"{host.address} is each host's own: write the address by which the "
+                     f"others reach {name}")  # fmt: skip
+    elif serves and host.listen and is_loopback(host.listen):
+        problems.add(
+            ("hosts", name, "listen"), f"{host.listen} is {name}'s own: no other host reaches what listens there"
+        )
 
 
 def _places(site: Site, problems: Problems) -> None:
@@ -79,6 +97,20 @@ def _services(site: Site, problems: Problems) -> None:
                     where[robot, service] = name
     for robot, settings in site.robots.items():
         _require_complete(robot, settings.device, {each: where.get((robot, each), "") for each in OF_A_ROBOT}, problems)
+
+
+def _lines(site: Site, problems: Problems) -> None:
+    """A serial line ends on the host of the gateway, and a virtual device's is a file there."""
+    for robot, settings in site.robots.items():
+        if settings.wire is not Wire.SERIAL:
+            continue
+        if not PurePosixPath(settings.serial).is_absolute():
+            text = f'serial = "{settings.serial}" must be the path of a device, as "/dev/ttyUSB0"'
+            problems.add(("robots", robot, "serial"), text)
+        ends = [name for name, host in site.hosts.items() if {GATEWAY, DEVICE} & {*host.services.get(robot, ())}]
+        if settings.device is DeviceKind.VIRTUAL and len(ends) > 1:
+            text = f"a virtual device on a serial line is on the host of its gateway: put both of {robot} on one"
+            problems.add(("robots", robot, "wire"), text)
 
 
 def _require_complete(robot: str, device: DeviceKind, where: dict[str, str], problems: Problems) -> None:
@@ -117,8 +149,9 @@ def _listeners(site: Site, problems: Problems) -> None:
     for name, wanted in ports.items():
         taken: dict[int, str] = {}
         for port, who, place in wanted:
-            if not 0 < port < 65536:
-                problems.add(place, f"{port} is no port: 1 to 65535")
+            if not 1024 <= port < 65536:
+                what = f"{port} is root's, which the services are not" if 0 < port < 1024 else f"{port} is no port"
+                problems.add(place, f"{what}: 1024 to 65535")
             elif port in taken:
                 problems.add(place, f"port {port} of {name} is wanted by {taken[port]} and by {who}: give one another")
             taken[port] = who
@@ -130,15 +163,20 @@ def _paths(site: Site, problems: Problems) -> None:
         if not PurePosixPath(path).is_absolute() or ".." in PurePosixPath(path).parts or path == "/":
             problems.add((key,), f'{key} = "{path}" must be an absolute path without ".."')
         _require_meaningless(path, (key,), problems)
+    for key in ("project", "config"):
+        if PurePosixPath(getattr(site, key)).is_relative_to(site.state):
+            text = f'the services may write below state = "{site.state}", so {key} cannot be there'
+            problems.add((key,), text)
     for robot, settings in site.robots.items():
         for key in ("folder", "cell", "serial"):
             _require_meaningless(getattr(settings, key), ("robots", robot, key), problems)
     if not USER.fullmatch(site.user):
-        problems.add(("user",), f'"{site.user}" cannot be a user\'s name: lower-case letters, digits, "_" and "-"')
+        problems.add(("user",), f'"{site.user}" cannot be a user\'s name: 1 to 32 lower-case letters, digits, "_", "-"')
     if site.user == "root":
         problems.add(("user",), "the services do not run as root: take a user of their own")
-    if site.certificate_days < 1:
-        problems.add(("certificate_days",), f"{site.certificate_days} days: a certificate needs at least 1")
+    if not 1 <= site.certificate_days <= DAYS:
+        text = f"{site.certificate_days} days: a certificate has 1 to {DAYS}, as many as its authority"
+        problems.add(("certificate_days",), text)
 
 
 def _robots(site: Site, problems: Problems, project: Path) -> None:
@@ -196,7 +234,9 @@ def _is_address(text: str) -> bool:
     try:
         address = ipaddress.ip_address(text)
     except ValueError:
-        return len(text) < 254 and all(LABEL.fullmatch(each) for each in text.split("."))
+        return (
+            len(text) < 254 and not NUMBERS.fullmatch(text) and all(LABEL.fullmatch(each) for each in text.split("."))
+        )
     zone = getattr(address, "scope_id", None)  # of which Python takes any text
     return zone is None or ZONE.fullmatch(zone) is not None
 

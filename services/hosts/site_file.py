@@ -6,6 +6,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Iterable
+from enum import EnumType
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,6 +17,12 @@ from schemas.errors import ConfigurationError
 from schemas.site import Site, SiteBroker, SiteHost, SiteRecord, SiteRobot, SiteRouter
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,30}")  # of a host or a site: part of file names, units and certificates
+PLAIN = '1 to 31 lower-case letters, digits, "_" or "-"'
+WANTED = re.compile(r"Expected `(\w+)`, got `(\w+)`(?: - at `\$([^`]*)`)?")  # msgspec's own sentence
+IN_TOML = {
+    "array": "a list", "object": "a table", "str": 'a text in "..."', "int": "a whole number",
+    "float": "a number with a point", "bool": "true or false",
+}  # fmt: skip
 TABLES: dict[str, type[SiteRecord]] = {"router": SiteRouter, "broker": SiteBroker}
 TABLES_BY_NAME: dict[str, type[SiteRecord]] = {"robots": SiteRobot, "hosts": SiteHost}
 
@@ -47,11 +54,14 @@ class Problems:
 def read_site(file: Path) -> tuple[Site, Problems]:
     """The site, and where to add what else is wrong; raises `SiteError`."""
     try:
-        text = file.read_text(encoding="utf-8")
+        text = file.read_text(encoding="utf-8-sig")  # some editors begin with a mark of the encoding
         raw = tomllib.loads(text)
     except FileNotFoundError:
         raise SiteError(f"{file}: there is no such file; deploy/hosts/example.toml is one to copy") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except UnicodeDecodeError as error:
+        at = error.object[: error.start].count(b"\n") + 1
+        raise SiteError(f"{file}, line {at}: this is not UTF-8: save the file in that encoding") from error
+    except (OSError, tomllib.TOMLDecodeError) as error:
         raise SiteError(f"{file}: {error}") from error
     problems = Problems(file, text)
     site = _site(raw, file.stem, problems)
@@ -65,7 +75,7 @@ def _site(raw: dict[str, Any], name: str, problems: Problems) -> Site | None:
         problems.add(("name",), f'a site has the name of its file, "{name}": take the key "name" away')
     is_plain = NAME.fullmatch(name) is not None
     if not is_plain:
-        problems.add((), f'{name!r} cannot be the name of a site: 1 to 31 lower-case letters, digits, "_" or "-"')
+        problems.add((), f"{name!r} cannot be the name of a site: {PLAIN}")
     values = {**raw, "name": name if is_plain else ""}
     for key, kind in TABLES.items():
         if isinstance(raw.get(key), dict):
@@ -79,7 +89,7 @@ def _site(raw: dict[str, Any], name: str, problems: Problems) -> Site | None:
 def _named(kind: type[R], tables: dict[str, Any], key: str, problems: Problems) -> dict[str, R | None]:
     for name, table in tables.items():
         if not NAME.fullmatch(name):
-            problems.add((key, name), f'{name!r} cannot be a name in [{key}]: lower-case letters, digits, "_" and "-"')
+            problems.add((key, name), f"{name!r} cannot be a name in [{key}]: {PLAIN}")
         if not isinstance(table, dict):
             problems.add((key, name), f"[{key}.{name}] must be a table")
     return {
@@ -106,8 +116,21 @@ def _record(kind: type[R], raw: dict[str, Any], place: Where, problems: Problems
         except (msgspec.ValidationError, ValueError) as error:
             is_whole = False
             if raw[name] is not None and not _is_reported(raw[name]):
-                problems.add((*place, name), f'key "{".".join(map(str, (*place, name)))}": {error}')
+                problems.add(
+                    (*place, name), f'key "{".".join(map(str, (*place, name)))}": {_in_toml(str(error), field.type)}'
+                )
     return kind(**values) if is_whole else None
+
+
+def _in_toml(said: str, kind: object) -> str:
+    """What msgspec says of a value that should be a `kind`, in the words of who writes TOML."""
+    if isinstance(kind, EnumType):
+        return f"{said.removeprefix('Invalid enum value ')} is not one of {', '.join(kind)}"
+    if not (found := WANTED.fullmatch(said)):
+        return said
+    wanted, got, within = found.groups()
+    what = "what stands in it " if within else ""
+    return f"{what}must be {IN_TOML.get(wanted, wanted)}, not {IN_TOML.get(got, got)}"
 
 
 def _is_reported(value: object) -> bool:

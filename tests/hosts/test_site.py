@@ -41,7 +41,14 @@ def problem(folder, old: str, new: str) -> str:
         ('address = "10.0.0.13"', 'address = "a b"', "'a b' is neither a host name nor an IP address"),
         ('address = "10.0.0.13"', 'address = ""', "'' is neither a host name nor an IP address"),
         ('address = "10.0.0.13"', 'address = "0.0.0.0"', "nobody can connect to 0.0.0.0: that is for `listen`"),
-        ('address = "10.0.0.13"', "address = 13", 'key "hosts.desk.address": Expected `str`, got `int`'),
+        (
+            'address = "10.0.0.13"',
+            "address = 13",
+            'key "hosts.desk.address": must be a text in "...", not a whole number',
+        ),
+        ('roles = ["operator", "viewer"]', 'roles = "viewer"', 'key "hosts.desk.roles": must be a list, not a text'),
+        ('address = "10.0.0.13"', 'address = "10.0.0.300"', "'10.0.0.300' is neither a host name nor an IP address"),
+        ('address = "10.0.0.13"', 'address = "localhost"', "localhost is each host's own: write the address by which"),
         ('address = "10.0.0.13"', 'adress = "10.0.0.13"', 'unknown key "hosts.desk.adress": did you mean'),
         (
             'host = "brain"',
@@ -60,7 +67,7 @@ def problem(folder, old: str, new: str) -> str:
         ('folder = "urdf/rm1"', 'cell = "urdf/rm1/robot.toml"\nfolder = "urdf/rm1"', "rm1: "),
         ('folder = "urdf/rm1"', 'cell = "urdf/none.toml"\nfolder = "urdf/rm1"', "rm1: "),
         ('device = "virtual"', 'device = "board"', "so virtual_esp32 has nothing to do on cell"),
-        ('device = "virtual"', 'device = "real"', 'key "robots.rm1.device": Invalid enum value'),
+        ('device = "virtual"', 'device = "real"', "key \"robots.rm1.device\": 'real' is not one of virtual, board"),
     ],
 )
 def test_each_mistake_is_named_with_its_line(tmp_path, old, new, said):
@@ -82,6 +89,60 @@ def test_a_robot_without_what_makes_its_state_is_refused(tmp_path):
     assert "rm1 has no virtual_esp32 on any host" in problem(
         tmp_path, SERVICES, 'rm1 = ["stepper_gateway", "state_publisher"]'
     )
+
+
+def test_a_virtual_device_on_a_serial_line_is_on_the_host_of_its_gateway(tmp_path):
+    file = changed(tmp_path, 'device = "virtual"', 'wire = "serial"')
+    load_site(file, project_root())
+    file.write_text(file.read_text().replace('"virtual_esp32", ', "").replace('"logger"', '"logger", "virtual_esp32"'))
+    with pytest.raises(SiteError, match="line 12: a virtual device on a serial line is on the host of its gateway"):
+        load_site(file, project_root())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('host = "cell"', 'host = "cell"\nport = 883', "line 9: 883 is root's, which the services are not"),
+        ('host = "cell"', 'host = "cell"\nport = 70000', "line 9: 70000 is no port: 1024 to 65535"),
+        (PLANS, 'rm1 = "planner"', 'line 21: key "hosts.brain.services": what stands in it must be a list, not a text'),
+        ("# A lab", "certificate_days = 40000\n# A lab", "line 1: 40000 days: a certificate has 1 to 3650"),
+        (
+            "# A lab",
+            'state = "/etc/gemelo"\n# A lab',
+            'services may write below state = "/etc/gemelo", so config cannot',
+        ),
+        ("# A lab", 'project = "/var/lib/gemelo/x"\n# A lab', "so project cannot be there"),
+        ('"10.0.0.12"', '"10.0.0.12"\nlisten = "::1"', "line 21: ::1 is brain's own: no other host reaches"),
+        ('device = "virtual"', 'wire = "serial"\nserial = "ttyUSB0"', 'as "/dev/ttyUSB0"'),
+    ],
+)
+def test_what_could_never_work_is_refused_with_its_line(tmp_path, old, new, said):
+    assert said in problem(tmp_path, old, new)
+
+
+def test_one_host_may_be_reached_over_loopback_and_two_names_that_differ_in_case_are_one(tmp_path):
+    file = tmp_path / "lab.toml"
+    every = '["stepper_gateway", "virtual_esp32", "state_publisher"]'
+    file.write_text(f"""router.host = "one"
+broker.host = "one"
+robots.rm1.folder = "urdf/rm1"
+hosts.one = {{ address = "localhost", services.rm1 = {every} }}
+""")
+    load_site(file, project_root())
+    file = changed(tmp_path, '"10.0.0.12"', '"Desk.lab"')
+    file.write_text(file.read_text().replace('"10.0.0.13"', '"desk.LAB"'))
+    with pytest.raises(SiteError, match=r"line 25: desk\.LAB is the address of brain too"):
+        load_site(file, project_root())
+
+
+def test_a_file_of_any_editor_is_read_or_said_to_be_in_another_encoding(tmp_path):
+    file = changed(tmp_path, "# A lab", "# Laboratorio ñ")
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text, encoding="utf-8-sig")
+    load_site(file, project_root())
+    file.write_text(text, encoding="latin-1")
+    with pytest.raises(SiteError, match="line 1: this is not UTF-8: save the file in that encoding"):
+        load_site(file, project_root())
 
 
 def test_two_that_would_listen_on_one_port_are_named(tmp_path):
